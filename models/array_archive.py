@@ -72,11 +72,7 @@ class _Member:
 
 
 def pack_arrays(arrays: Arrays) -> bytes:
-    """Return the bytes of a compressed .npz, which depend only on the arrays, not on clock or processor.
-
-    numpy.savez_compressed also gives steady bytes but does not promise them. Up to numpy 2.1 it offers no way
-    to refuse pickles, and its members are 20 bytes longer.
-    """
+    """The bytes of a compressed .npz, which depend only on the arrays; numpy.savez does not promise that."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
@@ -90,11 +86,7 @@ def pack_arrays(arrays: Arrays) -> bytes:
 
 
 class ArrayArchive:
-    """The members of an .npz in memory; each is unpacked on request.
-
-    Raises InstanceError for bytes that the module's docstring does not allow, and for members of more than
-    MAX_ARCHIVE bytes in all.
-    """
+    """The members of an .npz in memory; each is unpacked on request. Raises InstanceError for other bytes."""
 
     def __init__(self, data: bytes) -> None:
         try:
@@ -110,11 +102,7 @@ class ArrayArchive:
         return name in self._members
 
     def arrays(self, expected: Mapping[str, Expected], prefix: str = "") -> Arrays:
-        """Return the expected arrays by name. prefix: text before the names in the archive.
-
-        Raises InstanceError, naming the array, for an array that is missing, of another kind or shape,
-        pickled, damaged, or too large.
-        """
+        """The expected arrays by name, without the prefix. Raises InstanceError for any other array."""
         return {name: self._array(prefix, name, kind) for name, kind in expected.items()}
 
     def finish(self) -> None:

@@ -8,13 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-LONGEST: Final = 1000
-"""Most characters of a message, without the name of its file."""
-QUOTED: Final = 80
-"""Most characters of a text from a file that a message quotes."""
-_HEAD: Final = (
-    0.7  # share of a shortened text from its beginning; the rest is its end, where the remedy stands
-)
+LONGEST: Final = 1000  # characters of a message, without the name of its file
+QUOTED: Final = 80  # characters of a text from a file that a message quotes
+_HEAD: Final = 0.7  # share of a shortened text from its beginning; the rest is its end with the remedy
 
 
 def printable(text: str) -> str:

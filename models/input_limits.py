@@ -8,59 +8,38 @@ from __future__ import annotations
 
 from typing import Final
 
-MAX_BYTES: Final = 200_000_000
-"""Bytes of a file, except for archives of arrays (MAX_ARCHIVE)."""
+MAX_BYTES: Final = 200_000_000  # bytes of a file, except for archives of arrays (MAX_ARCHIVE)
 
 # SVG
-MAX_TAGS: Final = 1_000_000
-"""Tags and attributes of a drawing."""
-MAX_ELEMENTS: Final = 100_000
-"""Elements drawn, counting every repetition by `use`."""
-MAX_USES: Final = 10_000
-"""Copies made by `use`."""
-MAX_USE_DEPTH: Final = 100
-"""Copies inside of copies."""
-MAX_DATA: Final = 10_000_000
-"""Characters of path data, point lists, styles and transforms of elements."""
-MAX_CURVES: Final = 500_000
-"""Segments of all shapes, counting every repetition by `use`."""
-MAX_LENGTH: Final = 64
-"""Characters of a length or a colour."""
-MAX_TRANSFORM: Final = 1000
-"""Characters of a transform."""
-LEAST_LENGTH: Final = 1e-9
-"""Width and height of a page: the quotient of two smaller lengths is not finite."""
-MAX_STYLE: Final = 1_000_000
-"""Characters of style sheets."""
-MAX_RULE_CHECKS: Final = 1_000_000
-"""Comparisons of style rules with elements."""
+MAX_TAGS: Final = 1_000_000  # tags and attributes of a drawing
+MAX_ELEMENTS: Final = 100_000  # elements drawn, counting every repetition by `use`
+MAX_USES: Final = 10_000  # copies made by `use`
+MAX_USE_DEPTH: Final = 100  # copies inside of copies
+MAX_DATA: Final = 10_000_000  # characters of path data, point lists, styles and transforms of elements
+MAX_CURVES: Final = 500_000  # segments of all shapes, counting every repetition by `use`
+MAX_LENGTH: Final = 64  # characters of a length or a colour
+MAX_TRANSFORM: Final = 1000  # characters of a transform
+LEAST_LENGTH: Final = 1e-9  # width and height of a page: the quotient of two smaller lengths is not finite
+MAX_STYLE: Final = 1_000_000  # characters of style sheets
+MAX_RULE_CHECKS: Final = 1_000_000  # comparisons of style rules with elements
 
 # Strokes on the grid
-MAX_SEGMENTS: Final = 5_000_000
-"""Straight segments that curves are cut into."""
-MAX_PIECES: Final = 40_000_000
-"""Pieces of segments between pixel edges."""
-MAX_LINES: Final = 500_000
-"""Lines of a .scap file, one per sample of a pen stroke."""
+MAX_SEGMENTS: Final = 5_000_000  # straight segments that curves are cut into
+MAX_PIECES: Final = 40_000_000  # pieces of segments between pixel edges
+MAX_LINES: Final = 500_000  # lines of a .scap file, one per sample of a pen stroke
 
 # Pictures
 MAX_SIDE: Final = 40_000
 MAX_PIXELS: Final = 80_000_000
 
 # Instances and fields
-MAX_GRID: Final = 9999
-"""Rows and columns of a grid."""
-MAX_ARCHIVE: Final = 1 << 31
-"""Bytes of an .npz, packed and unpacked: far more than a solvable field takes."""
-MAX_HEAD: Final = 1 << 20
-"""Bytes of the text in an .npz."""
-MAX_NUMBER: Final = 40
-"""Characters of a number in a .rawfield, on average; a double has 24 at most."""
+MAX_GRID: Final = 9999  # rows and columns of a grid
+MAX_ARCHIVE: Final = 1 << 31  # bytes of an .npz, packed and unpacked: far more than a solvable field takes
+MAX_HEAD: Final = 1 << 20  # bytes of the text in an .npz
+MAX_NUMBER: Final = 40  # characters of a number in a .rawfield, on average; a double has 24 at most
 
 # Solutions
-MAX_SOLUTION: Final = 1 << 31
-"""Bytes of a solution file, packed and unpacked: one line for each of 40 million columns."""
+MAX_SOLUTION: Final = 1 << 31  # bytes of a solution file, packed and unpacked: 50 per column of 40 million
 
 # Logs of solvers
-MAX_LOG: Final = 50_000_000
-"""Bytes of a log: one line per second for years."""
+MAX_LOG: Final = 50_000_000  # bytes of a log: one line per second for years

@@ -17,8 +17,7 @@ from typing import IO, Final
 
 from .errors import InputError, OutputError
 
-PART: Final = ".part"
-"""Suffix of the names of temporary neighbours, which begin with a dot."""
+PART: Final = ".part"  # suffix of the names of temporary neighbours, which begin with a dot
 _MARK: Final = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]+\.part", re.DOTALL)
 _LONGEST: Final = 50  # characters of a name that a neighbour's name repeats, at most 200 of 255 bytes
 
@@ -57,11 +56,10 @@ def neighbour(path: Path) -> Path:
 
 @lru_cache(maxsize=1024)
 def remove_dead(folder: Path) -> None:
-    """Remove temporary files that killed processes left in a folder; each process does so once per folder.
+    """Remove temporary files of this user's killed processes from a folder, once per process and folder.
 
-    Removes only files that this user's processes on this machine wrote, and ignores files that it cannot
-    remove: no write needs the removal, because names are never used twice. Keeps files of processes whose
-    state is unknown: on Windows, and for other machines. Raises OSError when the folder cannot be listed.
+    Keeps files of processes whose state is unknown: on Windows, and for other machines. No write needs the
+    removal, because names are never used twice. Raises OSError when the folder cannot be listed.
     """
     for entry in os.scandir(folder):
         mark = _MARK.fullmatch(entry.name)
@@ -120,11 +118,12 @@ def read_bytes(path: str | Path, most: int | None = None, remedy: str = "give a 
 
 def make_folder(path: str | Path) -> Path:
     """Create the folder with its parents if it is missing, and return it. Raises OutputError."""
+    path = Path(path)
     try:
-        Path(path).mkdir(parents=True, exist_ok=True)
+        path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot be created: {_reason(error)}; choose another folder", file=path) from error
-    return Path(path)
+    return path
 
 
 def sha256_of(path: str | Path) -> str:

@@ -35,7 +35,7 @@ from ...models.input_limits import MAX_BYTES
 from ...models.instance.file import check_schema, check_version, parse_json, read_instance, write_instance
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
-from ...models.processes.progress import Progress, silent
+from ...models.processes.deadline import Progress, silent
 from ...models.processes.side_by_side import checked
 from ...models.storage import make_folder, read_bytes, write_bytes
 from ..formats.registry import DEFAULTS, FORMATS, Written, generator, write

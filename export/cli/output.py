@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from ...models.errors import CrossfieldError, printable
-from ...models.processes.progress import Progress, silent
+from ...models.processes.deadline import Progress, silent
 
 if TYPE_CHECKING:
     from rich.console import Console

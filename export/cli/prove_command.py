@@ -78,7 +78,7 @@ def prove_command(
 def _write(proof: Proof, folder: Path, deadline: Deadline) -> dict[str, Any]:
     """Write field, report and, in the 2-norm, certificate of a proof; return the report."""
     from ...models.field.file import write_field
-    from ...models.processes.interruption import interruptible
+    from ...models.processes.groups import interruptible
     from ...models.storage import make_folder, write_bytes
     from ..solving.proven import certified
 

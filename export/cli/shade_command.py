@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import InputError, shortened
-from ...models.processes.progress import Progress
+from ...models.processes.deadline import Progress
 from . import options
 from .inputs import SAVED, drawing_of, field_or_instance, known
 from .output import print_notice, progress, show_surface

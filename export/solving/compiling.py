@@ -14,8 +14,8 @@ from filelock import FileLock
 
 from ...models.errors import CrossfieldError, SolverError
 from ...models.processes.child import Child, KilledError
+from ...models.processes.control import WorkerError
 from ...models.processes.deadline import Deadline
-from ...models.processes.messages import WorkerError
 from ...models.storage import make_folder
 
 

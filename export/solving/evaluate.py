@@ -13,10 +13,9 @@ import numpy as np
 from ...models.errors import CrossfieldError, InputError
 from ...models.evaluation.hidden import SHORTEST, HiddenCurve, Summary, hidden_curves, summary
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Over, Stop, stop_function
-from ...models.processes.interruption import interruptible
+from ...models.processes.deadline import Over, Progress, Stop, silent, stop_function
+from ...models.processes.groups import interruptible
 from ...models.processes.limits import Limits
-from ...models.processes.progress import Progress, silent
 from ...models.sketch.choice import Choice
 from ...models.sketch.tracing import curves_of, has_curves
 from ..formats.registry import generator

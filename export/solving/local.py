@@ -29,9 +29,9 @@ from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...models.processes.child import Child, KilledError
+from ...models.processes.control import WorkerError
 from ...models.processes.deadline import Deadline, Stop, stop_function
 from ...models.processes.limits import Limits
-from ...models.processes.messages import WorkerError
 from ...models.storage import make_folder
 from ..bundle.manifest import is_recordable, write_manifest
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start

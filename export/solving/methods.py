@@ -12,9 +12,8 @@ import numpy as np
 
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Clock, Deadline, Over, never
+from ...models.processes.deadline import Clock, Deadline, Over, Progress, never, silent
 from ...models.processes.limits import Limits
-from ...models.processes.progress import Progress, silent
 from ...models.processes.side_by_side import cores
 from ...models.proof.dual_start import search
 from ...models.search.box_qp import fitted

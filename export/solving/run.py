@@ -12,9 +12,8 @@ from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Clock, Deadline, Over, Stop, never, stop_function
+from ...models.processes.deadline import Clock, Deadline, Over, Progress, Stop, never, silent, stop_function
 from ...models.processes.limits import Limits
-from ...models.processes.progress import Progress, silent
 from ...models.search.starts import first_field
 from ...models.storage import make_folder, write_bytes
 from ...models.surface.lift import surface

@@ -14,15 +14,15 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple
 
+from .control import Stop, Task, WorkerError, reason, send
 from .deadline import Deadline, Over, never
 from .groups import KILLED, ending, kill, start
-from .messages import Stop, Task, WorkerError, reason, send
 
 GRACE: Final = 0.5
 GRACE_SHARE: Final = 0.05
@@ -54,7 +54,7 @@ class Returned(NamedTuple):
     interrupted: bool
 
 
-class Child:
+class Child(AbstractContextManager["Child"]):
     """A process that runs functions of modules, one call at a time.
 
     folder: its current folder, this process' folder by default. one_thread: whether numerical libraries there
@@ -70,10 +70,6 @@ class Child:
         self._closed = False
         self._loaded: set[str] = set()
 
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
     def __exit__(self, *_: object) -> None:
         """End the process."""
         self.close()
@@ -88,10 +84,9 @@ class Child:
     ) -> Returned:
         """Call `work(*arguments)` in the child and return its result.
 
-        work: a function of an importable module. deadline: when the work is asked to stop; deadlines among
-        the arguments arrive with the seconds that are left. log: file for what the work prints. stop: says
-        whether to interrupt the work. The first Ctrl-C interrupts it as well, the second kills it and is
-        raised.
+        work: a function of an importable module. deadline: when the work is asked to stop. log: file for the
+        output of the work. stop: returns whether to interrupt the work. The first Ctrl-C interrupts it as
+        well, the second kills it and is raised.
 
         Raises the exceptions of the work, KilledError for work that does not stop in time, and WorkerError,
         with the reason, when the process dies or a value cannot be sent.
@@ -179,7 +174,7 @@ class Child:
             except KeyboardInterrupt:
                 watch.interrupt()
             else:
-                if isinstance(answer, _Ended):
+                if answer is _ENDED:
                     if watch.asked:
                         raise KilledError("ended on a request to stop", interrupted=watch.interrupted)
                     raise WorkerError(self._how_it_ended())
@@ -226,8 +221,8 @@ def _result(answer: bytes) -> Any:
     return found
 
 
-class _Ended(NamedTuple):
-    """Item in the queue of answers after the child has closed its end of the pipe."""
+_ENDED: Final = object()
+"""Item in the queue of answers after the child has closed its end of the pipe."""
 
 
 def _listen(process: subprocess.Popen[bytes], answers: queue.SimpleQueue[Any]) -> None:
@@ -237,7 +232,7 @@ def _listen(process: subprocess.Popen[bytes], answers: queue.SimpleQueue[Any]) -
             while True:
                 answers.put(pickle.load(stream))  # noqa: S301 - from a process of our own
         except Exception:  # noqa: BLE001 - pickle raises anything for a truncated message
-            answers.put(_Ended())
+            answers.put(_ENDED)
 
 
 @dataclass

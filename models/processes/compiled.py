@@ -1,30 +1,34 @@
-"""Functions that Numba compiles on their first call and caches on disk.
+"""Functions that Numba compiles on their first call and caches on disk, and threads that share their work.
 
-Pip installs Numba without a compiler.
+Parallel loops of Numba are the alternative. But their threads spin while they wait, which doubled the time on
+a busy machine. The OpenMP threads do not survive a fork, and the built-in ones allow no second thread of
+Python.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import numba
+import numpy as np
 
+from .side_by_side import checked
+
+_Part = TypeVar("_Part")
 _Work = TypeVar("_Work", bound=Callable[..., Any])
 _MADE: Final[list[Any]] = []
 
 
 def compiled(work: _Work) -> _Work:
-    """The function compiled on its first call, and cached on disk where a folder is writable.
-
-    It runs without Python's lock.
-    """
-    made: Any
-    try:
-        made = numba.njit(cache=True, error_model="numpy", nogil=True)(work)
-    except RuntimeError:  # no folder is writable
-        made = numba.njit(error_model="numpy", nogil=True)(work)
+    """The function compiled on its first call, and cached on disk where a folder is writable."""
+    made: Any = numba.njit(error_model="numpy", nogil=True)(work)
+    with suppress(RuntimeError):  # no folder is writable
+        made.enable_caching()
     _MADE.append(made)
     return cast("_Work", made)
 
@@ -44,3 +48,38 @@ def _is_kept(made: Any) -> bool:
     code, folder = made.py_func.__code__, made.stats.cache_path
     named = f"*.{code.co_name}-{code.co_firstlineno}.*.nbi"
     return folder is None or any(Path(folder).glob(named))
+
+
+class Crew:
+    """A thread pool that includes the calling thread."""
+
+    def __init__(self, count: int, others: ThreadPoolExecutor) -> None:
+        self._count, self._others = count, others
+
+    def parts(self, work: np.ndarray[Any, Any]) -> list[slice]:
+        """Consecutive items for each thread, as equal in work as whole items allow."""
+        done = np.concatenate([[0.0], np.cumsum(work, dtype=np.float64)])
+        goals = np.linspace(0.0, done[-1], self._count + 1)
+        ends = np.abs(done[:, None] - goals).argmin(axis=0)
+        ends[0], ends[-1] = 0, len(work)
+        return [slice(a, b) for a, b in pairwise(ends) if a < b]
+
+    def equal_parts(self, many: int) -> list[slice]:
+        """A number of items, cut into as many parts as there are threads."""
+        ends = [many * number // self._count for number in range(self._count + 1)]
+        return [slice(a, b) for a, b in pairwise(ends)]
+
+    def run(self, work: Callable[[_Part], object], parts: Sequence[_Part]) -> None:
+        """Do the work on all parts at the same time."""
+        waiting = [self._others.submit(work, part) for part in parts[1:]]
+        for part in parts[:1]:
+            work(part)
+        for each in waiting:
+            each.result()
+
+
+@contextmanager
+def crew(count: int) -> Iterator[Crew]:
+    """A thread pool that ends with the block. Raises InputError for a number of threads out of range."""
+    with ThreadPoolExecutor(max(1, checked(count) - 1)) as others:
+        yield Crew(count, others)

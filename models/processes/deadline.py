@@ -1,4 +1,4 @@
-"""End of work: created once from a limit and passed down, so that every part can ask for the time left.
+"""Deadlines, requests to stop and reports of progress of work, which all its parts receive.
 
 Work that may be cut off checks the deadline at every good place, and then returns its present result.
 """
@@ -16,14 +16,17 @@ from ..errors import InputError
 Clock = Callable[[], float]
 
 Over = Callable[[], bool]
-"""Returns whether work has to end now. Work calls it at every good place, then returns its present result."""
+"""Returns whether work has to end now."""
+
+Progress = Callable[[str], None]
+"""Receives one line that describes the current step."""
 
 
 class Event(Protocol):
     """Interface of `threading.Event` and `multiprocessing.Event`."""
 
     def is_set(self) -> bool:
-        """Return whether the event has happened."""
+        """Whether the event has happened."""
 
 
 Stop = Callable[[], bool] | Event
@@ -31,14 +34,7 @@ Stop = Callable[[], bool] | Event
 
 
 def stop_function(stop: Stop | None) -> Over:
-    """Return a request to stop as a function; for None it never stops.
-
-    Raises
-    ------
-    InputError
-        When `stop` is neither a function nor an event.
-
-    """
+    """A request to stop as a function; for None it never stops. Raises InputError for other values."""
     if stop is None:
         return never
     if callable(stop):
@@ -51,6 +47,10 @@ def stop_function(stop: Stop | None) -> Over:
 def never() -> bool:
     """Return False: the work runs to its own end, and its result depends only on its input."""
     return False
+
+
+def silent(_line: str) -> None:
+    """Ignore a report of progress."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +81,7 @@ class Deadline:
         return self.left() == 0.0
 
     def steps(self) -> Over:
-        """Return a function to call before each of some equal steps of work.
-
-        It returns whether the deadline would pass during the next step, if that took as long as the last one.
-        """
+        """A function that returns whether the deadline would pass during a step as long as the last one."""
         began = [self.clock()]
 
         def over() -> bool:

@@ -1,4 +1,4 @@
-"""Child processes in groups of their own: starting, interrupting and killing them on each system.
+"""Ctrl-C, and child processes in groups of their own: starting, interrupting and killing them on each system.
 
 Ctrl-C on a terminal reaches the group in the foreground. A child in another group is controlled by the
 process that started it. On Windows, `kill` ends the child but not its children.
@@ -10,8 +10,9 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any, Final
 
 KILLED: Final = 1 if sys.platform == "win32" else -int(signal.SIGKILL)
@@ -57,3 +58,27 @@ def ending(code: int) -> str:
         return f"was killed by signal {signal.Signals(-code).name}"
     except ValueError:  # a real-time signal
         return f"was killed by signal {-code}"
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[], bool]]:
+    """A function that returns whether Ctrl-C was pressed; a second Ctrl-C interrupts at once.
+
+    Outside the main thread, and where signals are ignored already, it always returns False.
+    """
+    pressed: list[int] = []
+
+    def note(number: int, _frame: Any) -> None:
+        if pressed:
+            raise KeyboardInterrupt
+        pressed.append(number)
+
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is signal.SIG_IGN:
+        yield lambda: False
+        return
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -52,14 +52,7 @@ class Limits:
 
     @classmethod
     def bounded(cls, given: Limits | None) -> Limits:
-        """Return the limits of work that always needs a time limit; the defaults for None.
-
-        Raises
-        ------
-        InputError
-            When the time limit is infinite.
-
-        """
+        """The limits of work that needs a time limit; the defaults for None. Raises InputError for none."""
         limits = given or cls()
         if limits.time_limit == math.inf:
             raise InputError("this work needs a finite time limit; give a number of seconds")

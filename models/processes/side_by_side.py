@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from typing import Final, ParamSpec, Self, TypeVar
+from typing import Final, ParamSpec, TypeVar
 
 from ..errors import InputError
 from .child import Child
@@ -81,9 +81,6 @@ class _Processes(Executor):
         self._idle: queue.LifoQueue[Child] = queue.LifoQueue()  # started processes come first
         for child in reversed(self._children):
             self._idle.put(child)
-
-    def __enter__(self) -> Self:
-        return self
 
     def submit(self, fn: Callable[P, Found], /, *args: P.args, **kwargs: P.kwargs) -> Future[Found]:
         return self._threads.submit(self._ask, partial(fn, *args, **kwargs))

@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from . import control
-from .messages import Stop, Task, WorkerError, reason, send
+from .control import Stop, Task, WorkerError, reason, send
 
 
 def main() -> None:
@@ -66,11 +66,9 @@ def _answer(task: bytes) -> bytes:
 
 
 def _failure(error: Exception) -> bytes:
-    """Pickle of an error of the work, or of a WorkerError with its name and message if it cannot be pickled.
-
-    Pickles call the class of an error with its `args`, which do not fit every constructor.
-    """
+    """Pickle of an error of the work, or of a WorkerError that names it if it cannot be pickled."""
     try:
+        # Pickles call the class of an error with its `args`, which do not fit every constructor.
         sent = pickle.dumps((False, _noted(error)))
         _, arrived = pickle.loads(sent)  # noqa: S301 - made in the line above
         if type(arrived) is type(error) and str(arrived) == str(error):

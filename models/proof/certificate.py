@@ -24,9 +24,10 @@ times a scale, and for any values of them the resulting bound is valid.
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Final, cast
 
 import numpy as np
 
@@ -39,20 +40,20 @@ from ..processes.deadline import Over, Stop, stop_function
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict
-from .lattice import starts
-from .record import LevelRecord, Proof, Status, relative_gap
+from .lattice import Lattice
+from .record import Claim, LevelRecord, Proof, Status
 
 _PREFIX: Final = "instance_"
 _MOST_16: Final = 2**15 - 1
 _MOST_32: Final = 2**31 - 1
-_SPARE: Final = 1e-10
-"""Share of the checked bound that a claimed bound gives up, relative to 1 + bound, because other
-processors round differently.
-"""
+_ADDITIONS: Final = 340_000.0  # of the checker, per unit of effort
+_LABELS: Final = 3_200.0  # compressed per unit of effort
+_SPARE_TIME: Final = 1.4  # factor for the rest of a check, and for a load that rises meanwhile
+_SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Claim):
     """A checked claim: no field has a 2-norm energy below the bound.
 
     Parameters
@@ -70,16 +71,7 @@ class Certificate:
 
     """
 
-    field: CrossField
-    energy: float
-    bound: float
-    status: Status
     verdict: Verdict
-
-    @property
-    def gap(self) -> float:
-        """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
-        return relative_gap(self)
 
     @property
     def forced(self) -> int:
@@ -122,12 +114,13 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
         raise InputError("certificates are of the 2-norm; a proof in the 1-norm has none", file=path)
     if not proof.levels:
         raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
-    arrays = certificate_arrays(proof, "gap", 0.0)
+    arrays = _arrays(proof, "gap", 0.0)
     verdict = _confirmed(arrays, path, stop_function(stop))
-    status, bound = _claim(verdict)
+    status = cast("Status", verdict.status)
+    bound = max(0.0, verdict.bound - _SPARE * (1 + verdict.bound))
     kept = len(verdict.levels)
     confirmed = replace(proof, levels=proof.levels[:kept], parents=proof.parents[:kept])
-    write_bytes(path, pack_arrays(certificate_arrays(confirmed, status, bound)))
+    write_bytes(path, pack_arrays(_arrays(confirmed, status, bound)))
     return Certificate(proof.field, verdict.energy, bound, status, verdict)
 
 
@@ -176,10 +169,7 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
 
 
 def _field(arrays: Arrays) -> CrossField:
-    """The field of a certificate, whose arrays must equal those of field and instance exactly.
-
-    An instance rounds its arguments. A certificate of other numbers proves nothing about the rounded ones.
-    """
+    """The field of a certificate; its instance must not round the arrays, which alone are proven."""
     parts = {name.removeprefix(_PREFIX): array for name, array in arrays.items() if name.startswith(_PREFIX)}
     field = CrossField(of_arrays(parts), arrays["alpha"], arrays["beta"], arrays["p"])
     written = arrays_of(field.instance)
@@ -200,13 +190,7 @@ def _confirmed(arrays: Arrays, path: Path, over: Over) -> Verdict:
         raise InputError(f"would hold a proof that is not valid: {error}", file=path) from error
 
 
-def _claim(verdict: Verdict) -> tuple[Status, float]:
-    """The status and the bound that a certificate with this verdict claims."""
-    bound = verdict.bound - _SPARE * (1 + verdict.bound)
-    return cast("Status", verdict.status), max(0.0, bound)
-
-
-def certificate_arrays(proof: Proof, status: Status, bound: float) -> Arrays:
+def _arrays(proof: Proof, status: Status, bound: float) -> Arrays:
     """The arrays of a proof's certificate."""
     field = proof.field
     head = {
@@ -227,12 +211,11 @@ def certificate_arrays(proof: Proof, status: Status, bound: float) -> Arrays:
         arrays["parents"] = np.array(proof.parents, dtype=np.int32)
     arrays |= {_PREFIX + name: array for name, array in arrays_of(field.instance).items()}
     for number, level in enumerate(proof.levels):
-        parts = _of_level(level, field)
-        arrays |= {f"level_{number}_{name}": array for name, array in parts.items()}
+        arrays |= {f"level_{number}_{name}": array for name, array in _of_level(level).items()}
     return arrays
 
 
-def _of_level(level: LevelRecord, field: CrossField) -> Arrays:
+def _of_level(level: LevelRecord) -> Arrays:
     ranges = (level.alpha_first, level.alpha_count, level.beta_first, level.beta_count)
     return {
         "h": np.array([level.h]),
@@ -240,31 +223,27 @@ def _of_level(level: LevelRecord, field: CrossField) -> Arrays:
         "beta": level.beta,
         "ranges": np.stack(ranges, axis=1).astype(np.int32),
         "allowed": np.packbits(level.allowed),
-        **_messages(level, field),
+        **_messages(level),
     }
 
 
-def _messages(level: LevelRecord, field: CrossField) -> Arrays:
+def _messages(level: LevelRecord) -> Arrays:
     """The messages from each pair to its earlier pixel, as whole numbers of its scale.
 
-    These are the level's own messages, unless too many of them fit into 32 bits.
+    They are the level's own shares, unless too many of them fit into 32 bits.
     """
-    flat, counts = _to_earlier(level, field)
-    if not len(counts):
-        return _stored(np.zeros(0, np.int64), counts, np.zeros(0))
-    begin = starts(counts)[:-1]
-    most = np.maximum.reduceat(np.abs(flat), begin)
-    scale = np.maximum(level.quantum, most / _MOST_32)
+    grid = level.instance.grid
+    early = np.minimum(grid.first, grid.second)
+    begin, counts, is_first = level.share_starts(early)[:-1], level.count[early], grid.first == early
+    mine = np.repeat(is_first, counts)
+    flat = np.zeros(len(mine))
+    flat[mine] = level.shares_first[np.repeat(is_first, level.count[grid.first])]
+    flat[~mine] = level.shares_second[np.repeat(~is_first, level.count[grid.second])]
+    scale = np.maximum(level.quantum, np.maximum.reduceat(np.abs(flat), begin) / _MOST_32)
     whole = np.round(flat / np.repeat(scale, counts)).astype(np.int64)
     steps = np.diff(whole, prepend=0)
     steps[begin] = whole[begin]
-    return _stored(steps, counts, scale)
-
-
-def _stored(steps: Any, counts: Any, scale: Any) -> Arrays:
-    """The arrays of messages that are given by the steps from label to label."""
-    begin = starts(counts)[:-1]
-    wide = np.maximum.reduceat(np.abs(steps), begin) > _MOST_16 if len(counts) else np.zeros(0, bool)
+    wide = np.maximum.reduceat(np.abs(steps), begin) > _MOST_16
     each = np.repeat(wide, counts)
     return {
         "scale": scale,
@@ -274,19 +253,28 @@ def _stored(steps: Any, counts: Any, scale: Any) -> Arrays:
     }
 
 
-def _to_earlier(level: LevelRecord, field: CrossField) -> tuple[Any, Any]:
-    """The shares of each pair's earlier pixel, flat, and their number."""
-    grid = field.instance.grid
-    count = level.alpha_count.astype(np.int64) * level.beta_count
-    early = np.minimum(grid.first, grid.second)
-    is_first = grid.first == early
-    own, shift = np.repeat(is_first, count[early]), np.arange(int(count[early].sum()))
-    shift -= np.repeat(starts(count[early])[:-1], count[early])
-    flat = np.zeros(len(own))
-    for shares, ends, mine in (
-        (level.shares_first, grid.first, own),
-        (level.shares_second, grid.second, ~own),
-    ):
-        begin = np.repeat(starts(count[ends])[:-1], count[early])
-        flat[mine] = shares[(begin + shift)[mine]]
-    return flat, count[early]
+def certificate_effort(level: Lattice) -> float:
+    """The expected effort of checking and writing one level of a certificate.
+
+    The unit is a pixel of a level with few labels, whose check takes about 1.6 ms.
+    """
+    return _SPARE_TIME * (len(level.alpha) + level.work / _ADDITIONS + level.allowed.size / _LABELS)
+
+
+def checking_pace() -> float:
+    """Seconds per unit of effort that the checker takes now, measured in some 60 ms on a tiny level.
+
+    The pace depends on the machine and its load.
+    """
+    instance = Instance("pace", np.ones((6, 6), dtype=bool), np.array([[0, 0]]), np.zeros(1), np.ones(1))
+    zero, pairs = np.zeros(instance.grid.size), np.zeros(len(instance.grid.first), dtype=np.int32)
+    field = CrossField(instance, zero, zero, pairs)
+    at = Lattice.whole(field, 16)
+    first, second = (
+        np.zeros(at.share_starts(end)[-1]) for end in (instance.grid.first, instance.grid.second)
+    )
+    level = LevelRecord.on(at, shares_first=first, shares_second=second, quantum=1.0, bound=0.0, energy=0.0)
+    arrays = _arrays(Proof(field, 0.0, 0.0, "gap", 0, (level,), 0.0, "time"), "gap", 0.0)
+    began = time.perf_counter()
+    check_certificate.check(arrays)
+    return (time.perf_counter() - began) / (certificate_effort(at) / _SPARE_TIME)

@@ -14,9 +14,8 @@ from typing import Final
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
-from ..processes.deadline import Over, Stop, never, stop_function
+from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
 from ..processes.limits import Limits
-from ..processes.progress import Progress, silent
 from ..search.search import Search, search_patches
 
 _FEWEST: Final = 64  # pixels up to which a search alone finds the optimum
@@ -102,16 +101,12 @@ def suggested(
 ) -> CrossField:
     """A field of no more energy: itself, or one rounded from the dual of the coarsest lattice round it.
 
-    left: seconds that are left; with few of them, and for very small and large grids, it is the field itself.
-    over: whether the time is over. Any number of threads gives the same field.
+    left: returns the seconds that are left. Any number of threads gives the same field.
     """
-    if not _FEWEST < field.instance.grid.size <= _MOST:
-        return field
-    if left() < _LEAST_SECONDS:
+    if not _FEWEST < field.instance.grid.size <= _MOST or left() < _LEAST_SECONDS:
         return field
     # Code that Numba compiles is loaded only here: it takes a second.
-    from ..processes.compiled import all_compiled
-    from ..processes.crew import crew
+    from ..processes.compiled import all_compiled, crew
     from .lattice import Lattice
     from .rounding import Rounding, improve
     from .sweep import Dual

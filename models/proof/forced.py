@@ -1,19 +1,9 @@
 """The convex quadratic that remains when no choice of jumps and lines is left.
 
-Let p be the jumps of the centre, s = (-1)^p, and Q the energy with these jumps and with line u at its own
-turn at every stroke: convex, `qp-fixed`.
-
-Jumps. p is a best jump of a pair on its whole box where |A| <= pi/2 and pi |A| - pi^2/4 <= 4 s beta_i beta_j:
-one step further A^2 falls by pi |A| - pi^2/4 at most, and B^2 grows by 4 s beta_i beta_j; two steps further
-A^2 does not fall, and B stays.
-
-Strokes. Let a = alpha - theta, |a| <= 3 pi/4. Where |a| <= pi/4, u at this turn is the nearest line. Above
-pi/4 it is v, and with e = a - pi/4 the cost of u exceeds v's cost, (alpha - pi/2 - beta - theta)^2, by 4 e
-(beta + pi/4). Below -pi/4, with e = -pi/4 - a, it exceeds (alpha + pi/2 - beta - theta)^2 by 4 e (pi/4 -
-beta). With e replaced by its greatest value on the box, these are linear in beta. So the energy is at least
-Q minus w times both: again a convex quadratic. It loses nothing where beta is at the end at which u and v
-coincide. If the loss is too large, the box is cut at the edges of the window into pieces. In the pieces
-beyond, v carries the stroke, and on each piece the energy is again a convex quadratic.
+models/proof/check_certificate.py, 4, proves when the jumps of the centre are best on the boxes, and that a
+convex quadratic bounds the energy there: the energy at these jumps with line u at every stroke (`qp-fixed`),
+less terms linear in beta at strokes whose box exceeds the window. If the loss is too large, boxes are cut at
+the edges of the window. Beyond them, v carries the stroke.
 
 The least value of that quadratic on the boxes is bounded from its gradient g at any point x: by its value
 there + the least of g (y - x) over y in the boxes.
@@ -21,17 +11,18 @@ there + the least of g (y - x) over y in the boxes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from scipy import sparse
 
 from ..field.field import CrossField
+from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, QUARTER
 from ..processes.deadline import Over, never
-from ..search.box_qp import least_in_box
+from ..search.box_qp import field_at, least_in_box
 from ..search.energy import Quadratic, energy_at
 from .pruning import RemainingCells
 from .record import EXACT
@@ -46,15 +37,12 @@ class Forced:
     """Choices that the boxes force.
 
     pairs (m,): whether the jump of the centre is a best one on the whole box. strokes (s,): whether a box
-    lies within 3 pi/4 of its stroke, so that the lemma holds. above, below (s,): greatest excess of alpha
-    over theta + pi/4, and below theta - pi/4.
+    lies so close to its stroke that the lemma holds.
     """
 
     left: RemainingCells
     pairs: Bools
     strokes: Bools
-    above: Floats
-    below: Floats
 
     @property
     def everything(self) -> bool:
@@ -62,12 +50,9 @@ class Forced:
         return bool(self.pairs.all() and self.strokes.all())
 
     def least(self, energy: float, over: Over = never) -> tuple[CrossField, float]:
-        """The field that minimises the quadratic of the lowest piece, and a lower bound of the energy on all.
-
-        Pieces with a bound of `energy` are not cut.
-        """
+        """The minimum of the lowest piece, and a bound of all; pieces with a bound of `energy` stay whole."""
         lines = np.zeros(len(self.strokes), dtype=np.int32)
-        waiting = [(-np.inf, Piece(self.left, self.left.alpha_low, self.left.alpha_high, lines))]
+        waiting = [(-np.inf, Piece(self.left, lines))]
         found: list[tuple[float, CrossField]] = []
         for _ in range(_MOST_PIECES):
             _, piece = waiting.pop()
@@ -86,58 +71,48 @@ class Forced:
 class Piece:
     """A part of the boxes, cut at the edges of windows.
 
-    alpha_low, alpha_high (n,). lines (s,): 0 where u carries the stroke, or v beyond an edge that the piece
-    crosses; -1 below the window and 1 above it, where v carries the stroke.
+    lines (s,): 0 where u carries the stroke, or v beyond an edge that the piece crosses; -1 below the window
+    and 1 above it, where v carries the stroke.
     """
 
     left: RemainingCells
-    alpha_low: Floats
-    alpha_high: Floats
     lines: Ints
 
     def least(self, over: Over = never) -> tuple[CrossField, float]:
         """The field that minimises the quadratic on the piece, and a lower bound of the energy there."""
         lattice = self.left.lattice
-        instance, n = lattice.instance, lattice.instance.grid.size
-        lower = np.concatenate([self.alpha_low, self.left.beta_low])
-        upper = np.concatenate([self.alpha_high, self.left.beta_high])
-        quadratic = self._quadratic()
+        (lower, upper), quadratic = self.left.bounds, self._quadratic()
         x = least_in_box(quadratic, np.concatenate([lattice.alpha, lattice.beta]), lower, upper, over=over)
         gradient = 2 * quadratic.slope(x)
-        field = CrossField(instance, x[:n], x[n:], lattice.p)
+        field = field_at(lattice.instance, x, lattice.p)
         value = field.energy().total - float(self._given(field).sum())
         value += float(np.minimum(gradient * (lower - x), gradient * (upper - x)).sum())
         return field, value - _ROUNDING * (1 + abs(value))
 
     def cut(self, field: CrossField) -> list[Piece]:
-        """The piece cut at both edges of the window of the stroke with the largest deduction.
-
-        Empty if it crosses no edge.
-        """
+        """The piece cut at the edges of the window of the stroke with the largest deduction, if any."""
         above, below = self._beyond()
         if not (above + below).any():
             return []
         stroke = int(np.argmax(np.where(above + below > 0, 1e-12 + self._given(field), 0.0)))
-        target, at = (
-            self.left.lattice.instance.target[stroke],
-            self.left.lattice.instance.stroke_index[stroke],
-        )
+        instance, left = self.left.lattice.instance, self.left
+        target, at = instance.target[stroke], instance.stroke_index[stroke]
         ends = (-np.inf, target - QUARTER, target + QUARTER, np.inf)
         parts = []
         for line in (-1, 1, 0):
-            low, high, lines = self.alpha_low.copy(), self.alpha_high.copy(), self.lines.copy()
+            low, high, lines = left.alpha_low.copy(), left.alpha_high.copy(), self.lines.copy()
             low[at], high[at] = max(low[at], ends[line + 1]), min(high[at], ends[line + 2])
             lines[stroke] = line
             if low[at] <= high[at]:
-                parts.append(Piece(self.left, low, high, lines))
+                parts.append(Piece(replace(left, alpha_low=low, alpha_high=high), lines))
         return parts
 
     def _beyond(self) -> tuple[Floats, Floats]:
         """Distances by which the piece exceeds the windows where u carries the stroke, shapes (s,)."""
         instance = self.left.lattice.instance
         at, u = instance.stroke_index, self.lines == 0
-        above = np.maximum(self.alpha_high[at] - instance.target - QUARTER, 0.0)
-        below = np.maximum(instance.target - QUARTER - self.alpha_low[at], 0.0)
+        above = np.maximum(self.left.alpha_high[at] - instance.target - QUARTER, 0.0)
+        below = np.maximum(instance.target - QUARTER - self.left.alpha_low[at], 0.0)
         return above * u, below * u
 
     def _given(self, field: CrossField) -> Floats:
@@ -168,28 +143,18 @@ class Piece:
 
 def forced(left: RemainingCells) -> Forced:
     """Choices that are forced on the boxes that are left."""
-    lattice = left.lattice
-    at, target = lattice.instance.stroke_index, lattice.instance.target
-    low, high = left.alpha_low[at] - target, left.alpha_high[at] - target
-    return Forced(
-        left,
-        _best_jumps(left),
-        np.maximum(np.abs(low), np.abs(high)) <= 3 * QUARTER,
-        np.maximum(high - QUARTER, 0.0),
-        np.maximum(-QUARTER - low, 0.0),
-    )
+    at, target = left.lattice.instance.stroke_index, left.lattice.instance.target
+    away = np.maximum(np.abs(left.alpha_low[at] - target), np.abs(left.alpha_high[at] - target))
+    most, products = at_pairs(left)
+    pairs = (most <= HALF) & (np.pi * most - np.pi**2 / 4 <= 4 * products.min(axis=0))
+    return Forced(left, pairs, away <= 3 * QUARTER)
 
 
-def _best_jumps(left: RemainingCells) -> Bools:
-    """Whether the centre's jump is a best one on the boxes of each pair, shape (m,)."""
+def at_pairs(left: RemainingCells) -> tuple[Floats, Floats]:
+    """Greatest |A| on the boxes of each pair, (m,), and (-1)^p beta_i beta_j at their corners, (4, m)."""
     lattice, (i, j) = left.lattice, (left.lattice.instance.grid.first, left.lattice.instance.grid.second)
-    turn, sign = HALF * lattice.p, 1.0 - 2.0 * (lattice.p & 1)
+    turn, sign, betas = HALF * lattice.p, parity_sign(lattice.p), (left.beta_low, left.beta_high)
     lowest = left.alpha_low[i] - left.alpha_high[j] + turn
     highest = left.alpha_high[i] - left.alpha_low[j] + turn
-    most = np.maximum(np.abs(lowest), np.abs(highest))
-    ends = [
-        sign * x[i] * y[j] for x in (left.beta_low, left.beta_high) for y in (left.beta_low, left.beta_high)
-    ]
-    least: Floats = np.min(ends, axis=0)
-    forced: Bools = (most <= HALF) & (np.pi * most - np.pi**2 / 4 <= 4 * least)
-    return forced
+    products = np.array([sign * x[i] * y[j] for x in betas for y in betas])
+    return np.maximum(np.abs(lowest), np.abs(highest)), products

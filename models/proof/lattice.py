@@ -5,20 +5,25 @@ beta_i), which is the cross of the best field known. The offset o is 0 on black 
 checkerboard. So the differences of neighbours at that field lie in the middle between the differences of
 their labels, where a pair's discrete cost touches the true one. Rectangles of labels are stored one after
 the other, each pixel's alpha-major; `allowed` marks the labels that are left.
+
+The discrete costs of the labels are in the mean at most the energy of the crosses that they represent.
+models/proof/check_certificate.py, 2, states and proves this.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..field.field import CrossField, Norm
+from ..instance.angles import wrap
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import HALF, QUARTER, Instance
+from ..smooth.systems import stroke_weight
 
 Starts = NDArray[np.int64]
 """Starts of the blocks of flat arrays, and the end of the last one."""
@@ -53,14 +58,9 @@ class Lattice:
         steps: an even number. alpha covers a window of length pi/2 round its centre, beta [-pi/4, pi/4].
         Cells that stick out are kept. Pixels that no stroke reaches have fewer labels: see `reached`.
         """
-        h, size = HALF / steps, field.instance.grid.size
-        alpha_first, alpha_count = np.full(size, -steps // 2, np.int32), np.full(size, steps + 1, np.int32)
-        beta_first, beta_last = strip(field.beta, h, offsets(field.instance.grid))
-        ranges = few_unreached(
-            reached(field.instance), alpha_first, alpha_count, beta_first, beta_last - beta_first + 1
-        )
-        allowed = np.ones(int((ranges[1].astype(np.int64) * ranges[3]).sum()), dtype=bool)
-        return cls(field.instance, h, field.alpha, field.beta, field.p, *ranges, allowed)
+        h = HALF / steps
+        ranges = whole_ranges(field.instance, field.beta, h, offsets(field.instance.grid))
+        return cls(field.instance, h, field.alpha, field.beta, field.p, **ranges)
 
     @cached_property
     def offset(self) -> Floats:
@@ -98,17 +98,40 @@ class Lattice:
 
     @property
     def work(self) -> float:
-        """Most additions of a pass: the size of all (min,+) products over one angle."""
+        """Greatest number of additions of a pass: the size of all (min,+) products over one angle."""
         i, j = self.instance.grid.first, self.instance.grid.second
         rows, columns = self.alpha_count.astype(np.float64), self.beta_count.astype(np.float64)
         return float(2 * (rows[j] * columns[i] * (columns[j] + rows[i])).sum())
 
     def share_starts(self, end: Ints) -> Starts:
-        """Starts of the shares of each pair at one of its ends in flat arrays, shape (m + 1,).
-
-        end: `first` or `second` of the grid.
-        """
+        """Starts of the pairs' shares at one end (`first` or `second` of the grid), flat; shape (m + 1,)."""
         return starts(self.count[end])
+
+    def unary_costs(self) -> Floats:
+        """D of each label, flat: skew and stroke term; inf for labels that are not allowed."""
+        alpha, beta = self.angles
+        cost = self.instance.skew_coefficient * self._skew(beta)
+        weight = stroke_weight(self.instance)[self.pixel]
+        at = np.flatnonzero(weight)
+        cost[at] += weight[at] * self._misfit(at, alpha[at], beta[at])
+        cost[~self.allowed] = np.inf
+        return cost
+
+    def _skew(self, beta: Floats) -> Floats:
+        return beta**2 - self.h * self.h / 4
+
+    def _misfit(self, at: NDArray[np.int64], alpha: Floats, beta: Floats) -> Floats:
+        """The squared angle from the stroke to the nearer line, less its deduction, at some labels."""
+        pixel, square = self.pixel[at], self.h * self.h
+        k, l = (steps[at] for steps in self.steps)  # noqa: E741 - the letters of the equation
+        target = np.zeros(self.instance.grid.size)
+        target[self.instance.stroke_index] = self.instance.target
+        own = wrap((self.alpha + self.beta - target)[pixel], -HALF, np.pi)
+        black, away = (self.offset[pixel] == 0) & (np.abs(own) < QUARTER), np.abs(k + l)
+        lost = np.where(black & (away <= 1), away, 0.5)
+        u = wrap(alpha + beta - target[pixel], -HALF, np.pi)
+        v = wrap(alpha + HALF - beta - target[pixel], -HALF, np.pi)
+        return np.minimum(u * u - lost * square, v * v - square / 2)
 
 
 def offsets(grid: Grid) -> Floats:
@@ -130,14 +153,26 @@ def reached(instance: Instance) -> Bools:
     return found
 
 
-def few_unreached(
-    reached: Bools, alpha_first: Ints, alpha_count: Ints, beta_first: Ints, beta_count: Ints
-) -> tuple[Ints, Ints, Ints, Ints]:
-    """The ranges of steps, reduced to -1, 0, 1 both ways where no stroke reaches."""
-    few = (np.int32(-1), np.int32(3), np.int32(-1), np.int32(3))
-    given = (alpha_first, alpha_count, beta_first, beta_count)
-    a, b, c, d = (np.where(reached, all_, some) for all_, some in zip(given, few, strict=True))
-    return a, b, c, d
+def ranges(instance: Instance, *ends: Ints) -> dict[str, Any]:
+    """The ranges of a lattice from its least and greatest k and l, with all labels allowed.
+
+    Where no stroke reaches, they are -1, 0, 1.
+    """
+    few, known = np.array([-1, 1, -1, 1], np.int32), reached(instance)
+    k, last_k, l, last_l = (  # noqa: E741 - the letters of the equation
+        np.where(known, all_, some) for all_, some in zip(ends, few, strict=True)
+    )
+    rows, columns = last_k - k + 1, last_l - l + 1
+    allowed = np.ones(int((rows.astype(np.int64) * columns).sum()), dtype=bool)
+    return {
+        "alpha_first": k, "alpha_count": rows, "beta_first": l, "beta_count": columns, "allowed": allowed
+    }  # fmt: skip
+
+
+def whole_ranges(instance: Instance, beta: Floats, h: float, offset: Floats) -> dict[str, Any]:
+    """The ranges round centres of those betas that hold every cross of the strip."""
+    k = np.full(len(beta), round(QUARTER / h), np.int32)
+    return ranges(instance, -k, k, *strip(beta, h, offset))
 
 
 def starts(counts: Ints) -> Starts:
@@ -149,3 +184,70 @@ def strip(beta: Floats, h: float, offset: Floats) -> tuple[Ints, Ints]:
     """Least and greatest step l so that the cells round the centres cover [-pi/4, pi/4]; shapes (n,)."""
     lower, upper = (-QUARTER - beta) / h - offset, (QUARTER - beta) / h - offset
     return np.floor(lower).astype(np.int32), np.ceil(upper).astype(np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class CommonLattice(Lattice):
+    """The labels of one level in the 1-norm: a lattice common to all pixels, on which pairs lose nothing.
+
+    alpha and beta of every label are multiples of h, and h divides pi/4. So the differences A and B of two
+    labels are multiples of h too, at every jump. Round crosses by thresholds as in check_certificate.py, 2: A
+    and B each become one of two neighbouring multiples of h with the right mean. |.| is linear between them,
+    and so it is for beta. Hence
+
+        pair    c = min over p of 2 (|A| + |B|)        E[c] <= 2 (|a| + |b|)
+        skew    w_beta |beta|                          E[.] = w_beta |beta|
+
+    For strokes the line's misfit R = alpha + beta - theta is a sum of two that are rounded independently: it
+    becomes one of three values h apart, with the right mean. With any -1 <= l <= 1 let
+
+        stroke  w d(R),  d(R) = |R| where |R| >= 2h, else l R        E[.] <= w |r|
+
+    Either all three values are less than 2h in size. Then d is linear there, and its mean is l r <= |r|. Or
+    one of them is 2h or more in size: because they span 2h, none has another sign. Then |.| is linear on
+    them, d is nowhere more, and the mean of d is at most |r|. The same holds with R = alpha + pi/2 - beta -
+    theta for line v, with l = 0, and after any number of turns by pi. The least over lines and turns is
+    nowhere more than any of them.
+
+    So the local polytope of the discrete problem holds every field at no more than its 1-norm energy. At the
+    best angles for some jumps there is no loss if l is the multiplier of the stroke in the linear program for
+    them (models/search/box_lp.py): l R supports |R| at r, and the pairs hold it in balance.
+
+    slopes (s,): l of each stroke, in [-1, 1]. The centres of beta are 0.
+    """
+
+    norm: ClassVar[Norm] = 1
+    slopes: Floats
+
+    @classmethod
+    def near(cls, field: CrossField, slopes: Floats, steps: int) -> CommonLattice:
+        """The lattice of spacing pi / (2 steps) with every cross of the strip in a cell.
+
+        steps: an even number. alpha covers pi/2 round the multiple of h nearest to the field's alpha.
+        """
+        h, beta = HALF / steps, np.zeros(field.instance.grid.size)
+        alpha = h * np.round(field.alpha * reached(field.instance) / h)
+        ranges = whole_ranges(field.instance, beta, h, beta)
+        return cls(field.instance, h, alpha, beta, field.p, slopes=slopes, **ranges)
+
+    @cached_property
+    def offset(self) -> Floats:
+        """0 at every pixel, shape (n,)."""
+        return np.zeros(self.instance.grid.size)
+
+    def _skew(self, beta: Floats) -> Floats:
+        return np.abs(beta)
+
+    def _misfit(self, at: NDArray[np.int64], alpha: Floats, beta: Floats) -> Floats:
+        target, slope = np.zeros((2, self.instance.grid.size))
+        target[self.instance.stroke_index] = self.instance.target
+        slope[self.instance.stroke_index] = self.slopes
+        pixel = self.pixel[at]
+        u = self._away(alpha + beta - target[pixel], slope[pixel])
+        v = self._away(alpha + HALF - beta - target[pixel], np.zeros(len(at)))
+        return np.minimum(u, v)
+
+    def _away(self, r: Floats, slope: Floats) -> Floats:
+        """The cost d(R) of a line, slightly reduced where rounding could increase it."""
+        r = wrap(r, -HALF, np.pi)
+        return np.where(np.abs(r) >= 2 * self.h * (1 + 1e-12) + 1e-12, np.abs(r), slope * r)

@@ -4,12 +4,10 @@ For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha an
 product is one over beta and then one over alpha: O(N^3) for N^2 labels. A^2 is the least over all jumps of
 that parity: A is taken modulo pi.
 
-Compiled by Numba (models/processes/compiled.py). Measured on the sample `mouse` at 24 pixels, 34 x 33
-labels each, one thread: 24 ms per pass. With two threads it takes 12.5 ms. NumPy over anti-diagonals takes
-108 ms for the products alone, with all labels of all pairs: it cannot skip labels that cannot be the least,
-and would have to pad levels whose pixels have different numbers of labels. The first call compiles for
-some 15 s; the code is cached on disk, and then loads in 0.3 s. The names of `State` and `Rectangles` are part
-of the cache: after renaming them, old files cannot be read.
+A pass over the sample `mouse` at 24 pixels with 34 x 33 labels each takes 24 ms on one thread. NumPy over
+anti-diagonals takes 108 ms for the products alone, because it cannot skip labels. The first call compiles for
+some 15 s; cached code loads in 0.3 s. The names of `State` and `Rectangles` are part of the cache: after
+renaming them, old files cannot be read.
 """
 
 from __future__ import annotations
@@ -28,10 +26,7 @@ _PI: Final = float(np.pi)
 
 @compiled
 def pixel_pass(i: int, earlier: int, state: State) -> None:
-    """Take from the pairs to earlier pixels, and pass on to the pairs to later pixels.
-
-    earlier: column of `around` with the two pairs to earlier pixels; the later ones are beyond.
-    """
+    """Take from pairs to earlier pixels, columns from `earlier` of `around`; pass on to the other two."""
     begin, end = state.start[i], state.start[i + 1]
     mine, unary = state.theta[begin:end], state.unary[begin:end]
     for x in range(mine.size):

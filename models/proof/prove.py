@@ -8,11 +8,10 @@ import time
 from ..errors import InputError
 from ..field.field import CrossField, Norm
 from ..instance.instance import Instance
-from ..processes.crew import crew
-from ..processes.deadline import Stop, stop_function
-from ..processes.interruption import interruptible
+from ..processes.compiled import crew
+from ..processes.deadline import Progress, Stop, silent, stop_function
+from ..processes.groups import interruptible
 from ..processes.limits import Limits
-from ..processes.progress import Progress, silent
 from ..processes.side_by_side import checked
 from ..smooth.systems import one_thread
 from .prove_1norm import WorkIn1Norm
@@ -88,10 +87,10 @@ def prove(
     given = limits or Limits(math.inf, gap=0.0)
     began = time.monotonic()
     with interruptible() as interrupted, crew(given.threads or jobs) as hands:
+        asked = stop_function(stop)
         own = WorkLimits(
             given.deadline(),
-            interrupted,
-            stop_function(stop),
+            lambda: interrupted() or asked(),
             given.gap,
             certified and norm == 2,
             work or math.inf,

@@ -1,4 +1,4 @@
-"""The work of a proof in the 1-norm: that of models/proof/work.py, on the lattices of common_lattice.py.
+"""The work of a proof in the 1-norm: as in models/proof/work.py, on a `CommonLattice`.
 
 Once a level's boxes leave no choice of jumps, a linear program gives the energy on them, except for strokes
 at the edges of their windows. Its multipliers prove its least value.
@@ -20,20 +20,52 @@ import numpy as np
 
 from ..field.field import CrossField, Norm
 from ..field.jumps import best_jumps
-from ..instance.grid import Bools, Floats
+from ..instance.grid import Floats
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
-from ..search.box_lp import LinearFit, fitted_1norm, settled_1norm
-from .common_lattice import CommonLattice
-from .forced import Forced
+from ..search.box_lp import fitted_1norm, linear_fit, settled_1norm
+from ..search.box_qp import field_at
+from .forced import Forced, at_pairs
+from .lattice import CommonLattice
 from .pruning import RemainingCells
 from .work import COARSEST, Work, first_of
+
+
+class Forced1Norm(Forced):
+    """Choices that the boxes force in the 1-norm, where a linear program gives the energy on them."""
+
+    def least(self, energy: float, over: Over = never) -> tuple[CrossField, float]:  # noqa: ARG002
+        """The field of least energy with u at all strokes, and a lower bound of the energy on the boxes."""
+        instance, p = self.left.lattice.instance, self.left.lattice.p
+        x, _, bound = linear_fit(instance, p, *self.left.bounds)
+        above, below = _beyond(self.left)
+        lost = 2 * instance.stroke_coefficient * float(instance.w @ (above + below))
+        return field_at(instance, x, p), bound - lost
+
+
+def forced_1norm(left: RemainingCells) -> Forced1Norm:
+    """Choices that are forced on the boxes that are left, in the 1-norm."""
+    i, j = left.lattice.instance.grid.first, left.lattice.instance.grid.second
+    (most, products), sizes = at_pairs(left), np.abs([left.beta_low, left.beta_high])
+    least = np.where((left.beta_low <= 0) & (left.beta_high >= 0), 0.0, sizes.min(axis=0))
+    greatest, same = sizes.max(axis=0), products.min(axis=0) >= 0
+    given = np.where(same, -np.minimum(least[i], least[j]), np.minimum(greatest[i], greatest[j]))
+    pairs = (most <= HALF) & (most + given <= QUARTER)
+    return Forced1Norm(left, pairs, np.maximum(*_beyond(left)) <= QUARTER)
+
+
+def _beyond(left: RemainingCells) -> tuple[Floats, Floats]:
+    """Distances by which the boxes exceed the windows of the strokes, shapes (s,)."""
+    at, target = left.lattice.instance.stroke_index, left.lattice.instance.target
+    low, high = left.alpha_low[at] - target, left.alpha_high[at] - target
+    return np.maximum(high - QUARTER, 0.0), np.maximum(-QUARTER - low, 0.0)
 
 
 class WorkIn1Norm(Work):
     """State of a proof of the 1-norm."""
 
     norm: ClassVar[Norm] = 1
+    forced = staticmethod(forced_1norm)
 
     @staticmethod
     def first(instance: Instance, given: CrossField | None, over: Over) -> CrossField:
@@ -56,59 +88,8 @@ class WorkIn1Norm(Work):
         """The field, fitted."""
         return settled_1norm(field, over)
 
-    def forced(self, left: RemainingCells) -> Forced1Norm:
-        """Choices that are forced on the boxes that are left."""
-        return forced_1norm(left)
-
     def _search(self, share: float) -> None:
-        """Return None: the search is for the 2-norm, and rounding finds better fields than it does."""
+        """Do nothing: rounding finds better fields than the search, which is for the 2-norm."""
 
     def _found_more(self) -> bool:
-        """Return False: there is no search that could find more."""
         return False
-
-
-class Forced1Norm(Forced):
-    """Choices that the boxes force in the 1-norm, where a linear program gives the energy on them.
-
-    pairs, strokes, above, below: as in `Forced`, in the 1-norm, with strokes up to pi/4 beyond their windows.
-    """
-
-    def least(self, energy: float, over: Over = never) -> tuple[CrossField, float]:  # noqa: ARG002
-        """The field of least energy with u at all strokes, and a lower bound of the energy on the boxes."""
-        left, instance = self.left, self.left.lattice.instance
-        lower = np.concatenate([left.alpha_low, left.beta_low])
-        upper = np.concatenate([left.alpha_high, left.beta_high])
-        fit = LinearFit.of(instance, left.lattice.p, lower, upper)
-        alpha, beta = np.split(fit.x, 2)
-        beyond = 2 * instance.stroke_coefficient * float(instance.w @ (self.above + self.below))
-        return CrossField(instance, alpha, beta, left.lattice.p), fit.bound - beyond
-
-
-def forced_1norm(left: RemainingCells) -> Forced1Norm:
-    """Choices that are forced on the boxes that are left, in the 1-norm."""
-    lattice = left.lattice
-    at, target = lattice.instance.stroke_index, lattice.instance.target
-    low, high = left.alpha_low[at] - target, left.alpha_high[at] - target
-    above, below = np.maximum(high - QUARTER, 0.0), np.maximum(-QUARTER - low, 0.0)
-    return Forced1Norm(left, _best_jumps(left), np.maximum(above, below) <= QUARTER, above, below)
-
-
-def _best_jumps(left: RemainingCells) -> Bools:
-    """Whether the centre's jump is a best one on the boxes of each pair, shape (m,)."""
-    lattice, (i, j) = left.lattice, (left.lattice.instance.grid.first, left.lattice.instance.grid.second)
-    turn, sign = HALF * lattice.p, 1.0 - 2.0 * (lattice.p & 1)
-    most = np.maximum(
-        np.abs(left.alpha_low[i] - left.alpha_high[j] + turn),
-        np.abs(left.alpha_high[i] - left.alpha_low[j] + turn),
-    )
-    ends = np.array(
-        [sign * x[i] * y[j] for x in (left.beta_low, left.beta_high) for y in (left.beta_low, left.beta_high)]
-    )
-    sizes = np.abs([left.beta_low, left.beta_high])
-    least = np.where((left.beta_low <= 0) & (left.beta_high >= 0), 0.0, sizes.min(axis=0))
-    most_beta = sizes.max(axis=0)
-    same = ends.min(axis=0) >= 0
-    given: Floats = np.where(same, -np.minimum(least[i], least[j]), np.minimum(most_beta[i], most_beta[j]))
-    forced: Bools = (most <= HALF) & (most + given <= QUARTER)
-    return forced

@@ -1,23 +1,16 @@
 """Pruning of a level: the cells that may hold crosses of fields of at most the energy U.
 
-The rule, with the values that a checker computes in float64 from a LevelRecord and the U of the whole proof:
-
-1. A forward pass (models/proof/sweep.py) from the shares of the record. At each pixel i, after it has taken
-   from the pairs to its upper and left neighbours: theta_i(x) = D_i(x) + the sum of its shares, over allowed
-   labels x.
-2. Label x of pixel i survives where `bound` + theta_i(x) - min theta_i <= U + tolerance. For a field whose
-   crosses are rounded as in models/proof/costs.py, the mean of the left side over the label's law is at most
-   its energy. So one vertex of its cell survives, for any changes that the pass has made to earlier shares,
-   because the bound never falls in a pass.
-3. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and one of them survives.
-4. The next level has half the spacing round the same centres. It allows every label whose cells meet a cell
+1. After a forward pass (models/proof/sweep.py), label x of pixel i survives where `bound` + theta_i(x) - min
+   theta_i <= U + tolerance. models/proof/check_certificate.py, 3, proves that no more is needed.
+2. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and one of them survives.
+3. The next level has half the spacing round the same centres. It allows every label whose cells meet a cell
    that is left, except labels beyond the cells that cover |beta| <= pi/4. In its steps, cell (k, l) begins at
    (2 k + o, 2 l + o): a vertex on black pixels and the middle of a cell on white ones.
 
-Pixels that no stroke reaches (models/proof/lattice.py) are exempt from these rules: see `reached` there.
+Pixels that no stroke reaches are exempt from these rules: see `reached` in models/proof/lattice.py.
 
-Here the tolerance is 1e-7 (1 + U), for U as it was then. A checker that allows for 1e-9 (1 + U) of its own
-rounding and takes the final U, which is no greater, never keeps a cell that was dropped here.
+The checker tolerates less for its rounding, and takes the final U, which is no greater. So it never keeps a
+cell that was dropped here.
 """
 
 from __future__ import annotations
@@ -31,7 +24,7 @@ import numpy as np
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER
 from ..processes.compiled import compiled
-from .lattice import Lattice, Starts, few_unreached, reached, starts, strip
+from .lattice import Lattice, Starts, ranges, reached, starts, strip
 from .sweep import Dual
 
 TOLERANCE: Final = 1e-7
@@ -52,6 +45,12 @@ class RemainingCells:
     alpha_high: Floats
     beta_low: Floats
     beta_high: Floats
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Least and greatest (alpha, beta) of the boxes, shapes (2n,)."""
+        low = np.concatenate([self.alpha_low, self.beta_low])
+        return low, np.concatenate([self.alpha_high, self.beta_high])
 
 
 def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
@@ -79,29 +78,16 @@ def finer(left: RemainingCells) -> Lattice:
     ends = 2 * _ends(lattice, left.cells)
     ends[:, 1] += half
     ends[:, 2], ends[:, 3] = np.maximum(ends[:, 2], lowest), np.minimum(ends[:, 3] + half, highest)
-    known = reached(lattice.instance)
-    alpha_first, alpha_last, beta_first, beta_last = ends.T
-    ranges = few_unreached(
-        known, alpha_first, alpha_last - alpha_first + 1, beta_first, beta_last - beta_first + 1
-    )
-    allowed = np.zeros(int((ranges[1].astype(np.int64) * ranges[3]).sum()), dtype=bool)
-    alpha_first, alpha_count, beta_first, beta_count = ranges
-    new = replace(
-        lattice, h=h, alpha_first=alpha_first, alpha_count=alpha_count, beta_first=beta_first,
-        beta_count=beta_count, allowed=allowed,
-    )  # fmt: skip
+    new = replace(lattice, h=h, **ranges(lattice.instance, *ends.T))
+    allowed = new.allowed
+    allowed[:] = False
     _allow((_rectangles(lattice), left.cells), (_rectangles(new), allowed), 3 + half)
-    allowed |= ~known[new.pixel]
+    allowed |= ~reached(lattice.instance)[new.pixel]
     return new
 
 
 def branches(dual: Dual, count: int) -> list[Dual]:
-    """The dual on parts of its lattice that together hold all its cells; the alpha of one pixel is cut.
-
-    The dual determines the alpha of this pixel least: the dearest alpha costs least there, at its best
-    beta. Where a vortex may be in many places, it is the pixel in their middle. Empty if there is nothing to
-    cut.
-    """
+    """The dual on parts of its lattice, cut at the alpha of one pixel; empty if there is nothing to cut."""
     dual.backward()
     pixel, lattice = _least_known(dual), dual.lattice
     begin, end = lattice.start[pixel : pixel + 2]
@@ -121,7 +107,7 @@ def branches(dual: Dual, count: int) -> list[Dual]:
 
 
 def _least_known(dual: Dual) -> int:
-    """The pixel whose dearest alpha costs least, after a pass."""
+    """The pixel whose alpha the dual determines least, after a pass: the dearest alpha costs least there."""
     lattice, theta = dual.lattice, dual.state.theta
     rows = starts(lattice.alpha_count)
     row = np.repeat(lattice.start[:-1], lattice.alpha_count)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal, Protocol, Self
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 from ..field.field import CrossField, Norm
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.grid import Floats
+from .lattice import Lattice
 
 if TYPE_CHECKING:
     from .sweep import Dual
@@ -18,48 +19,52 @@ EXACT: Final = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class LevelRecord:
-    """One level of a proof: a lattice (see models/proof/lattice.py) and a dual solution on it.
+class Claim:
+    """A field and a proven lower bound of the energy of all fields."""
 
-    h: spacing in radians. alpha, beta (n,), p (m,): the centres, the same at all levels of a proof.
-    alpha_first, alpha_count, beta_first, beta_count (n,), allowed (flat): the labels. shares_first,
-    shares_second: flat over pairs in the grid's order, alpha-major: the shares of a pair at the labels of its
-    first and of its second pixel; 0 at labels that are not allowed. Whole multiples of `quantum`, a power of
-    two, below 2^31 of them (2^49 in the 1-norm). bound: sum over pixels of min (D + shares) + sum over pairs
-    of min (c - shares), over allowed labels; D and c are in models/proof/costs.py. An error bound for its
-    float64 sums is deducted. energy: U when the level was pruned; fields outside the next level have more
-    (models/proof/pruning.py). work: additions of a pass, as of its lattice.
+    field: CrossField
+    energy: float
+    bound: float
+    status: Status
+
+    @property
+    def gap(self) -> float:
+        """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
+        return 0.0 if self.status == "optimal" else (self.energy - self.bound) / max(self.energy, 1e-300)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LevelRecord(Lattice):
+    """One level of a proof: its lattice and a dual solution on it.
+
+    shares_first, shares_second: flat over pairs in the grid's order, alpha-major: the shares of a pair at the
+    labels of its first and of its second pixel; 0 at labels that are not allowed. Whole multiples of
+    `quantum`, a power of two, below 2^31 of them (2^49 in the 1-norm). bound: sum over pixels of min (D +
+    shares) + sum over pairs of min (c - shares), over allowed labels, minus a bound of its rounding error.
+    energy: U when the level was pruned; fields outside the next level have more (models/proof/pruning.py).
     """
 
-    h: float
-    alpha: Floats
-    beta: Floats
-    p: Ints
-    alpha_first: Ints
-    alpha_count: Ints
-    beta_first: Ints
-    beta_count: Ints
-    allowed: Bools
     shares_first: Floats
     shares_second: Floats
     quantum: float
     bound: float
     energy: float
-    work: float = 0.0
 
     @classmethod
     def of(cls, dual: Dual, energy: float) -> Self:
         """The record of a dual; its shares are first rounded to multiples of their quantum."""
-        at, quantum, state = dual.lattice, dual.quantise(), dual.state
-        return cls(
-            at.h, at.alpha, at.beta, at.p, at.alpha_first, at.alpha_count, at.beta_first, at.beta_count,
-            at.allowed, state.shares_first.copy(), state.shares_second.copy(), quantum, dual.bound(), energy,
-            at.work,
-        )  # fmt: skip
+        quantum, state = dual.quantise(), dual.state
+        shares = {name: getattr(state, name).copy() for name in ("shares_first", "shares_second")}
+        return cls.on(dual.lattice, **shares, quantum=quantum, bound=dual.bound(), energy=energy)
+
+    @classmethod
+    def on(cls, lattice: Lattice, **solution: Any) -> Self:
+        """The record of a solution on a lattice, which is without cached arrays."""
+        return cls(**{each.name: getattr(lattice, each.name) for each in fields(Lattice)}, **solution)
 
 
 @dataclass(frozen=True, eq=False)
-class Proof:
+class Proof(Claim):
     """The best field that was found, and what is proven of it.
 
     Parameters
@@ -90,34 +95,9 @@ class Proof:
 
     """
 
-    field: CrossField
-    energy: float
-    bound: float
-    status: Status
     forced: int
     levels: tuple[LevelRecord, ...]
     seconds: float
     ended: str
     norm: Norm = 2
     parents: tuple[int, ...] = ()
-
-    @property
-    def gap(self) -> float:
-        """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
-        return relative_gap(self)
-
-
-class _Bounded(Protocol):
-    """Common attributes of a proof and a certificate."""
-
-    @property
-    def status(self) -> Status: ...
-    @property
-    def energy(self) -> float: ...
-    @property
-    def bound(self) -> float: ...
-
-
-def relative_gap(claim: _Bounded) -> float:
-    """The gap relative to the energy, (energy - bound) / energy; 0 where the field is proven optimal."""
-    return 0.0 if claim.status == "optimal" else (claim.energy - claim.bound) / max(claim.energy, 1e-300)

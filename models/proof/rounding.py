@@ -17,8 +17,8 @@ from ..instance.grid import Bools, Floats
 from ..instance.instance import QUARTER
 from ..processes.compiled import compiled
 from ..processes.deadline import Over, never
+from ..search.box_qp import FreeField
 from ..search.energy import LinearSolver
-from ..search.free_field import FreeField
 from ..search.improvement import improved_field, settle
 from .products import add, share_of, sized
 from .state import Indices, State
@@ -27,7 +27,6 @@ from .sweep import Dual
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
 _HALF: Final = float(np.pi / 2)
 _PI: Final = float(np.pi)
-
 
 Improve = Callable[[CrossField, CrossField, Over], CrossField]
 """Returns the better of a rounded field and the best one so far, improved."""
@@ -41,10 +40,7 @@ class Rounding:
         self._tried: set[bytes] = set()
 
     def lower(self, best: CrossField, over: Over = never) -> CrossField:
-        """A field of no more energy than `best`: itself, or a field that the shares suggest.
-
-        Called after a backward pass, and leaves the dual after one.
-        """
+        """`best`, or a lower field that the shares suggest; before and after it the last pass is backward."""
         best = self._rounded(best, over, forwards=True)
         if over():
             return best

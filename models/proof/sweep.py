@@ -30,47 +30,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.grid import Floats, Grid
-from ..processes.compiled import compiled
-from ..processes.crew import Crew
+from ..processes.compiled import Crew, compiled
 from ..processes.deadline import Over, never
-from .costs import unary_costs
 from .lattice import Lattice
 from .products import add, pair_minimum, pixel_pass, share_of
 from .state import Indices, State
 
 _ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
 _ROUNDING: Final = 32 * 2.0**-53
-"""Relative error of one term of a bound.
-
-It is the sum of at most eight numbers. An angle among them is right to four units in the last place, and a
-square doubles that.
-"""
-
-
-class Momentum:
-    """Extrapolates arrays along their last change, further the longer a bound has not fallen."""
-
-    def __init__(self, shares: tuple[Floats, ...], crew: Crew) -> None:
-        self._shares, self._crew = shares, crew
-        self._before: list[NDArray[np.float32]] = []  # the direction alone needs no more digits
-        self._times, self._bound = 0, -math.inf
-
-    def carry_on(self) -> None:
-        """Extrapolate the arrays; the first time there is no known change yet."""
-        part = self._times / (self._times + 3)
-        self._times += 1
-        if not self._before:
-            self._before = [shares.astype(np.float32) for shares in self._shares]
-            return
-        for shares, before in zip(self._shares, self._before, strict=True):
-            parts = [(shares[at], before[at]) for at in self._crew.equal_parts(len(shares))]
-            self._crew.run(lambda each: _carry_on(*each, part), parts)
-
-    def judge(self, bound: float) -> None:
-        """Restart if the bound has fallen."""
-        if bound < self._bound:
-            self._times = 0
-        self._bound = bound
+"""Relative error of a term: eight numbers, with angles right to four units in the last place, squared."""
 
 
 class Dual:
@@ -84,7 +52,8 @@ class Dual:
         self.state = _state(lattice, first, second)
         self._fronts = fronts(lattice.instance.grid)
         self._parts = [crew.parts(lattice.count[front]) for front in self._fronts]
-        self._momentum = Momentum((self.state.shares_first, self.state.shares_second), crew)
+        self._before: list[NDArray[np.float32]] = []  # the direction of a change needs no more digits
+        self._times, self._reached = 0, -math.inf
         self.seconds = 0.0  # of the last pass that was not cut off
 
     def forward(self, over: Over = never) -> float:
@@ -96,19 +65,30 @@ class Dual:
         return self._pass(2, over)
 
     def ascend(self, times: int, over: Over = never) -> float:
-        """The bound after that many passes forwards and backwards, or fewer when the time is over.
-
-        It is -inf if a pass was cut off. The shares prove a bound all the same.
-        """
+        """The bound after that many passes forwards and backwards; -inf if time cut a pass off."""
         bound = -math.inf
         for _ in range(times):
-            self._momentum.carry_on()
+            self._extrapolate()
             self.forward(over)
             bound = self.backward(over)
-            self._momentum.judge(bound)
+            if bound < self._reached:
+                self._times = 0
+            self._reached = bound
             if over():
                 break
         return bound
+
+    def _extrapolate(self) -> None:
+        """Move the shares along their last change, further the longer the bound has not fallen."""
+        part = self._times / (self._times + 3)
+        self._times += 1
+        both = (self.state.shares_first, self.state.shares_second)
+        if not self._before:
+            self._before = [shares.astype(np.float32) for shares in both]
+            return
+        for shares, before in zip(both, self._before, strict=True):
+            parts = [(shares[at], before[at]) for at in self.crew.equal_parts(len(shares))]
+            self.crew.run(lambda each: _carry_on(*each, part), parts)
 
     def _pass(self, earlier: int, over: Over) -> float:
         def work(pixels: Indices) -> None:
@@ -130,11 +110,7 @@ class Dual:
         return self.seconds * lattice.work / max(self.lattice.work, 1.0)
 
     def quantise(self) -> float:
-        """Round the shares to whole multiples of a quantum, 0 at labels not allowed; return the quantum.
-
-        It is the least power of two with less than 2^31 multiples, which certificates can hold; in the
-        1-norm, where bounds become exact, 2^49.
-        """
+        """Round the shares to whole multiples of a power of two, and return it; see `LevelRecord`."""
         both = (self.state.shares_first, self.state.shares_second)
         most = max(*(_most(shares) for shares in both), 2.0**-16)
         quantum = 2.0 ** (math.ceil(math.log2(most)) - (30 if self.lattice.norm == 2 else 48))
@@ -144,12 +120,7 @@ class Dual:
         return quantum
 
     def bound(self) -> float:
-        """The bound that any shares prove.
-
-        It is the sum of min (D + shares) over pixels + the sum of min (c - shares) over pairs, minus its
-        rounding error. Every minimum is right to 32 units in the last place of the largest number in it, and
-        the sum of the minima (math.fsum) is exact.
-        """
+        """The bound that any shares prove, as `LevelRecord` defines it."""
         pixels = self._minima(_pixel_minima, self.lattice.instance.grid.size)
         pairs = self._minima(_pair_minima, len(self.state.first))
         error = _ROUNDING * (len(pixels) + len(pairs)) * self._largest()
@@ -180,7 +151,7 @@ def _carry_on(shares: Floats, before: NDArray[np.float32], part: float) -> None:
 
 def _state(lattice: Lattice, first: Floats | None, second: Floats | None) -> State:
     grid = lattice.instance.grid
-    unary = unary_costs(lattice)
+    unary = lattice.unary_costs()
     start_first, start_second = lattice.share_starts(grid.first), lattice.share_starts(grid.second)
     return State(
         lattice.h,

@@ -1,4 +1,4 @@
-"""The work of a proof: a field, and how far from the best it is at most.
+"""The work of a proof: a field, and a bound of its distance from the minimum.
 
 Lattice after lattice, each of half the spacing. On each level the dual rises by passes
 (models/proof/sweep.py), fields are rounded from it (rounding.py), and what cannot hold a better field is
@@ -6,14 +6,13 @@ dropped (pruning.py), until the jumps are forced (forced.py). A better field bec
 lattices begin anew round it.
 
 Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
-lattices leave its gap. Once such a level is met, the one before is cut into branches at the alpha of the
-pixel of which the dual says least. The branch of least bound goes on, with half the spacing, or cut again;
-the least of their bounds is that of all.
+lattices leave its gap. Then the level before is cut into branches at the alpha of the pixel that the dual
+determines least. The branch with the least bound goes on, with half the spacing, or is cut again. The least
+of their bounds holds for all.
 """
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass, field, replace
 from heapq import heappop, heappush
@@ -24,13 +23,12 @@ import numpy as np
 from ..field.field import CrossField, Norm, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
-from ..processes.crew import Crew
-from ..processes.deadline import Deadline, Over, never
-from ..processes.progress import Progress
+from ..processes.compiled import Crew
+from ..processes.deadline import Deadline, Over, Progress, never
 from ..search.improvement import improved_field
 from ..search.search import search_patches
-from ..search.starts import first_field, polyvector_start
-from .certificate_pace import certificate_effort, checking_pace
+from ..search.starts import best_start, polyvector_start
+from .certificate import certificate_effort, checking_pace
 from .check_certificate import MOST_LEVELS
 from .forced import Forced, forced
 from .lattice import Lattice, reached
@@ -42,10 +40,7 @@ from .sweep import Dual
 COARSEST: Final = 16  # steps in pi/2 of the first level
 _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
 _PASSES: Final = 3  # forwards and backwards between two roundings
-_SLOW: Final = 0.05
-"""Share of the gap: a level on which some passes close less has done its work.
-A tenth of it where no other level can follow.
-"""
+_SLOW: Final = 0.05  # share of the gap that passes must close for a level to go on; a tenth on the last one
 _MOST_ROUNDS: Final = 40  # a level
 _STALLED: Final = 0.5  # share of the gap that half the spacing leaves where branches are needed
 _PARTS: Final = 8  # branches of a level
@@ -66,19 +61,18 @@ _ROUNDS: Final = 5  # of a search without a limit of time
 
 @dataclass
 class WorkLimits:
-    """When to end: a deadline, whether the user or the caller asks for it, a sufficient gap, enough work.
+    """When to end: a deadline, a request to stop, a sufficient gap, enough work.
 
-    whole: the deadline of proof and certificate. certified: whether there is a certificate to write. work:
+    whole: the deadline of proof and certificate. certified: whether to keep time for a certificate. work:
     greatest number of labels; labels: those so far. pace: greatest measured seconds per unit of the
     certificate's effort. kept: the seconds that the certificate is expected to take.
     """
 
     whole: Deadline
-    interrupted: Over
     stop: Over
     gap: float
     certified: bool
-    work: float = math.inf
+    work: float
     labels: int = 0
     pace: float = 0.0
     kept: float = 0.0
@@ -89,11 +83,7 @@ class WorkLimits:
         return self.whole.later(-self.kept)
 
     def keep(self, effort: float) -> None:
-        """Keep time for a certificate of that effort.
-
-        If there is too little for the first level, no certificate can be written in time. The proof then uses
-        all of the time, and looks for better fields.
-        """
+        """Keep time for a certificate of that effort, unless it is too little even for the first level."""
         if not self.certified or self.whole.at == np.inf:
             return
         self.pace = max(self.pace, checking_pace())
@@ -102,26 +92,21 @@ class WorkLimits:
         self.kept = seconds if self.certified else 0.0
 
     def met(self) -> str:
-        """Which limit is met; empty when none is."""
-        if self.interrupted() or self.stop():
+        """The limit that is met; empty when none is."""
+        if self.stop():
             return "interrupted"
         if self.labels > self.work:
             return "work"
         return "time" if self.deadline.passed() else ""
 
     def over(self, ahead: float = 0.0) -> bool:
-        """Whether work has to end now, or within so many seconds."""
+        """Whether work has to end now, or within `ahead` seconds."""
         return bool(self.met()) or self.deadline.left() <= ahead
 
 
 def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossField:
-    """The best of the first field, of what the user gives and, in time, of the PolyVector start, improved."""
-    fields = [first_field(instance, over)]
-    if given is not None:
-        fields.append(improved_field(given, stop=over))
-    if not over():
-        fields.append(improved_field(polyvector_start(instance, over), stop=over))
-    return min(fields, key=lambda field: round(field.energy().total, 9))
+    """The best of the first field, of the user's field and, in time, of the PolyVector start, improved."""
+    return best_start(instance, given, over, polyvector_start)
 
 
 @dataclass
@@ -192,17 +177,14 @@ class Work:
         )  # fmt: skip
 
     def run(self) -> str:
-        """Go through chains of levels until a limit is met, or nothing helps; which one."""
+        """Go through chains of levels until a limit is met or nothing helps; return the reason."""
         ended = self._descend()
         while not ended or (ended == "labels" and self._found_more()):
             ended = self._descend()
         return self.limits.met() or ended
 
     def _found_more(self) -> bool:
-        """Whether a search in the time that is left finds a field for which to begin anew.
-
-        That needs as much time as the last chain took; with less the search goes on to the end.
-        """
+        """Whether a search finds a better field, with as much time left as the last chain took."""
         before, spent = self.energy(self.best), time.monotonic() - self.began
         while not self.limits.over():
             left = self.limits.deadline.left()
@@ -214,7 +196,7 @@ class Work:
         return False
 
     def _descend(self) -> str:
-        """Go through the levels round the best field; how it ended, empty where a better one was found."""
+        """Go through the levels round the best field; the reason of the end, empty for a better field."""
         if met := self.limits.met():
             return met
         self.chain, before, self.began = _Chain(), self.best, time.monotonic()
@@ -256,20 +238,17 @@ class Work:
         return max(self.proven.effort, self.chain.effort + certificate_effort(lattice))
 
     def _closing(self, dual: Dual) -> Over:
-        """Says whether the time that is left is what it takes to record the level."""
+        """A function that returns whether only the time to record the level is left."""
         return lambda: self.limits.over(_RECORDING * dual.seconds)
 
     def _stalls(self) -> bool:
-        """Whether half the spacing has left more than half of the gap, and the best field has a vortex.
-
-        Then the dual mixes places where it may be, and finer lattices do not help.
-        """
+        """Whether half the spacing has left more than half of the gap, and the best field has a vortex."""
         bounds = [self.energy(self.best) - level.bound for level in self.chain.levels[-2:]]
         vortices = len(self.best.singularities.index) > 0
         return len(self.chain.levels) > 2 and bounds[1] > _STALLED * bounds[0] and vortices
 
     def _branch(self, dual: Dual) -> str:
-        """Cut the last level but one into branches, and go on with the one of least bound; how it ended."""
+        """Cut the last level but one into branches, and follow the lowest; the reason of the end."""
         levels = self.chain.levels[:-1]
         self.chain = _Chain(levels, list(range(-1, len(levels) - 1)))
         waiting = [_Branch(levels[-1].bound, len(levels) - 1, dual, stalls=True)]
@@ -287,7 +266,7 @@ class Work:
             self.chain.bound = min(waiting[0].bound, self.energy(self.best))
             if self.chain.bound > self.proven.bound:
                 self.proven = replace(self.chain, levels=levels[:], parents=self.chain.parents[:])
-            self._tell(self.proven.bound, _labels(waiting))
+            self._report(self.proven.bound, _labels(waiting))
         return ended or self._ended()
 
     def _parts(self, branch: _Branch) -> list[Dual]:
@@ -314,7 +293,7 @@ class Work:
         return _Branch(level.bound, len(levels) - 1, dual, stalls=stalls)
 
     def _ended(self) -> str:
-        """Why the work is at its end; empty if it is not."""
+        """The reason why the work ends; empty if it goes on."""
         energy, bound = self.energy(self.best), self.proven.bound
         if self._exact(bound):
             return "optimal"
@@ -357,21 +336,18 @@ class Work:
             bound = dual.ascend(_PASSES, closing)
             self.best = rounding.lower(self.best, closing)
             energy = self.energy(self.best)
-            self._tell(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
+            self._report(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
             if closing() or self._exact(bound) or bound - reached <= slow * (energy - bound):
                 return
             reached = bound
 
-    def _tell(self, bound: float, labels: int) -> None:
+    def _report(self, bound: float, labels: int) -> None:
         """Report bound, least energy and remaining labels, and count the labels as work."""
         self.limits.labels += labels
         self.progress(f"energy {self.energy(self.best):.5g}, bound {bound:.5g}, {labels} labels")
 
     def _record(self, dual: Dual, *, again: bool) -> Forced | None:
-        """Record the level and what it proves, prune it, and see what is forced; not when the time is over.
-
-        again: it is recorded already, with less.
-        """
+        """Record the level, `again` if it has a record, and prune it in time; the choices that are forced."""
         chain, energy = self.chain, self.energy(self.best)
         level, what = LevelRecord.of(dual, energy), None
         if again:

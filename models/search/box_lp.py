@@ -19,9 +19,10 @@ from ..errors import CrossfieldError
 from ..field.field import CrossField
 from ..field.jumps import best_jumps, parity_sign
 from ..instance.grid import Floats, Ints
-from ..instance.instance import HALF, QUARTER, Instance
+from ..instance.instance import HALF, Instance
 from ..processes.deadline import Over, never
 from ..smooth.systems import one_thread
+from .box_qp import bounds, field_at
 
 _BETTER = 1e-9  # relative: rounding is no improvement
 
@@ -47,20 +48,11 @@ class Residuals:
         return cls(
             sparse.vstack([a, b, r, skew], format="csr"),
             np.concatenate([HALF * p, np.zeros(m), -strokes.goal, np.zeros(n)]),
-            np.concatenate(
-                [
-                    np.full(2 * m, 2.0),
-                    strokes.weight,
-                    np.full(n, instance.skew_coefficient),
-                ]
-            ),
+            np.concatenate([np.full(2 * m, 2.0), strokes.weight, np.full(n, instance.skew_coefficient)]),
         )
 
     def bound(self, multipliers: Floats, lower: Floats, upper: Floats) -> float:
-        """A lower bound of the energy with lower <= x <= upper, shapes (2n,), from any multipliers.
-
-        They are clipped to [-1, 1], and rounding errors are deducted.
-        """
+        """A lower bound of the energy with lower <= x <= upper, shapes (2n,), from any multipliers."""
         force = self.weight * np.clip(multipliers, -1.0, 1.0)
         slope = self.matrix.T @ force
         terms = np.concatenate([force * self.constant, np.minimum(slope * lower, slope * upper)])
@@ -68,64 +60,39 @@ class Residuals:
         return math.fsum(terms) - 2.0**-48 * float(size + np.abs(terms).sum())
 
 
-@dataclass(frozen=True, eq=False)
-class LinearFit:
-    """Angles of least 1-norm energy in a box at given jumps, x (2n,), and their proof.
+def linear_fit(instance: Instance, p: Ints, lower: Floats, upper: Floats) -> tuple[Floats, Floats, float]:
+    """Angles x of least energy at jumps p with lower <= x <= upper, shapes (2n,), by HiGHS.
 
-    multipliers (r,): l of each residual in [-1, 1], see `Residuals`; 0 where weights are 0.
-    bound: no angles in the box have less energy.
+    Also returns l of each residual, see `Residuals`, 0 where weights are 0; and a lower bound of the energy.
+    Raises CrossfieldError when HiGHS ends without a solution, which a linear program of this kind has.
     """
+    from scipy.optimize import linprog
 
-    x: Floats
-    multipliers: Floats
-    bound: float
-
-    @classmethod
-    def of(cls, instance: Instance, p: Ints, lower: Floats, upper: Floats) -> LinearFit:
-        """The fit at jumps p with lower <= x <= upper, shapes (2n,), by HiGHS.
-
-        Raises CrossfieldError when HiGHS ends without a solution, which a linear program of this kind has.
-        """
-        from scipy.optimize import linprog
-
-        terms = Residuals.at(instance, p)
-        rows = terms.matrix.shape[0]
-        both = sparse.eye_array(rows)
-        found = linprog(
-            np.concatenate([np.zeros(len(lower)), terms.weight, terms.weight]),
-            A_eq=sparse.hstack([terms.matrix, -both, both], format="csc"),
-            b_eq=-terms.constant,
-            bounds=np.stack(
-                [np.append(lower, np.zeros(2 * rows)), np.append(upper, np.full(2 * rows, np.inf))], axis=1
-            ),
-            method="highs",
-        )
-        if found.x is None:
-            raise CrossfieldError(f"HiGHS found no angles for given jumps: {found.message}")
-        multipliers = np.clip(-found.eqlin.marginals / np.maximum(terms.weight, 1e-300), -1.0, 1.0)
-        multipliers[terms.weight == 0] = 0.0
-        x = np.clip(found.x[: len(lower)], lower, upper)
-        return cls(x, multipliers, terms.bound(multipliers, lower, upper))
+    terms = Residuals.at(instance, p)
+    rows = terms.matrix.shape[0]
+    both = sparse.eye_array(rows)
+    found = linprog(
+        np.concatenate([np.zeros(len(lower)), terms.weight, terms.weight]),
+        A_eq=sparse.hstack([terms.matrix, -both, both], format="csc"),
+        b_eq=-terms.constant,
+        bounds=np.stack([np.pad(lower, (0, 2 * rows)), np.append(upper, [np.inf] * (2 * rows))], axis=1),
+        method="highs",
+    )
+    if found.x is None:
+        raise CrossfieldError(f"HiGHS found no angles for given jumps: {found.message}")
+    multipliers = np.clip(-found.eqlin.marginals / np.maximum(terms.weight, 1e-300), -1.0, 1.0)
+    multipliers[terms.weight == 0] = 0.0
+    x = np.clip(found.x[: len(lower)], lower, upper)
+    return x, multipliers, terms.bound(multipliers, lower, upper)
 
 
 @one_thread()
 def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
-    """The field of least 1-norm energy with the jumps of `field` within its windows.
-
-    Also returns the multipliers of its first strokes, shape (s,) in [-1, 1]: the force that keeps each
-    stroke, relative to its weight.
-    """
+    """The field of least 1-norm energy with the jumps of `field`, and its strokes' multipliers, (s,)."""
     instance, m = field.instance, len(field.p)
-    quarter = np.full(instance.grid.size, QUARTER)
-    fit = LinearFit.of(
-        instance,
-        field.p,
-        np.concatenate([instance.alpha_lower, -quarter]),
-        np.concatenate([instance.alpha_upper, quarter]),
-    )
-    alpha, beta = np.split(fit.x, 2)
-    strokes = fit.multipliers[2 * m : 2 * m + len(instance.theta)]
-    return CrossField(instance, alpha, beta, field.p), strokes
+    x, multipliers, _ = linear_fit(instance, field.p, *bounds(instance))
+    strokes = multipliers[2 * m : 2 * m + len(instance.theta)]
+    return field_at(instance, x, field.p), strokes
 
 
 @one_thread()

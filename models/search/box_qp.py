@@ -8,15 +8,16 @@ found, one step leads to the minimum.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from ..field.field import CrossField
-from ..instance.grid import Floats
-from ..instance.instance import QUARTER
+from ..field.field import CrossField, relabelled
+from ..instance.grid import Floats, Ints
+from ..instance.instance import QUARTER, Instance
 from ..processes.deadline import Over, never
-from ..smooth.systems import one_thread
+from ..smooth.systems import PULL, one_thread
 from .energy import LinearSolver, Quadratic, energy_at
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15
@@ -28,24 +29,35 @@ _DECREASE: Final = 0.1  # least share of the decrease that the slope promises
 
 
 def fitted(field: CrossField, over: Over = never) -> CrossField:
-    """The field of least 2-norm energy with the jumps of `field`, alpha in its windows and |beta| <= pi/4.
+    """The field of least 2-norm energy with the jumps of `field` in its bounds: the optimum of `qp-fixed`.
 
-    This is the optimum of `qp-fixed`, the second stage of section 5 of the paper. Where the energy does not
-    determine angles (parts without strokes), they stay near the given ones. The gradient's entries that no
-    bound balances are below 1e-12 (1 + max |b|), see models/search/energy.py for b. If time is over before,
-    the best angles so far are returned.
+    Where the energy does not determine angles (parts without strokes), they stay near the given ones.
     """
-    instance = field.instance
-    quarter = np.full(instance.grid.size, QUARTER)
-    x = least_in_box(
-        energy_at(instance, field.p),
-        np.concatenate([field.alpha, field.beta]),
-        np.concatenate([instance.alpha_lower, -quarter]),
-        np.concatenate([instance.alpha_upper, quarter]),
-        over=over,
-    )
+    energy, x = energy_at(field.instance, field.p), np.concatenate([field.alpha, field.beta])
+    x = least_in_box(energy, x, *bounds(field.instance), over=over)
+    return field_at(field.instance, x, field.p)
+
+
+def field_at(instance: Instance, x: Floats, p: Ints) -> CrossField:
+    """The field with the angles x = (alpha, beta), shape (2n,), and jumps p."""
     alpha, beta = np.split(x, 2)
-    return CrossField(instance, alpha, beta, field.p)
+    return CrossField(instance, alpha, beta, p)
+
+
+def bounds(instance: Instance) -> tuple[Floats, Floats]:
+    """Least and greatest (alpha, beta) of a field, shapes (2n,)."""
+    quarter = np.full(instance.grid.size, QUARTER)
+    lower = np.concatenate([instance.alpha_lower, -quarter])
+    return lower, np.concatenate([instance.alpha_upper, quarter])
+
+
+def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
+    """As `bounds`, with alpha bounded only at strokes."""
+    lower, upper = bounds(instance)
+    free = np.ones(instance.grid.size, dtype=bool)
+    free[instance.stroke_index] = False
+    lower[: len(free)][free], upper[: len(free)][free] = -np.inf, np.inf
+    return lower, upper
 
 
 @one_thread()
@@ -61,15 +73,13 @@ def least_in_box(
 ) -> Floats:
     """The point of least energy with lower <= x <= upper, shapes (2n,), searched from x.
 
-    Bounds may be infinite.
-
-    Rounding, 500 steps, or the end of time stop the search too and return the best point so far.
+    Bounds may be infinite. The search also ends when rounding decides, after 500 steps, or when time is over.
     tolerance: the largest remaining slope that no bound balances, relative to 1 + the largest entry of b.
-    solver: a solver that was used for a similar system, which saves a factorisation.
+    solver: one that was used for a similar system, which saves a factorisation.
     """
     solver = LinearSolver() if solver is None else solver
     enough = tolerance * (1 + np.abs(energy.vector).max())
-    stiffness = energy.stiffness
+    stiffness = energy.matrix.diagonal() + PULL
     x = np.clip(x, lower, upper)
     for _ in range(_MOST_STEPS):
         if over():
@@ -93,3 +103,44 @@ def _falls(energy: Quadratic, slope: Floats, step: Floats) -> bool:
     """Whether a nonzero step lowers the energy by a fair share of the decrease that the slope promises."""
     promised = float(slope @ step)
     return promised < 0 and energy.change(slope, step) <= 2 * _DECREASE * promised
+
+
+@dataclass(eq=False)
+class FreeField:
+    """A field under construction: angles that may be any real numbers, jumps without ranges.
+
+    Windows and ranges of an instance make the label of a cross unique, but hinder growth and search.
+    """
+
+    instance: Instance
+    alpha: Floats
+    beta: Floats
+    p: Ints
+
+    @classmethod
+    def of(cls, field: CrossField) -> FreeField:
+        """The same angles and jumps, free to change."""
+        return cls(field.instance, field.alpha, field.beta, field.p)
+
+    @property
+    def x(self) -> Floats:
+        """Both angles, (alpha, beta), shape (2n,)."""
+        return np.concatenate([self.alpha, self.beta])
+
+    @x.setter
+    def x(self, value: Floats) -> None:
+        self.alpha, self.beta = np.split(value, 2)
+
+    @property
+    def field(self) -> CrossField:
+        """The same angles and jumps as a field."""
+        return CrossField(self.instance, self.alpha, self.beta, self.p)
+
+    @property
+    def energy(self) -> float:
+        """The 2-norm energy."""
+        return self.field.energy().total
+
+    def bounded(self, over: Over = never) -> CrossField:
+        """The field of least 2-norm energy for these jumps, within the bounds of alpha, beta and p."""
+        return fitted(relabelled(self.instance, self.alpha, self.beta, self.p), over)

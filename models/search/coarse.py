@@ -17,8 +17,8 @@ from ..field.jumps import parity_sign, stepped
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, MOST_WEIGHT, Instance
 from ..processes.deadline import Over, never
+from .box_qp import FreeField
 from .energy import LinearSolver
-from .free_field import FreeField
 from .improvement import improved_field, settle
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
@@ -27,11 +27,7 @@ CREEP: Final = 1e-3
 
 
 def halved(instance: Instance) -> Instance | None:
-    """The instance with each 2 x 2 pixels merged into one, or None when no stroke is left.
-
-    A coarse pixel is inside the mask when one of its pixels is. Its stroke is the mean of its pixels'
-    strokes, by the double angle.
-    """
+    """The instance with 2 x 2 pixels merged into one, strokes by mean double angles; None without strokes."""
     height, width = instance.mask.shape
     even = np.pad(instance.mask, ((0, height % 2), (0, width % 2)))
     squares = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2)
@@ -60,11 +56,7 @@ def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> Cro
 
 
 def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
-    """The field on the fine grid of `instance` that grows from a field on `halved(instance)`.
-
-    Crosses and jumps start with the values of the coarse pixels; at strokes u is the line nearer to the
-    stroke. Then angles and jumps settle until the time is over.
-    """
+    """The field that grows on the fine grid: its crosses and jumps start as the coarse ones, then settle."""
     state = lifted(coarse, instance)
     settle(state, LinearSolver(), over, enough=CREEP)
     return state.bounded(over)
@@ -74,9 +66,9 @@ def lifted(coarse: CrossField, instance: Instance) -> FreeField:
     """The crosses and jumps of the coarse pixels on the fine grid, before they settle; see `grown`."""
     grid = instance.grid
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
-    state = FreeField(instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance))
-    _face_strokes(state)
-    return state
+    return _facing_strokes(
+        instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance)
+    )
 
 
 def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:
@@ -89,12 +81,11 @@ def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:
     return np.where(first == second, 0, coarse.p[pair]).astype(np.int32)
 
 
-def _face_strokes(state: FreeField) -> None:
-    """Choose the label at each stroke pixel whose u is nearest to the stroke."""
-    instance, at = state.instance, state.instance.stroke_index
-    steps = np.zeros(instance.grid.size, dtype=np.int32)
-    steps[at] = _nearest_label(instance.target, state.alpha[at], state.beta[at])
-    state.alpha, state.beta, state.p = stepped(instance.grid, state.alpha, state.beta, state.p, steps)
+def _facing_strokes(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> FreeField:
+    """The same crosses, each stroke pixel with the label whose u is nearest to the stroke."""
+    at, steps = instance.stroke_index, np.zeros(instance.grid.size, dtype=np.int32)
+    steps[at] = _nearest_label(instance.target, alpha[at], beta[at])
+    return FreeField(instance, *stepped(instance.grid, alpha, beta, p, steps))
 
 
 def _nearest_label(target: Floats, alpha: Floats, beta: Floats) -> Ints:

@@ -31,12 +31,6 @@ class Quadratic:
     matrix: Any
     vector: Floats
 
-    @property
-    def stiffness(self) -> Floats:
-        """The diagonal of H, shape (2n,), above zero everywhere."""
-        stiffness: Floats = self.matrix.diagonal() + PULL
-        return stiffness
-
     def slope(self, x: Floats) -> Floats:
         """Half the gradient, Hx - b, shape (2n,)."""
         slope: Floats = self.matrix @ x - self.vector

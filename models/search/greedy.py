@@ -1,8 +1,8 @@
 """The greedy strategy of BendFields: the baseline for comparisons, and the start of solvers and searches.
 
 It grows one cell round every stroke pixel, in which all jumps are 0. Then it decides the jumps between
-cells, cheapest first, and updates the angles after every batch (docs/mathematics.md, 10). The strategy is
-that of mixed-integer quadrangulation.
+cells, cheapest first, and updates the angles after every batch (docs/mathematics.md, 10). Mixed-integer
+quadrangulation uses the same strategy.
 """
 
 from __future__ import annotations
@@ -16,29 +16,22 @@ from ..field.field import CrossField
 from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
-from ..processes.deadline import Over, Stop, never, stop_function
-from ..processes.progress import Progress, silent
+from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
 from ..smooth.systems import locally, one_thread
+from .box_qp import FreeField
 from .energy import CLOSE, LinearSolver, energy_at
-from .free_field import FreeField
 from .nearest_stroke import nearest_strokes
 
-_CLOSE_UP_TO: Final = (
-    8192  # pixels: beyond, solves take most of the time, and local updates rank jumps equally well
-)
+_CLOSE_UP_TO: Final = 8192  # pixels: beyond, solves take most of the time, and local updates rank as well
 
 
 @dataclass(frozen=True)
 class _Pace:
-    """Energy that one batch of jumps may add, and relative residual of the local updates of angles after it.
+    """Size of batches of jumps, and accuracy of the updates of angles after them."""
 
-    Local updates leave the smooth part of the error; None: updates by factorisations. share: of the energy
-    that all jumps so far have added, which a batch may add if that is more.
-    """
-
-    batch: float
-    local: float | None
-    share: float = 0.0
+    batch: float  # energy that a batch may add
+    local: float | None  # relative residual of local updates; None for updates by factorisations
+    share: float = 0.0  # of the energy added so far, which a batch may add if that is more
 
 
 _CLOSE: Final = _Pace(1.0, None)
@@ -77,10 +70,7 @@ def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop 
 
 
 def rough_greedy(instance: Instance, over: Over = never) -> FreeField:
-    """As `greedy_field`, in a tenth of its time: 60 batches, angles updated locally, no bounds.
-
-    The jumps differ, and are as good on average.
-    """
+    """As `greedy_field`, without bounds, in a tenth of its time: 60 batches, angles updated locally."""
     state, nearest = _cells(instance)
     _stitch(state, nearest, _ROUGH, over)
     return state

@@ -20,9 +20,8 @@ from ..instance.grid import Ints
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, Stop, never, stop_function
 from ..smooth.systems import one_thread
-from .box_qp import least_in_box
+from .box_qp import FreeField, free_bounds, least_in_box
 from .energy import CLOSE, LinearSolver, energy_at
-from .free_field import FreeField, free_bounds
 from .nearest_stroke import chamfer, nearest_strokes
 
 FALL: Final = 1e-9
@@ -63,10 +62,9 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
 
 
 def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough: float = FALL) -> None:
-    """Alternate solving within the bounds and choosing jumps, while the energy falls and time lasts.
+    """Alternate solving within the bounds and choosing jumps, until a round's relative fall is below enough.
 
-    enough: relative fall of the energy in a round below which no more rounds follow. Singularities move by a
-    pixel per round, on fine grids for a hundred rounds.
+    Singularities move by a pixel per round, on fine grids for a hundred rounds.
     """
     bounds = free_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
@@ -87,11 +85,7 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough
 
 
 def _swap_lines(state: FreeField) -> None:
-    """Exchange u and v where a stroke pixel's alpha has reached a bound of its window in the gauge `strokes`.
-
-    There (alpha, beta) and (alpha -+ pi/2, -beta) fit the stroke equally badly, and beyond the bound the
-    other fits better.
-    """
+    """Exchange u and v at strokes with alpha at a bound in the gauge `strokes`: beyond it v fits better."""
     instance, at = state.instance, state.instance.stroke_index
     if instance.gauge != "strokes":
         return
@@ -119,10 +113,7 @@ def _exchange_families(state: FreeField, solver: LinearSolver, over: Over) -> No
 
 
 def _turn_if_better(state: FreeField, own: Ints, solver: LinearSolver, over: Over) -> None:
-    """Turn the crosses round a curve (own = 1) by a quarter either way, and keep the largest decrease.
-
-    Without the bounds the energy of a trial is a lower bound, and usually the exact energy.
-    """
+    """Turn the crosses round a curve (own = 1) by a quarter either way, and keep the largest decrease."""
     enough = state.energy * (1 - 1e-6) - 1e-9
     trials = [_turned(state, quarters, solver) for quarters in (own, -own)]
     best = min(trials, key=lambda trial: round(trial.energy, 9))
@@ -133,11 +124,7 @@ def _turn_if_better(state: FreeField, own: Ints, solver: LinearSolver, over: Ove
 
 
 def _turned(state: FreeField, quarters: Ints, solver: LinearSolver) -> FreeField:
-    """The state after turning each pixel's labels back by `quarters`, solved; the former v is the new u.
-
-    The turn alone does not change the crosses; but the strokes, which pull at u, now pull at the other
-    line.
-    """
+    """The state after turning labels back by `quarters`, solved: strokes pull at the other line."""
     grid, sign = state.instance.grid, parity_sign(quarters)
     trial = FreeField(state.instance, *stepped(grid, state.alpha, state.beta, state.p, -quarters))
     energy = energy_at(trial.instance, trial.p)
@@ -147,6 +134,13 @@ def _turned(state: FreeField, quarters: Ints, solver: LinearSolver) -> FreeField
     matrix = sparse.diags_array(old) @ energy.matrix @ sparse.diags_array(old)
     trial.x = trial.x + old * solver.step(matrix, -old * energy.slope(trial.x), CLOSE)
     return trial
+
+
+def pixel_curves(instance: Instance) -> Ints:
+    """The curve of each pixel, (n,); -1 without a stroke."""
+    curve = np.full(instance.grid.size, -1)
+    curve[instance.stroke_index] = stroke_curves(instance)
+    return curve
 
 
 def stroke_curves(instance: Instance) -> Ints:

@@ -14,7 +14,7 @@ costs one update of G. Angles outside the patch stay as they are; the energy is 
 Updates lose digits. Where the parities of all jumps fit together and every stroke has the same sign of beta,
 (alpha + c, beta -+ c) costs w_beta alone. Then H has an eigenvalue of about w_beta, and a jump that ends this
 state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is computed
-from its definition (models/search/patch_energy.py). If the updates give another energy, G is computed anew.
+from its definition (`PatchEnergy`). If the updates give another energy, G is computed anew.
 Gains that no energy can have are discarded too.
 """
 
@@ -27,13 +27,13 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.linalg.blas import dgemm
 
+from ..field.field import CrossField
 from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, Instance
 from ..smooth.systems import PULL
+from .box_qp import free_bounds
 from .energy import energy_at
-from .free_field import free_bounds
-from .patch_energy import PatchEnergy
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)
 """Changes of one jump in the rows of `gains`."""
@@ -91,16 +91,50 @@ class Patch:
         return np.concatenate([self.pixels, self.pixels + self.instance.grid.size])
 
 
+class PatchEnergy:
+    """The 2-norm energy by its definition, free of errors of updates, where only a patch changes."""
+
+    def __init__(self, instance: Instance, pixels: Ints, x: Floats, p: Ints) -> None:
+        """Take over angles x (2n,) and jumps p (m,); those outside the pixels (k,) stay."""
+        grid, free = instance.grid, np.zeros(len(x) // 2, dtype=bool)
+        free[pixels] = True
+        self._instance = instance
+        self._pairs = np.nonzero(free[grid.first] | free[grid.second])[0].astype(np.int32)
+        ends = np.concatenate([grid.first[self._pairs], grid.second[self._pairs]])
+        # Local numbers: the pixels of the patch, and then those beside it, whose angles stay.
+        beside = np.setdiff1d(ends, pixels)
+        number = np.zeros(grid.size, dtype=np.int32)
+        number[np.concatenate([pixels, beside])] = np.arange(len(pixels) + len(beside))
+        self._first, self._second = np.split(number[ends], 2)
+        alpha, beta = np.split(x, 2)
+        self._alpha, self._beta = alpha[beside], beta[beside]
+        strokes = np.nonzero(free[instance.stroke_terms.pixel])[0].astype(np.int32)
+        self._strokes = instance.stroke_terms.chosen(strokes, number)
+        field, terms = CrossField(instance, alpha, beta, p), instance.stroke_terms
+        pair = field.residual_a**2 + field.residual_b**2
+        stroke = terms.weight * terms.residuals(alpha, beta) ** 2
+        pair[self._pairs], stroke[strokes] = 0.0, 0.0
+        skew = instance.skew_coefficient * (beta[~free] ** 2).sum()
+        self._rest = float(2 * pair.sum() + stroke.sum() + skew)
+
+    def __call__(self, x: Floats, p: Ints) -> float:
+        """The energy at the patch's angles x (2k,) and the jumps p (m,) of the whole field."""
+        inside = np.split(x, 2)
+        alpha, beta = np.concatenate([inside[0], self._alpha]), np.concatenate([inside[1], self._beta])
+        jumps = p[self._pairs]
+        a = alpha[self._first] - alpha[self._second] + HALF * jumps
+        b = parity_sign(jumps) * beta[self._first] - beta[self._second]
+        r = self._strokes.residuals(alpha, beta)
+        skew = self._instance.skew_coefficient * float(inside[1] @ inside[1])
+        return self._rest + 2 * float(a @ a + b @ b) + float(self._strokes.weight @ (r * r)) + skew
+
+
 class Landscape:
     """The least energy over a patch's angles at jumps that change step by step; angles outside stay.
 
-    energy: of the whole field, by its definition, plus the penalties that keep bounds and make H definite. A
-    stiff penalty on angles that would pass their bounds keeps them, so the energy is exact to about 1e-4
-    where bounds matter. Without bounds (`gains` does not look ahead to bounds that a change would meet) walks
-    lead to points that look low and are not, so bounds are kept at every step.
-
-    Raises LinAlgError, at the start and in a change, when the jumps lead to a system that double precision
-    cannot solve.
+    energy: of the whole field, by its definition, plus penalties. A stiff penalty keeps angles within their
+    bounds at every step, to about 1e-4; without it walks lead to points that look low and are not. Raises
+    LinAlgError when the jumps lead to a system that double precision cannot solve.
     """
 
     def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
@@ -111,7 +145,7 @@ class Landscape:
         self._defined = PatchEnergy(patch.instance, patch.pixels, x, p)
         soft = max(PULL, _SOFTEST - patch.instance.skew_coefficient)
         self._soft = np.repeat([PULL, soft], len(patch.pixels))
-        self._lower, self._upper = _bounds(patch)
+        self._lower, self._upper = (each[patch.unknowns] for each in free_bounds(patch.instance))
         self._held: dict[int, float] = {}
         self._solve()
         self._settle()
@@ -143,10 +177,7 @@ class Landscape:
         self.energy, self._held, self._fresh = state.energy, dict(state.held), False
 
     def gains(self) -> Floats:
-        """Change of the energy when each jump changes by +1 and by -1; shape (2, e), rows as in STEPS.
-
-        Infinite where rounding hides the gain even from a fresh inverse.
-        """
+        """Change of the energy for each change of one jump, (2, e), rows as in STEPS; inf where unknown."""
         gains = self._gains()
         if np.isinf(gains).any() and not self._fresh:
             self._solve()
@@ -193,8 +224,9 @@ class Landscape:
         self._x += moved
         places, added = self._couplings(pairs, steps)
         if len(places):
-            small = self._small(places, added)
+            # With C = `added`, H + C has the inverse G - G C (1 + G C)^-1 G.
             columns = self._inverse[:, places]
+            small = added @ np.linalg.inv(np.eye(len(places)) + columns[places] @ added)
             here = self._x[places]
             self.energy += float(here @ small @ here)
             self._x -= columns @ (small @ here)
@@ -263,12 +295,6 @@ class Landscape:
         added[first, second] = added[second, first] = 4 * parity_sign(self.p[self.patch.pairs[odd]])
         return places + len(self.patch.pixels), added
 
-    def _small(self, places: Ints, added: Floats) -> Floats:
-        """C (1 + G C)^-1 for added couplings C: H + C has the inverse G - G (...) G."""
-        inside = self._inverse[np.ix_(places, places)]
-        small: Floats = added @ np.linalg.inv(np.eye(len(places)) + inside @ added)
-        return small
-
     def _update(self, factor: float, left: Floats, right: Floats) -> None:
         self._inverse = dgemm(factor, left, right, beta=1.0, c=self._inverse, trans_b=1, overwrite_c=1)
 
@@ -303,9 +329,3 @@ class Landscape:
         self.energy += share * off * off
         self._x += column[:, 0] * (share * off)
         self._update(-share, column, column)
-
-
-def _bounds(patch: Patch) -> tuple[Floats, Floats]:
-    """Least and greatest angles of the patch, shapes (2k,)."""
-    lower, upper = free_bounds(patch.instance)
-    return lower[patch.unknowns], upper[patch.unknowns]

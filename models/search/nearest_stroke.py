@@ -13,10 +13,7 @@ from ..instance.instance import Instance
 
 
 def nearest_strokes(instance: Instance) -> Ints:
-    """For each pixel the number of its nearest stroke pixel, or -1 in a part without strokes; shape (n,).
-
-    Nearest by the 3-4 chamfer distance along paths inside the mask.
-    """
+    """The number of each pixel's nearest stroke pixel by `chamfer`, -1 in a part without strokes; (n,)."""
     grid = instance.grid
     _, _, source = dijkstra(
         chamfer(grid), directed=False, indices=instance.stroke_index, min_only=True, return_predecessors=True

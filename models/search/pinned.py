@@ -15,9 +15,8 @@ import numpy as np
 
 from ..field.field import CrossField
 from ..instance.grid import Floats
-from ..instance.instance import QUARTER
 from ..smooth.systems import one_thread
-from .box_qp import fitted
+from .box_qp import bounds, field_at, fitted
 from .energy import LinearSolver, Quadratic, energy_at
 from .nearest_stroke import nearest_strokes
 
@@ -48,9 +47,7 @@ def pinned(field: CrossField) -> CrossField:
 
     """
     instance, start = field.instance, fitted(field)
-    quarter = np.full(instance.grid.size, QUARTER)
-    lower = np.concatenate([instance.alpha_lower, -quarter])
-    upper = np.concatenate([instance.alpha_upper, quarter])
+    lower, upper = bounds(instance)
     energy, solver = energy_at(instance, field.p), LinearSolver()
     unreached = np.tile(nearest_strokes(instance) < 0, 2)
     x, rest = np.concatenate([start.alpha, start.beta]), np.zeros(len(lower))
@@ -65,8 +62,7 @@ def pinned(field: CrossField) -> CrossField:
             break
     x = np.round(x + rest, _DECIMALS) + 0.0  # no -0.0
     x = np.where(x - lower < _AT_BOUND, lower, np.where(upper - x < _AT_BOUND, upper, x))
-    alpha, beta = np.split(x, 2)
-    return CrossField(instance, alpha, beta, field.p)
+    return field_at(instance, x, field.p)
 
 
 def _slope(energy: Quadratic, x: Floats, rest: Floats) -> Floats:
@@ -75,12 +71,8 @@ def _slope(energy: Quadratic, x: Floats, rest: Floats) -> Floats:
     product, error = _two_product(matrix.data, x[matrix.indices])
     terms = np.stack([product, error, matrix.data * rest[matrix.indices]], axis=1).ravel().tolist()
     ends, vector = (3 * matrix.indptr).tolist(), energy.vector.tolist()
-    return np.array(
-        [
-            math.fsum([*terms[begin:end], -goal])
-            for begin, end, goal in zip(ends[:-1], ends[1:], vector, strict=True)
-        ]
-    )
+    rows = zip(ends[:-1], ends[1:], vector, strict=True)
+    return np.array([math.fsum([*terms[begin:end], -goal]) for begin, end, goal in rows])
 
 
 def _two_product(a: Floats, b: Floats) -> tuple[Floats, Floats]:

@@ -19,19 +19,18 @@ from ..errors import InputError
 from ..field.field import CrossField
 from ..instance.grid import Bools
 from ..instance.instance import Instance
-from ..processes.deadline import Deadline, Over, never
-from ..processes.interruption import interruptible
-from ..processes.progress import Progress, silent
+from ..processes.deadline import Deadline, Over, Progress, never, silent
+from ..processes.groups import interruptible
 from ..processes.side_by_side import checked, side_by_side
 from ..smooth.power_field import power_field
 from ..smooth.systems import one_thread
+from .box_qp import FreeField, free_bounds
 from .coarse import halved, prolonged
 from .energy import LinearSolver
-from .free_field import FreeField, free_bounds
-from .improvement import improved_field, settle, stroke_curves
+from .improvement import improved_field, pixel_curves, settle
 from .landscape import Point
 from .nearest_stroke import nearest_strokes
-from .starts import first_field, polyvector_start
+from .starts import best_start, polyvector_start, rounded_energy
 from .walk import LOWER, Explored, Task, explore
 
 Suggest = Callable[[CrossField, Callable[[], float], Over], CrossField]
@@ -90,19 +89,9 @@ def search_patches(
     stop: Over = never,
     suggest: Suggest = lambda field, *_: field,
 ) -> Search:
-    """Search patch by patch, from the best of several fields and of what `suggest` makes of it.
+    """Search patch by patch, from the best start or from what `suggest` returns for it.
 
-    `crossfield.search` documents the parameters. The field is no higher than the first field
-    (models/search/starts.py), unless time cuts that off. Nor is it higher than what `suggest` makes of the
-    best of the starts, here and on grids of lower resolution.
-
-    Raises
-    ------
-    InputError
-        For a negative number of rounds, and for too few or too many jobs.
-    InstanceError
-        For a start on another instance.
-
+    `crossfield.search` documents the other parameters, and the errors.
     """
     if (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of rounds and of jobs")
@@ -180,23 +169,9 @@ def _from_coarse(
 
 
 def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best of first field, given field and, in time, PolyVector and power field, or a suggestion from it.
-
-    Each is improved in time.
-    """
-    fields = [first_field(instance, limits.over)]
-    if given is not None:
-        fields.append(improved_field(given, stop=limits.over))
-    if not limits.over():
-        fields.append(improved_field(polyvector_start(instance, limits.over), stop=limits.over))
-    if not limits.over():
-        fields.append(improved_field(power_field(instance), stop=limits.over))
-    best = min(fields, key=_energy)
+    """The best start, or what is suggested from it."""
+    best = best_start(instance, given, limits.over, polyvector_start, lambda each, _: power_field(each))
     return best if limits.over() else limits.suggest(best, limits.deadline.left, limits.over)
-
-
-def _energy(field: CrossField) -> float:
-    return round(field.energy().total, 9)
 
 
 class _Hunt:
@@ -216,13 +191,12 @@ class _Hunt:
         self._unsettled = False
         # Parts without a stroke are constant and cost nothing.
         self._reached = nearest_strokes(instance) >= 0
-        self._curve = np.full(instance.grid.size, -1)
-        self._curve[instance.stroke_index] = stroke_curves(instance)
+        self._curve = pixel_curves(instance)
 
     def best(self, over: Over) -> CrossField:
         """The field of least energy so far."""
         self._settle(over)
-        return min(self._state.bounded(over), self._start, key=_energy)
+        return min(self._state.bounded(over), self._start, key=rounded_energy)
 
     @property
     def large(self) -> bool:

@@ -21,10 +21,9 @@ from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
 from ..smooth.systems import locally, one_thread
-from .box_qp import fitted
+from .box_qp import FreeField, fitted, free_bounds
 from .coarse import CREEP, halved, lifted
 from .energy import LinearSolver, energy_at
-from .free_field import FreeField, free_bounds
 from .greedy import greedy_field, rough_greedy
 from .improvement import improved_field, settle
 
@@ -40,30 +39,36 @@ _FAINT: Final = 1e-2  # of the polynomials of an approximate field, whose values
 
 @one_thread()
 def first_field(instance: Instance, over: Over = never) -> CrossField:
-    """A field of low 2-norm energy within the time, to start searches and to give `qp-fixed` its jumps.
+    """A field of low 2-norm energy within the time.
 
     Up to 1024 pixels it is the improved greedy field. On larger grids it fuses fast approximate fields of up
     to ten strategies, fewer on larger grids, and a field grown from the grid of half the resolution.
-    Deterministic if time does not cut it off.
     """
     if instance.grid.size <= _SMALL:
         return improved_field(greedy_field(instance, stop=over), stop=over)
     return _best_of_many(instance, over)[0].bounded(over)
 
 
+def best_start(
+    instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
+) -> CrossField:
+    """The field of least energy: the first field, the given one and, in time, the others, each improved."""
+    fields = [first_field(instance, over)]
+    if given is not None:
+        fields.append(improved_field(given, stop=over))
+    fields.extend(improved_field(other(instance, over), stop=over) for other in others if not over())
+    return min(fields, key=rounded_energy)
+
+
 @one_thread()
 def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
-    """The field of least 2-norm energy among the PolyVector fields of all `HOLDS`, with their best angles.
-
-    The hold with the best jumps depends on how much strokes contradict each other, and a fit costs little.
-    When time is over, the best of the fields so far is returned.
-    """
+    """The field of least 2-norm energy among the PolyVector fields of all `HOLDS`, with their best angles."""
     best = fitted(polyvector_field(instance, hold=HOLDS[0]), over)
     for hold in HOLDS[1:]:
         if over():
             break
         tried = fitted(polyvector_field(instance, hold=hold), over)
-        best = min(best, tried, key=_energy)
+        best = min(best, tried, key=rounded_energy)
     return best
 
 
@@ -136,5 +141,6 @@ def _of_state(state: FreeField) -> float:
     return round(state.energy, 9)
 
 
-def _energy(field: CrossField) -> float:
+def rounded_energy(field: CrossField) -> float:
+    """The 2-norm energy for comparisons, which differences between processors must not decide."""
     return round(field.energy().total, 9)

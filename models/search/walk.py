@@ -7,19 +7,22 @@ point.
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over
 from ..smooth.systems import one_thread
+from .box_qp import field_at
 from .landscape import STEPS, Landscape, Patch, Point
-from .perturbations import Change, Perturbations
+
+Change = tuple[Ints, Ints]
+"""Local numbers of pairs of a patch, each at most once, and the steps that are added to their jumps."""
 
 LOWER: Final = 1e-7
 """Energy by which a field has to be lower to count as better: less may be rounding."""
@@ -27,24 +30,23 @@ LOWER: Final = 1e-7
 _FRUITLESS: Final = 4  # changes of one jump without a new lowest point that end a walk
 _MOST_STEPS: Final = 1000  # of a walk; 5 to 60 are usual
 _REST: Final = (4, 12)  # changes for which a jump stays fixed once it has changed
+_LONGEST: Final = 16  # quads of a path
+_WIDEST: Final = 12.0  # pixels, radius of a disc
+_TURNS: Final = 0.6  # share of turns
+_SIDES: Final = (1, 1, -1, -1)  # signs of the pairs of a quad on its counter-clockwise walk
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A patch to explore from a field.
-
-    x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the patch,
-    shape (n,); curve: number of the curve of each pixel, -1 without a stroke, shape (n,); perturbations:
-    how many to try; seed: of their choice; deadline: when to end.
-    """
+    """A patch to explore from a field."""
 
     instance: Instance
-    x: Floats
+    x: Floats  # angles (alpha, beta) of the whole field, (2n,)
     p: Ints
-    free: Bools
-    curve: Ints
-    perturbations: int
-    seed: tuple[int, ...]
+    free: Bools  # pixels of the patch
+    curve: Ints  # number of the curve of each pixel, -1 without a stroke
+    perturbations: int  # how many to try
+    seed: tuple[int, ...]  # of their choice
     deadline: Deadline
 
 
@@ -59,11 +61,7 @@ class Explored(NamedTuple):
 
 
 def explore(task: Task) -> Explored:
-    """Explore a patch; energies follow their definition, within all bounds of the angles.
-
-    The same task gives the same field unless its deadline cuts it off. It runs on one thread, because sums
-    over several threads end in other digits.
-    """
+    """Explore a patch on one thread: the same task gives the same point unless its deadline cuts it off."""
     with one_thread(), suppress(np.linalg.LinAlgError):
         return _explore(task, task.deadline.passed)
     return Explored(None, whole=True)
@@ -74,8 +72,7 @@ def _explore(task: Task, over: Over) -> Explored:
     patch = Patch.of(task.instance, task.free)
     land = Landscape(patch, task.x, task.p)
     home, perturbations = land.saved(), Perturbations(patch, task.curve)
-    alpha, beta = np.split(task.x, 2)
-    given = CrossField(task.instance, alpha, beta, task.p).energy().total
+    given = field_at(task.instance, task.x, task.p).energy().total
     # Solved in the patch alone, the angles may be lower already; jumps have to improve on that.
     least = min(given, land.point.energy)
     best: Point | None = None
@@ -94,14 +91,11 @@ def _explore(task: Task, over: Over) -> Explored:
 def _perturbed(
     land: Landscape, perturbation: Change, rng: np.random.Generator, goal: float, over: Over
 ) -> Landscape | None:
-    """The landscape at the lowest point below `goal` of the walk after a perturbation, computed anew.
-
-    Rounding of many updates must not accumulate. None when there is no such point, or none that can be
-    computed.
-    """
+    """The landscape at the lowest point below `goal` of the walk after a perturbation; None without one."""
     with suppress(np.linalg.LinAlgError):
         land.change(*perturbation)
         jumps = _walk(land, rng, goal, over)
+        # Computed anew, because rounding of many updates must not accumulate.
         return None if jumps is None else Landscape(land.patch, land.angles, jumps)
     return None
 
@@ -128,3 +122,78 @@ def _walk(land: Landscape, rng: np.random.Generator, goal: float, over: Over) ->
         if fruitless == _FRUITLESS:
             break
     return found
+
+
+class Perturbations:
+    """Random changes of several jumps at once, to leave a valley that single changes do not leave.
+
+    `shift` follows a path of quads and moves the turn at its start to its end: a singularity moves, two
+    opposite ones meet, or a pair of them is created. `turn` goes round a piece of a curve, or a disc: the
+    strokes inside change to the other family of lines.
+    """
+
+    def __init__(self, patch: Patch, curve: Ints) -> None:
+        """Prepare the patch; curve: number of the curve of each pixel, -1 without a stroke; shape (n,)."""
+        instance = patch.instance
+        self._patch = patch
+        local = np.full(len(instance.grid.first), -1)
+        local[patch.pairs] = np.arange(len(patch.pairs))
+        quads = local[instance.grid.quads]
+        self._quads = quads[(quads >= 0).all(axis=1)]
+        # The quads with each pair at bottom or right [0], and at top or left [1], or -1.
+        self._beside = np.full((len(patch.pairs), 2), -1)
+        for side in range(4):
+            self._beside[self._quads[:, side], int(side >= 2)] = np.arange(len(self._quads))
+        self._curve = curve[patch.pixels]
+        self._strokes = np.nonzero(self._curve >= 0)[0]
+        self._row = instance.grid.rows[patch.pixels].astype(np.float64)
+        self._column = instance.grid.columns[patch.pixels].astype(np.float64)
+
+    def draw(self, rng: np.random.Generator, p: Ints) -> Change:
+        """A random change for the present jumps p (m,); never an empty one if the patch has a quad."""
+        kind = rng.random()
+        change = self.turn(rng) if kind < _TURNS and len(self._strokes) else self.shift(rng, p)
+        return change if len(change[0]) else self.shift(rng, p)
+
+    def shift(self, rng: np.random.Generator, p: Ints) -> Change:
+        """The jumps along a random path of quads, which starts at a singularity every other time."""
+        if not len(self._quads):
+            pair = rng.integers(len(self._patch.pairs), size=1, dtype=np.int32)
+            return pair, rng.choice(np.array([-1, 1], dtype=np.int32), size=1)
+        turns = p[self._patch.pairs[self._quads]] @ np.array(_SIDES)
+        singular = np.nonzero(turns)[0]
+        if len(singular) and rng.random() < 0.5:
+            quad = int(rng.choice(singular))
+            direction = -int(np.sign(turns[quad]))
+        else:
+            quad = int(rng.integers(len(self._quads)))
+            direction = int(rng.choice([-1, 1]))
+        return self._path(rng, quad, direction)
+
+    def _path(self, rng: np.random.Generator, quad: int, direction: int) -> Change:
+        """The jumps of a path from a quad that change its turn by `direction`."""
+        steps: Counter[int] = Counter()
+        side = int(rng.integers(4))
+        for _ in range(int(_LONGEST ** rng.random())):
+            pair = int(self._quads[quad, side])
+            steps[pair] += direction * _SIDES[side]
+            quad = int(self._beside[pair, int(side < 2)])
+            if quad < 0:  # the border of the patch: the turn has left
+                break
+            if rng.random() < 0.3:
+                side = int(rng.integers(4))
+        kept = {pair: step for pair, step in steps.items() if step}
+        return np.array(list(kept), dtype=np.int32), np.array(list(kept.values()), dtype=np.int32)
+
+    def turn(self, rng: np.random.Generator) -> Change:
+        """The jumps round the strokes of a disc, of one curve or of all."""
+        centre = int(rng.choice(self._strokes))
+        radius = 0.5 * (2 * _WIDEST) ** rng.random()
+        away = np.hypot(self._row - self._row[centre], self._column - self._column[centre])
+        inside = (away <= radius) & (self._curve >= 0)
+        if rng.random() < 0.7:
+            inside &= self._curve == self._curve[centre]
+        own: Ints = inside.astype(np.int32) * np.int32(rng.choice([-1, 1]))
+        steps = own[self._patch.first] - own[self._patch.second]
+        pairs = np.nonzero(steps)[0].astype(np.int32)
+        return pairs, steps[pairs]

@@ -11,8 +11,7 @@ from scipy import ndimage
 
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Grid
-from ..processes.deadline import Over, Stop, stop_function
-from ..processes.progress import Progress, silent
+from ..processes.deadline import Over, Progress, Stop, silent, stop_function
 from ..smooth.systems import one_thread
 from .crosses import Crosses
 from .descent import descended

@@ -14,9 +14,8 @@ PROGRAM = """
 import hashlib, json, time
 import crossfield as cf
 from crossfield.models.search.box_lp import fitted_1norm
-from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.box_qp import FreeField, fitted
 from crossfield.models.search.energy import LinearSolver
-from crossfield.models.search.free_field import FreeField
 from crossfield.models.search.improvement import settle
 from crossfield.models.search.starts import first_field
 

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.record import LevelRecord, Proof
 
 QUANTUM = 2.0**-24
@@ -115,19 +116,20 @@ class Table:
     def record(self, bound, energy):
         labels = self.labels
         first, second = ([share[side] for share in self.shares] for side in (0, 1))
-        return LevelRecord(
+        lattice = Lattice(
+            self.field.instance,
             self.h,
             self.field.alpha,
             self.field.beta,
             self.field.p,
             *(np.array(x) for x in zip(*((k[0], len(k), q[0], len(q)) for k, q, _ in labels), strict=True)),
             np.concatenate([allowed.ravel() for *_, allowed in labels]),
-            np.concatenate([*first, np.zeros(0)]),
-            np.concatenate([*second, np.zeros(0)]),
-            QUANTUM,
-            bound,
-            energy,
         )
+        shares = {
+            "shares_first": np.concatenate([*first, []]),
+            "shares_second": np.concatenate([*second, []]),
+        }
+        return LevelRecord.on(lattice, **shares, quantum=QUANTUM, bound=bound, energy=energy)
 
 
 def whole(field, h, i, offset):

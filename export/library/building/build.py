@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
-from ....models.processes.progress import Progress, silent
+from ....models.processes.deadline import Progress, silent
 from ....models.storage import make_folder, write_bytes
 from ..documents.documents import Library, about_file, are_whole, read_about, read_library, read_sidecar
 from ..documents.lock import locked

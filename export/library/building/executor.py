@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import Any, Final, TypeVar
 
 from ....models.errors import CrossfieldError, InputError
-from ....models.processes.messages import WorkerError
+from ....models.processes.control import WorkerError
 from ....models.processes.side_by_side import workers
 
 T = TypeVar("T")

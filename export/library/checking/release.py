@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Final
 
 from ....models.errors import InputError, OutputError
-from ....models.processes.progress import Progress, silent
+from ....models.processes.deadline import Progress, silent
 from ....models.storage import make_folder, read_bytes, replacing, sha256_of, write_bytes
 from ..building.index import SUMS
 from ..documents.citation import slug

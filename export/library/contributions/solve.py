@@ -23,8 +23,8 @@ from ....models.errors import (
 )
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
+from ....models.processes.deadline import Progress, silent
 from ....models.processes.limits import Limits
-from ....models.processes.progress import Progress, silent
 from ...solutions.logs.registry import read_log
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution

@@ -18,7 +18,7 @@ from ....models.field.field import CrossField
 from ....models.field.file import field_of_json, read_field
 from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
 from ....models.formulations.problem import Problem, Violation
-from ....models.processes.progress import Progress, silent
+from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes
 from ...formats.registry import generator

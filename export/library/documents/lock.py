@@ -17,7 +17,7 @@ from typing import Final
 from filelock import FileLock, Timeout
 
 from ....models.errors import OutputError, shortened
-from ....models.processes.progress import Progress, silent
+from ....models.processes.deadline import Progress, silent
 
 FILE: Final = ".lock"
 PATIENCE: Final = 600.0

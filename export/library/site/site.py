@@ -25,7 +25,7 @@ from ....models.errors import InputError, InstanceError, OutputError
 from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.instance.file import read_instance
-from ....models.processes.progress import Progress, silent
+from ....models.processes.deadline import Progress, silent
 from ....models.storage import make_folder, neighbour, read_bytes, remove_dead, sha256_of, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS

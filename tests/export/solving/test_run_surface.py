@@ -8,7 +8,7 @@ import pytest
 from crossfield.export.cli.output import show_report
 from crossfield.export.solving.methods import Candidate
 from crossfield.export.solving.run import Report, _shaded
-from crossfield.models.processes.progress import silent
+from crossfield.models.processes.deadline import silent
 from PIL import Image
 from shapes import ball
 

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -11,8 +12,8 @@ import pytest
 import work
 from children import all_end, descendants
 from crossfield.models.processes.child import Child, KilledError
+from crossfield.models.processes.control import WorkerError
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.processes.messages import WorkerError
 
 
 class Clock:
@@ -74,10 +75,10 @@ def test_a_child_works_in_its_folder(tmp_path):
 
 
 def test_failures_are_named(child):
-    with pytest.raises(WorkerError, match="ended with code 3"):
+    with pytest.raises(WorkerError, match="a process ended before its work was done: it ended with code 3"):
         child.call(os._exit, 3)
-    with pytest.raises(WorkerError, match="a task cannot be sent"):
-        child.call(abs, lambda: 0)
+    with pytest.raises(WorkerError, match="a task cannot be sent to a process: TypeError: cannot pickle"):
+        child.call(abs, threading.Lock())
     with pytest.raises(WorkerError, match="cannot be sent back"):
         child.call(open, os.devnull)
     with pytest.raises(ValueError, match="'three'") as caught:

@@ -10,8 +10,12 @@ from contextlib import contextmanager
 import crossfield as cf
 import pytest
 from children import all_end, complaints, descendants, running
+from crossfield.export.cli.app import invoke
+from crossfield.export.library.building.build import build
+from crossfield.export.library.plan.spec import default_spec
 from crossfield.export.solving.methods import METHODS
 from crossfield.export.solving.run import PICTURES, plan
+from crossfield.models.processes.side_by_side import MOST
 
 FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj", "field.sings"}
 
@@ -141,9 +145,6 @@ def test_the_plan_is_the_first_thing_that_is_told(tmp_path):
     ],
 )
 def test_too_many_threads_or_processes_are_refused_with_the_range(tmp_path, arguments, capsys):
-    from crossfield.export.cli.app import invoke
-    from crossfield.models.processes.side_by_side import MOST
-
     assert invoke([*arguments, "100000", "-o", str(tmp_path / "out")]) == 2
     output = " ".join(capsys.readouterr().err.replace("\u2502", " ").split())
     assert f"Invalid value for '{arguments[-1]}'" in output
@@ -152,12 +153,10 @@ def test_too_many_threads_or_processes_are_refused_with_the_range(tmp_path, argu
 
 
 def test_too_many_jobs_are_refused_in_python_too(tmp_path):
-    from crossfield.export.library.building.build import build
-    from crossfield.export.library.plan.spec import default_spec
-
-    with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
-        cf.write_all(cf.sample("skew", 4), tmp_path, jobs=100000)
-    with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
-        build(default_spec(), tmp_path / "library", jobs=100000)
-    with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
-        cf.search(cf.sample("mouse", 14), limits=cf.Limits(1), jobs=100000)
+    for work in (
+        lambda: cf.write_all(cf.sample("skew", 4), tmp_path, jobs=100000),
+        lambda: build(default_spec(), tmp_path / "library", jobs=100000),
+        lambda: cf.search(cf.sample("mouse", 14), limits=cf.Limits(1), jobs=100000),
+    ):
+        with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
+            work()

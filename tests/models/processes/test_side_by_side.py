@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import crossfield as cf
@@ -13,7 +12,7 @@ import pytest
 from children import all_end, descendants
 from crossfield.models.errors import InputError
 from crossfield.models.processes import side_by_side as module
-from crossfield.models.processes.messages import WorkerError
+from crossfield.models.processes.control import WorkerError
 from crossfield.models.processes.side_by_side import MOST, checked, side_by_side
 
 
@@ -32,20 +31,6 @@ def test_there_are_as_many_processes_as_tasks_and_jobs_allow():
         assert len(descendants(os.getpid()) - before) == 1
         work([0.3] * 9)
         assert 1 < len(descendants(os.getpid()) - before) <= 4
-
-
-def test_an_error_of_the_work_is_raised_here_and_the_process_goes_on():
-    with side_by_side(int, 2) as work:
-        with pytest.raises(ValueError, match="'three'") as caught:
-            work(["1", "three"])
-        assert "in _answer" in caught.value.__notes__[0]
-        assert work(["4", "5"]) == [4, 5]
-
-
-def test_a_process_that_dies_is_named_with_its_exit_code():
-    with side_by_side(os._exit, 2) as work, pytest.raises(WorkerError) as caught:
-        work([3])
-    assert str(caught.value) == "a process ended before its work was done: it ended with code 3"
 
 
 @pytest.mark.parametrize("number,remedy", [(signal.SIGKILL, True), (signal.SIGABRT, False)])
@@ -127,13 +112,6 @@ def test_a_function_that_a_process_cannot_import_is_named(module_of_a_user, tmp_
         work(["a"])
     expected = "cannot import the function of its task or read its data: ImportError: half of it is missing"
     assert expected in str(caught.value)
-
-
-def test_a_task_that_cannot_be_sent_is_named():
-    with side_by_side(abs, 2) as work:
-        with pytest.raises(WorkerError, match="a task cannot be sent to a process: TypeError: cannot pickle"):
-            work([threading.Lock()])
-        assert work([-1]) == [1]
 
 
 def test_a_task_is_sent_when_its_process_has_imported_the_work(tmp_path, monkeypatch):

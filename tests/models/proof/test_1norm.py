@@ -8,7 +8,7 @@ import pytest
 from crossfield.models.errors import InputError
 from crossfield.models.instance.instance import HALF, Instance
 from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.proof.common_lattice import CommonLattice
+from crossfield.models.proof.lattice import CommonLattice
 from crossfield.models.proof.prove_1norm import forced_1norm
 from crossfield.models.proof.pruning import RemainingCells
 from crossfield.models.search.box_lp import Residuals, fitted_1norm
@@ -44,7 +44,7 @@ def test_levels_bound_any_field_from_any_slopes():
 
 
 def lattice_bound(lattice):
-    from crossfield.models.processes.crew import crew
+    from crossfield.models.processes.compiled import crew
     from crossfield.models.proof.sweep import Dual
 
     with crew(1) as hands:

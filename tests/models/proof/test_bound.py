@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from crossfield.models.field.field import relabelled
 from crossfield.models.instance.instance import HALF, Instance
-from crossfield.models.processes.crew import crew
+from crossfield.models.processes.compiled import crew
 from crossfield.models.processes.deadline import never
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.pruning import finer, prolonged, remaining_cells

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError
-from crossfield.models.processes.crew import crew
+from crossfield.models.processes.compiled import crew
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.pruning import branches, finer, prolonged, remaining_cells

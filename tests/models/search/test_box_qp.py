@@ -70,18 +70,6 @@ def assert_optimal(field):
     return int(np.sum(~moves))
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_gradient_agrees_with_differences(seed):
-    field = random_field(random_instance(seed), seed)
-    way = np.random.default_rng(seed).normal(size=(2, len(field.alpha)))
-    ends = [
-        CrossField(field.instance, field.alpha + h * way[0], field.beta + h * way[1], field.p).energy().total
-        for h in (0.5, -0.5)
-    ]
-    # Central differences of a quadratic are exact.
-    assert ends[0] - ends[1] == pytest.approx(np.sum(gradient(field) * way), rel=1e-9)
-
-
 @given(seed=SEEDS, gauge=st.sampled_from(["strokes", "box"]))
 @settings(deadline=None)
 def test_random_jumps_are_fitted_to_the_optimum(seed, gauge):
@@ -202,13 +190,6 @@ def test_the_optimum_comes_back_as_it_is():
     again = fitted(best)
     assert again.alpha.tobytes() == best.alpha.tobytes()
     assert again.beta.tobytes() == best.beta.tobytes()
-
-
-def test_same_field_gives_the_same_bits():
-    field = random_field(random_instance(8, (20, 20)), 8)
-    one, two = fitted(field), fitted(field)
-    assert one.alpha.tobytes() == two.alpha.tobytes()
-    assert one.beta.tobytes() == two.beta.tobytes()
 
 
 def test_optimum_without_jumps_is_that_of_the_transposed_sketch():

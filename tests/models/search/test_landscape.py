@@ -10,13 +10,12 @@ import pytest
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import GAUGES
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.search.free_field import free_bounds
-from crossfield.models.search.improvement import stroke_curves
+from crossfield.models.search.box_qp import free_bounds
+from crossfield.models.search.improvement import pixel_curves
 from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
-from crossfield.models.search.perturbations import Perturbations
 from crossfield.models.search.search import _Hunt
 from crossfield.models.search.starts import first_field
-from crossfield.models.search.walk import explore
+from crossfield.models.search.walk import Perturbations, explore
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from threadpoolctl import threadpool_limits
@@ -75,10 +74,8 @@ def walked(instance, seed, perturbations, steps):
     patch = Patch.of(instance, np.ones(instance.grid.size, bool))
     if not len(patch.pairs):
         return
-    curve = np.full(instance.grid.size, -1)
-    curve[instance.stroke_index] = stroke_curves(instance)
     land = Landscape(patch, np.concatenate([field.alpha, field.beta]), field.p)
-    draw, rng = Perturbations(patch, curve).draw, np.random.default_rng(seed)
+    draw, rng = Perturbations(patch, pixel_curves(instance)).draw, np.random.default_rng(seed)
     for _ in range(perturbations):
         land.change(*draw(rng, land.p))
         assert_as_defined(land)
