@@ -24,11 +24,12 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
 
        c = min over p of 2 (A^2 + B^2) - h^2     W (min of R^2 - h^2/2)     w_beta (beta^2 - h^2/4)
 
-   are at most the terms of F. (On a black pixel the line u at the turn it has at the centre may lose 0 where
-   k + l = 0 and h^2 where |k + l| = 1 in place of h^2/2. With fractions f and g of the step the variance is
-   h^2 (f (1 - f) + g (1 - g)). From k + l = 0 on, (1 - f)(1 - g) 0 + (f + g - 2 f g) + f g/2 exceeds it, over
-   h^2, by f^2 + g^2 - 3 f g/2; from -1 on by (1 - f - g)^2; from 1 on by f^2 + g^2 + f g/2 - 3 (f + g)/2 + 1,
-   which is at least 1/10; from -2 and -3 on by symmetry; elsewhere h^2/2 is enough.) The distribution of a
+   are at most the terms of F. (Let s = k + l + 2 o. The line u at the turn it has at the centre may lose 0
+   where s = 0 and h^2 where |s| = 1 in place of h^2/2; certificates of version 1 do so on black pixels only.
+   With fractions f and g of the step the variance is h^2 (f (1 - f) + g (1 - g)). For a lower corner with
+   s = 0, (1 - f)(1 - g) 0 + (f + g - 2 f g) + f g/2 exceeds it, over h^2, by f^2 + g^2 - 3 f g/2; with
+   s = -1 by (1 - f - g)^2; with s = 1 by f^2 + g^2 + f g/2 - 3 (f + g)/2 + 1, which is at least 1/10; with
+   s = -2 and -3 by symmetry; elsewhere h^2/2 is enough.) The distribution of a
    pixel's vertex is the same at all its pairs. Hence a sum of functions of single vertices and of pairs that
    is below the discrete costs everywhere is, in the mean, below F.
 
@@ -93,7 +94,8 @@ from typing import Any
 
 import numpy as np
 
-FORMAT, VERSION = "crossfield-certificate", 1
+FORMAT, VERSION = "crossfield-certificate", 2
+READABLE = (1, 2)
 HALF, QUARTER = math.pi / 2, math.pi / 4
 OPTIMAL = 1e-8
 PRECISION = 2.0**-52
@@ -139,11 +141,13 @@ class StoppedError(Exception):
 class Sketch:
     """The instance: pixels in order, pairs (upper or right neighbours), strokes, windows.
 
-    weight, target (n,): W and theta, 0 where there is no stroke. lower (n,): least alpha of the gauge.
+    weight, target (n,): W and theta, 0 where there is no stroke. lower (n,): least alpha of the gauge. sharp
+    (n,): where the deduction of a stroke's line u depends on the label.
     earlier, later: numbers of the pairs of each pixel to later, to earlier pixels.
     """
 
     black: Array
+    sharp: Array
     first: Array
     second: Array
     weight: Array
@@ -321,8 +325,9 @@ def _need_names(arrays: dict[str, Array]) -> None:
 def head_of(arrays: dict[str, Array]) -> dict[str, Any]:
     """The text in the array `head`."""
     head = _text(arrays, "head")
-    if head.get("format") != FORMAT or head.get("version") != VERSION or head["version"] is True:
-        raise UnreadableError(f"is no {FORMAT} of version {VERSION}")
+    known = type(head.get("version")) is int and head["version"] in READABLE
+    if head.get("format") != FORMAT or not known:
+        raise UnreadableError(f"is no {FORMAT} of version {' or '.join(map(str, READABLE))}")
     return head
 
 
@@ -401,7 +406,9 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
         later[min(i, j)].append(e)
         earlier[max(i, j)].append(e)
     w_beta = _number(head, "w_beta", 0.0, MOST_WEIGHT)
-    return Sketch((rows + columns) % 2 == 0, first, second, weight, target, lower, w_beta, later, earlier)
+    black = (rows + columns) % 2 == 0
+    sharp = black if head_of(arrays)["version"] == 1 else np.ones(n, bool)
+    return Sketch(black, sharp, first, second, weight, target, lower, w_beta, later, earlier)
 
 
 def _strokes(
@@ -549,10 +556,9 @@ def _misfit(level: Level, sketch: Sketch, i: int, alpha: Array, beta: Array) -> 
     nearest = np.abs(u - math.pi * turns)
     other = np.where(turns == own, math.pi - nearest, nearest)
     best = np.minimum(other, np.abs(v - math.pi * np.round(v / math.pi))) ** 2 - half
-    steps = np.abs(
-        level.ranges[i, 0] + np.arange(len(alpha))[:, None] + level.ranges[i, 2] + np.arange(len(beta))
-    )
-    lost = np.where((steps <= 1) & sketch.black[i], 2 * half * steps, half)
+    corner = level.ranges[i, 0] + level.ranges[i, 2] + (0 if sketch.black[i] else 1)
+    steps = np.abs(corner + np.arange(len(alpha))[:, None] + np.arange(len(beta)))
+    lost = np.where((steps <= 1) & sketch.sharp[i], 2 * half * steps, half)
     return np.minimum(best, (u - math.pi * own) ** 2 - lost)
 
 

@@ -127,8 +127,8 @@ class Lattice:
         target = np.zeros(self.instance.grid.size)
         target[self.instance.stroke_index] = self.instance.target
         own = wrap((self.alpha + self.beta - target)[pixel], -HALF, np.pi)
-        black, away = (self.offset[pixel] == 0) & (np.abs(own) < QUARTER), np.abs(k + l)
-        lost = np.where(black & (away <= 1), away, 0.5)
+        away = np.abs(k + l + 2 * self.offset[pixel])
+        lost = np.where((np.abs(own) < QUARTER) & (away <= 1), away, 0.5)
         u = wrap(alpha + beta - target[pixel], -HALF, np.pi)
         v = wrap(alpha + HALF - beta - target[pixel], -HALF, np.pi)
         return np.minimum(u * u - lost * square, v * v - square / 2)

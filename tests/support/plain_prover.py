@@ -44,8 +44,8 @@ class Table:
             if at != i:
                 continue
             own = round((self.field.alpha[i] + self.field.beta[i] - theta) / np.pi)
-            steps = np.abs(k[:, None] + q)
-            lost = np.where((steps < 2) & (self.offset[i] == 0), steps, 0.5)
+            steps = np.abs(k[:, None] + q + 2 * self.offset[i])
+            lost = np.where(steps < 2, steps, 0.5)
             best = (alpha + beta - theta - np.pi * own) ** 2 - lost * h * h
             for turn in range(-4, 5):
                 if turn != own:

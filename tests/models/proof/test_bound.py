@@ -46,7 +46,7 @@ def discrete(lattice):
         steps = np.rint((alpha + beta - lattice.alpha[pixel] - lattice.beta[pixel]) / h)
         lines = []
         for turn in np.arange(-4, 5) * np.pi:
-            own = lattice.offset[pixel] == 0 and abs(centre + turn) < np.pi / 4
+            own = abs(centre + turn) < np.pi / 4
             lost = np.where(steps == 0, 0, np.where(abs(steps) == 1, 1, 0.5)) if own else 0.5
             lines.append((alpha + beta - theta + turn) ** 2 - lost * h * h)
             lines.append((alpha + HALF - beta - theta + turn) ** 2 - h * h / 2)

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import places
 import pytest
 from archives import forged, members_of, npy, of_numpy, packed
 from crossfield.export.cli.app import invoke
@@ -230,6 +231,23 @@ def test_a_changed_byte_of_the_file_is_told_or_changes_nothing(written, tmp_path
             continue
         assert (found.status, found.energy, found.bound) == (verdict.status, verdict.energy, verdict.bound)
     assert refused_forgeries > 70
+
+
+def test_both_versions_are_read_and_neither_as_the_other_proves_what_is_false(written):
+    """The deduction on the strokes of white pixels differs, and so do bounds from the same shares."""
+    shipped = places.ROOT / "export" / "library" / "plan" / "known" / "points"
+    old = check_certificate.read(str(shipped / "cf_torus_n011.certificate.npz"))
+    assert check_certificate.head_of(old)["version"] == 1
+    assert check_certificate.check(old).status == "optimal"
+    for arrays, version in ((old, 2), (written(1)[1], 1)):
+        energy = check_certificate.head_of(arrays)["energy"]
+        try:
+            verdict = check_certificate.check(with_head(arrays, version=version))
+        except check_certificate.RefusedError:
+            continue
+        assert verdict.bound <= energy
+    for version in (0, 3, True, "2", 2.0):
+        assert "is no crossfield-certificate of version 1 or 2" in refusal(with_head(old, version=version))
 
 
 def test_what_is_refused_says_where(written):
