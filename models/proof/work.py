@@ -211,7 +211,9 @@ class Work:
             lattice = finer(what.left)
             small = not _too_large(lattice) and self._in_time(dual, lattice)
             stalls = not patient and self._stalls()
-            if not self.searched and (stalls or self._costly(lattice)):
+            # The next level takes long, or the gap that is left may be that of the field.
+            costly = len(self.chain.levels) == _MANY or lattice.start[-1] > _LARGE
+            if not self.searched and (stalls or costly):
                 self.searched = True
                 self._search(_SEARCH)
             if self.energy(self.best) < self.energy(before) * (1 - _BETTER):
@@ -302,10 +304,6 @@ class Work:
     def _exact(self, bound: float) -> bool:
         energy = self.energy(self.best)
         return energy - bound <= EXACT * (1 + energy)
-
-    def _costly(self, lattice: Lattice) -> bool:
-        """Whether it is time to search for a better centre: the next level takes long, or there were many."""
-        return len(self.chain.levels) == _MANY or bool(lattice.start[-1] > _LARGE)
 
     def _search(self, share: float) -> None:
         """Search for a better field from the best one, for a share of the time, or some rounds."""

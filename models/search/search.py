@@ -106,9 +106,6 @@ def search_patches(
         alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
         try:
             with side_by_side(explore, 1 if alone else jobs) as explorers:
-                if hunt.large:
-                    for field in _from_coarse(instance, seed, limits, explorers):
-                        hunt.offer(field)
                 ended = hunt.run(explorers, limits, progress)
         except KeyboardInterrupt:
             ended = "interrupted"
@@ -158,9 +155,6 @@ def _from_coarse(
         return
     sooner = limits.coarse()
     hunt = _Hunt(coarse, seed, _start(coarse, None, sooner))
-    if hunt.large:
-        for field in _from_coarse(coarse, seed, sooner, explorers):
-            hunt.offer(field)
     hunt.run(explorers, sooner, silent)
     for field in hunt.latest(limits.over):
         if limits.over():
@@ -214,7 +208,10 @@ class _Hunt:
             self.energies.append((self.round, field.energy().total))
 
     def run(self, explorers: Explorers, limits: _Limits, progress: Progress) -> str:
-        """Go on until a limit is met; which one."""
+        """Adopt fields from coarser grids, then explore until a limit is met; return which one."""
+        if self.large:
+            for field in _from_coarse(self._instance, self._seed, limits, explorers):
+                self.offer(field)
         while not (ended := limits.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
