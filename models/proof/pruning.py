@@ -110,10 +110,7 @@ def _least_known(dual: Dual) -> int:
     """The pixel whose alpha the dual determines least, after a pass: the dearest alpha costs least there."""
     lattice, theta = dual.lattice, dual.state.theta
     rows = starts(lattice.alpha_count)
-    row = np.repeat(lattice.start[:-1], lattice.alpha_count)
-    row += (np.arange(rows[-1]) - np.repeat(rows[:-1], lattice.alpha_count)) * np.repeat(
-        lattice.beta_count, lattice.alpha_count
-    )
+    row = starts(np.repeat(lattice.beta_count, lattice.alpha_count))[:-1]
     cheapest = np.minimum.reduceat(theta, row)
     cheapest[cheapest == np.inf] = -np.inf  # rows that are not allowed
     dearest = np.maximum.reduceat(cheapest, rows[:-1]) - dual.state.least

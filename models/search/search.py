@@ -1,10 +1,8 @@
-"""A search for a field of low 2-norm energy: from the greedy field downwards, patch by patch, on all cores.
+"""A search for a field of low 2-norm energy: from the best start downwards, patch by patch, on all cores.
 
-Every round some patches of the grid are explored (models/search/walk.py) with all else fixed; what is lower
-is taken over, and angles and jumps of the whole grid follow from time to time. A small grid is one patch. On
-one kind of processor the field at the end of a round depends on instance and seed alone, not on the number of
-processes, unless a time limit runs out. The clock then decides where the start, the grids of lower resolution
-and the last round are cut off. What a round that was cut off has found is taken over if it is lower.
+Every round explores some patches of the grid (models/search/walk.py) with all else fixed and adopts lower
+points; angles and jumps of the whole grid follow from time to time. A small grid is one patch. On one kind of
+processor the field at the end of a round depends only on instance and seed, unless a time limit runs out.
 """
 
 from __future__ import annotations
