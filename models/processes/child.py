@@ -221,8 +221,7 @@ def _result(answer: bytes) -> Any:
     return found
 
 
-_ENDED: Final = object()
-"""Item in the queue of answers after the child has closed its end of the pipe."""
+_ENDED: Final = object()  # item in the queue of answers after the child has closed its end of the pipe
 
 
 def _listen(process: subprocess.Popen[bytes], answers: queue.SimpleQueue[Any]) -> None:

@@ -27,8 +27,7 @@ from ..processes.compiled import compiled
 from .lattice import Lattice, Starts, ranges, reached, starts, strip
 from .sweep import Dual
 
-TOLERANCE: Final = 1e-7
-"""Excess over U with which labels still survive, relative to 1 + U."""
+TOLERANCE: Final = 1e-7  # excess over U with which labels still survive, relative to 1 + U
 
 
 @dataclass(frozen=True, eq=False)

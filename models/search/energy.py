@@ -18,8 +18,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..smooth.systems import PULL, Solve, factored, stroke_weight, symmetric
 
-CLOSE: Final = 1e-2
-"""Relative residual of a step that ranks jumps as the exact one does."""
+CLOSE: Final = 1e-2  # relative residual of a step that ranks jumps as the exact one does
 
 _MOST_STEPS: Final = 25  # of conjugate gradients; beyond, a new factorisation is cheaper
 

@@ -24,8 +24,7 @@ from .box_qp import FreeField, free_bounds, least_in_box
 from .energy import CLOSE, LinearSolver, energy_at
 from .nearest_stroke import chamfer, nearest_strokes
 
-FALL: Final = 1e-9
-"""Least fall of the energy, relative to 1 + energy: less may be rounding."""
+FALL: Final = 1e-9  # least fall of the energy, relative to 1 + energy: less may be rounding
 
 _SETTLED: Final = 1e-4  # slope left while jumps still change
 _ROUNDS: Final = 500  # of solving and choosing jumps again; 3 to 30 are usual

@@ -35,8 +35,7 @@ from ..smooth.systems import PULL
 from .box_qp import free_bounds
 from .energy import energy_at
 
-STEPS: Final = np.array([1, -1], dtype=np.int32)
-"""Changes of one jump in the rows of `gains`."""
+STEPS: Final = np.array([1, -1], dtype=np.int32)  # changes of one jump in the rows of `gains`
 
 _HOLD: Final = 1e4  # weight that holds an angle at its bound, against stiffnesses of 1 to 20
 _OUTSIDE: Final = 1e-4  # radians by which an angle may pass its bound before it is held
