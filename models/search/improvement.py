@@ -49,7 +49,7 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
     Returns
     -------
     CrossField
-        A field whose 2-norm energy (docs/mathematics.md, 5) is at most that of `field`.
+        A field whose 2-norm energy (docs/mathematics.md, 5) does not exceed the energy of `field`.
 
     """
     state, solver, over = FreeField.of(field), LinearSolver(), stop_function(stop)
