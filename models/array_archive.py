@@ -23,8 +23,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -38,8 +37,6 @@ _ENTRY: Final = struct.Struct("<4s6H3L5H2L")
 _LOCAL: Final = struct.Struct("<4s5H3L2H")
 _WIDE: Final = struct.Struct("<2H2Q")
 _UNKNOWN: Final = 0xFFFFFFFF  # stands for a size that the extra field of 64-bit sizes holds
-_STORED: Final = 0
-_METHODS: Final = (_STORED, zipfile.ZIP_DEFLATED)
 _HEADER: Final = 128  # bytes of an array's header, for every array
 _ARRAY: Final = re.compile(
     rb"\x93NUMPY\x01\x00\x76\x00\{'descr': '([ -&(-~]{1,20})', 'fortran_order': (False|True), "
@@ -52,8 +49,7 @@ class _DamagedError(Exception):
     """A defect in the bytes of an archive."""
 
 
-@dataclass(frozen=True)
-class Expected:
+class Expected(NamedTuple):
     """Limits of a member: number of dimensions, most entries along one, kinds of its numbers."""
 
     dimensions: int
@@ -61,9 +57,8 @@ class Expected:
     kinds: str = "biuf"
 
 
-@dataclass(frozen=True)
-class _Member:
-    """Position and packing of a member, the number of its bytes once unpacked, and their checksum."""
+class _Member(NamedTuple):
+    """Packing of a member, the number of its bytes once unpacked, and their checksum."""
 
     deflated: bool
     packed: memoryview
@@ -171,11 +166,14 @@ def _member(data: memoryview, place: int, entry: tuple[Any, ...], name: str) -> 
         and name_length == len(name) and data[begin - len(name) : begin] == name.encode(),
         f"the header of {name!r} differs from its directory entry",
     )  # fmt: skip
-    _need(not flags and method in _METHODS, f"{name!r} is packed in another way than NumPy packs")
-    _need(method != _STORED or packed == length, f"the sizes of {name!r} differ")
+    _need(
+        not flags and method in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED),
+        f"{name!r} is packed in another way than NumPy packs",
+    )
+    _need(method != zipfile.ZIP_STORED or packed == length, f"the sizes of {name!r} differ")
     content = data[after : after + packed]
     _need(len(content) == packed, "it is cut off")
-    return _Member(method != _STORED, content, length, checksum), after + packed
+    return _Member(method != zipfile.ZIP_STORED, content, length, checksum), after + packed
 
 
 def _array(member: _Member, name: str, expected: Expected) -> np.ndarray[Any, Any]:

@@ -32,7 +32,7 @@ PATIENCE: Final = 4.0
 _TICK: Final = 0.1
 _PROGRAM: Final = (
     "import sys; sys.path += [each for each in sys.argv[1:] if each not in sys.path]; "
-    f"from {__package__}.worker import main; main()"
+    f"from {__package__}.control import main; main()"
 )
 """Finds modules where this process does, but puts no folder of the user before those of libraries."""
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -221,8 +221,7 @@ def _result(answer: bytes) -> Any:
     return found
 
 
-_ENDED: Final = object()
-"""Item in the queue of answers after the child has closed its end of the pipe."""
+_ENDED: Final = object()  # item in the queue of answers after the child has closed its end of the pipe
 
 
 def _listen(process: subprocess.Popen[bytes], answers: queue.SimpleQueue[Any]) -> None:

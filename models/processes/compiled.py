@@ -65,7 +65,7 @@ class Crew:
         return [slice(a, b) for a, b in pairwise(ends) if a < b]
 
     def equal_parts(self, many: int) -> list[slice]:
-        """A number of items, cut into as many parts as there are threads."""
+        """Consecutive items, an equal number for each thread."""
         ends = [many * number // self._count for number in range(self._count + 1)]
         return [slice(a, b) for a, b in pairwise(ends)]
 

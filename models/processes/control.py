@@ -1,11 +1,16 @@
-"""Messages between a process and its children, and requests of the parent to stop the work in a child."""
+"""The program of a child process, its messages, and requests of its parent to stop the work."""
 
 from __future__ import annotations
 
+import ctypes
+import os
 import pickle
+import queue
+import sys
 import threading
+import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, Final, NamedTuple
 
@@ -74,3 +79,97 @@ def ask_to_stop() -> None:
 def begin() -> None:
     """Forget requests to stop earlier work."""
     _STOP.clear()
+
+
+def main() -> None:
+    """Answer each task from standard input by a message on standard output, until the input closes."""
+    tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
+    with os.fdopen(os.dup(1), "wb") as answers:
+        os.dup2(2, 1)  # output of libraries is not an answer
+        threading.Thread(target=_receive, args=(tasks,), daemon=True).start()
+        send(b"", answers)  # all imports are done: time limits count from here
+        while True:
+            task = tasks.get()
+            with _output_to(task.log):
+                answer = _answer(task.work)
+            send(answer, answers)
+
+
+def _receive(tasks: queue.SimpleQueue[Task]) -> None:
+    """Queue tasks and pass on requests to stop; end this process when the parent is gone."""
+    try:
+        # Not sys.stdin: Python aborts at exit while a thread waits there.
+        with os.fdopen(os.dup(0), "rb") as stream:
+            while True:
+                message = pickle.load(stream)  # noqa: S301 - from the process that started this one
+                if isinstance(message, Stop):
+                    ask_to_stop()
+                else:
+                    begin()
+                    tasks.put(message)
+    finally:
+        os._exit(1)
+
+
+def _answer(task: bytes) -> bytes:
+    """Pickle of whether the task succeeded, and of its result or error."""
+    try:
+        work: Callable[[], object] = pickle.loads(task)  # noqa: S301 - from the process that started this one
+    except Exception as error:  # noqa: BLE001 - imports raise anything
+        message = f"a process cannot import the function of its task or read its data: {reason(error)}"
+        return pickle.dumps((False, _noted(WorkerError(message))))
+    try:
+        found = work()
+    except Exception as error:  # noqa: BLE001 - the parent raises it where the task came from
+        return _failure(error)
+    try:
+        return pickle.dumps((True, found))
+    except Exception as error:  # noqa: BLE001 - pickling calls methods of any class
+        message = f"the result of a task cannot be sent back: {reason(error)}"
+        return pickle.dumps((False, _noted(WorkerError(message))))
+
+
+def _failure(error: Exception) -> bytes:
+    """Pickle of an error of the work, or of a WorkerError that names it if it cannot be pickled."""
+    try:
+        # Pickles call the class of an error with its `args`, which do not fit every constructor.
+        sent = pickle.dumps((False, _noted(error)))
+        _, arrived = pickle.loads(sent)  # noqa: S301 - made in the line above
+        if type(arrived) is type(error) and str(arrived) == str(error):
+            return sent
+    except Exception:  # noqa: BLE001, S110 - an exception while pickling does not concern the work
+        pass
+    return pickle.dumps((False, _noted(WorkerError(reason(error)))))
+
+
+def _noted(error: Exception) -> Exception:
+    """The error, with the traceback of the exception being handled as a note."""
+    error.add_note(traceback.format_exc())
+    return error
+
+
+@contextmanager
+def _output_to(log: Path | None) -> Iterator[None]:
+    """Redirect the output of the work to a file, including C libraries."""
+    if log is None:
+        yield
+        return
+    kept = os.dup(1), os.dup(2)
+    target = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+    try:
+        _redirect(target, target)
+        yield
+    finally:
+        _redirect(*kept)
+        for descriptor in (*kept, target):
+            os.close(descriptor)
+
+
+def _redirect(out: int, err: int) -> None:
+    """Make descriptors 1 and 2 copies of others, after writing buffered output."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    with suppress(OSError, TypeError, AttributeError):  # elsewhere C libraries flush by themselves
+        ctypes.CDLL(None).fflush(None)
+    os.dup2(out, 1)
+    os.dup2(err, 2)

@@ -15,11 +15,9 @@ from ..errors import InputError
 
 Clock = Callable[[], float]
 
-Over = Callable[[], bool]
-"""Returns whether work has to end now."""
+Over = Callable[[], bool]  # returns whether work has to end now
 
-Progress = Callable[[str], None]
-"""Receives one line that describes the current step."""
+Progress = Callable[[str], None]  # receives one line that describes the current step
 
 
 class Event(Protocol):

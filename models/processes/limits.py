@@ -10,8 +10,7 @@ from ..errors import InputError
 from .deadline import Deadline
 from .side_by_side import checked
 
-LEAST: Final = 0.01
-"""Seconds of a solve for which no time is left: its starting point is still returned."""
+LEAST: Final = 0.01  # seconds of a solve for which no time is left: its starting point is still returned
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """Check a certificate of a cross field with no code of its prover: `python check_certificate.py FILE`.
 
-One file, Python 3.9 or newer and NumPy. All of it is recomputed from the instance in float64: the energy U of
-the field, and at every level of the lattice the costs, a bound, the cells that it excludes, and that the next
-level covers the rest. Exit code 0: the claim is proven. 1: it is not; a line says where. 2: no certificate.
+This file needs only Python 3.9 or newer and NumPy. It recomputes everything from the instance in float64: the
+energy U of the field, and at every level of the lattice the costs, a bound, the cells that it excludes, and
+that the next level covers the rest. Exit code 0: the claim is proven. 1: it is not; a line names the place.
+2: the file is not a certificate.
 
 "Optimal" means: no field has an energy below U by more than the number printed, which is at most OPTIMAL
 times the greater of 1 and U. "Gap" means: no field has an energy below the bound.
@@ -219,7 +220,7 @@ class Verdict:
 def read(path: str) -> dict[str, Array]:
     """The arrays of the certificate in a file."""
     try:
-        with open(path, "rb") as stream:  # noqa: PTH123 - the path as typed is enough here
+        with open(path, "rb") as stream:  # noqa: PTH123 - only built-in functions
             data = stream.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:
         raise UnreadableError(f"cannot be read ({type(error).__name__})") from error

@@ -28,8 +28,7 @@ from .pruning import RemainingCells
 from .record import EXACT
 
 _MOST_PIECES: Final = 60
-_ROUNDING: Final = 1e-10
-"""Deduction from a bound, relative to 1 + its value: float64 loses some 1e-12 in it."""
+_ROUNDING: Final = 1e-10  # deduction from a bound, relative to 1 + its value: float64 loses some 1e-12 in it
 
 
 @dataclass(frozen=True, eq=False)

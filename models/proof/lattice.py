@@ -25,8 +25,7 @@ from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import HALF, QUARTER, Instance
 from ..smooth.systems import stroke_weight
 
-Starts = NDArray[np.int64]
-"""Starts of the blocks of flat arrays, and the end of the last one."""
+Starts = NDArray[np.int64]  # starts of the blocks of flat arrays, and the end of the last one
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,7 @@ from ..processes.compiled import compiled
 from .lattice import Lattice, Starts, ranges, reached, starts, strip
 from .sweep import Dual
 
-TOLERANCE: Final = 1e-7
-"""Excess over U with which labels still survive, relative to 1 + U."""
+TOLERANCE: Final = 1e-7  # excess over U with which labels still survive, relative to 1 + U
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,10 +109,7 @@ def _least_known(dual: Dual) -> int:
     """The pixel whose alpha the dual determines least, after a pass: the dearest alpha costs least there."""
     lattice, theta = dual.lattice, dual.state.theta
     rows = starts(lattice.alpha_count)
-    row = np.repeat(lattice.start[:-1], lattice.alpha_count)
-    row += (np.arange(rows[-1]) - np.repeat(rows[:-1], lattice.alpha_count)) * np.repeat(
-        lattice.beta_count, lattice.alpha_count
-    )
+    row = starts(np.repeat(lattice.beta_count, lattice.alpha_count))[:-1]
     cheapest = np.minimum.reduceat(theta, row)
     cheapest[cheapest == np.inf] = -np.inf  # rows that are not allowed
     dearest = np.maximum.reduceat(cheapest, rows[:-1]) - dual.state.least

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
 Status = Literal["optimal", "gap"]
 
-EXACT: Final = 1e-9
-"""Gap relative to 1 + energy that rounding leaves when the true gap is zero."""
+EXACT: Final = 1e-9  # gap relative to 1 + energy that rounding leaves when the true gap is zero
 
 
 @dataclass(frozen=True, eq=False)

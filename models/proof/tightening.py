@@ -6,12 +6,11 @@ import numpy as np
 
 from ..field.jumps import parity_sign
 from ..formulations.windows import Windows
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.grid import Bools
 from ..instance.instance import HALF, QUARTER
 from .certificate import Certificate
 
-_MARGIN = 1e-9
-"""Radians by which windows are wider than the boxes, to allow for rounding in solvers."""
+_MARGIN = 1e-9  # radians by which windows are wider than the boxes, to allow for rounding in solvers
 _SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds
 
 
@@ -25,7 +24,12 @@ def windows_left(certificate: Certificate) -> Windows:
     """
     field, verdict = certificate.field, certificate.verdict
     instance, grid = field.instance, field.instance.grid
-    box = _relabelled(verdict.boxes, np.round((field.alpha - verdict.centres[:, 0]) / HALF).astype(np.int32))
+    steps = np.round((field.alpha - verdict.centres[:, 0]) / HALF).astype(np.int32)
+    alpha, beta = (
+        verdict.boxes[:, :2] + HALF * steps[:, None],
+        verdict.boxes[:, 2:] * parity_sign(steps)[:, None],
+    )
+    box = np.concatenate([alpha, np.sort(beta, axis=1)], axis=1)
     box += np.array([-_MARGIN, _MARGIN, -_MARGIN, _MARGIN])
     inside: Bools = (box[:, 0] >= instance.alpha_lower) & (box[:, 1] <= instance.alpha_upper)
     reach = np.abs(box[:, 2:]).max(axis=1)
@@ -33,7 +37,8 @@ def windows_left(certificate: Certificate) -> Windows:
     alpha_upper = np.where(inside, box[:, 1], instance.alpha_upper)
     beta_lower = np.maximum(np.where(inside, box[:, 2], -reach), -QUARTER)
     beta_upper = np.minimum(np.where(inside, box[:, 3], reach), QUARTER)
-    least, most = _jumps(alpha_lower, alpha_upper, grid.first, grid.second)
+    least = np.floor(-2 * (alpha_upper[grid.first] - alpha_lower[grid.second]) / np.pi + _SLACK)
+    most = np.ceil(-2 * (alpha_lower[grid.first] - alpha_upper[grid.second]) / np.pi - _SLACK)
     fixed = verdict.forced_pairs & inside[grid.first] & inside[grid.second]
     return Windows(
         alpha_lower,
@@ -45,15 +50,3 @@ def windows_left(certificate: Certificate) -> Windows:
         certificate.energy,
         f"certificate of {instance.name}, status {certificate.status}",
     )
-
-
-def _relabelled(boxes: Floats, steps: Ints) -> Floats:
-    """The boxes (n, 4) of alpha and beta after that many steps of their labels."""
-    alpha, beta = boxes[:, :2] + HALF * steps[:, None], boxes[:, 2:] * parity_sign(steps)[:, None]
-    return np.concatenate([alpha, np.sort(beta, axis=1)], axis=1)
-
-
-def _jumps(lower: Floats, upper: Floats, first: Ints, second: Ints) -> tuple[Floats, Floats]:
-    """Least and greatest useful jump of each pair between windows of alpha, shapes (m,)."""
-    least = np.floor(-2 * (upper[first] - lower[second]) / np.pi + _SLACK)
-    return least, np.ceil(-2 * (lower[first] - upper[second]) / np.pi - _SLACK)

@@ -49,13 +49,13 @@ _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
 MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
 _MOST_BRANCHED: Final = 5_000_000  # of all branches that wait: each keeps its messages
 _RECORDING: Final = 4  # passes: what rounding begins, the bound of a record and the pruning take as long
-_WORTH: Final = 2 * _RECORDING  # passes; where there is no time for as many, a level is not begun
+_WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
-_MANY: Final = 4  # levels after which a gap that is left may be that of the field
+_MANY: Final = 4  # levels after which the field may cause the rest of the gap
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _SEARCH: Final = 0.1  # share of the time for that search
-_SLICE: Final = 0.3  # share of the time that is left for a search where the lattices have come to their end
+_SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 
 
@@ -211,7 +211,9 @@ class Work:
             lattice = finer(what.left)
             small = not _too_large(lattice) and self._in_time(dual, lattice)
             stalls = not patient and self._stalls()
-            if not self.searched and (stalls or self._costly(lattice)):
+            # The next level takes long, or the field may cause the rest of the gap.
+            costly = len(self.chain.levels) == _MANY or lattice.start[-1] > _LARGE
+            if not self.searched and (stalls or costly):
                 self.searched = True
                 self._search(_SEARCH)
             if self.energy(self.best) < self.energy(before) * (1 - _BETTER):
@@ -302,10 +304,6 @@ class Work:
     def _exact(self, bound: float) -> bool:
         energy = self.energy(self.best)
         return energy - bound <= EXACT * (1 + energy)
-
-    def _costly(self, lattice: Lattice) -> bool:
-        """Whether it is time to search for a better centre: the next level takes long, or there were many."""
-        return len(self.chain.levels) == _MANY or bool(lattice.start[-1] > _LARGE)
 
     def _search(self, share: float) -> None:
         """Search for a better field from the best one, for a share of the time, or some rounds."""

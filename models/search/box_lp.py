@@ -2,7 +2,7 @@
 
 With x = (alpha, beta), shape (2n,), the 1-norm energy at jumps p (docs/mathematics.md, 5) is sum k |Mx +
 c|: two rows for each pair, A and B with k = 2, one for each stroke, R with k = w_strokes w, and one for
-each pixel, beta with k = w_beta. For numbers -1 <= l <= 1 the sum is at least that of k l (Mx + c), which
+each pixel, beta with k = w_beta. For numbers -1 <= l <= 1 it is at least the sum of k l (Mx + c), which
 is linear. The least value of this sum in a box is a lower bound there, for l from any source. At the
 multipliers of the linear program it is the least energy in the box.
 """

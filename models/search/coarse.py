@@ -31,7 +31,7 @@ def halved(instance: Instance) -> Instance | None:
     height, width = instance.mask.shape
     even = np.pad(instance.mask, ((0, height % 2), (0, width % 2)))
     squares = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2)
-    mask = squares[:, 0, :, 0] | squares[:, 0, :, 1] | squares[:, 1, :, 0] | squares[:, 1, :, 1]
+    mask = np.logical_or.reduce(squares, axis=(1, 3))
     parent = (instance.stroke_pixels[:, 0] // 2) * mask.shape[1] + instance.stroke_pixels[:, 1] // 2
     weight = np.bincount(parent, instance.w, mask.size)
     turn = [np.bincount(parent, instance.w * f(2 * instance.theta), mask.size) for f in (np.cos, np.sin)]
@@ -63,12 +63,13 @@ def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossFi
 
 
 def lifted(coarse: CrossField, instance: Instance) -> FreeField:
-    """The crosses and jumps of the coarse pixels on the fine grid, before they settle; see `grown`."""
+    """The coarse crosses and jumps on the fine grid; strokes have the label whose u is nearest to them."""
     grid = instance.grid
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
-    return _facing_strokes(
-        instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance)
-    )
+    alpha, beta, at = coarse.alpha[parent], coarse.beta[parent], instance.stroke_index
+    steps = np.zeros(grid.size, dtype=np.int32)
+    steps[at] = _nearest_label(instance.target, alpha[at], beta[at])
+    return FreeField(instance, *stepped(grid, alpha, beta, _jumps(coarse, parent, instance), steps))
 
 
 def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:
@@ -79,13 +80,6 @@ def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:
     row, column = above.rows[first], above.columns[first]
     pair = np.where(grid.upward, upper[row, column], right[row, column])
     return np.where(first == second, 0, coarse.p[pair]).astype(np.int32)
-
-
-def _facing_strokes(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> FreeField:
-    """The same crosses, each stroke pixel with the label whose u is nearest to the stroke."""
-    at, steps = instance.stroke_index, np.zeros(instance.grid.size, dtype=np.int32)
-    steps[at] = _nearest_label(instance.target, alpha[at], beta[at])
-    return FreeField(instance, *stepped(instance.grid, alpha, beta, p, steps))
 
 
 def _nearest_label(target: Floats, alpha: Floats, beta: Floats) -> Ints:

@@ -18,8 +18,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..smooth.systems import PULL, Solve, factored, stroke_weight, symmetric
 
-CLOSE: Final = 1e-2
-"""Relative residual of a step that ranks jumps as the exact one does."""
+CLOSE: Final = 1e-2  # relative residual of a step that ranks jumps as the exact one does
 
 _MOST_STEPS: Final = 25  # of conjugate gradients; beyond, a new factorisation is cheaper
 
@@ -48,10 +47,10 @@ def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadra
     i, j, p = grid.first[pairs], grid.second[pairs], p[pairs]
     degree = 2.0 * (np.bincount(i, minlength=n) + np.bincount(j, minlength=n))
     weight, turn = stroke_weight(instance), np.pi * p
-    beside = np.concatenate([np.full(len(p), -2.0), 4.0 * (p & 1) - 2.0, weight[at]])
+    couplings = np.concatenate([np.full(len(p), -2.0), 4.0 * (p & 1) - 2.0, weight[at]])
     diagonal = np.concatenate([degree + weight, degree + weight + instance.skew_coefficient])
     row, column = np.concatenate([i, i + n, at]), np.concatenate([j, j + n, at + n])
-    matrix = symmetric(row, column, beside, diagonal)
+    matrix = symmetric(row, column, couplings, diagonal)
     goal = strokes.at_pixels(strokes.weight * strokes.goal, n)
     pulled = np.bincount(j, turn, n) - np.bincount(i, turn, n)
     return Quadratic(matrix, np.concatenate([pulled + goal, goal]))

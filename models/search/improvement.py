@@ -24,8 +24,7 @@ from .box_qp import FreeField, free_bounds, least_in_box
 from .energy import CLOSE, LinearSolver, energy_at
 from .nearest_stroke import chamfer, nearest_strokes
 
-FALL: Final = 1e-9
-"""Least fall of the energy, relative to 1 + energy: less may be rounding."""
+FALL: Final = 1e-9  # least fall of the energy, relative to 1 + energy: less may be rounding
 
 _SETTLED: Final = 1e-4  # slope left while jumps still change
 _ROUNDS: Final = 500  # of solving and choosing jumps again; 3 to 30 are usual
@@ -50,7 +49,7 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
     Returns
     -------
     CrossField
-        A field whose 2-norm energy (docs/mathematics.md, 5) is at most that of `field`.
+        A field whose 2-norm energy (docs/mathematics.md, 5) does not exceed the energy of `field`.
 
     """
     state, solver, over = FreeField.of(field), LinearSolver(), stop_function(stop)

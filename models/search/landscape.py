@@ -35,8 +35,7 @@ from ..smooth.systems import PULL
 from .box_qp import free_bounds
 from .energy import energy_at
 
-STEPS: Final = np.array([1, -1], dtype=np.int32)
-"""Changes of one jump in the rows of `gains`."""
+STEPS: Final = np.array([1, -1], dtype=np.int32)  # changes of one jump in the rows of `gains`
 
 _HOLD: Final = 1e4  # weight that holds an angle at its bound, against stiffnesses of 1 to 20
 _OUTSIDE: Final = 1e-4  # radians by which an angle may pass its bound before it is held
@@ -101,13 +100,13 @@ class PatchEnergy:
         self._instance = instance
         self._pairs = np.nonzero(free[grid.first] | free[grid.second])[0].astype(np.int32)
         ends = np.concatenate([grid.first[self._pairs], grid.second[self._pairs]])
-        # Local numbers: the pixels of the patch, and then those beside it, whose angles stay.
-        beside = np.setdiff1d(ends, pixels)
+        # Local numbers: the pixels of the patch, and then their neighbours outside, whose angles stay.
+        outside = np.setdiff1d(ends, pixels)
         number = np.zeros(grid.size, dtype=np.int32)
-        number[np.concatenate([pixels, beside])] = np.arange(len(pixels) + len(beside))
+        number[np.concatenate([pixels, outside])] = np.arange(len(pixels) + len(outside))
         self._first, self._second = np.split(number[ends], 2)
         alpha, beta = np.split(x, 2)
-        self._alpha, self._beta = alpha[beside], beta[beside]
+        self._alpha, self._beta = alpha[outside], beta[outside]
         strokes = np.nonzero(free[instance.stroke_terms.pixel])[0].astype(np.int32)
         self._strokes = instance.stroke_terms.chosen(strokes, number)
         field, terms = CrossField(instance, alpha, beta, p), instance.stroke_terms

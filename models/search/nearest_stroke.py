@@ -27,10 +27,10 @@ def nearest_strokes(instance: Instance) -> Ints:
 def chamfer(grid: Grid) -> Any:
     """Distances between neighbours: 3 along the grid, 4 across a corner next to a pixel of the mask."""
     number = grid.number
-    beside = [(number[1:, :-1], number[:-1, 1:], number[:-1, :-1], number[1:, 1:])]
-    beside.append((beside[0][2], beside[0][3], beside[0][0], beside[0][1]))
+    squares = [(number[1:, :-1], number[:-1, 1:], number[:-1, :-1], number[1:, 1:])]
+    squares.append((squares[0][2], squares[0][3], squares[0][0], squares[0][1]))
     first, second = [grid.first], [grid.second]
-    for start, end, one, other in beside:
+    for start, end, one, other in squares:
         passable = (start >= 0) & (end >= 0) & ((one >= 0) | (other >= 0))
         first.append(start[passable])
         second.append(end[passable])

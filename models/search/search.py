@@ -1,10 +1,8 @@
-"""A search for a field of low 2-norm energy: from the greedy field downwards, patch by patch, on all cores.
+"""A search for a field of low 2-norm energy: from the best start downwards, patch by patch, on all cores.
 
-Every round some patches of the grid are explored (models/search/walk.py) with all else fixed; what is lower
-is taken over, and angles and jumps of the whole grid follow from time to time. A small grid is one patch. On
-one kind of processor the field at the end of a round depends on instance and seed alone, not on the number of
-processes, unless a time limit runs out. The clock then decides where the start, the grids of lower resolution
-and the last round are cut off. What a round that was cut off has found is taken over if it is lower.
+Every round explores some patches of the grid (models/search/walk.py) with all else fixed and adopts lower
+points; angles and jumps of the whole grid follow from time to time. A small grid is one patch. On one kind of
+processor the field at the end of a round depends only on instance and seed, unless a time limit runs out.
 """
 
 from __future__ import annotations
@@ -106,9 +104,6 @@ def search_patches(
         alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
         try:
             with side_by_side(explore, 1 if alone else jobs) as explorers:
-                if hunt.large:
-                    for field in _from_coarse(instance, seed, limits, explorers):
-                        hunt.offer(field)
                 ended = hunt.run(explorers, limits, progress)
         except KeyboardInterrupt:
             ended = "interrupted"
@@ -158,9 +153,6 @@ def _from_coarse(
         return
     sooner = limits.coarse()
     hunt = _Hunt(coarse, seed, _start(coarse, None, sooner))
-    if hunt.large:
-        for field in _from_coarse(coarse, seed, sooner, explorers):
-            hunt.offer(field)
     hunt.run(explorers, sooner, silent)
     for field in hunt.latest(limits.over):
         if limits.over():
@@ -214,7 +206,10 @@ class _Hunt:
             self.energies.append((self.round, field.energy().total))
 
     def run(self, explorers: Explorers, limits: _Limits, progress: Progress) -> str:
-        """Go on until a limit is met; which one."""
+        """Adopt fields from coarser grids, then explore until a limit is met; return which one."""
+        if self.large:
+            for field in _from_coarse(self._instance, self._seed, limits, explorers):
+                self.offer(field)
         while not (ended := limits.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"

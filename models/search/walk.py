@@ -24,8 +24,7 @@ from .landscape import STEPS, Landscape, Patch, Point
 Change = tuple[Ints, Ints]
 """Local numbers of pairs of a patch, each at most once, and the steps that are added to their jumps."""
 
-LOWER: Final = 1e-7
-"""Energy by which a field has to be lower to count as better: less may be rounding."""
+LOWER: Final = 1e-7  # energy by which a field has to be lower to count as better: less may be rounding
 
 _FRUITLESS: Final = 4  # changes of one jump without a new lowest point that end a walk
 _MOST_STEPS: Final = 1000  # of a walk; 5 to 60 are usual

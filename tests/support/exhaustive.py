@@ -4,7 +4,7 @@ a second opinion on greedy fields and searches.
 
 import numpy as np
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import HALF, Instance
+from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.search.box_qp import fitted
 
 
@@ -33,6 +33,13 @@ def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
         skew_coefficient=1e-3,
         gauge=gauge,
     )
+
+
+def assert_feasible(field):
+    instance = field.instance
+    assert ((field.alpha >= instance.alpha_lower) & (field.alpha <= instance.alpha_upper)).all()
+    assert (np.abs(field.beta) <= QUARTER).all()
+    assert ((field.p >= instance.p_min) & (field.p <= instance.p_max)).all()
 
 
 def exact(instance):

@@ -661,7 +661,7 @@ def test_a_process_that_dies_ends_the_build_with_one_line_and_whole_files(built,
     while process.poll() is None and len(list(out.glob("cf_*_n*_milp.json"))) < 1:
         time.sleep(0.01)
     lines = command_lines()
-    workers = [child for child in descendants(process.pid) if b"processes.worker" in lines[child]]
+    workers = [child for child in descendants(process.pid) if b"processes.control" in lines[child]]
     assert len(workers) == 2
     os.kill(workers[0], signal.SIGKILL)
     error = complaints(process.communicate()[1])

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from crossfield.models.errors import InputError
 from crossfield.models.instance.instance import HALF, Instance
+from crossfield.models.processes.compiled import crew
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.lattice import CommonLattice
 from crossfield.models.proof.prove_1norm import forced_1norm
 from crossfield.models.proof.pruning import RemainingCells
+from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.box_lp import Residuals, fitted_1norm
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
@@ -44,9 +46,6 @@ def test_levels_bound_any_field_from_any_slopes():
 
 
 def lattice_bound(lattice):
-    from crossfield.models.processes.compiled import crew
-    from crossfield.models.proof.sweep import Dual
-
     with crew(1) as hands:
         dual = Dual(lattice, hands)
         dual.ascend(10)

@@ -105,7 +105,7 @@ def after(questions):
 
 
 def test_optima_of_small_instances_are_proven_and_no_bound_is_above_one(tmp_path):
-    """The optima are those of all jumps, each by least squares."""
+    """Least squares for each choice of jumps give the optima."""
     optimal = 0
     for seed in range(24):
         instance = random_instance(seed, ((1, 1), (1, 4), (2, 2), (2, 3))[seed % 4], 4)

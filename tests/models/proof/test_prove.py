@@ -31,8 +31,8 @@ def test_small_instances_are_proven_at_the_least_energy_over_all_jumps():
 
 def a_few_steps():
     """Arguments that end a proof that cannot close its gap after a dozen reports."""
-    told = []
-    return {"progress": told.append, "stop": lambda: len(told) > 12}
+    lines = []
+    return {"progress": lines.append, "stop": lambda: len(lines) > 12}
 
 
 def weighted(seed, **weights):
@@ -117,11 +117,11 @@ def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
 
 def test_limits_end_a_proof_with_what_it_has():
     instance = cf.sample("bottle", 12, stroke_weight=0.5)
-    told = []
-    some = cf.prove(instance, limits=cf.Limits(math.inf, 0.5), progress=told.append)
+    lines = []
+    some = cf.prove(instance, limits=cf.Limits(math.inf, 0.5), progress=lines.append)
     assert some.ended == "gap"
     assert 0 < some.gap <= 0.5
-    for line in told:
+    for line in lines:
         energy, bound, labels = re.fullmatch(r"energy (\S+), bound (\S+), (\d+) labels", line).groups()
         assert float(bound) <= float(energy)
         assert int(labels) > 0
@@ -147,8 +147,8 @@ def test_limits_end_a_proof_with_what_it_has():
 def test_ctrl_c_ends_a_proof_with_what_it_has():
     program = (
         "import crossfield as cf\n"
-        "told = lambda line: print(line.split()[-2], flush=True)\n"
-        "proof = cf.prove(cf.sample('mouse', 24), progress=told)\n"
+        "lines = lambda line: print(line.split()[-2], flush=True)\n"
+        "proof = cf.prove(cf.sample('mouse', 24), progress=lines)\n"
         "print(proof.ended, proof.status, proof.bound <= proof.energy)"
     )
     assert interrupted(program) == ["interrupted", "gap", "True"]

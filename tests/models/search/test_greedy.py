@@ -14,7 +14,7 @@ from crossfield.models.search.search import search_patches
 from crossfield.models.search.starts import first_field
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.power_field import power_field
-from exhaustive import exact, least_energy, random_instance, sketch
+from exhaustive import assert_feasible, exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -23,15 +23,6 @@ pytestmark = pytest.mark.numeric
 
 SEEDS = st.integers(0, 2**32 - 1)
 SOLVERS = pytest.mark.parametrize("solve", [greedy_field, first_field, power_field])
-
-
-def assert_feasible(field):
-    instance = field.instance
-    assert (field.alpha >= instance.alpha_lower).all()
-    assert (field.alpha <= instance.alpha_upper).all()
-    assert (np.abs(field.beta) <= QUARTER).all()
-    assert (field.p >= instance.p_min).all()
-    assert (field.p <= instance.p_max).all()
 
 
 def some_curves(size=16, seed=3):

@@ -60,7 +60,7 @@ def definition(instance, x, p):
 
 
 def assert_as_defined(land):
-    """The energy of a landscape is that of its angles and jumps, and of the pulls on them."""
+    """The energy of a landscape is the energy of its angles and jumps plus all penalties."""
     energy = definition(land.patch.instance, land.angles, land.p)
     held = sum(_HOLD * (land._x[place] - bound) ** 2 for place, bound in land._held.items())
     soft = float(land._soft @ land._x**2)
