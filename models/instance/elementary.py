@@ -1,8 +1,7 @@
-"""Sine, cosine, arctangent, lengths and products that are equal to the last bit on every processor.
+"""Sine, cosine, arctangent, lengths and products, correct to 1e-15 and equal on every processor.
 
-The functions of NumPy and of C libraries differ in the last digit between processors, for example with and
-without fused multiply-add. The functions here use only additions, multiplications, divisions and square
-roots, one at a time, which IEEE 754 rounds in one way. They are correct to 1e-15.
+Functions of NumPy and of C libraries differ in the last digit between processors. These use only additions,
+multiplications, divisions and square roots, one at a time, which IEEE 754 rounds in one way.
 """
 
 from __future__ import annotations

@@ -18,10 +18,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Pixels of a mask, numbered row by row, and their ordered neighbour pairs.
-
-    mask: bool [height, width], True where the field is solved for.
-    """
+    """Pixels of a mask [height, width], numbered row by row, and their ordered neighbour pairs."""
 
     mask: Bools
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from .digits import in_digits
-
 REFERENCE: Final = 24
 """Pixels of the longer side of the grid on which weights are the coefficients of the energy."""
 STROKE_WEIGHT: Final = 20.0
@@ -20,21 +18,16 @@ SKEW_WEIGHT: Final = 1e-6
 """Default weight of the skew in a sketch."""
 
 
-def stroke_coefficient(weight: float, longer: int) -> float:
-    """The coefficient of a weight of the strokes; longer: pixels of the grid's longer side."""
-    return weight * REFERENCE / longer
+def coefficient_of(weight: float, longer: int, power: int) -> float:
+    """The coefficient of a weight on a grid; longer: pixels of its longer side."""
+    return float(weight * REFERENCE**power / longer**power)
 
 
-def skew_coefficient(weight: float, longer: int) -> float:
-    """The coefficient of a weight of the skew; longer: pixels of the grid's longer side."""
-    return weight * REFERENCE**2 / longer**2
+def weight_of(coefficient: float, longer: int, power: int) -> float:
+    """The weight, to 12 digits, with this coefficient on a grid."""
+    return in_digits(coefficient * longer**power / REFERENCE**power)
 
 
-def stroke_weight(coefficient: float, longer: int) -> float:
-    """The weight of the strokes, to 12 digits, with this coefficient on a grid."""
-    return in_digits(coefficient * longer / REFERENCE)
-
-
-def skew_weight(coefficient: float, longer: int) -> float:
-    """The weight of the skew, to 12 digits, with this coefficient on a grid."""
-    return in_digits(coefficient * longer**2 / REFERENCE**2)
+def in_digits(value: float) -> float:
+    """The number to 12 significant digits, equal on processors that differ in the last digit."""
+    return float(f"{value:.12g}") + 0.0  # no -0.0

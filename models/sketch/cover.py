@@ -23,11 +23,7 @@ Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
 MARGIN: Final = 0.04
 """Empty border round a drawing, as a share of its longer side; at least one pixel."""
 LEAST_R: Final = 0.5
-"""Least R of a pixel with a direction.
-
-Two lines at an angle d in equal parts have R = |cos d| and a mean that is neither of them; a single line
-that bends by a right angle inside the pixel still has R = 0.64.
-"""
+"""Least R of a pixel with a direction. Lines at an angle d have R = |cos d|, a bend by 90 degrees 0.64."""
 _NUDGE: Final = 1e-9  # of a pixel: a line exactly along a pixel edge is shared by both sides
 
 
@@ -58,9 +54,8 @@ class Frame:
 class Cover:
     """Cover of each pixel by one kind of stroke.
 
-    amount: float [height, width], length of stroke in pixel sides; 1 = one stroke straight across.
-    direction: float [height, width, 2], mean double-angle vector (y up) weighted by length; its length R is 1
-    for one direction and near 0 at crossings and corners.
+    amount: [height, width], length of stroke in pixel sides. direction: [height, width, 2], mean double-angle
+    vector (y up) weighted by length; its length R is 1 for one direction and near 0 at crossings and corners.
     """
 
     amount: Floats
@@ -93,17 +88,17 @@ def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool
 
 
 def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
-    """The cover by straight segments (m, 2, 2), each cut exactly at the pixel edges.
-
-    Raises InputError if there would be more than MAX_PIECES pieces.
-    """
+    """The cover by straight segments (m, 2, 2), each cut exactly at the pixel edges. Raises InputError."""
     cut = _cut(segments, frame)
     unit = cut.unit
     double = np.stack([np.ones(len(unit)), unit[:, 0] ** 2 - unit[:, 1] ** 2, -2 * unit[:, 0] * unit[:, 1]])
     amount, cosine, sine = np.zeros((3, *frame.shape))
     for nudge in product((-_NUDGE, _NUDGE), repeat=2):
-        quarter = _binned(cut.middle + nudge, cut.covered / 4 * double, frame)
-        amount, cosine, sine = amount + quarter[0], cosine + quarter[1], sine + quarter[2]
+        cell, kept = _cells(cut.middle + nudge, frame)
+        amount, cosine, sine = (
+            total + np.bincount(cell, value[kept], total.size).reshape(frame.shape)
+            for total, value in zip((amount, cosine, sine), cut.covered / 4 * double, strict=True)
+        )
     return Cover(amount, np.stack([cosine, sine], axis=-1) / np.where(amount > 0, amount, 1)[..., None])
 
 
@@ -192,14 +187,6 @@ def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
     return number, start, end
 
 
-def _binned(points: Floats, values: Floats, frame: Frame) -> Floats:
-    """Sums [c, height, width] of values (c, m) at points (m, 2) in pixels on the grid."""
-    cell, kept = _cells(points, frame)
-    size = frame.height * frame.width
-    sums = [np.bincount(cell, value[kept], size) for value in values]
-    return np.array(sums, dtype=np.float64).reshape(-1, *frame.shape)
-
-
 def _cells(points: Floats, frame: Frame) -> tuple[Indices, Bools]:
     """Numbers of the pixels, row by row, at the points (m, 2) on the grid, and which points these are."""
     column, row = np.floor(points).astype(np.int64).T
@@ -208,10 +195,7 @@ def _cells(points: Floats, frame: Frame) -> tuple[Indices, Bools]:
 
 
 def block_means(image: Pixels, rows: Floats, columns: Floats) -> Floats:
-    """Exact area means of a picture [h, w, ...] over the cells between fractional row and column edges.
-
-    Cells cover whole pixels and parts of pixels; values outside the picture are 0.
-    """
+    """Area means of a picture [h, w, ...], 0 outside, over cells between fractional row and column edges."""
     means = _strip_means(np.moveaxis(_strip_means(image, rows), 1, 0), columns)
     return np.moveaxis(means, 1, 0)
 

@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 from ..errors import InputError
@@ -50,11 +51,7 @@ class StyleSheet:
     _known: dict[tuple[str, str, str], Mapping[str, str]] = field(default_factory=dict)
 
     def properties(self, tag: str, identifier: str, classes: str) -> Mapping[str, str]:
-        """The properties of an element: the most specific rule decides, and of equal ones the last.
-
-        Raises InputError when the search through rules and elements takes more than MAX_RULE_CHECKS
-        comparisons.
-        """
+        """The properties of an element: the most specific rule decides, and of equal ones the last."""
         asked = (tag, identifier if f"#{identifier}" in self.rules else "", classes)
         if asked not in self._known:
             self._known[asked] = self._found(*asked)
@@ -134,7 +131,6 @@ def _declared(content: Any) -> dict[str, str]:
 
 
 def _text(tokens: list[Any]) -> str:
-    """The value as text; empty when it is nested too deeply."""
     import tinycss2
 
     try:
@@ -145,27 +141,21 @@ def _text(tokens: list[Any]) -> str:
 
 def _selectors(prelude: list[Any]) -> Iterator[_Selector]:
     """The simple selectors of a rule."""
-    part: list[Any] = []
-    for each in (*prelude, None):
-        if each is None or each == ",":
-            found = _selector(part)
-            part = []
-            if found is not None:
-                yield found
-        elif each.type != "comment":
-            part.append(each)
+    tokens = [each for each in prelude if each.type != "comment"]
+    ends = [place for place, each in enumerate(tokens) if each == ","]
+    for start, end in pairwise([-1, *ends, len(tokens)]):
+        found = _selector(tokens[start + 1 : end])
+        if found is not None:
+            yield found
 
 
 def _selector(part: list[Any]) -> _Selector | None:
     """The selector formed by tokens, None when it is not a simple one."""
     tag, ids, classes = "", set[str](), set[str]()
-    left = deque(part)
-    while left and left[0].type == "whitespace":
-        left.popleft()
-    while left and left[-1].type == "whitespace":
-        left.pop()
-    if not left:
+    blank = [each.type == "whitespace" for each in part]
+    if all(blank):
         return None
+    left = deque(part[blank.index(False) : len(part) - blank[::-1].index(False)])
     if left[0].type == "ident" or left[0] == "*":
         first = left.popleft()
         tag = first.value.replace("*", "")

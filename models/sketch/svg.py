@@ -1,10 +1,9 @@
 """Reader of SVG drawings: the outlines of everything that is painted, as cubic Beziers.
 
-svgelements parses path data, transforms, lengths and colours, tinycss2 parses style sheets. This module walks
-through the document: style sheets at any place, `use` of symbols and invisible parts determine which strokes
-there are. Each element is parsed once, for any number of uses, and the work is bounded by the limits of
-`input_limits`. The bytes first pass defusedxml, which refuses entities. Files outside the drawing are never
-loaded: pictures and `use` of other files are ignored. So are clip paths, masks, dashes and text.
+svgelements parses path data, transforms, lengths and colours, tinycss2 parses style sheets. Each element is
+parsed once, for any number of uses, and the work is bounded by the limits of `input_limits`. The bytes first
+pass defusedxml, which refuses entities. Pictures and `use` of other files are never loaded. Clip paths,
+masks, dashes and text are ignored.
 
 Strokes are the path of every shape with a visible `stroke`, and the outline of a shape that is only filled:
 drawing programs export strokes as filled outlines. White (paper) counts as invisible.
@@ -51,10 +50,7 @@ _START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "co
 
 @dataclass(frozen=True)
 class _Place:
-    """An element to visit: its inherited style, its transform, and its depth in `use`.
-
-    chosen: whether it, or an element around it, has a chosen label.
-    """
+    """An element to visit. chosen: whether it, or an element around it, has a chosen label."""
 
     element: Element
     style: Mapping[str, str]
@@ -64,10 +60,9 @@ class _Place:
 
 
 def read_svg(data: bytes, chooser: Chooser | None = None) -> Curves:
-    """Read the strokes of an SVG drawing in the units of its viewBox.
+    """Read the strokes of an SVG drawing in the units of its viewBox. Raises InputError.
 
-    chooser: matches the labels of curvature lines; None: colours decide. Raises InputError for malformed or
-    unsafe XML, damaged path data, too many elements, an empty drawing, and for missing labels.
+    chooser: matches the labels of curvature lines; None: colours decide.
     """
     root = _parsed(data)
     if _tag(root) != "svg":
@@ -125,10 +120,7 @@ class _Walk:
     curves: int = 0
 
     def shapes(self, root: Element) -> Iterator[tuple[tuple[float, float, float], Floats, bool]]:
-        """Every visible shape in drawing order: colour, control points in the root's units, and choice.
-
-        The choice is True where a label of the shape is chosen.
-        """
+        """Every visible shape in drawing order: colour, control points in the root's units, if chosen."""
         from svgelements import Matrix
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
@@ -136,7 +128,9 @@ class _Walk:
         while stack:
             place = self._styled(stack.pop())
             tag, element = _tag(place.element), place.element
-            self._count()
+            self.visited += 1
+            if self.visited > MAX_ELEMENTS:
+                raise InputError(f"draws more than {MAX_ELEMENTS} elements; simplify the drawing")
             if place.style.get("display") == "none" or _number(place.style.get("opacity")) == 0:
                 continue
             if tag in SHAPES and _painted(place.style):
@@ -148,11 +142,6 @@ class _Walk:
                 stack += [replace(place, element=child, matrix=inner) for child in reversed(element)]
             elif tag == "use":
                 stack += self._used(place, named)
-
-    def _count(self) -> None:
-        self.visited += 1
-        if self.visited > MAX_ELEMENTS:
-            raise InputError(f"draws more than {MAX_ELEMENTS} elements; simplify the drawing")
 
     def _styled(self, place: _Place) -> _Place:
         """The place with the element's own style and transform applied."""
@@ -203,7 +192,12 @@ class _Walk:
     def _placed(self, place: _Place) -> Floats:
         """Control points (k, 4, 2) of a shape in the units of the root."""
         if place.element not in self.outlines:
-            self.outlines[place.element] = self._outline(place.element)
+            page = self.canvas[2:] if self.canvas else (100.0, 100.0)
+            try:
+                found = outline(_tag(place.element), place.element.attrib, page)
+            except InputError as error:
+                raise InputError(f"{_named(place.element)}: {error}") from error
+            self.outlines[place.element] = found
         points, m = self.outlines[place.element], place.matrix
         self.curves += len(points)
         if self.curves > MAX_CURVES:
@@ -224,13 +218,6 @@ class _Walk:
             raise InputError(
                 f"has more than {MAX_DATA} characters of paths, styles and transforms; simplify the drawing"
             )
-
-    def _outline(self, element: Element) -> Floats:
-        _, _, width, height = self.canvas or (0.0, 0.0, 100.0, 100.0)
-        try:
-            return outline(_tag(element), element.attrib, (width, height))
-        except InputError as error:
-            raise InputError(f"{_named(element)}: {error}") from error
 
 
 def _labels(element: Element) -> Iterator[str]:
@@ -298,9 +285,8 @@ def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
     for kind in ("stroke", "fill"):
         colour = style[kind]
         colour = style["color"] if colour.lower() == "currentcolor" else colour
-        seen = _number(style.get(f"{kind}-opacity")) != 0 and not (
-            kind == "stroke" and _number(style.get("stroke-width")) == 0
-        )
+        numbers = ("stroke-opacity", "stroke-width") if kind == "stroke" else ("fill-opacity",)
+        seen = all(_number(style.get(name)) != 0 for name in numbers)
         if seen and colour.lower() not in ("none", "transparent"):
             return _rgb(colour)
     return 1.0, 1.0, 1.0
@@ -315,10 +301,8 @@ def _rgb(colour: str) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     try:
         parsed = Color(colour)
-        alpha = parsed.alpha / 255
-        red, green, blue = (
-            1 - alpha * (1 - channel / 255) for channel in (parsed.red, parsed.green, parsed.blue)
-        )
+        alpha, channels = parsed.alpha / 255, (parsed.red, parsed.green, parsed.blue)
+        red, green, blue = (1 - alpha * (1 - channel / 255) for channel in channels)
     except (ValueError, TypeError):
         return 0.0, 0.0, 0.0
     return red, green, blue

@@ -30,10 +30,7 @@ from .samples import SAMPLES, sample_svg
 REACH: Final = 2
 """Rows and columns from a pixel of a chain to the next, which bridges crossings without a direction."""
 ASIDE: Final = np.radians(27.0)
-"""Greatest angle between a chain's direction and the way to its next pixel.
-
-A little more than atan(1/2): of the 16 ways within REACH one is as near as that to every direction.
-"""
+"""Greatest angle between a chain's direction and the way to its next pixel: a little more than atan(1/2)."""
 TURN: Final = np.radians(15.0)
 """Greatest turn of a chain from a pixel to the next, as on a circle four pixels in radius."""
 REDRAWN: Final = 0.5
@@ -46,9 +43,8 @@ _NONE: Final = -2
 def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choice = AS_DRAWN) -> Ints:
     """The number of the only curve of each stroke pixel, int (s,), SEVERAL where more curves pass through it.
 
-    sketch: the file that the instance was read from, or the name of a sample; None: not available. Pictures,
-    computed samples and instance files count as not available. choice: with which the sketch was read. Raises
-    InputError for an unreadable sketch, and for a sketch without a curve at a stroke of the instance.
+    sketch: the file that the instance was read from, or the name of a sample. None, pictures, computed
+    samples and instance files record no curves. Raises InputError for another sketch.
     """
     found = None if sketch is None else _drawn(sketch, choice)
     if found is None:
@@ -72,15 +68,12 @@ def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choi
 
 
 def has_curves(sketch: str | Path | None, choice: Choice = AS_DRAWN) -> bool:
-    """Whether a sketch is available and records its curves; otherwise chains are taken as curves."""
+    """Whether a sketch records its curves; otherwise chains are taken as curves."""
     return sketch is not None and _drawn(sketch, choice) is not None
 
 
 def _only(owner: Indices, stroke: Indices, count: int) -> Ints:
-    """The number of the only curve through each of `count` stroke pixels (s,), SEVERAL, or _NONE.
-
-    owner, stroke: (k,), a curve and a stroke pixel on it, each pair once.
-    """
+    """The only curve (s,) at each stroke pixel, SEVERAL, or _NONE, from pairs of curve and stroke pixel."""
     names, curve = np.unique(owner, return_inverse=True)
     through = csr_array((np.ones(len(curve)), (curve, stroke)), shape=(len(names), count))
     single = csr_array(
@@ -95,10 +88,7 @@ def _only(owner: Indices, stroke: Indices, count: int) -> Ints:
 
 
 def _redrawn(through: csr_array) -> Indices:
-    """The curve (c,) that each curve counts as: a longer one that it redraws, or itself.
-
-    through: 1 where a curve passes through a stroke pixel, (c, s).
-    """
+    """The curve (c,) that each curve redraws, or itself. through: 1 at its stroke pixels, (c, s)."""
     at_stroke = through.T.tocsr()
     length = np.diff(through.indptr)
     stands_for = np.full(len(length), -1)
@@ -113,11 +103,7 @@ def _redrawn(through: csr_array) -> Indices:
 
 
 def chains(instance: Instance) -> Ints:
-    """The number of the chain that each stroke pixel belongs to, int (s,), numbered from 0.
-
-    Two stroke pixels at most REACH apart are linked when their directions differ by at most TURN from each
-    other and by at most ASIDE from the line between them.
-    """
+    """The number of the chain that each stroke pixel belongs to, int (s,), numbered from 0."""
     theta, count = instance.theta, len(instance.theta)
     number = np.full(np.add(instance.mask.shape, 2 * REACH), -1, dtype=np.int32)
     row, column = instance.stroke_pixels.T + REACH

@@ -15,10 +15,7 @@ from ..smooth.polyvector import roots
 
 @dataclass(frozen=True, eq=False)
 class Crosses:
-    """Two lines at each of n places. product, total: complex (n,), of the numbers exp(2 i angle) of the two.
-
-    Neither depends on the order of the lines or on turns by pi, and so no result here does.
-    """
+    """Two lines at each of n places: product and total of their numbers exp(2 i angle), complex (n,)."""
 
     product: NDArray[np.complex128]
     total: NDArray[np.complex128]

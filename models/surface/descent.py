@@ -21,11 +21,7 @@ _DOWN: Final = 8.0
 
 
 def descended(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
-    """Minimise from heights z, and return the energy reached and its heights.
-
-    Every round computes the energy anew and adopts only lower points. The descent ends when there is hardly
-    any gain, after 60 rounds, or when time is over.
-    """
+    """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
     energy, damping = equations.energy(z), _DAMPING
     for _ in range(_ROUNDS):
         if over():

@@ -22,11 +22,7 @@ FORGIVEN: Final = 0.007
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of a surface's energy besides the equations of its crosses.
-
-    even: differences of the normals of neighbours, times the number of pixels. facing: deviation of every
-    normal from the viewer. forgiven: as FORGIVEN; infinity for plain squares.
-    """
+    """Weights of a surface's energy besides the equations of its crosses, as in `Equations`."""
 
     even: float
     facing: float
@@ -72,11 +68,8 @@ class Equations:
 
     @cached_property
     def conjugacy(self) -> Any:
-        """The matrix (2b, N) of u . d_v g, then of v . d_u g, at the centres of blocks.
-
-        All derivatives there are central ones. At the border, where a surface is steep, one-sided derivatives
-        at pixels would cause larger errors than the crosses do.
-        """
+        """The matrix (2b, N) of u . d_v g, then of v . d_u g, at the centres of blocks."""
+        # Derivatives there are central: at a steep border, one-sided ones would cause large errors.
         blocks = self.stencils.blocks
         count = blocks.shape[1]
         at = (np.tile(np.arange(count), 4), blocks.ravel())
@@ -128,11 +121,7 @@ class Equations:
         return float(scale**2 * np.sum(np.log1p((cosine / scale) ** 2)))
 
     def model(self, z: Floats) -> tuple[Floats, Any]:
-        """Half the slope (N,) of the energy at z, and half a curvature (N, N) that is nowhere negative.
-
-        The curvature is the one of Gauss and Newton; for `facing`, the curvature of |g|^2 with weights as at
-        z.
-        """
+        """Half the slope (N,) of the energy at z, and half its curvature (N, N) by Gauss and Newton."""
         linear, squares = self._squares
         down, angles = self._of_angles(z)
         even, bend = self._of_normals(z)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import Final
 
 import numpy as np
@@ -27,10 +28,8 @@ FIRST: Final = Weights(even=1e-4, facing=1e-2)
 """The first pass from a start: stiff, so that starts converge to the same surface."""
 WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)
 """Found on cylinder, torus, vase and spheroid of docs/surface.md, exact and from strokes."""
-
 CLEARLY: Final = 0.8
 """Ratio of energies below which the plane's surface is preferred to the dome's: bodies bulge more often."""
-
 TELLING: Final = np.radians(10)
 """Least slant of a hint that distinguishes z from -z: with less slant, both sides fit it nearly alike."""
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
@@ -94,18 +93,14 @@ def surface(
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
         found.append((level.grid.size, level, z, own))
-    _, level, z, own = max(found, key=lambda each: each[0])
+    _, level, z, own = max(found, key=itemgetter(0))
     firm = firmness(level, z, [Disc.of(hint, level).rows for hint in own])
-    return _judged(field, heights, firm, hinted=_decide_side(own), cut=cut.off)
-
-
-def _judged(field: CrossField, heights: Floats, firm: float, *, hinted: bool, cut: bool) -> Surface:
-    """The surface of heights, with its doubts and freedom."""
     off = off_right_angles(field, heights)
-    found = Surface(field, heights, confidence_of(field, off), (), freedom_of(firm, hinted=hinted), firm)
-    slant = np.arccos(np.minimum(found.normals[:, 2], 1.0))
-    late = ("time was over before it had settled",) if cut else ()
-    return replace(found, doubts=(*doubts_of(field, off, slant), *late))
+    freedom = freedom_of(firm, hinted=_decide_side(own))
+    lifted = Surface(field, heights, confidence_of(field, off), (), freedom, firm)
+    slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
+    late = ("time was over before it had settled",) if cut.off else ()
+    return replace(lifted, doubts=(*doubts_of(field, off, slant), *late))
 
 
 @dataclass
@@ -132,15 +127,12 @@ def _solved(part: Level, hints: Sequence[Hint], over: Over, *, flip: bool) -> Fl
     """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
     coarse, *finer = levels_of(part)
     dome, *planes = ([*_from_start(coarse, z, hints, over, flip=flip)] for z in coarse.starts)
-    _, z = min([*dome, *((energy / CLEARLY, z) for found in planes for energy, z in found)], key=_energy)
+    found = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
+    _, z = min(found, key=itemgetter(0))
     for level in finer:
         z = _settled(level, level.refined(coarse, z), hints, over)[1]
         coarse = level
     return z if hints else _oriented(part, z, flip=flip)
-
-
-def _energy(found: tuple[float, Floats]) -> float:
-    return found[0]
 
 
 def _from_start(

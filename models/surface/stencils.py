@@ -14,10 +14,9 @@ from ..instance.grid import Bools, Floats, Grid, Ints
 
 @dataclass(frozen=True, eq=False)
 class Stencils:
-    """The matrices of a mask. Heights are a vector (N,) over the corners of its pixels, in pixels.
+    """The matrices of a mask with n pixels, N corners numbered row by row, and b blocks of 2 x 2 pixels.
 
-    N corners are numbered row by row, n pixels as in `grid`; blocks are 2 x 2 pixels of the mask. x runs to
-    the right, y up.
+    Heights are a vector (N,), in pixels; x runs to the right, y up.
     """
 
     grid: Grid
