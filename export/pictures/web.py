@@ -25,7 +25,7 @@ HUES: Final = (FAMILIES[0], "#b5179e", "#a35c00", "#2f6b2f", "#4361ee", "#9b2226
 """Colours of curves, one after the other."""
 _SHADE: Final = "#e1e4e9"
 _FAINT: Final = "#d3d6db"
-_NIGHT: Final = {
+_NIGHT: Final = {  # colours in dark mode by those in light mode
     PAPER: "#1d2126",
     _SHADE: "#3a424c",
     GRID: "#30363d",
@@ -40,7 +40,6 @@ _NIGHT: Final = {
     LABEL: "#a3acb6",
     **dict(zip(HUES[1:], ("#f07be0", "#f0a35e", "#7ccf7c", "#8fa2ff", "#ff8a8f"), strict=True)),
 }
-"""Colours in dark mode by those in light mode."""
 _MARGIN: Final = 7.0
 _CHARACTER: Final = 6.2  # the widest digits and letters of usual fonts at the size of the labels
 _SPACING: Final = 10.0  # between streamlines of one family

@@ -1,8 +1,7 @@
 """A surface as a mesh (.obj): a quad for each pixel, with texture coordinates and normals.
 
 x runs to the right, y up, z towards the viewer, all in pixels; the lower left corner of the grid is at
-x = y = 0. Texture coordinates cover the grid, so any picture of the grid fits the mesh. Pixels that meet only
-in a corner each have their own vertex there.
+x = y = 0. Texture coordinates cover the grid.
 """
 
 from __future__ import annotations
@@ -16,12 +15,11 @@ from ...models.instance.grid import Floats, Ints
 from ...models.surface.surface import Surface
 
 MATERIAL: Final = "drawing"
-_WALK: Final = [2, 3, 1, 0]
-"""Corners of a pixel counter-clockwise: lower left and right, upper right and left."""
+_WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
 
 def to_obj(surface: Surface, materials: str) -> bytes:
-    """The mesh as text. materials: name of the .mtl file in its folder, which has the one material."""
+    """The mesh as text. materials: name of the .mtl file in its folder."""
     instance = surface.instance
     places, corners = vertices_of(instance.grid)
     height, width = instance.mask.shape
@@ -48,10 +46,7 @@ def to_mtl(texture: str) -> bytes:
 
 
 def vertex_normals(surface: Surface, corners: Ints, count: int) -> Floats:
-    """Unit normals (count, 3) at the vertices: the mean of the normals of the pixels round each.
-
-    corners: the vertex at each corner of each pixel, (n, 4).
-    """
+    """Means (count, 3) of the normals of pixels round their corners, numbers of vertices (n, 4)."""
     summed = np.zeros((count, 3))
     np.add.at(summed, corners, surface.normals[:, None, :])
     unit: Floats = summed / np.linalg.norm(summed, axis=1, keepdims=True)
