@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from .drawing import ink_colours
 from .marks import Area, Dots, Lines, Mark, Sheet
 
-_SIDE: Final = 400.0
-"""Points of the longer side of the page."""
+_SIDE: Final = 400.0  # points of the longer side of the page
 _TIP: Final = 1e-3  # of a pixel: else a side could be rounded down by a pixel
 
 

@@ -20,8 +20,7 @@ from .drawing import INK, Box, Drawing
 from .marks import FAMILIES, Frame, Layer, Lines, Sheet, runs
 from .streamlines import streamlines
 
-UNITS: Final = 400.0
-"""Parts of the longer side of the grid in which the lengths below are given."""
+UNITS: Final = 400.0  # parts of the longer side of the grid in which the lengths below are given
 _SPACING: Final = 7.6  # of streamlines of one family
 _LINE: Final = 0.95
 _CROSS: Final = 0.7

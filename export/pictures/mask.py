@@ -77,7 +77,7 @@ def mask_on_page(instance: Instance, page: Page) -> Bools:
     """Which pixels, of one unit a side, of the page have their middle in a pixel that is solved for."""
     column, row = (_cells(*axis) for axis in zip(page[:2], page[2:], instance.origin, strict=True))
     padded = np.pad(instance.mask, 1)
-    white: Bools = padded[
+    return padded[
         np.ix_(
             *(
                 np.clip(np.floor(cell / instance.pixel_size) + 1, 0, side - 1).astype(np.int64)
@@ -85,7 +85,6 @@ def mask_on_page(instance: Instance, page: Page) -> Bools:
             )
         )
     ]
-    return white
 
 
 def _cells(start: float, side: float, origin: float) -> Floats:

@@ -25,8 +25,7 @@ OUTSIDE: Final = "#ececec"
 OPENING: Final = "#3056d3"
 
 _DOTS_PER_POINT: Final = 3  # of a surface, as in a PNG
-SPACING: Final = 6.5
-"""Points between streamlines of one family in a panel of full size."""
+SPACING: Final = 6.5  # points between streamlines of one family in a panel of full size
 
 
 @dataclass(frozen=True, eq=False)

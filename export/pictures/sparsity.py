@@ -20,8 +20,7 @@ from .web import CUT, EDGE, SIDE, picture, wide
 
 Places = NDArray[np.int64]
 
-CELLS: Final = 160
-"""Cells on the longer side of a picture, at most."""
+CELLS: Final = 160  # cells on the longer side of a picture, at most
 
 _EDGE: Final = 8.0  # around names
 _BELOW: Final = 5.0  # the name of a last row of few is lower than the row

@@ -27,8 +27,7 @@ Positions = NDArray[np.complex128]
 Labels = NDArray[np.int64]
 _Array = np.ndarray[Any, Any]
 
-CLOSEST: Final = 0.55
-"""Lines of one family end where they come closer than this part of the separation."""
+CLOSEST: Final = 0.55  # lines of one family end where they come closer than this part of the separation
 
 _LONGEST: Final = 0.45  # step in pixels; below 1/2, so that it never leaves the cells that touch its pixel
 _DENSEST: Final = 400  # separations across the grid, at most

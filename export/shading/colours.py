@@ -20,8 +20,7 @@ from .raster import Raster, raster, scale_of
 
 Bytes = NDArray[np.uint8]
 
-CLAY: Final = (0.80, 0.77, 0.73)
-"""Share of red, green and blue light that the surface reflects."""
+CLAY: Final = (0.80, 0.77, 0.73)  # share of red, green and blue light that the surface reflects
 _AMBIENT: Final = 0.04  # light from all sides, on any surface
 _VIEWER: Final = 0.10  # light from the viewer
 _LAMP: Final = 0.95
@@ -79,8 +78,7 @@ class Light:
         return Light(self.azimuth + np.pi, self.elevation / 2)
 
 
-UPPER_LEFT: Final = Light()
-"""The default lamp."""
+UPPER_LEFT: Final = Light()  # the default lamp
 
 
 def lit(raster: Raster, light: Light = UPPER_LEFT, colour: tuple[float, float, float] = CLAY) -> Floats:

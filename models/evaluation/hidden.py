@@ -13,10 +13,8 @@ from ..field.field import CrossField
 from ..instance.grid import Floats, Ints
 from ..instance.instance import Instance
 
-SHORTEST: Final = 3
-"""Fewest stroke pixels of a curve that is hidden."""
-MOST: Final = 0.5
-"""Greatest share of the stroke pixels that a hidden curve may have: a larger one is most of the drawing."""
+SHORTEST: Final = 3  # fewest stroke pixels of a curve that is hidden
+MOST: Final = 0.5  # greatest share of the stroke pixels that a hidden curve may have
 
 
 @dataclass(frozen=True, eq=False)

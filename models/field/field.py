@@ -19,12 +19,9 @@ Norm = Literal[1, 2]
 
 DEGENERATE: Final = np.radians(2.5)
 """Lines closer than twice this (5 degrees) count as one: |beta| > pi/4 - DEGENERATE."""
-FAR: Final = np.radians(10)
-"""A stroke that deviates more than this from both lines counts as not followed."""
-NARROW: Final = QUARTER
-"""Lines that are less than this apart are a narrow cross."""
-MOST: Final = 0.9
-"""Share of the stroke pixels that deviate no more than `Shape.most_deviation`."""
+FAR: Final = np.radians(10)  # A stroke that deviates more than this from both lines counts as not followed
+NARROW: Final = QUARTER  # lines that are less than this apart are a narrow cross
+MOST: Final = 0.9  # share of the stroke pixels that deviate no more than `Shape.most_deviation`
 _EQUAL: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
 _ROUNDING: Final = 1e-12  # quarter turns by which a label may miss its window
 

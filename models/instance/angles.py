@@ -9,8 +9,7 @@ import numpy as np
 from .elementary import arctangent, cosine, sine
 from .grid import Floats
 
-MOST_ANGLE: Final = 1e6
-"""Largest absolute angle in radians that keeps enough digits modulo pi."""
+MOST_ANGLE: Final = 1e6  # largest absolute angle in radians that keeps enough digits modulo pi
 
 
 def wrap(angle: Floats, lower: Floats | float, period: float) -> Floats:

@@ -46,8 +46,7 @@ def arctangent(y: Floats, x: Floats) -> Floats:
 
 def length(x: Floats, y: Floats) -> Floats:
     """The length of vectors (x, y), without protection from overflow; shapes are broadcast."""
-    root: Floats = np.sqrt(x * x + y * y)
-    return root
+    return np.sqrt(x * x + y * y)
 
 
 def turned(vectors: Floats, matrix: Floats) -> Floats:

@@ -27,8 +27,7 @@ _FINE = 1e-3  # reliabilities up to here would lose digits that count
 _FARTHEST = 1e100  # coordinates whose squares are finite numbers
 _SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds and at the ends of ranges
 
-MOST_WEIGHT: Final = 1e6
-"""Greatest weight of a term of the energy."""
+MOST_WEIGHT: Final = 1e6  # greatest weight of a term of the energy
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
 """Instance names that instance libraries allow: at most 32 lower-case letters, digits and `_`."""
 _POWERS: Final = {"stroke": 1, "skew": 2}  # of the longer side, by which weights of terms are divided

@@ -10,12 +10,9 @@ from __future__ import annotations
 
 from typing import Final
 
-REFERENCE: Final = 24
-"""Pixels of the longer side of the grid on which weights are the coefficients of the energy."""
-STROKE_WEIGHT: Final = 20.0
-"""Default weight of the strokes of a sketch; see docs/weights.md for the reason."""
-SKEW_WEIGHT: Final = 1e-6
-"""Default weight of the skew in a sketch."""
+REFERENCE: Final = 24  # pixels of the longer side of the grid on which weights are coefficients
+STROKE_WEIGHT: Final = 20.0  # default weight of the strokes of a sketch; see docs/weights.md for the reason
+SKEW_WEIGHT: Final = 1e-6  # default weight of the skew in a sketch
 
 
 def coefficient_of(weight: float, longer: int, power: int) -> float:

@@ -263,8 +263,7 @@ def _light(colours: Floats) -> Ink:
         np.interp(np.arange(side) + 0.5, (edges[:-1] + edges[1:]) / 2, np.arange(len(edges) - 1.0))
         for side, edges in ((height, rows), (width, columns))
     ]
-    light: Ink = _between(_between(smooth.astype(np.float32), places[0]).T, places[1]).T
-    return light
+    return _between(_between(smooth.astype(np.float32), places[0]).T, places[1]).T
 
 
 def _between(rows: Ink, place: Floats) -> Ink:

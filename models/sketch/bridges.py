@@ -19,13 +19,10 @@ from .outline import enclosed, place
 
 Indices = NDArray[np.intp]
 
-LONGEST: Final = 0.08
-"""Longest bridge, as a share of the grid's longer side: with a wider gap a drawing is meant to be open."""
-WIDER: Final = 0.7
-"""Least width of the room behind a bridge per pixel of the bridge; a line has up to 1 / 0.7 per unit."""
+LONGEST: Final = 0.08  # longest bridge, as a share of the grid's longer side; wider gaps are meant
+WIDER: Final = 0.7  # least width of the room behind a bridge per pixel of the bridge
 AHEAD: Final = 0.5
-ASIDE: Final = -0.1
-"""Least cosines of the turns from the two strokes into the bridge, 60 and 96 degrees: it may be a corner."""
+ASIDE: Final = -0.1  # least cosines of the turns from the two strokes into the bridge
 _TAIL: Final = 11  # pixels round the end of a thinned line that determine its continuation
 _NEAREST: Final = 8  # most other ends that an end may be bridged to: the work stays linear
 _THINNED: Final = 512  # pixels on the longer side of a bitmap while its ends are sought
@@ -151,8 +148,7 @@ def _candidates(walls: Bools, outside: Bools, ends: Floats, frame: Frame) -> Flo
     first = slice(_MOST_BRIDGES)
     on = _prolonged(walls, on_grid[first], longest[first]) * frame.pixel + (frame.x, frame.y)
     # Of two equivalent lines the later one is kept, which is between two ends.
-    lines: Floats = np.concatenate([on, _between(ends[open_there], longest * frame.pixel)])
-    return lines
+    return np.concatenate([on, _between(ends[open_there], longest * frame.pixel)])
 
 
 def _between(ends: Floats, longest: Floats) -> Floats:

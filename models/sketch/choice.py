@@ -63,8 +63,7 @@ def view_in(source: str) -> str | None:
     return source.rpartition(_SEEN_FROM)[2] if _SEEN_FROM in source else None
 
 
-AS_DRAWN: Final = Choice()
-"""Selects everything drawn in red, or in the only colour."""
+AS_DRAWN: Final = Choice()  # selects everything drawn in red, or in the only colour
 
 
 @dataclass(eq=False)

@@ -11,10 +11,8 @@ import numpy as np
 
 from ..instance.grid import Bools, Floats
 
-PAPER: Final = 0.1
-"""Ink below this counts as paper."""
-REDDISH: Final = 0.4
-"""Least share of a stroke's ink that must be missing from green and blue alone."""
+PAPER: Final = 0.1  # ink below this counts as paper
+REDDISH: Final = 0.4  # least share of a stroke's ink that must be missing from green and blue alone
 
 
 def ink_of(rgb: Floats) -> Floats:
@@ -32,11 +30,9 @@ def redness(rgb: Floats) -> Floats:
 
 def is_paper(rgb: Floats) -> Bools:
     """True where a colour is as good as white; shape (...,)."""
-    paper: Bools = ink_of(rgb) < PAPER
-    return paper
+    return ink_of(rgb) < PAPER
 
 
 def is_red(rgb: Floats) -> Bools:
     """True where a colour is a saturated red; shape (...,)."""
-    red: Bools = redness(rgb) > REDDISH * ink_of(rgb)
-    return red
+    return redness(rgb) > REDDISH * ink_of(rgb)

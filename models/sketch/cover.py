@@ -20,10 +20,9 @@ from ..instance.grid import Bools, Floats, Ints
 Indices = NDArray[np.intp]
 Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
 
-MARGIN: Final = 0.04
-"""Empty border round a drawing, as a share of its longer side; at least one pixel."""
+MARGIN: Final = 0.04  # empty border round a drawing, as a share of its longer side; at least one pixel
 LEAST_R: Final = 0.5
-"""Least R of a pixel with a direction. Lines at an angle d have R = |cos d|, a bend by 90 degrees 0.64."""
+"""Least R of a pixel with a direction: |cos d| for lines at an angle d, 0.64 for a bend by 90."""
 _NUDGE: Final = 1e-9  # of a pixel: a line exactly along a pixel edge is shared by both sides
 
 
@@ -65,8 +64,7 @@ class Cover:
     def weight(self) -> Floats:
         """Weight [height, width], min(1, amount) R or 0 where R < LEAST_R (docs/mathematics.md, 1)."""
         single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
-        weight: Floats = np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
-        return weight
+        return np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
 
 
 def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:

@@ -44,8 +44,7 @@ class Curves:
 def lines_as_cubics(start: Floats, end: Floats) -> Floats:
     """Control points (k, 4, 2) of the straight lines from start (k, 2) to end (k, 2)."""
     thirds = np.arange(4.0).reshape(1, 4, 1) / 3
-    cubics: Floats = start[:, None] * (1 - thirds) + end[:, None] * thirds
-    return cubics
+    return start[:, None] * (1 - thirds) + end[:, None] * thirds
 
 
 def are_straight(cubics: Floats) -> bool:
@@ -56,8 +55,7 @@ def are_straight(cubics: Floats) -> bool:
 def runs(points: Floats, shape: Ints) -> Ints:
     """The number (k,), from 0, of the unbroken run of one shape (k,) that contains each cubic (k, 4, 2)."""
     apart = (points[1:, 0] != points[:-1, 3]).any(axis=1) | (np.diff(shape) != 0)
-    numbers: Ints = np.concatenate([[0], np.cumsum(apart)]).astype(np.int32)
-    return numbers
+    return np.concatenate([[0], np.cumsum(apart)]).astype(np.int32)
 
 
 def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]:

@@ -11,24 +11,15 @@ from ..instance.elementary import cosine, sine
 from ..instance.grid import Bools, Floats
 from .cover import Frame
 
-GAPS: Final = (0.03, 0.06, 0.12)
-"""Gaps in an outline that count as closed, as shares of the grid's longer side, tried in turn."""
-ENCLOSED: Final = 0.25
-"""Least share of the strokes' convex hull that a closed drawing fills; otherwise it is open."""
-CRUMB: Final = 0.01
-"""Least share of a region for a separate part: a stroke that grazes the outline cuts off less."""
-HELD: Final = 2.0
-"""Least stroke length, in pixel sides, in a separate part: a stroke's loose end has less."""
-STEP: Final = 3.0
-"""Distance in pixels over which a stroke is followed to determine whether it runs along the outline."""
-THICKER: Final = 1.25
-"""Width of the thickest strokes of a picture relative to typical ones."""
-BLOCK: Final = 4
-"""Side in pixels of a block filled by strokes; no sample has one from 16 pixels on."""
-CROWDED: Final = 0.1
-"""Least share of the solved pixels in connected blocks filled by strokes that causes a warning."""
-OFF: Final = 0.01
-"""Least share of the solved pixels more than a pixel off the page that causes a warning."""
+GAPS: Final = (0.03, 0.06, 0.12)  # shares of the longer side: gaps that count as closed, tried in turn
+ENCLOSED: Final = 0.25  # least share of the strokes' convex hull that a closed drawing fills
+CRUMB: Final = 0.01  # least share of a region for a separate part; a grazing stroke cuts off less
+HELD: Final = 2.0  # least stroke length, in pixel sides, in a separate part: a stroke's loose end has less
+STEP: Final = 3.0  # pixels over which a stroke is compared with the outline
+THICKER: Final = 1.25  # width of the thickest strokes of a picture relative to typical ones
+BLOCK: Final = 4  # side in pixels of a block filled by strokes; no sample has one from 16 pixels on
+CROWDED: Final = 0.1  # least share of the solved pixels in blocks filled by strokes that causes a warning
+OFF: Final = 0.01  # least share of the solved pixels more than a pixel off the page that causes a warning
 _NUDGE: Final = 1e-9  # of a pixel: the limit of exactly 30 degrees is decided equally on every processor
 
 

@@ -26,10 +26,8 @@ from .curves import Curves, lines_as_cubics
 _GREATEST: Final = 1e9
 SPATIAL: Final = re.compile(rb"v[ \t]+\d+[ \t]*[\r\n]")
 """First line of a .curves file; a mesh, whose vertices begin with v as well, has three numbers there."""
-SIDE: Final = 1000.0
-"""Longer side of the projected drawing, in the units of its page."""
-BORDER: Final = 40.0
-"""Empty border of the page round it."""
+SIDE: Final = 1000.0  # longer side of the projected drawing, in the units of its page
+BORDER: Final = 40.0  # empty border of the page round it
 VIEWS: Final = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 90.0)}
 """Directions of views: azimuth, from z towards x, and elevation, in degrees."""
 

@@ -268,8 +268,7 @@ def _towards_viewer(first: Floats, second: Floats) -> Floats:
     (ax, ay, az), (bx, by, bz) = first.T, second.T
     normal = _vectors(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
     x, y, z = normal.T
-    unit: Floats = normal * (np.where(z < 0, -1.0, 1.0) / length(length(x, y), z))[:, None]
-    return unit
+    return normal * (np.where(z < 0, -1.0, 1.0) / length(length(x, y), z))[:, None]
 
 
 def _frame(surface: CurvaturePatch, size: int) -> Frame:
@@ -353,8 +352,7 @@ def _lines(surface: CurvaturePatch, frame: Frame, spacing: float) -> tuple[Float
 def _spread(ends: tuple[float, float], count: float) -> Floats:
     """Middles of about `count` equal parts of an interval."""
     number = max(1, round(count))
-    middles: Floats = ends[0] + (np.arange(number) + 0.5) * (ends[1] - ends[0]) / number
-    return middles
+    return ends[0] + (np.arange(number) + 0.5) * (ends[1] - ends[0]) / number
 
 
 def _polylines(surface: CurvaturePatch, s: Floats, t: Floats) -> Floats:

@@ -21,8 +21,7 @@ from .systems import factored, locally, one_thread, smoothness
 
 _Complex = NDArray[np.complex128]
 
-HOLDS: Final = (0.1, 1.0, 100.0)
-"""Factors of the stroke weights worth trying: loose, as in the energy, hard."""
+HOLDS: Final = (0.1, 1.0, 100.0)  # factors of the stroke weights worth trying: loose, as in the energy, hard
 _HARDEST: Final = 1e4  # weight of a stroke, far above the 2 of a pair; `PULL` still counts in 16 digits
 _DECIMALS: Final = 9  # of line angles in quarter turns: rounding errors must not decide jumps
 

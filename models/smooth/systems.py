@@ -18,8 +18,7 @@ from ..instance.instance import Instance
 
 Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
 
-PULL: Final = 1e-9
-"""Pull towards the present values: parts without strokes, or w_beta = 0, make a system singular."""
+PULL: Final = 1e-9  # pull to the present values, where strokes or w_beta are missing and a system is singular
 
 _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution would follow rounding
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual

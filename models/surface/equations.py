@@ -1,4 +1,4 @@
-"""The energy that a surface over crosses minimises, with its slope and curvature for a descent."""
+"""The energy that a surface over crosses minimises, with its slope and curvature, and the descent."""
 
 from __future__ import annotations
 
@@ -11,13 +11,20 @@ import numpy as np
 from scipy import sparse
 
 from ..instance.grid import Floats
+from ..processes.deadline import Over
+from ..smooth.systems import factored
 from .crosses import Crosses
 from .stencils import Stencils, scaled
 
-CONJUGACY: Final = 0.1
-"""Weight of conjugacy: from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree."""
-FORGIVEN: Final = 0.007
-"""Cosine of the angle in space, ideally a right one, from which a cross counts less and less."""
+CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree
+FORGIVEN: Final = 0.007  # cosine of the angle in space from which a cross counts less and less
+_ROUNDS: Final = 60  # of the descent by Levenberg and Marquardt; 5 to 25 are usual
+_TRIALS: Final = 12  # increases of the damping in a round
+_FALL: Final = 2e-4  # least share of the energy that a round has to remove before another one
+_DAMPING: Final = 1e-2
+_LEAST: Final = 1e-9
+_UP: Final = 5.0
+_DOWN: Final = 8.0
 
 
 @dataclass(frozen=True)
@@ -179,6 +186,29 @@ def _in_blocks(values: Floats, row: Any, column: Any, size: int) -> Any:
         for axis, each in enumerate((row, column))
     ]
     return sparse.csr_array((values.ravel(), tuple(places)), shape=(2 * size, 2 * size))
+
+
+def descended(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
+    """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
+    energy, damping = equations.energy(z), _DAMPING
+    for _ in range(_ROUNDS):
+        if over():
+            break
+        slope, curvature = equations.model(z)
+        diagonal = sparse.diags_array(curvature.diagonal())
+        for _ in range(_TRIALS):
+            tried = z - factored(curvature + damping * diagonal)(slope)
+            reached = equations.energy(tried)
+            if reached < energy:
+                break
+            damping *= _UP
+        else:
+            break
+        fallen, z, energy = energy - reached, tried, reached
+        damping = max(damping / _DOWN, _LEAST)
+        if fallen <= _FALL * (energy + fallen):
+            break
+    return energy, z
 
 
 def _along(matrices: tuple[Any, Any], line: Floats) -> Any:

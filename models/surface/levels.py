@@ -12,8 +12,7 @@ from ..instance.grid import Bools, Floats, Grid
 from .crosses import Crosses
 from .stencils import Stencils, around
 
-SMALL: Final = 500
-"""Most pixels of the coarsest level, unless it cannot be halved: all starts are tried there."""
+SMALL: Final = 500  # most pixels of the coarsest level, where all starts are tried
 _DOME: Final = 0.7  # height of a dome, relative to a half sphere
 _PLANE: Final = 0.5  # slope of a plane
 

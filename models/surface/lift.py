@@ -16,22 +16,18 @@ from ..processes.deadline import Over, Stop, stop_function
 from ..processes.progress import Progress, silent
 from ..smooth.systems import one_thread
 from .crosses import Crosses
-from .descent import descended
-from .equations import FORGIVEN, Equations, Weights, normals_of
-from .hints import Disc, Hint, check_hints
+from .equations import FORGIVEN, Equations, Weights, descended, normals_of
+from .hints import Hint, check_hints, rows_of
 from .levels import Level, levels_of
 from .stencils import Stencils
 from .surface import Surface
 from .trust import confidence_of, doubts_of, firmness, freedom_of, off_right_angles
 
-FIRST: Final = Weights(even=1e-4, facing=1e-2)
-"""The first pass from a start: stiff, so that starts converge to the same surface."""
+FIRST: Final = Weights(even=1e-4, facing=1e-2)  # stiff, so that starts converge to the same surface
 WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)
 """Found on cylinder, torus, vase and spheroid of docs/surface.md, exact and from strokes."""
-CLEARLY: Final = 0.8
-"""Ratio of energies below which the plane's surface is preferred to the dome's: bodies bulge more often."""
-TELLING: Final = np.radians(10)
-"""Least slant of a hint that distinguishes z from -z: with less slant, both sides fit it nearly alike."""
+CLEARLY: Final = 0.8  # ratio of energies below which a plane's surface is preferred to the dome's
+TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z from -z
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
 
 
@@ -94,7 +90,7 @@ def surface(
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
         found.append((level.grid.size, level, z, own))
     _, level, z, own = max(found, key=itemgetter(0))
-    firm = firmness(level, z, [Disc.of(hint, level).rows for hint in own])
+    firm = firmness(level, z, [rows_of(hint, level) for hint in own])
     off = off_right_angles(field, heights)
     freedom = freedom_of(firm, hinted=_decide_side(own))
     lifted = Surface(field, heights, confidence_of(field, off), (), freedom, firm)
@@ -152,7 +148,7 @@ def _decide_side(hints: Sequence[Hint]) -> bool:
 
 def _settled(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> tuple[float, Floats]:
     """The energy and heights reached from z by descent, with the hints."""
-    extra = [Disc.of(hint, level).rows for hint in hints]
+    extra = [rows_of(hint, level) for hint in hints]
     return descended(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, over)
 
 

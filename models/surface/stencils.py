@@ -48,8 +48,7 @@ class Stencils:
     def blocks(self) -> Ints:
         """Numbers of the pixels of each block, shape (4, b): upper left and right, lower left and right."""
         pixels = np.stack(around(self.grid.number))
-        found: Ints = pixels[:, (pixels >= 0).all(axis=0)]
-        return found
+        return pixels[:, (pixels >= 0).all(axis=0)]
 
     @cached_property
     def changes(self) -> tuple[Any, Any]:

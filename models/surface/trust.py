@@ -16,16 +16,11 @@ from .equations import Equations, Rows, Weights, changes_of_normals
 from .levels import Level
 from .stencils import Stencils, around, scaled
 
-OFF: Final = np.radians(10)
-"""Lines whose angle in space deviates more than this from a right angle do not fit."""
-UNFIT: Final = 0.25
-"""Share of misfit crosses from which a surface is doubted; docs/surface.md has the figures."""
-SPOTS: Final = 4
-"""Singular spots that a surface may show: an ellipsoid has four umbilics."""
-FLAT: Final = np.radians(10)
-"""Mean slant below which a surface is called flat."""
-LOOSE: Final = 0.01
-"""Firmness below which the crosses do not determine the surface: see `firmness`."""
+OFF: Final = np.radians(10)  # lines whose angle in space deviates more from a right angle do not fit
+UNFIT: Final = 0.25  # share of misfit crosses from which a surface is doubted (docs/surface.md)
+SPOTS: Final = 4  # singular spots that a surface may show: an ellipsoid has four umbilics
+FLAT: Final = np.radians(10)  # mean slant below which a surface is called flat
+LOOSE: Final = 0.01  # firmness below which the crosses do not determine the surface: see `firmness`
 
 _PLAIN: Final = Weights(even=0.0, facing=0.0)
 _VECTORS: Final = 4
@@ -38,8 +33,7 @@ def off_right_angles(field: CrossField, heights: Floats) -> Floats:
     """Deviation from a right angle between each cross's lines on the surface, in [0, pi/2] radians; (n,)."""
     stencils = Stencils(field.instance.grid)
     cosine = Equations(stencils, Crosses.of(field), _PLAIN).right_angles(heights[stencils.used])
-    off: Floats = np.arcsin(np.minimum(np.abs(cosine), 1.0))
-    return off
+    return np.arcsin(np.minimum(np.abs(cosine), 1.0))
 
 
 def confidence_of(field: CrossField, off: Floats) -> Floats:

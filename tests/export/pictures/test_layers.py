@@ -4,9 +4,8 @@ import re
 
 import numpy as np
 import pytest
-from crossfield.export.pictures.cubics import fitted
 from crossfield.export.pictures.draw import draw
-from crossfield.export.pictures.layers import Place, trimmed
+from crossfield.export.pictures.layers import Place, fitted, trimmed
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import sample

@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from crossfield.export.pictures.combing import combed
-from crossfield.export.pictures.streamlines import CLOSEST, streamlines
+from crossfield.export.pictures.streamlines import CLOSEST, combed, streamlines
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField, relabelled
 from crossfield.models.instance.angles import line_difference

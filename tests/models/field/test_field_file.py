@@ -16,6 +16,7 @@ from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.power_field import power_field
+from damage import change, full_instance, refused, same_instance, without
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -23,24 +24,11 @@ from loops import for_each
 # The file is written anew in every example, so sharing the folder is harmless.
 settings.register_profile("files", suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 files = settings.get_profile("files")
-MASK = np.array([[1, 1, 0, 1], [1, 1, 0, 0], [0, 1, 1, 0]], dtype=bool)
 
 
 @pytest.fixture
 def instance():
-    return Instance(
-        name="sample",
-        mask=MASK,
-        stroke_pixels=[[0, 0], [1, 1], [2, 2]],
-        theta=[0.1, 1 / 3, 2.9],
-        w=[1.0, 0.1, 2 / 3],
-        stroke_coefficient=0.5,
-        skew_coefficient=1e-7,
-        gauge="box",
-        source='a "quoted" sketch.svg, Größe',
-        pixel_size=2.5,
-        origin=(-1.25, 1e-3),
-    )
+    return full_instance()
 
 
 @pytest.fixture
@@ -55,30 +43,9 @@ def random_field(instance, seed):
     return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
 
-def same_instance(one, other):
-    return one.sha256 == other.sha256 and (one.mask == other.mask).all() and (one.theta == other.theta).all()
-
-
 def same_field(one, other):
     angles = (one.alpha == other.alpha).all() and (one.beta == other.beta).all()
     return angles and (one.p == other.p).all() and same_instance(one.instance, other.instance)
-
-
-def refused(read, path, message, error=InstanceError):
-    with pytest.raises(error) as caught:
-        read(path)
-    text = str(caught.value)
-    assert text.startswith(str(path))
-    assert message in text
-    assert "\n" not in text
-
-
-def change(key, value):
-    return lambda document: document | {key: value}
-
-
-def without(key):
-    return lambda document: {k: v for k, v in document.items() if k != key}
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])
@@ -304,13 +271,6 @@ def test_singularities_are_the_vertices_round_which_the_raw_field_turns(tmp_path
     assert {int(row.split()[0]): int(row.split()[1]) for row in rows} == turning
     assert len(turning) == len(field.singularities.index)
     assert turning or name != "singular"
-
-
-def test_rawfield_is_the_same_twice(field, tmp_path):
-    for name in ("one", "two"):
-        write_field(field, tmp_path / f"{name}.rawfield")
-    for suffix in (".rawfield", ".obj", ".sings"):
-        assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
 
 
 # Whatever the bytes

@@ -8,7 +8,7 @@ import pytest
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.instance import HALF, QUARTER
-from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, _lines, bend_field, tremble
+from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, bend_field, tremble
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
 from exhaustive import random_instance, sketch
 from hypothesis import given, settings
@@ -185,7 +185,9 @@ def test_rounds_end_when_the_time_is_over():
         calls.clear()
         found = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: over(rounds))
         assert len(calls) == rounds + 1
-        energies.append(_Bend.of(start, HARMONIC, HOLD).energy(np.concatenate(_lines(found))))
+        energies.append(
+            _Bend.of(start, HARMONIC, HOLD).energy(np.concatenate([found.u_angle, found.v_angle]))
+        )
     assert energies == sorted(energies, reverse=True)
     whole = bend_field(start)
     assert np.array_equal(bend_field(start, stop=lambda: False).alpha, whole.alpha)

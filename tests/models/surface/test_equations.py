@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from crossfield.models.processes.deadline import never
 from crossfield.models.surface.crosses import Crosses
-from crossfield.models.surface.descent import descended
-from crossfield.models.surface.equations import CONJUGACY, Equations, Rows, Weights
+from crossfield.models.surface.equations import CONJUGACY, Equations, Rows, Weights, descended
 from crossfield.models.surface.levels import Level, levels_of
 from crossfield.models.surface.stencils import Stencils
 from loops import for_each
