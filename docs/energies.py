@@ -27,8 +27,7 @@ import numpy as np
 from crossfield.export.bundle.manifest import write_all
 from crossfield.export.verify.verify import Check, verify
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import Instance
-from crossfield.models.instance.weights import REFERENCE
+from crossfield.models.instance.instance import REFERENCE, Instance
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.sketch.samples import SAMPLES
 from make import generated, markdown

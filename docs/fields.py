@@ -26,8 +26,7 @@ from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.errors import InputError
 from crossfield.models.evaluation.hidden import summary
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import Instance
-from crossfield.models.instance.weights import STROKE_WEIGHT
+from crossfield.models.instance.instance import STROKE_WEIGHT, Instance
 from crossfield.models.sketch.samples import SAMPLES
 from energies import SKETCHES
 from fields_text import FIELDS, WEIGHTS

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 from crossfield.models.sketch.samples import SAMPLES
 from make import DOCS, markdown
 

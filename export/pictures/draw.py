@@ -9,6 +9,7 @@ import io
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -227,7 +228,6 @@ def own_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
 
 
 def _saved(figure: Any, suffix: str, *, dots: int = _DOTS, title: str | None = None) -> bytes:
-
     metadata = SUFFIXES[suffix] | ({} if title is None else {"Title": title})
     stream = io.BytesIO()
     figure.savefig(stream, format=suffix[1:], dpi=dots, metadata=metadata)
@@ -277,8 +277,8 @@ def _page(picture: panels.Picture, kind: Kind, title: str | None) -> Any:
     if keys:
         place = (0.5, (_EDGE + _LINE - 3) / page[1])
         spaces = {"borderaxespad": 0, "borderpad": 0.2, "handlelength": 1.4, "columnspacing": 1.6}
-        style = {"loc": "lower center", "bbox_to_anchor": place, "ncols": len(keys), "frameon": False}
-        figure.legend(handles=keys, **style, **spaces)
+        style = {"bbox_to_anchor": place, "ncols": len(keys), "frameon": False}
+        figure.legend(handles=keys, loc="lower center", **style, **spaces)
     return figure
 
 
@@ -303,9 +303,8 @@ def counted(field: CrossField) -> str:
     values, counts = np.unique(np.round(4 * field.singularities.index).astype(int), return_counts=True)
     if not len(values):
         return "no singularity"
-    names = {1: "1/4", 2: "1/2", 3: "3/4"}
     each = [
-        f"{count} of {'−' if value < 0 else '+'}{names.get(abs(value), f'{abs(value) / 4:g}')}"
+        f"{count} of {'−' if value < 0 else '+'}{Fraction(abs(value), 4)}"
         for value, count in zip(values[::-1].tolist(), counts[::-1].tolist(), strict=True)
     ]
     total = int(counts.sum())

@@ -51,18 +51,6 @@ class Drawing:
     ink: NDArray[np.uint8] | None = None
     scale: float = 1.0
 
-    def check(self, instance: Instance) -> None:
-        """Raise InputError if an instance lies elsewhere."""
-        left, top = instance.origin
-        right = left + instance.pixel_size * instance.grid.width
-        bottom = top + instance.pixel_size * instance.grid.height
-        if left < self.box[2] and top < self.box[3] and right > self.box[0] and bottom > self.box[1]:
-            return
-        raise InputError(
-            f"the drawing lies elsewhere than the field of {instance.name}, which is at x {left:g} to "
-            f"{right:g}, y {top:g} to {bottom:g}; give the drawing that its instance was read from"
-        )
-
 
 def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
     """The drawing of an instance, from a sketch file or a drawn sample; .curves is seen from the same side.
@@ -75,7 +63,18 @@ def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
     with naming(path):
         curves = curves_in(data, ".svg" if sampled else path.suffix.lower(), Choice(view=view_in(on.source)))
         drawing = _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves, data)
-        drawing.check(on)
+        (left, top), size = on.origin, on.pixel_size
+        right, bottom = left + size * on.grid.width, top + size * on.grid.height
+        if (
+            left >= drawing.box[2]
+            or top >= drawing.box[3]
+            or right <= drawing.box[0]
+            or bottom <= drawing.box[1]
+        ):
+            raise InputError(
+                f"the drawing lies elsewhere than the field of {on.name}, which is at x {left:g} to "
+                f"{right:g}, y {top:g} to {bottom:g}; give the drawing that its instance was read from"
+            )
     return drawing
 
 
@@ -115,9 +114,8 @@ def _size(data: bytes, canvas: Box | None, page: Box) -> tuple[str, str]:
 
 def _of_ink(picture: Picture) -> Drawing:
     level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
-    numbers = level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)
+    ink = (level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)).astype(np.uint8)
     page = (0.0, 0.0, float(picture.width), float(picture.height))
-    ink = numbers.astype(np.uint8)
     return Drawing(page, picture.box, {}, size_in_units(page), ink, float(picture.reduced))
 
 

@@ -103,9 +103,12 @@ def _strokes(place: Place) -> tuple[Lines, ...]:
 
 def _streamlines(field: CrossField, place: Place) -> list[Layer]:
     """Evenly spaced lines, a layer for each family; u is above."""
+    from scipy import ndimage
+
     scale = max(field.instance.mask.shape) / UNITS
     found = streamlines(field, _SPACING * scale)
-    depth = _depth(field.instance)
+    blurred = ndimage.gaussian_filter(np.pad(field.instance.mask, 1).astype(np.float64), _BLUR)
+    depth = blurred - _BORDER - _DRAWN_BORDER * drawn_border(field.instance)
     layers = []
     for family, name in ((1, "streamlines-v"), (0, "streamlines-u")):
         inside = [part for line in found for run in runs(line, family) for part in trimmed(run, depth)]
@@ -113,14 +116,6 @@ def _streamlines(field: CrossField, place: Place) -> list[Layer]:
         lines = Lines(FAMILIES[family], _LINE * place.unit, list(map(place.frame.at, smooth)), single=True)
         layers.append(Layer(name, (lines,)))
     return layers
-
-
-def _depth(instance: Instance) -> Floats:
-    """The blurred mask less its level at a smooth border, [height + 2, width + 2] with a rim of a pixel."""
-    from scipy import ndimage
-
-    blurred: Floats = ndimage.gaussian_filter(np.pad(instance.mask, 1).astype(np.float64), _BLUR)
-    return blurred - _BORDER - _DRAWN_BORDER * drawn_border(instance)
 
 
 def trimmed(line: Floats, depth: Floats) -> list[Floats]:

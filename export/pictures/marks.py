@@ -154,21 +154,14 @@ class Frame:
             if some.any()
         ]
 
-    def border(self, colour: str, width: float) -> Lines:
-        """The outline of the mask along the sides of pixels."""
-        return self._sides(colour, width, between=False)
-
-    def cells(self, colour: str, width: float) -> Lines:
-        """The sides between pixels of the mask."""
-        return self._sides(colour, width, between=True)
+    def sides(self, colour: str, width: float, *, between: bool = False) -> Lines:
+        """The outline of the mask along the sides of pixels, or the sides between its pixels."""
+        ends = np.array(self.corner) + self.pixel * _sides(np.pad(self.instance.mask, 1), between=between)
+        return Lines(colour, width, list(ends[:, None]))
 
     def area(self, colour: str, chosen: Bools) -> Area:
         """The chosen pixels, bool [height, width]."""
         return Area(colour, boxes(chosen) * self.pixel + np.tile(self.corner, 2))
-
-    def _sides(self, colour: str, width: float, *, between: bool) -> Lines:
-        ends = np.array(self.corner) + self.pixel * _sides(np.pad(self.instance.mask, 1), between=between)
-        return Lines(colour, width, list(ends[:, None]))
 
     def _pieces(self, centre: Floats, arm: Floats) -> Floats:
         return self.at(np.stack([centre - arm, centre + arm], axis=1))[:, None]

@@ -145,7 +145,7 @@ def _under(axes: Any, picture: Picture) -> None:
 
 
 def _border(axes: Any, picture: Picture) -> None:
-    paint(axes, [picture.frame.border(BORDER, 0.5 * picture.ink)], snap=True)
+    paint(axes, [picture.frame.sides(BORDER, 0.5 * picture.ink)], snap=True)
 
 
 def _singularities(axes: Any, picture: Picture) -> None:

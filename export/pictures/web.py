@@ -87,8 +87,8 @@ def _frame(instance: Instance) -> Frame:
 
 def _ground(frame: Frame) -> list[Area | Lines]:
     """The mask, its pixels where they are large enough, and its outline."""
-    cells = [frame.cells(GRID, 0.8)] if frame.pixel >= _CELLS_FROM else []
-    return [frame.area(PAPER, frame.instance.mask), *cells, frame.border(EDGE, 1.2)]
+    cells = [frame.sides(GRID, 0.8, between=True)] if frame.pixel >= _CELLS_FROM else []
+    return [frame.area(PAPER, frame.instance.mask), *cells, frame.sides(EDGE, 1.2)]
 
 
 def _page(frame: Frame, marks: Iterable[Mark]) -> bytes:

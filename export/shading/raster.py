@@ -59,7 +59,11 @@ def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Ras
     blurred = ndimage.gaussian_filter(solid, _BLUR, mode="constant")
     narrow, wide = spread(solid) - _SLOPE * within, spread(blurred) - _BLURRED_SLOPE * within
     most = _MOVED + thin * (_MOVED_THIN - _MOVED)
-    return Raster(unit, _opacity(narrow + np.clip(wide - narrow, -most, most)))
+    # The part of each pixel inside of the outline, where the level is one half.
+    depth = np.pad(narrow + np.clip(wide - narrow, -most, most) - 0.5, 1, mode="edge")
+    steepness = np.hypot(*np.gradient(depth))
+    opacity = np.clip(0.5 + depth / np.maximum(steepness, 1e-9), 0.0, 1.0)
+    return Raster(unit, opacity[1:-1, 1:-1])
 
 
 def scale_of(instance: Instance, scale: int | None) -> int:
@@ -109,11 +113,3 @@ def drawn_border(instance: Instance) -> float:
     mask = np.pad(instance.mask, 1)
     border = (mask & ~ndimage.binary_erosion(mask))[1:-1, 1:-1]
     return float(border[tuple(instance.stroke_pixels.T)].sum() / border.sum())
-
-
-def _opacity(level: Floats) -> Floats:
-    """The part of each pixel inside of the outline, where the level is one half."""
-    depth = np.pad(level - 0.5, 1, mode="edge")
-    steepness = np.hypot(*np.gradient(depth))
-    part: Floats = np.clip(0.5 + depth / np.maximum(steepness, 1e-9), 0.0, 1.0)
-    return part[1:-1, 1:-1]

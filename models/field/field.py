@@ -149,8 +149,7 @@ class CrossField(Pictured):
 
         """
         alpha, beta = label_of(_angles(instance, u_angle, "u_angle"), _angles(instance, v_angle, "v_angle"))
-        steps = _window_steps(instance, alpha)
-        steps[instance.stroke_index] = _nearer_steps(instance, alpha, beta, steps)
+        steps = _steps(instance, alpha, beta, inside=True)
         alpha = np.clip(alpha + HALF * steps, instance.alpha_lower, instance.alpha_upper)
         beta = np.clip(parity_sign(steps) * beta, -QUARTER, QUARTER)
         return cls(instance, alpha, beta, best_jumps(instance, alpha, beta))
@@ -313,13 +312,10 @@ def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> Cros
 
     Each pair gets its best jump; without clipping the energy does not rise.
     """
-    lower = instance.alpha_lower
-    steps = _window_steps(instance, alpha)
-    steps[instance.stroke_index] = _stroke_steps(instance, alpha, beta, steps)
-    alpha, beta, p = stepped(instance.grid, alpha, beta, p, steps)
+    alpha, beta, p = stepped(instance.grid, alpha, beta, p, _steps(instance, alpha, beta, inside=False))
     kept = CrossField(
         instance,
-        np.clip(alpha, lower, instance.alpha_upper),
+        np.clip(alpha, instance.alpha_lower, instance.alpha_upper),
         np.clip(beta, -QUARTER, QUARTER),
         np.clip(p, instance.p_min, instance.p_max),
     )
@@ -327,44 +323,26 @@ def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> Cros
     return best if best.energy().total < kept.energy().total else kept
 
 
-def _window_steps(instance: Instance, alpha: Floats) -> Ints:
-    """The step that moves each label into its window, shape (n,)."""
-    return np.ceil((instance.alpha_lower - alpha) / HALF - _ROUNDING).astype(np.int32)
+def _steps(instance: Instance, alpha: Floats, beta: Floats, *, inside: bool) -> Ints:
+    """The step of each label, (n,), into its window; on an edge, the one nearer to the stroke.
 
-
-def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
-    """The step of each stroke pixel's label with the least clipping and misfit; shape (s,)."""
+    If not inside, the label of a stroke may leave its window for the least clipping and misfit.
+    """
+    steps = np.ceil((instance.alpha_lower - alpha) / HALF - _ROUNDING).astype(np.int32)
+    at, target = instance.stroke_index, instance.target
     # The label in the window, the next one, which also fits on an edge, and the one with u at the stroke.
-    at = instance.stroke_index
-    faithful = 2 * np.round((instance.target - alpha[at] - beta[at]) / np.pi).astype(np.int32)
-    candidates = np.stack([steps[at], steps[at] + 1, faithful])
-    clipped, misfit = _losses(instance, alpha, beta, candidates)
-    return _cheapest(candidates, clipped + misfit)
-
-
-def _nearer_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
-    """The step of each stroke pixel's label into its window, (s,); on an edge, nearer to the stroke."""
-    at = instance.stroke_index
-    candidates = np.stack([steps[at], steps[at] + 1])
-    clipped, misfit = _losses(instance, alpha, beta, candidates)
-    fits = clipped <= 2 * HALF * _ROUNDING
-    fits[0] = True
-    return _cheapest(candidates, np.where(fits, misfit, np.inf))
-
-
-def _losses(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> tuple[Floats, Floats]:
-    """Clipping of alpha and remaining misfit for steps (k, s) of strokes; shape (k, s) each."""
-    at = instance.stroke_index
-    moved = alpha[at] + HALF * steps
+    faithful = 2 * np.round((target - alpha[at] - beta[at]) / np.pi).astype(np.int32)
+    candidates = np.stack([steps[at], steps[at] + 1, faithful][: 2 if inside else 3])
+    moved = alpha[at] + HALF * candidates
     shifted = np.clip(moved, instance.alpha_lower[at], instance.alpha_upper[at])
-    turned = np.clip(parity_sign(steps) * beta[at], -QUARTER, QUARTER)
-    misfit = np.abs(shifted + turned - instance.target)
-    return np.abs(moved - shifted), misfit
-
-
-def _cheapest(candidates: Ints, cost: Floats) -> Ints:
-    best: Ints = candidates[np.argmin(np.round(cost, 12), axis=0), np.arange(candidates.shape[1])]
-    return best
+    misfit = np.abs(shifted + np.clip(parity_sign(candidates) * beta[at], -QUARTER, QUARTER) - target)
+    clipped = np.abs(moved - shifted)
+    if inside:
+        cost = np.stack([misfit[0], np.where(clipped[1] <= 2 * HALF * _ROUNDING, misfit[1], np.inf)])
+    else:
+        cost = clipped + misfit
+    steps[at] = candidates[np.argmin(np.round(cost, 12), axis=0), np.arange(len(at))]
+    return steps
 
 
 def _angles(instance: Instance, given: Any, name: str) -> Floats:

@@ -149,7 +149,6 @@ def _of_npz(data: bytes) -> CrossField:
 
 
 def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
-
     try:
         return read(source)
     except InstanceError as error:

@@ -108,9 +108,7 @@ def _faces(head: bytes, instance: Instance) -> int:
     """The number of faces that the first line states."""
     words = head.split()
     if len(words) != 2 or not all(word.isdigit() and len(word) < MAX_NUMBER for word in words):
-        raise InstanceError(
-            f"line 1: is {_shown(head)}, not the degree 4 and the number of faces; give a .rawfield as text"
-        )
+        raise InstanceError(f"line 1: is {_shown(head)}, not the degree 4 and the number of faces as text")
     degree, faces = map(int, words)
     if degree != 4:
         raise InstanceError(f"line 1: has {degree} vectors per face; crosses have 4: u, v, -u, -v")

@@ -211,7 +211,7 @@ def check_counts(strokes: int, pixels: int) -> None:
     """Raise InstanceError if there are more stroke pixels than pixels."""
     if strokes > pixels:
         raise InstanceError(
-            f"lists {strokes} stroke pixels, but its mask has {pixels} pixels; list each stroke pixel once"
+            f"lists {strokes} stroke pixels, but its mask has {pixels} pixels; list each once"
         )
 
 

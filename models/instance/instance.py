@@ -14,7 +14,6 @@ from ..errors import InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import MOST_ANGLE, wrap
 from .grid import Bools, Floats, Grid, Ints
-from .weights import SKEW_WEIGHT, STROKE_WEIGHT, coefficient_of, in_digits, weight_of
 
 Gauge = Literal["strokes", "box"]
 GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
@@ -30,7 +29,11 @@ _SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds and at 
 MOST_WEIGHT: Final = 1e6  # greatest weight of a term of the energy
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
 """Instance names that instance libraries allow: at most 32 lower-case letters, digits and `_`."""
-_POWERS: Final = {"stroke": 1, "skew": 2}  # of the longer side, by which weights of terms are divided
+REFERENCE: Final = 24  # pixels of the longer side of the grid on which weights are coefficients
+STROKE_WEIGHT: Final = 20.0  # see docs/weights.md
+SKEW_WEIGHT: Final = 1e-6
+# On a finer grid the smoothness keeps its value, strokes have more pixels, and areas the square of that.
+_POWERS: Final = {"stroke": 1, "skew": 2}
 _NOT_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")  # would break a comment line, or have no UTF-8
 
 
@@ -85,16 +88,17 @@ def whole_numbers(values: Any, name: str) -> Ints:
     return given.astype(np.int32)
 
 
+def in_digits(value: float) -> float:
+    """The number to 12 significant digits, equal on processors that differ in the last digit."""
+    return float(f"{value:.12g}") + 0.0  # no -0.0
+
+
 def _check_weight(name: str, value: float) -> None:
     if not 0 <= value <= MOST_WEIGHT:
-        raise InstanceError(
-            f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}, "
-            "beyond which rounding hides the other terms"
-        )
+        raise InstanceError(f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}")
 
 
 def _check_lines(at: Ints, theta: Floats, w: Floats, outside: Bools) -> None:
-
     for label, wrong in (
         ("theta is not a finite number", ~np.isfinite(theta)),
         (f"theta is beyond {MOST_ANGLE:g} radians", ~(np.abs(theta) <= MOST_ANGLE)),
@@ -223,20 +227,15 @@ class Instance(Pictured):
         if self.theta.shape != (count,) or self.w.shape != (count,):
             sizes = f"{self.theta.size} and {self.w.size}"
             raise InstanceError(f"{count} stroke pixels need as many theta and w, but there are {sizes}")
-        _check_lines(self.stroke_pixels, self.theta, self.w, ~self._inside())
-        key = self.stroke_pixels[:, 0].astype(np.int64) * self.mask.shape[1] + self.stroke_pixels[:, 1]
-        if (np.diff(key) <= 0).any():
-            row, column = self.stroke_pixels[int(np.argmax(np.diff(key) <= 0)) + 1]
-            raise InstanceError(
-                f"stroke pixel [{row}, {column}] is out of order or listed twice; list each once, row by row"
-            )
-
-    def _inside(self) -> Bools:
         row, column = self.stroke_pixels.T
         height, width = self.mask.shape
         on_grid = (row >= 0) & (column >= 0) & (row < height) & (column < width)
-        inside: Bools = on_grid & self.mask[np.where(on_grid, row, 0), np.where(on_grid, column, 0)]
-        return inside
+        inside = on_grid & self.mask[np.where(on_grid, row, 0), np.where(on_grid, column, 0)]
+        _check_lines(self.stroke_pixels, self.theta, self.w, ~inside)
+        key = self.stroke_pixels[:, 0].astype(np.int64) * self.mask.shape[1] + self.stroke_pixels[:, 1]
+        if (np.diff(key) <= 0).any():
+            row, column = self.stroke_pixels[int(np.argmax(np.diff(key) <= 0)) + 1]
+            raise InstanceError(f"stroke pixel [{row}, {column}] is out of order or listed twice; sort them")
 
     @cached_property
     def grid(self) -> Grid:
@@ -322,18 +321,23 @@ class Instance(Pictured):
         for term, given in (("stroke", stroke_weight), ("skew", skew_weight)):
             if given is not None:
                 _check_weight(f"{term}_weight", given)
-                changed[f"{term}_coefficient"] = coefficient_of(given, max(self.mask.shape), _POWERS[term])
+                power = _POWERS[term]
+                changed[f"{term}_coefficient"] = given * REFERENCE**power / max(self.mask.shape) ** power
         return replace(self, **changed) if changed else self
 
     @property
     def stroke_weight(self) -> float:
         """Weight of the strokes that means the same on every grid; the coefficient on a grid of 24 pixels."""
-        return weight_of(self.stroke_coefficient, max(self.mask.shape), _POWERS["stroke"])
+        return self._weight("stroke")
 
     @property
     def skew_weight(self) -> float:
         """Weight of the skew that means the same on every grid; the coefficient on a grid of 24 pixels."""
-        return weight_of(self.skew_coefficient, max(self.mask.shape), _POWERS["skew"])
+        return self._weight("skew")
+
+    def _weight(self, term: str) -> float:
+        side, power = max(self.mask.shape), _POWERS[term]
+        return in_digits(getattr(self, f"{term}_coefficient") * side**power / REFERENCE**power)
 
     def with_strokes(self, kept: Bools, mask: Bools | None = None) -> Instance:
         """Return the same instance with a part of its strokes.

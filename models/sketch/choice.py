@@ -28,7 +28,6 @@ class Choice:
     view: str | None = None
 
     def __post_init__(self) -> None:
-
         if self.silhouette not in get_args(Silhouette):
             known = " or ".join(get_args(Silhouette))
             raise InputError(f"there is no silhouette {shortened(self.silhouette)!r}; choose {known}")
@@ -52,10 +51,8 @@ class Choice:
     def refuse_view(self) -> None:
         """Raise InputError if a view is chosen for a flat sketch."""
         if self.view is not None:
-            raise InputError(
-                f"is flat: only a .curves file can be seen from {shortened(self.view)}; give one, or leave "
-                "the view out"
-            )
+            view = shortened(self.view)
+            raise InputError(f"is flat: only a .curves file can be seen from {view}; leave the view out")
 
 
 def view_in(source: str) -> str | None:

@@ -166,10 +166,7 @@ def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
     first = np.floor(low) + 1
     crossings = np.maximum(np.ceil(high) - first, 0).astype(np.int64)
     if count + crossings.sum() > MAX_PIECES:
-        raise InputError(
-            f"its strokes fall into more than {MAX_PIECES} pieces on this grid; "
-            "simplify the drawing or choose a smaller size"
-        )
+        raise InputError(f"has more than {MAX_PIECES} pieces of strokes; choose a smaller size")
     owners, cuts = [np.arange(count)], [np.zeros(count)]
     for axis in (0, 1):
         many = crossings[:, axis]

@@ -67,10 +67,7 @@ def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]
     bend = np.sqrt((np.diff(points, n=2, axis=1) ** 2).sum(axis=-1)).max(axis=1, initial=0.0)
     steps = np.clip(np.ceil(np.sqrt(0.75 * bend / tolerance)), 1, MAX_SEGMENTS + 1).astype(np.int64)
     if steps.sum() > MAX_SEGMENTS:
-        raise InputError(
-            f"has more than {MAX_SEGMENTS} segments at this size; "
-            "simplify the drawing or choose a smaller size"
-        )
+        raise InputError(f"has more than {MAX_SEGMENTS} segments; simplify it, or choose a smaller size")
     owner = np.repeat(np.arange(len(points)), steps)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)
     ends = [_at(points[owner], (step + side) / steps[owner]) for side in (0, 1)]

@@ -72,9 +72,7 @@ def _trace(data: str, drawn: _Outline) -> None:
 
     data = data.strip()
     if data and data != "none" and data[0] not in "Mm":
-        raise InputError(
-            f"its path data begins with {data[:10]!r}, not with a move (M); export the drawing again"
-        )
+        raise InputError(f"its path data begins with {data[:10]!r}, not with a move (M); export it again")
     SVGLexicalParser().parse(drawn, data)
 
 
@@ -92,9 +90,8 @@ def _draw_basic(tag: str, attributes: Mapping[str, str], page: tuple[float, floa
     import svgelements
 
     kind, keys = _BASIC[tag]
-    shape = getattr(svgelements, kind)(
-        {key: _readable(attributes[key]) for key in keys if attributes.get(key)}
-    )
+    lengths = {key: _readable(attributes[key]) for key in keys if attributes.get(key)}
+    shape = getattr(svgelements, kind)(lengths)
     shape.render(ppi=PPI, width=page[0], height=page[1])
     for segment in shape.segments():
         drawn.add(segment)
@@ -112,10 +109,7 @@ def _readable(length: str) -> str | float:
 
 def too_many_curves() -> InputError:
     """The error for a drawing with more than MAX_CURVES segments."""
-    return InputError(
-        f"draws more than {MAX_CURVES} segments of curves, those repeated by <use> counted each time; "
-        "simplify the drawing"
-    )
+    return InputError(f"draws more than {MAX_CURVES} segments of curves, with <use>; simplify the drawing")
 
 
 @dataclass(eq=False)
@@ -184,7 +178,6 @@ class _Outline:
         self.quad((control.real, control.imag), point)
 
     def arc(self, rx: float, ry: float, *others: Any, **_: bool) -> None:
-
         from svgelements import Arc
 
         rotation, large, sweep, point = others

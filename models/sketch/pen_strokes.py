@@ -47,20 +47,21 @@ def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
         if line == "{":
             if opened:
                 raise InputError(
-                    f"line {number}: a stroke starts inside the stroke of line {opened}; "
-                    "close that one with }"
+                    f"line {number}: a stroke starts inside the stroke of line {opened}; close it"
                 )
             samples, opened = [], number
         elif line == "}":
             if not opened:
                 raise InputError(f"line {number}: a stroke ends that did not start; remove the line")
-            clusters.append(_cluster(lines[opened], len(strokes)))
+            fields = lines[opened].strip().removeprefix("#").split()
+            named = len(fields) == 2 and lines[opened].strip().startswith("#")
+            clusters.append(fields[1] if named else f"stroke {len(strokes)}")
             strokes.append(samples)
             opened = 0
         elif line and line[0] not in "#@":
             if not opened:
                 raise InputError(
-                    f"line {number}: a sample stands outside of any stroke; put it between {{ and }}"
+                    f"line {number}: a sample stands outside of strokes; put it between {{ and }}"
                 )
             x, y = _numbers_in(line, number, "x y pressure", 2)
             samples.append((x, y))
@@ -136,10 +137,8 @@ def _spatial(data: bytes) -> list[Floats]:
         count = int(match[1])
         samples = [_numbers_in(text, at, "x y z", 3) for at, text in lines[place + 1 : place + 1 + count]]
         if len(samples) < count:
-            raise InputError(
-                f"line {number}: this stroke announces {count} points, and {len(samples)} follow; "
-                "the file is cut off"
-            )
+            follow = f"announces {count} points, and {len(samples)} follow"
+            raise InputError(f"line {number}: this stroke {follow}; the file is cut off")
         if count > 1:
             strokes.append(np.array(samples))
         place += 1 + count
@@ -198,12 +197,6 @@ def _curves(
         chooser.check(taken=bool(taken.any()))
     samples = [np.array(strokes[number]) for number in drawn]
     return _polylines(samples, np.array(curve, dtype=np.int32), canvas, taken)
-
-
-def _cluster(line: str, stroke: int) -> str:
-    """The name of the cluster in a stroke's first line, `#stroke cluster`; without one the stroke's own."""
-    fields = line.strip().removeprefix("#").split()
-    return fields[1] if len(fields) == 2 and line.strip().startswith("#") else f"stroke {stroke}"
 
 
 def _canvas(line: str) -> tuple[float, float, float, float]:

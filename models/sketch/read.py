@@ -20,8 +20,7 @@ from ..errors import InputError, NoStrokeError, naming
 from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import Gauge, Instance, Reading
-from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading
 from ..memory import available_memory
 from ..storage import read_bytes
 from .bitmap import Picture, read_picture, read_white
@@ -169,7 +168,9 @@ def instance_of(
     if choice.silhouette == "outer":
         region = solve | (others.amount >= CUT) if given is None else given
         weight[along_outline(region, lines.direction, sketch.stroke_width / frame.pixel)] = 0.0
-        solve = _left(solve, weight) if given is None else solve
+        if not (held := _held(weight)).any() and given is None:
+            raise InputError("every stroke runs along the outline; choose the silhouette none")
+        solve = parts_with(solve, held) if given is None else solve
     stroke = solve & (weight >= LEAST_WEIGHT)
     if not stroke.any():
         raise NoStrokeError("no stroke lies inside the mask; draw a curvature line there or move the mask")
@@ -290,10 +291,8 @@ def _mask_on_grid(
     x, y, width, height = page
     wanted = (round(width), round(height))
     if white.shape[::-1] != wanted:
-        raise InputError(
-            f"the mask has {white.shape[1]} x {white.shape[0]} pixels, "
-            f"but the sketch {wanted[0]} x {wanted[1]}; make them equal"
-        )
+        given = f"{white.shape[1]} x {white.shape[0]} pixels"
+        raise InputError(f"the mask has {given}, but the sketch {wanted[0]} x {wanted[1]}; make them equal")
     if not white.any():
         raise InputError("the mask is black all over; paint the region to solve white")
     across, down = width / wanted[0], height / wanted[1]
@@ -320,7 +319,7 @@ def _solve_mask(
         raise NoStrokeError("no stroke is left on so coarse a grid; choose a larger size")
     closed, openings = closing(walls, sketch.ends(), frame)
     region = inside_outline(closed)
-    solve = parts_with(region & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0))
+    solve = parts_with(region & ~cut, _held(lines.weight))
     if not solve.any():
         raise NoStrokeError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
@@ -335,9 +334,6 @@ def _solve_mask(
     return solve, Reading(sketch.page, warnings, gaps)
 
 
-def _left(solve: Bools, weight: Floats) -> Bools:
-    """The parts of a mask that have curvature lines besides their outline. Raises InputError without any."""
-    held = np.where(weight >= LEAST_WEIGHT, weight, 0.0)
-    if not held.any():
-        raise InputError("every stroke runs along the outline; choose the silhouette none, or add strokes")
-    return parts_with(solve, held)
+def _held(weight: Floats) -> Floats:
+    """The weights of pixels with a direction, 0 elsewhere."""
+    return np.where(weight >= LEAST_WEIGHT, weight, 0.0)

@@ -7,8 +7,7 @@ from importlib.resources import files
 from typing import Final, Literal
 
 from ..errors import InputError
-from ..instance.instance import Gauge, Instance
-from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from .choice import AS_DRAWN, Choice, Silhouette
 from .read import DEFAULT_SIZE, check_size, instance_of
 from .surfaces import analytic

@@ -24,8 +24,6 @@ KNOWN: Final = frozenset({*PAINT, "display", "opacity", "transform"})
 
 
 class _Selector(NamedTuple):
-    """A simple selector: tag (or empty), id (or empty), classes."""
-
     tag: str
     id: str
     classes: frozenset[str]
@@ -44,7 +42,7 @@ class _Selector(NamedTuple):
 
 @dataclass(eq=False)
 class StyleSheet:
-    """The rules of a drawing: for each simple selector its properties, with the place of each."""
+    """The rules of a drawing: for each simple selector its properties, with the number of each."""
 
     rules: dict[str, dict[_Selector, dict[str, tuple[int, str]]]] = field(default_factory=dict)
     checks: int = 0
@@ -75,14 +73,8 @@ class StyleSheet:
         self.checks += more
         if self.checks > MAX_RULE_CHECKS:
             raise InputError(
-                f"its style sheets take more than {MAX_RULE_CHECKS} comparisons of rules with elements; "
-                "export it without style sheets"
+                f"its style sheets take more than {MAX_RULE_CHECKS} comparisons; export it without"
             )
-
-    def add(self, selector: _Selector, properties: Mapping[str, str], place: int) -> None:
-        """Add a rule; place: its number in the order of the rules."""
-        held = self.rules.setdefault(selector.key, {}).setdefault(selector, {})
-        held.update((name, (place, value)) for name, value in properties.items())
 
 
 def style_sheet(texts: Iterable[str]) -> StyleSheet:
@@ -93,9 +85,7 @@ def style_sheet(texts: Iterable[str]) -> StyleSheet:
     for text in texts:
         length += len(text)
         if length > MAX_STYLE:
-            raise InputError(
-                f"its style sheets have more than {MAX_STYLE} characters; export it without them"
-            )
+            raise InputError(f"its style sheets have more than {MAX_STYLE} characters; export it without")
         try:
             rules = tinycss2.parse_stylesheet(text, skip_comments=True, skip_whitespace=True)
         except ValueError:  # a whole number of thousands of digits
@@ -105,7 +95,8 @@ def style_sheet(texts: Iterable[str]) -> StyleSheet:
                 properties = _declared(rule.content)
                 for selector in _selectors(rule.prelude) if properties else ():
                     sheet.count(1)
-                    sheet.add(selector, properties, sheet.checks)
+                    held = sheet.rules.setdefault(selector.key, {}).setdefault(selector, {})
+                    held.update((name, (sheet.checks, value)) for name, value in properties.items())
     return sheet
 
 

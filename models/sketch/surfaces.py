@@ -17,8 +17,7 @@ from ..errors import InputError
 from ..instance.angles import wrap
 from ..instance.elementary import arctangent, cosine, length, sine, turned
 from ..instance.grid import Bools, Floats
-from ..instance.instance import Gauge, Instance
-from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from .cover import Frame, cover_by_segments, fit_frame
 from .outline import largest_part
 from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_size

@@ -66,17 +66,14 @@ def read_svg(data: bytes, chooser: Chooser | None = None) -> Curves:
     """
     root = _parsed(data)
     if _tag(root) != "svg":
-        raise InputError(
-            f"its root element is <{root.tag.split('}')[-1][:30]}>, not <svg>; expected an SVG drawing"
-        )
+        tag = root.tag.split("}")[-1][:30]
+        raise InputError(f"its root element is <{tag}>, not <svg>; expected an SVG drawing")
     canvas = _canvas(root)
     texts = ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
     walk = _Walk(style_sheet(texts), canvas, chooser)
     shapes = list(walk.shapes(root))
     if not sum(len(points) for _, points, _ in shapes):
-        raise InputError(
-            "draws no stroke: no visible path, line or shape was found; export the drawing with its strokes"
-        )
+        raise InputError("draws no stroke: it has no visible path, line or shape; export it again")
     paints, outlines, taken = zip(*shapes, strict=True)
     red, points = is_red(np.array(paints)), np.concatenate(outlines)
     shape = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(outline) for outline in outlines])
@@ -96,9 +93,7 @@ def _parsed(data: bytes) -> Element:
     try:
         root: Element = fromstring(data, forbid_dtd=False, forbid_entities=True, forbid_external=True)
     except DefusedXmlException as error:
-        raise InputError(
-            "declares XML entities, which are not read for safety; save it as plain SVG"
-        ) from error
+        raise InputError("declares XML entities, which are unsafe; save it as plain SVG") from error
     except (ParseError, ValueError, LookupError, RecursionError) as error:
         raise InputError(f"is not well-formed XML: {error}; save the drawing again") from error
     return root
@@ -111,9 +106,9 @@ class _Walk:
     sheet: StyleSheet
     canvas: tuple[float, float, float, float] | None
     chooser: Chooser | None
-    own: dict[Element, tuple[Mapping[str, str], Any]] = field(default_factory=dict)
+    own: dict[Element, tuple[Mapping[str, str], Any, bool]] = field(default_factory=dict)
     outlines: dict[Element, Floats] = field(default_factory=dict)
-    taken: dict[Element, bool] = field(default_factory=dict)
+
     visited: int = 0
     used: int = 0
     characters: int = 0
@@ -133,10 +128,11 @@ class _Walk:
                 raise InputError(f"draws more than {MAX_ELEMENTS} elements; simplify the drawing")
             if place.style.get("display") == "none" or _number(place.style.get("opacity")) == 0:
                 continue
-            if tag in SHAPES and _painted(place.style):
+            if tag in SHAPES:
                 paint = _paint(place.style)
-                painted = self.chooser is not None and self.chooser.takes([colour_label(paint)])
-                yield paint, self._placed(place), painted or place.chosen
+                if not (place.style["visibility"] in ("hidden", "collapse") or is_paper(np.array(paint))):
+                    painted = self.chooser is not None and self.chooser.takes([colour_label(paint)])
+                    yield paint, self._placed(place), painted or place.chosen
             elif tag in _CONTAINERS:
                 inner = _view(place, element) if element is not root else place.matrix
                 stack += [replace(place, element=child, matrix=inner) for child in reversed(element)]
@@ -145,24 +141,22 @@ class _Walk:
 
     def _styled(self, place: _Place) -> _Place:
         """The place with the element's own style and transform applied."""
-        if place.element not in self.own:
-            self._read(place.element)
-            style = _own_style(place.element, self.sheet)
-            self.own[place.element] = style, _transform(place.element, style)
-        own, transform = self.own[place.element]
+        element = place.element
+        if element not in self.own:
+            self.characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
+            if self.characters > MAX_DATA:
+                raise InputError(
+                    f"has more than {MAX_DATA} characters of paths, styles and transforms; "
+                    "simplify the drawing"
+                )
+            style = _own_style(element, self.sheet)
+            taken = self.chooser is not None and self.chooser.takes(_labels(element))
+            self.own[element] = style, _transform(element, style), taken
+        own, transform, taken = self.own[element]
         inherited = {key: place.style[key] for key in PAINT if key in place.style}
         style = inherited | {key: value for key, value in own.items() if value != "inherit"}
         matrix = place.matrix if transform is None else transform * place.matrix
-        chosen = self._chosen(place.element) or place.chosen
-        return _Place(place.element, style, matrix, place.uses, chosen)
-
-    def _chosen(self, element: Element) -> bool:
-        """Whether an element itself has a chosen label; all of its labels are recorded."""
-        if self.chooser is None:
-            return False
-        if element not in self.taken:
-            self.taken[element] = self.chooser.takes(_labels(element))
-        return self.taken[element]
+        return _Place(element, style, matrix, place.uses, taken or place.chosen)
 
     def _used(self, place: _Place, named: Mapping[str, Element]) -> list[_Place]:
         """The elements that a `use` refers to; none when it points into another file or at itself."""
@@ -177,10 +171,7 @@ class _Walk:
         if target is None or link in place.uses:
             return []
         if len(place.uses) == MAX_USE_DEPTH:
-            raise InputError(
-                f"has <use> elements nested more than {MAX_USE_DEPTH} deep; "
-                "expand them in the drawing program"
-            )
+            raise InputError(f"has <use> elements nested more than {MAX_USE_DEPTH} deep; expand them")
         moved = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
         uses = (*place.uses, link)
         used = replace(place, matrix=moved, uses=uses)
@@ -209,15 +200,7 @@ class _Walk:
             raise InputError(
                 f"{_named(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"
             )
-        drawn: Floats = placed[(placed != placed[:, :1]).any(axis=(1, 2))]
-        return drawn
-
-    def _read(self, element: Element) -> None:
-        self.characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
-        if self.characters > MAX_DATA:
-            raise InputError(
-                f"has more than {MAX_DATA} characters of paths, styles and transforms; simplify the drawing"
-            )
+        return np.asarray(placed[(placed != placed[:, :1]).any(axis=(1, 2))])
 
 
 def _labels(element: Element) -> Iterator[str]:
@@ -247,8 +230,7 @@ def _transform(element: Element, style: Mapping[str, str]) -> Any:
         return None
     if len(text) > MAX_TRANSFORM:
         raise InputError(
-            f"{_named(element)}: its transform has more than {MAX_TRANSFORM} characters; "
-            "export the drawing again"
+            f"{_named(element)}: its transform has more than {MAX_TRANSFORM} characters; simplify it"
         )
     try:
         return Matrix(text)
@@ -271,13 +253,6 @@ def _view(place: _Place, element: Element) -> Any:
     scale = min(wide / width, high / height)
     centre = Matrix.translate((wide - scale * width) / 2, (high - scale * height) / 2)
     return Matrix.translate(-x, -y) * Matrix.scale(scale) * centre * corner
-
-
-def _painted(style: Mapping[str, str]) -> bool:
-    """Whether a shape is visible: its stroke or fill is neither none, transparent, nor white like paper."""
-    return style["visibility"] not in ("hidden", "collapse") and not bool(
-        is_paper(np.array([_paint(style)]))[0]
-    )
 
 
 def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:

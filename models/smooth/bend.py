@@ -98,7 +98,6 @@ def tremble(field: CrossField) -> float:
 
 
 def _bent(start: CrossField, harmonic: float, hold: float, over: Over) -> CrossField:
-
     bend = _Bend.of(start, harmonic, hold)
     x = np.concatenate([start.u_angle, start.v_angle])
     energy = bend.energy(x)

@@ -100,7 +100,6 @@ class _SharedLimit:
         self._held: Any = None
 
     def enter(self) -> None:
-
         with self._lock:
             if not self._inside:
                 with _any_thread_may_set():
@@ -108,7 +107,6 @@ class _SharedLimit:
             self._inside += 1
 
     def leave(self) -> None:
-
         with self._lock:
             self._inside -= 1
             if not self._inside:

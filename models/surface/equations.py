@@ -112,20 +112,17 @@ class Equations:
     def energy(self, z: Floats) -> float:
         """The energy of heights."""
         linear, _ = self._squares
+        cosine, scale = self.right_angles(z), self.weights.forgiven
+        plain = np.isinf(scale)
+        loss = np.sum(cosine**2) if plain else scale**2 * np.sum(np.log1p((cosine / scale) ** 2))
         normals = normals_of(self.stencils, z)
         uneven = sum(normal @ (self.stencils.unevenness @ normal) for normal in normals)
         return float(
-            self._loss(self.right_angles(z))
+            loss
             + np.sum((linear.matrix @ z - linear.goal) ** 2)
             + self.weights.even * normals.shape[1] * uneven
             - 2 * self.weights.facing * np.sum(np.log(normals[2]))
         )
-
-    def _loss(self, cosine: Floats) -> float:
-        scale = self.weights.forgiven
-        if np.isinf(scale):
-            return float(np.sum(cosine**2))
-        return float(scale**2 * np.sum(np.log1p((cosine / scale) ** 2)))
 
     def model(self, z: Floats) -> tuple[Floats, Any]:
         """Half the slope (N,) of the energy at z, and half its curvature (N, N) by Gauss and Newton."""

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from scipy import sparse
 
-from ..instance.grid import Bools, Floats, Grid
+from ..instance.grid import Floats, Grid
 from .crosses import Crosses
 from .stencils import Stencils, around
 
@@ -37,7 +37,8 @@ class Level:
     def coarser(self) -> Level:
         """The level of pixels twice as large: one for each nonempty 2 x 2, with its mean cross."""
         grid = self.grid
-        larger = Grid(_halved(grid.mask))
+        even = np.pad(grid.mask, [(0, size % 2) for size in grid.mask.shape])
+        larger = Grid(np.any([even[down::2, right::2] for down in (0, 1) for right in (0, 1)], axis=0))
         at = larger.number[grid.rows // 2, grid.columns // 2]
         share = 1 / np.bincount(at, minlength=larger.size)[at]
         mean = sparse.csr_array((share, (at, np.arange(grid.size))), shape=(larger.size, grid.size))
@@ -71,11 +72,4 @@ def levels_of(level: Level) -> list[Level]:
     found = [level]
     while found[0].grid.size > SMALL:
         found.insert(0, found[0].coarser())
-    return found
-
-
-def _halved(mask: Bools) -> Bools:
-    """Whether any pixel of each 2 x 2 is in the mask, from the upper left corner on."""
-    even = np.pad(mask, [(0, size % 2) for size in mask.shape])
-    found: Bools = np.any([even[down::2, right::2] for down in (0, 1) for right in (0, 1)], axis=0)
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..field.field import CrossField
-from ..instance.grid import Bools, Floats, Grid
+from ..instance.grid import Floats, Grid
 from ..processes.deadline import Over, Stop, stop_function
 from ..processes.progress import Progress, silent
 from ..smooth.systems import one_thread
@@ -83,7 +83,10 @@ def surface(
     found = []
     for number in range(1, parts + 1):
         progress("surface" if parts == 1 else f"surface, part {number} of {parts}")
-        level = _part(field, part_of == number)
+        mask = part_of == number
+        window = ndimage.find_objects(mask.astype(np.int8))[0]
+        stencils, crosses = Stencils(Grid(mask[window])), Crosses.of(field).at(mask[instance.mask])
+        level = Level(stencils, crosses, (window[0].start, window[1].start))
         own = [hint for hint in given if part_of[hint.row, hint.column] == number]
         z = _solved(level, own, cut, flip=flip)
         used, (top, left) = level.stencils.used, level.corner
@@ -110,13 +113,6 @@ class TimeLimit:
         """Whether time is over."""
         self.off = self.off or self.over()
         return self.off
-
-
-def _part(field: CrossField, mask: Bools) -> Level:
-    """The finest level of a part of the mask, cut out."""
-    window = ndimage.find_objects(mask.astype(np.int8))[0]
-    crosses = Crosses.of(field).at(mask[field.instance.mask])
-    return Level(Stencils(Grid(mask[window])), crosses, (window[0].start, window[1].start))
 
 
 def _solved(part: Level, hints: Sequence[Hint], over: Over, *, flip: bool) -> Floats:
