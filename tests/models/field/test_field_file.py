@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.array_archive import pack_arrays
-from crossfield.models.errors import CrossfieldError, InputError, InstanceError, OutputError
+from crossfield.models.errors import CrossfieldError, InputError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.file import read_field, write_field
 from crossfield.models.field.jumps import best_jumps
@@ -91,11 +91,6 @@ def test_unknown_ending_is_refused_before_anything_is_written(field, tmp_path):
 
 def test_missing_file_is_named(tmp_path):
     refused(read_field, tmp_path / "none.npz", "cannot be read: no such file", InputError)
-
-
-def test_folder_that_is_not_there_is_named(field, tmp_path):
-    with pytest.raises(OutputError, match="cannot be written"):
-        write_field(field, tmp_path / "none" / "field.npz")
 
 
 def pixel(number, column, value):

@@ -1,4 +1,4 @@
-"""The bend field: exact on constant crosses, near the truth on surfaces, and it moves with the sketch."""
+"""The bend field and its start: exact on constant crosses, near the truth on surfaces, moved with the sketch."""
 
 from dataclasses import replace
 
@@ -90,6 +90,9 @@ def test_the_field_moves_with_the_sketch(name):
         def there(field, mask=other.mask):
             return [turn(move(field.image(line)))[mask] for line in lines(field)]
 
+        plain = polyvector_field(other, hold=max(HOLDS))
+        assert plain.cross_error(*there(start)) == pytest.approx(0, abs=1e-6)
+        assert plain.energy().total == pytest.approx(start.energy().total, rel=1e-6)
         moved = bend_field(cf.CrossField.from_lines(other, *there(start)))
         assert moved.cross_error(*there(bend_field(start))) == pytest.approx(0, abs=1e-6)
 
@@ -116,12 +119,14 @@ def test_any_weights_will_do(seed, gauge, skew_coefficient, stroke_coefficient):
         skew_coefficient=skew_coefficient,
         stroke_coefficient=stroke_coefficient,
     )
-    field = bend_field(polyvector_field(instance))
-    assert (field.alpha >= instance.alpha_lower).all()
-    assert (field.alpha <= instance.alpha_upper).all()
-    assert (np.abs(field.beta) <= QUARTER).all()
-    assert (field.p >= instance.p_min).all()
-    assert (field.p <= instance.p_max).all()
+    start = polyvector_field(instance)
+    for field in (start, bend_field(start)):
+        assert (field.alpha >= instance.alpha_lower).all()
+        assert (field.alpha <= instance.alpha_upper).all()
+        assert (np.abs(field.beta) <= QUARTER).all()
+        assert (field.p >= instance.p_min).all()
+        assert (field.p <= instance.p_max).all()
+        assert 0 <= field.energy().total < np.inf
 
 
 @for_each(
