@@ -105,10 +105,6 @@ class ArrayArchive:
             raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")
         self._unread = set(self._members)
 
-    def holds(self, name: str) -> bool:
-        """Whether the archive holds an array of that name."""
-        return name in self._members
-
     def arrays(self, expected: Mapping[str, Expected], prefix: str = "") -> Arrays:
         """Return the expected arrays by name. prefix: text before the names in the archive.
 

@@ -166,7 +166,7 @@ def draw(
     if underlay is not None:
         raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}, or leave it out")
     with own_settings():
-        return write_bytes(path, _saved(_panels(what, chosen, title), suffix))
+        return write_bytes(path, _saved(_page(what, chosen, title), suffix))
 
 
 def preview(what: Subject) -> bytes:
@@ -185,7 +185,7 @@ def preview(what: Subject) -> bytes:
     """
     kind = _kind(_fitting(what, ".png", underlaid=False), what)
     with own_settings():
-        return _saved(_panels(what, kind, None), ".png", dots=_PREVIEW_DOTS)
+        return _saved(_page(what, kind, None), ".png", dots=_PREVIEW_DOTS)
 
 
 def _fitting(what: Subject, suffix: str, *, underlaid: bool) -> str:
@@ -207,13 +207,6 @@ def _layers(
         return svg_of(layers, title)
     with own_settings():
         return _saved(page_of(layers), suffix, title=title)
-
-
-def _panels(what: Subject, kind: Kind, title: str | None) -> Any:
-    instance = what if isinstance(what, Instance) else what.instance
-    field = what if isinstance(what, CrossField) else None
-    surface = what if isinstance(what, Surface) else None
-    return _page(panels.Picture(instance, field, kind.size, surface), kind, title)
 
 
 @contextmanager
@@ -250,10 +243,13 @@ def _kind(kind: str, what: Subject) -> Kind:
     return table[kind]
 
 
-def _page(picture: panels.Picture, kind: Kind, title: str | None) -> Any:
+def _page(what: Subject, kind: Kind, title: str | None) -> Any:
     """The figure: panels in a row, headings above, legend and caption below; every length in points."""
     from matplotlib.figure import Figure
 
+    instance = what if isinstance(what, Instance) else what.instance
+    field = what if isinstance(what, CrossField) else None
+    picture = panels.Picture(instance, field, kind.size, what if isinstance(what, Surface) else None)
     height, width = (side * picture.unit for side in picture.instance.mask.shape)
     above = _EDGE + _LINE * (any(heading for heading, _ in kind.panels) + (title is not None) * 1.3)
     below = _EDGE + _LINE * (1 + kind.legend)

@@ -1,7 +1,4 @@
-"""Marks of a picture (lines, dots, areas, words), and those of an instance and its field in any coordinates.
-
-`svg` and `canvas` write the same marks: `svg` as a small SVG file, `canvas` with matplotlib.
-"""
+"""Marks of a picture (lines, dots, areas, words), and those of an instance and its field."""
 
 from __future__ import annotations
 

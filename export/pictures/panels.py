@@ -1,8 +1,4 @@
-"""The panels of a picture: each function draws one kind onto one set of matplotlib axes.
-
-Axes are in points of the printed picture, y down, from the top left corner of the grid. Widths, marks and
-spacings do not depend on the size of a pixel, so that 24 and 200 pixels look alike.
-"""
+"""The panels of a picture: each function draws one kind onto matplotlib axes in points, y down."""
 
 from __future__ import annotations
 

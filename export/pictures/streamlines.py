@@ -151,8 +151,7 @@ class _Crosses:
 
     def nearest(self, place: tuple[Labels, Labels], heading: Positions) -> Labels:
         """Number 0..3 of the direction nearest to a heading at places of the table."""
-        number: Labels = np.argmax((self.directions[place] * heading.conj()[..., None]).real, axis=-1)
-        return number
+        return np.asarray(np.argmax((self.directions[place] * heading.conj()[..., None]).real, axis=-1))
 
     def heading(self, z: Positions, before: Positions) -> Positions:
         """Unit vectors of the lines at z that continue the headings before."""
@@ -162,8 +161,7 @@ class _Crosses:
         weight = np.where(_CORNERS[0], down, 1 - down) * np.where(_CORNERS[1], across, 1 - across)
         chosen = np.take_along_axis(self.directions[place], self.nearest(place, before)[..., None], axis=-1)
         total = np.sum(weight * chosen[..., 0], axis=0)
-        unit: Positions = total / np.maximum(np.abs(total), 1e-12)
-        return unit
+        return np.asarray(total / np.maximum(np.abs(total), 1e-12))
 
     def allowed(self, z: Positions, target: Positions) -> Bools:
         """Which lines may go from z to a target: not where pixels meet only in a corner."""

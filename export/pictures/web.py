@@ -1,7 +1,4 @@
-"""Pictures for a web site, in the reader's light or dark mode; same input, same bytes.
-
-The longer side of the mask is 320 units; pixel [row, column] is the square at (column, row) times the unit.
-"""
+"""Pictures for a web site, in the reader's light or dark mode; same input, same bytes."""
 
 from __future__ import annotations
 

@@ -111,8 +111,7 @@ def ball(normals: Floats) -> Floats:
     side = np.maximum(normals @ fill, 0.0)[..., None] * _WALL_COLOUR
     gloss = np.maximum(normals @ half, 0.0)[..., None] ** _SHINE * _KEY_COLOUR
     rim = np.maximum(1 - normals[..., 2:], 0.0) ** _RIM * (_WALL_COLOUR + 0.25 * soft)
-    energy: Floats = _BODY * (soft + side + _FLOOR) + 0.4 * gloss + 0.55 * rim
-    return energy
+    return np.asarray(_BODY * (soft + side + _FLOOR) + 0.4 * gloss + 0.55 * rim)
 
 
 def normal_map(instance: Instance, normals: Floats, scale: int = 1) -> Bytes:

@@ -102,8 +102,7 @@ def _thin(mask: Bools) -> Bools:
     changed = (ndimage.binary_opening(wide, block) != wide) | (ndimage.binary_closing(wide, block) != wide)
     part, _ = ndimage.label(changed, block)
     long = np.bincount(part.ravel()) > _TIP
-    thin: Bools = ndimage.binary_dilation(changed & long[part], block)[3:-3, 3:-3]
-    return thin
+    return np.asarray(ndimage.binary_dilation(changed & long[part], block)[3:-3, 3:-3])
 
 
 def drawn_border(instance: Instance) -> float:

@@ -1,4 +1,8 @@
-"""The folder of a surface: pictures, heights, a mesh for other programs, and a report."""
+"""The folder of a surface: pictures, heights, a report, and a mesh (.obj) with a quad for each pixel.
+
+x runs to the right, y up, z towards the viewer, all in pixels; the lower left corner of the grid is at
+x = y = 0. Texture coordinates cover the grid.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.field.rawfield import vertices_of
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import make_folder, write_bytes
@@ -23,7 +28,6 @@ from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.layers import strokes_sheet
 from ..shading.colours import UPPER_LEFT, Light, eight_bit, lit, matcap, normal_map
 from ..shading.raster import raster, scale_of
-from .mesh import to_mtl, to_obj
 
 SHADED: Final = "shaded.png"
 DRAWING: Final = "drawing.png"
@@ -42,6 +46,9 @@ FILES: Final = {
 }
 """The files of a surface, and the content of each."""
 _PAPER: Final = (0.93, 0.91, 0.88)
+_MATERIAL: Final = "drawing"
+_MTL: Final = f"newmtl {_MATERIAL}\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {DRAWING}\n"
+_WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
 
 def write_surface(
@@ -107,7 +114,7 @@ def write_surface(
     heights = io.BytesIO()
     np.save(heights, surface.heights, allow_pickle=False)
     write_bytes(folder / "heights.npy", heights.getvalue())
-    write_bytes(folder / MATERIALS, to_mtl(DRAWING))
+    write_bytes(folder / MATERIALS, _MTL.encode())
     write_bytes(folder / "surface.obj", to_obj(surface, MATERIALS))
     document = surface_document(surface, about) | {"files": FILES}
     write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
@@ -185,3 +192,32 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
         "freedom": list(surface.freedom),
         **{name: round(float(value), 4) for name, value in numbers.items()},
     }
+
+
+def to_obj(surface: Surface, materials: str) -> bytes:
+    """The mesh as text. materials: name of the .mtl file in its folder."""
+    instance = surface.instance
+    places, corners = vertices_of(instance.grid)
+    height, width = instance.mask.shape
+    row, column = places.T
+    points = np.column_stack([column, height - row, surface.heights[row, column]])
+    texture = np.column_stack([column / width, 1 - row / height])
+    normals = np.zeros((len(places), 3))
+    np.add.at(normals, corners, surface.normals[:, None, :])
+    faces = corners[:, _WALK] + 1
+    return "".join(
+        [
+            f"# {instance.name}: quad k is pixel k = 1, 2, ... of the mask, row by row; y up, z to you\n",
+            f"mtllib {materials}\n",
+            _lines("v", points),
+            _lines("vt", texture),
+            _lines("vn", normals / np.linalg.norm(normals, axis=1, keepdims=True)),
+            f"usemtl {_MATERIAL}\ns 1\n",
+            *("f " + " ".join(f"{k}/{k}/{k}" for k in face) + "\n" for face in faces.tolist()),
+        ]
+    ).encode()
+
+
+def _lines(lead: str, table: np.ndarray[Any, Any]) -> str:
+    form = lead + " {:.6f}" * table.shape[1] + "\n"
+    return "".join(form.format(*row) for row in (np.round(table, 6) + 0.0).tolist())

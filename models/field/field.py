@@ -235,8 +235,7 @@ class CrossField(Pictured):
     @cached_property
     def degenerate(self) -> Bools:
         """True where both lines are the same to within 5 degrees; shape (n,)."""
-        close: Bools = np.abs(self.beta) > QUARTER - DEGENERATE
-        return close
+        return np.asarray(np.abs(self.beta) > QUARTER - DEGENERATE)
 
     @property
     def angle_between(self) -> Floats:

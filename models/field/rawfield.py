@@ -1,8 +1,6 @@
 """Directional's raw field of a mesh (.rawfield), its singularities (.sings), and the mesh (.obj).
 
-A line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z. Rows are written counter-clockwise,
-because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
-
+A line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z, counter-clockwise.
 The mesh has two triangles per pixel, 2k and 2k + 1 of pixel k, counter-clockwise with y up, and the field is
 per face. Pixels that meet only in a corner each get their own vertex there, so that the mesh is a manifold.
 Coordinates are the sketch's, with y negated and z = 0.
@@ -20,8 +18,7 @@ import numpy as np
 
 from ..errors import InstanceError, shortened
 from ..input_limits import MAX_NUMBER
-from ..instance.angles import double_angle, line_difference, line_of
-from ..instance.elementary import arctangent
+from ..instance.angles import arctangent, double_angle, line_difference, line_of
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import Instance
 from .field import CrossField

@@ -41,10 +41,6 @@ _ARCHIVE: Final = {
     "theta": Expected(1, MAX_GRID**2),
     "w": Expected(1, MAX_GRID**2),
 }
-_RETIRED: Final = {
-    "crossings": "holds crossings (two strokes at one pixel) and was made by an earlier version; "
-    "read the sketch again"
-}
 
 
 def write_instance(instance: Instance, path: str | Path) -> Path:
@@ -180,9 +176,7 @@ def _check_writable(document: object) -> None:
 def of_document(document: object) -> Instance:
     """Read an instance from a parsed JSON document. Raises InstanceError with the place in the document."""
     check_version(document, FORMAT, VERSION)
-    if isinstance(document, dict):
-        for key in _RETIRED.keys() & document.keys():
-            raise InstanceError(_RETIRED[key])
+
     document = check_schema(document, "instance", __package__, rows={"strokes": _are_strokes})
     width = len(document["mask"][0])
     for number, row in enumerate(document["mask"]):
@@ -299,9 +293,6 @@ def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
 
 def of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
     """Read an instance from arrays whose names start with a prefix. Raises InstanceError."""
-    for name, message in _RETIRED.items():
-        if archive.holds(prefix + name):
-            raise InstanceError(message)
     return of_arrays(archive.arrays(_ARCHIVE, prefix))
 
 

@@ -1,7 +1,4 @@
-"""The pixel grid: mask, numbering, neighbour pairs and quads as index arrays.
-
-Arrays are indexed [row, column], row 0 at the top; x = column, y = -row (y up).
-"""
+"""The pixel grid as index arrays [row, column], row 0 at the top; x = column, y = -row (y up)."""
 
 from __future__ import annotations
 

@@ -246,8 +246,7 @@ class Instance(Pictured):
     def stroke_index(self) -> Ints:
         """Pixel number of each stroke pixel, shape (s,)."""
         row, column = self.stroke_pixels.T
-        number: Ints = self.grid.number[row, column]
-        return number
+        return np.asarray(self.grid.number[row, column])
 
     @cached_property
     def target(self) -> Floats:

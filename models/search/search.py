@@ -23,7 +23,7 @@ from ..processes.deadline import Deadline, Over, never
 from ..processes.interruption import interruptible
 from ..processes.progress import Progress, silent
 from ..processes.side_by_side import checked, side_by_side
-from ..smooth.power_field import power_field
+from ..smooth.polyvector import power_field
 from ..smooth.systems import one_thread
 from .coarse import halved, prolonged
 from .energy import LinearSolver

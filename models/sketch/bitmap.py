@@ -1,9 +1,8 @@
 """Reader of bitmaps: ink on paper, and stroke directions by a structure tensor.
 
-The paper may have any colour lighter than the strokes, and any light on it: its level is taken from the
-picture, place by place where the light is uneven. Directions are found at the picture's own resolution and
-then averaged over grid pixels by the double angle, weighted by darkness and coherence, so that junctions and
-corners drop out (docs/mathematics.md, 1).
+The paper may have any colour lighter than the strokes, and any light on it. Directions are found at the
+picture's own resolution and then averaged over grid pixels by the double angle, weighted by darkness and
+coherence, so that junctions and corners drop out (docs/mathematics.md, 1).
 """
 
 from __future__ import annotations
@@ -114,8 +113,7 @@ def stroke_directions(ink: Ink, width: float) -> Ink:
     cosine, sine, energy = (
         ndimage.gaussian_filter(part, scale, mode="constant", truncate=3.0) for part in tensor
     )
-    direction: Ink = np.stack([cosine, sine], axis=-1) / np.maximum(energy, 1e-8)[..., None]
-    return direction
+    return np.asarray(np.stack([cosine, sine], axis=-1) / np.maximum(energy, 1e-8)[..., None])
 
 
 def read_picture(data: bytes, size: int) -> Picture:
@@ -271,8 +269,7 @@ def _between(rows: Ink, place: Floats) -> Ink:
     below = np.minimum(place.astype(np.intp), max(len(rows) - 2, 0))
     above = np.minimum(below + 1, len(rows) - 1)
     part = (place - below).astype(np.float32)[:, None]
-    between: Ink = rows[below] * (1 - part) + rows[above] * part
-    return between
+    return np.asarray(rows[below] * (1 - part) + rows[above] * part)
 
 
 def _specks(ink: Ink) -> Bools:
@@ -281,8 +278,7 @@ def _specks(ink: Ink) -> Bools:
 
     label, count = ndimage.label(ink > 0, structure=np.ones((3, 3)))
     weight = np.bincount(label.ravel(), ink.ravel(), count + 1)
-    specks: Bools = weight[label] < _SPECK
-    return specks
+    return np.asarray(weight[label] < _SPECK)
 
 
 def _red_part(rgb: Floats, ink: Floats) -> Ink:
@@ -292,5 +288,4 @@ def _red_part(rgb: Floats, ink: Floats) -> Ink:
     if rgb.shape[-1] == 1:
         return np.zeros(ink.shape, dtype=np.float32)
     red, all_ink = (ndimage.gaussian_filter(part, 1.5) for part in (redness(rgb), ink))
-    part: Ink = (red > REDDISH * all_ink).astype(np.float32)
-    return part
+    return np.asarray((red > REDDISH * all_ink).astype(np.float32))

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.elementary import length as vector_length
+from ..instance.angles import length as vector_length
 from ..instance.grid import Bools, Floats
 from .cover import Frame, block_means, covering_curves
 from .outline import enclosed, place
@@ -87,8 +87,7 @@ def _removable(line: Bools, *, first: bool) -> Bools:
     count = around.sum(axis=0, dtype=np.uint8)
     turns = (~around & np.roll(around, -1, axis=0)).sum(axis=0, dtype=np.uint8)
     sides = (up & right & down) | (right & down & left) if first else (up & right & left) | (up & down & left)
-    removable: Bools = (count >= 2) & (count <= 6) & (turns == 1) & ~sides
-    return removable
+    return np.asarray((count >= 2) & (count <= 6) & (turns == 1) & ~sides)
 
 
 def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
@@ -132,8 +131,7 @@ def _extents(walls: Bools, row: Indices, column: Indices) -> Floats:
 
     label, _ = ndimage.label(walls, np.ones((3, 3), dtype=bool))
     sides = [0, *(max(part.stop - part.start for part in box) for box in ndimage.find_objects(label))]
-    extents: Floats = ndimage.maximum_filter(np.array(sides, dtype=np.float64)[label], size=3)[row, column]
-    return extents
+    return np.asarray(ndimage.maximum_filter(np.array(sides, dtype=np.float64)[label], size=3)[row, column])
 
 
 def _candidates(walls: Bools, outside: Bools, ends: Floats, frame: Frame) -> Floats:
@@ -171,8 +169,7 @@ def _between(ends: Floats, longest: Floats) -> Floats:
     cosine = np.sort((way * line).sum(axis=-1) / np.maximum(length, np.finfo(float).tiny), axis=1)
     ahead = (cosine[:, 0] >= ASIDE) & (cosine[:, 1] >= AHEAD) & (far <= longest[pairs].min(axis=1))
     shortest = np.argsort(far[ahead], kind="stable")[:_MOST_BRIDGES]
-    lines: Floats = point[pairs[ahead][np.sort(shortest)]]
-    return lines
+    return np.asarray(point[pairs[ahead][np.sort(shortest)]])
 
 
 def _prolonged(walls: Bools, ends: Floats, longest: Floats) -> Floats:
@@ -189,8 +186,7 @@ def _prolonged(walls: Bools, ends: Floats, longest: Floats) -> Floats:
     meets = stroke & left & (step <= longest[:, None])
     ahead = meets.any(axis=1)
     met = way[np.arange(len(way)), np.argmax(meets, axis=1)]
-    lines: Floats = np.stack([point, met], axis=1)[ahead]
-    return lines
+    return np.asarray(np.stack([point, met], axis=1)[ahead])
 
 
 def _with(walls: Bools, pixels: tuple[Indices, Indices, Indices], kept: Indices) -> Bools:

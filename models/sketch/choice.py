@@ -1,7 +1,6 @@
 """Selection of curvature lines of a drawing by labels, beyond its colours.
 
-Strokes are chosen by labels: `colour=`, `class=`, `id=` and `layer=` in SVG, `cluster=` in .scap. Elements in
-a group have the labels of the group too. The strokes that are not chosen cut the field.
+Labels are `colour=`, `class=`, `id=` and `layer=` in SVG, also of groups, and `cluster=` in .scap.
 """
 
 from __future__ import annotations
@@ -12,7 +11,12 @@ from typing import Final, Literal, get_args
 
 from ..errors import InputError, printable, shortened
 
+Kind = Literal["svg", "scap", "curves", "picture"]
 Silhouette = Literal["none", "outer"]
+_UNLABELLED: Final = {
+    "curves": "is a .curves file, whose strokes have no labels",
+    "picture": "is a picture, whose strokes have no labels: only red strokes are recognised",
+}
 KINDS: Final = ("colour", "class", "id", "layer", "cluster")
 """Kinds of labels by which strokes can be chosen."""
 _FEW: Final = 4  # labels of each kind that an error lists
@@ -43,14 +47,11 @@ class Choice:
         seen = "" if self.view is None else f"{_SEEN_FROM}{self.view}"
         return printable(f"{file}{seen}")
 
-    def refuse_labels(self, what: str) -> None:
-        """Raise InputError if strokes are chosen in a sketch without labels."""
-        if self.curvature:
-            raise InputError(f"{what}; leave the choice of {self.curvature[0]} out")
-
-    def refuse_view(self) -> None:
-        """Raise InputError if a view is chosen for a flat sketch."""
-        if self.view is not None:
+    def check(self, kind: Kind) -> None:
+        """Raise InputError if strokes or a view are chosen in a sketch that has none."""
+        if self.curvature and kind in _UNLABELLED:
+            raise InputError(f"{_UNLABELLED[kind]}; leave the choice of {self.curvature[0]} out")
+        if self.view is not None and kind != "curves":
             view = shortened(self.view)
             raise InputError(f"is flat: only a .curves file can be seen from {view}; leave the view out")
 

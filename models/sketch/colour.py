@@ -1,7 +1,4 @@
-"""Recognition of strokes, and of red strokes, by colour on white paper.
-
-Designers mark curvature lines in red and draw silhouettes and creases in black (docs/mathematics.md, 1).
-"""
+"""Recognition of strokes, and of red strokes, by colour on white paper."""
 
 from __future__ import annotations
 
@@ -17,15 +14,13 @@ REDDISH: Final = 0.4  # least share of a stroke's ink that must be missing from 
 
 def ink_of(rgb: Floats) -> Floats:
     """Ink of a colour, 1 - min(red, green, blue) in [0, 1], shape (...,): 1 for black and for pure red."""
-    ink: Floats = 1 - rgb.min(axis=-1)
-    return ink
+    return np.asarray(1 - rgb.min(axis=-1))
 
 
 def redness(rgb: Floats) -> Floats:
     """Amount of red ink in a colour, (...,): red - max(green, blue), less orange and purple."""
     red, green, blue = np.moveaxis(rgb, -1, 0)
-    excess: Floats = np.maximum(red - np.maximum(green, blue) - np.abs(green - blue) / 2, 0)
-    return excess
+    return np.asarray(np.maximum(red - np.maximum(green, blue) - np.abs(green - blue) / 2, 0))
 
 
 def is_paper(rgb: Floats) -> Bools:

@@ -1,7 +1,4 @@
-"""Strokes on the pixel grid: their cover of each pixel, and its direction.
-
-Sketches have y down, instances have y up; this module converts between them.
-"""
+"""Strokes on the pixel grid: their cover of each pixel, y down, and its direction, y up."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..input_limits import MAX_PIECES
-from ..instance.elementary import length as vector_length
+from ..instance.angles import length as vector_length
 from ..instance.grid import Bools, Floats, Ints
 
 Indices = NDArray[np.intp]
@@ -201,5 +198,4 @@ def _strip_means(image: Pixels, edges: Floats) -> Floats:
     below = np.minimum(place.astype(np.int64), len(image) - 1)
     part = (place - below).reshape(-1, *[1] * (image.ndim - 1))
     at = sums[below] * (1 - part) + sums[below + 1] * part
-    means: Floats = np.diff(at, axis=0) / np.diff(edges).reshape(-1, *[1] * (image.ndim - 1))
-    return means
+    return np.asarray(np.diff(at, axis=0) / np.diff(edges).reshape(-1, *[1] * (image.ndim - 1)))

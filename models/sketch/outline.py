@@ -6,8 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.angles import line_of
-from ..instance.elementary import cosine, sine
+from ..instance.angles import cosine, line_of, sine
 from ..instance.grid import Bools, Floats
 from .cover import Frame
 
@@ -55,8 +54,7 @@ def parts_with(region: Bools, weight: Floats) -> Bools:
     kept = (held >= HELD) & (size >= max(4, CRUMB * region.sum()))
     kept[np.argmax(held)] = held.max() > 0
     kept[0] = False
-    parts: Bools = kept[label]
-    return parts
+    return np.asarray(kept[label])
 
 
 def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
@@ -146,8 +144,7 @@ def enclosed(strokes: Bools, gap: float = GAPS[0]) -> Bools:
     free = ndimage.distance_transform_edt(~walls) > radius
     label, _ = ndimage.label(free)
     outside = ndimage.distance_transform_edt(label != label[0, 0]) <= radius
-    region: Bools = (~outside | walls)[pad:-pad, pad:-pad]
-    return region
+    return np.asarray((~outside | walls)[pad:-pad, pad:-pad])
 
 
 def largest_part(mask: Bools) -> Bools:
@@ -155,5 +152,4 @@ def largest_part(mask: Bools) -> Bools:
     from scipy import ndimage
 
     label, _ = ndimage.label(mask)
-    part: Bools = label == 1 + np.argmax(np.bincount(label.ravel(), minlength=2)[1:])
-    return part
+    return np.asarray(label == 1 + np.argmax(np.bincount(label.ravel(), minlength=2)[1:]))

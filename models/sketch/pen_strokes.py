@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError, shortened
 from ..input_limits import LEAST_LENGTH, MAX_LINES
-from ..instance.elementary import cosine, sine, turned
+from ..instance.angles import cosine, sine, turned
 from ..instance.grid import Bools, Floats, Ints
 from .choice import Chooser
 from .curves import Curves, lines_as_cubics

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from ..memory import available_memory
 from ..storage import read_bytes
 from .bitmap import Picture, read_picture, read_white
 from .bridges import closing, curve_ends, opened
-from .choice import AS_DRAWN, Choice, Silhouette
+from .choice import AS_DRAWN, Choice, Kind, Silhouette
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
 from .outline import along_outline, boundless, crowded, inside_outline, off_page, parts_with
@@ -50,7 +50,7 @@ _PICTURES: Final = {
 }
 """First bytes of pictures, by the suffix of their files."""
 _PICTURE: Final = re.compile(b"|".join(_PICTURES.values()), re.DOTALL)
-Kind = Literal["svg", "scap", "curves", "picture"]
+
 _FLATNESS: Final = 0.02  # of a pixel
 
 
@@ -223,14 +223,10 @@ def bytes_of(path: Path) -> bytes:
 def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | None:
     """The curves of a vector sketch, None for a picture. Raises InputError."""
     kind = kind_of(data, suffix)
+    choice.check(kind)
     if kind == "curves":
-        choice.refuse_labels("is a .curves file, whose strokes have no labels")
         return read_curves(data, choice.view)
-    choice.refuse_view()
-    if kind != "picture":
-        return (read_svg if kind == "svg" else read_scap)(data, choice.chooser)
-    choice.refuse_labels("is a picture, whose strokes have no labels: only red strokes are recognised")
-    return None
+    return None if kind == "picture" else (read_svg if kind == "svg" else read_scap)(data, choice.chooser)
 
 
 def kind_of(data: bytes, suffix: str) -> Kind:

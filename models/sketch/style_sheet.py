@@ -1,8 +1,7 @@
 """Style sheets of SVG drawings: the properties that they give to an element.
 
-tinycss2 parses, in time linear in the text. Only simple selectors count: a tag, an id, classes, and
-combinations of these. Selectors that depend on other elements are ignored, because matching them takes time
-that grows without bound in the depth of a drawing.
+tinycss2 parses, in time linear in the text. Only simple selectors of tag, id and classes count; the time of
+others grows with the depth of a drawing.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Instances with a known answer: curved surfaces, projected, with their exact curvature lines.
 
-Each surface is parametrised by its lines of curvature: position(s, t), turned in space and viewed along
--z. A line s = const or t = const of the drawing is then exactly a projected curvature line. x runs to the
-right, y up, z towards the viewer.
+Each surface is parametrised by its lines of curvature, s = const and t = const, turned in space and viewed
+along -z. x runs to the right, y up, z towards the viewer.
 """
 
 from __future__ import annotations
@@ -14,8 +13,7 @@ from typing import Final
 import numpy as np
 
 from ..errors import InputError
-from ..instance.angles import wrap
-from ..instance.elementary import arctangent, cosine, length, sine, turned
+from ..instance.angles import arctangent, cosine, length, sine, turned, wrap
 from ..instance.grid import Bools, Floats
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from .cover import Frame, cover_by_segments, fit_frame

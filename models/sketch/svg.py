@@ -3,10 +3,8 @@
 svgelements parses path data, transforms, lengths and colours, tinycss2 parses style sheets. Each element is
 parsed once, for any number of uses, and the work is bounded by the limits of `input_limits`. The bytes first
 pass defusedxml, which refuses entities. Pictures and `use` of other files are never loaded. Clip paths,
-masks, dashes and text are ignored.
-
-Strokes are the path of every shape with a visible `stroke`, and the outline of a shape that is only filled:
-drawing programs export strokes as filled outlines. White (paper) counts as invisible.
+masks, dashes and text are ignored. Shapes that are only filled count as strokes, because drawing programs
+export strokes as filled outlines; white (paper) counts as invisible.
 """
 
 from __future__ import annotations
@@ -32,7 +30,7 @@ from ..input_limits import (
     MAX_USE_DEPTH,
     MAX_USES,
 )
-from ..instance.elementary import turned
+from ..instance.angles import turned
 from ..instance.grid import Floats
 from .choice import Chooser, colour_label
 from .colour import is_paper, is_red

@@ -1,9 +1,8 @@
 """The curve of a sketch that each stroke pixel belongs to; not part of the instance.
 
 In a vector sketch a curve is an unbroken run of a path (SVG), a cluster of strokes (.scap), or a stroke
-(.curves), together with shorter ones that redraw it: they share more than half of their stroke pixels with
-it. Pictures do not record curves. For them, and without a sketch, a curve is a chain of stroke pixels that
-continue in each other's direction. A chain ends at a corner, and may end at a crossing.
+(.curves), together with shorter ones that redraw it. Without a vector sketch it is a chain of stroke pixels
+that continue in each other's direction. A chain ends at a corner, and may end at a crossing.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError, naming
-from ..instance.angles import line_difference
-from ..instance.elementary import arctangent
+from ..instance.angles import arctangent, line_difference
 from ..instance.grid import Ints
 from ..instance.instance import Instance
 from .choice import AS_DRAWN, Choice
@@ -115,8 +113,7 @@ def chains(instance: Instance) -> Ints:
         ends.append(np.stack([one[linked], other[one][linked]]))
     first, second = np.concatenate(ends, axis=1)
     links = csr_array((np.ones(len(first)), (first, second)), shape=(count, count))
-    numbers: Ints = connected_components(links, directed=False)[1].astype(np.int32)
-    return numbers
+    return np.asarray(connected_components(links, directed=False)[1].astype(np.int32))
 
 
 def _drawn(sketch: str | Path, choice: Choice) -> Curves | None:

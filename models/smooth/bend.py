@@ -1,9 +1,8 @@
 """The bend field: lines of one family change little along the lines of the other family.
 
 Iarussi, Bommes, Bousseau: BendFields: Regularized Curvature Fields from Rough Concept Sketches (ACM
-Transactions on Graphics 34, 2015). The smoothness energy of docs/mathematics.md, 5, penalises every turn of a
-line. Curvature lines do turn along themselves, as the surface bends; their direction changes little from one
-of them to the next.
+Transactions on Graphics 34, 2015). Curvature lines turn along themselves, as the surface bends; their
+direction changes little from one to the next.
 """
 
 from __future__ import annotations

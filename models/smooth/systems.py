@@ -22,6 +22,8 @@ PULL: Final = 1e-9  # pull to the present values, where strokes or w_beta are mi
 
 _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution would follow rounding
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual
+_LOCK: Final = threading.Lock()
+_HELD: Final[list[Any]] = []  # the limit of BLAS, once for each context that is open
 
 
 def stroke_weight(instance: Instance) -> Floats:
@@ -86,35 +88,20 @@ def one_thread() -> Iterator[None]:
     Contexts may be nested, and several threads may be inside at once. The number of threads of BLAS is a
     setting of the whole process: it returns to its old value when the last context ends.
     """
-    _LIMIT.enter()
+    with _LOCK:
+        if _HELD:
+            _HELD.append(_HELD[0])
+        else:
+            with _any_thread_may_set():
+                _HELD.append(_libraries().limit(limits=1, user_api="blas"))
     try:
         yield
     finally:
-        _LIMIT.leave()
-
-
-class _SharedLimit:
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._inside = 0
-        self._held: Any = None
-
-    def enter(self) -> None:
-        with self._lock:
-            if not self._inside:
+        with _LOCK:
+            held = _HELD.pop()
+            if not _HELD:
                 with _any_thread_may_set():
-                    self._held = _libraries().limit(limits=1, user_api="blas")
-            self._inside += 1
-
-    def leave(self) -> None:
-        with self._lock:
-            self._inside -= 1
-            if not self._inside:
-                with _any_thread_may_set():
-                    self._held.restore_original_limits()
-
-
-_LIMIT: Final = _SharedLimit()
+                    held.restore_original_limits()
 
 
 @contextmanager

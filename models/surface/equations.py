@@ -13,8 +13,7 @@ from scipy import sparse
 from ..instance.grid import Floats
 from ..processes.deadline import Over
 from ..smooth.systems import factored
-from .crosses import Crosses
-from .stencils import Stencils, scaled
+from .stencils import Crosses, Stencils, scaled
 
 CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree
 FORGIVEN: Final = 0.007  # cosine of the angle in space from which a cross counts less and less
@@ -106,8 +105,7 @@ class Equations:
         """The cosines r (n,) of the angles in space between both lines."""
         u, v = self._lines
         a, b = (along @ z for along in self._along)
-        cosine: Floats = (np.sum(u * v, axis=1) + a * b) / np.sqrt((1 + a * a) * (1 + b * b))
-        return cosine
+        return np.asarray((np.sum(u * v, axis=1) + a * b) / np.sqrt((1 + a * a) * (1 + b * b)))
 
     def energy(self, z: Floats) -> float:
         """The energy of heights."""
@@ -164,8 +162,7 @@ class Equations:
 def normals_of(stencils: Stencils, z: Floats) -> Floats:
     """The unit normals of the pixels, with their parts x, y and z one below the other: shape (3, n)."""
     x, y = (slope @ z for slope in stencils.slopes)
-    normals: Floats = np.stack([-x, -y, np.ones_like(x)]) / np.sqrt(1 + x * x + y * y)
-    return normals
+    return np.asarray(np.stack([-x, -y, np.ones_like(x)]) / np.sqrt(1 + x * x + y * y))
 
 
 def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..instance.grid import Floats
 from ..instance.instance import HALF, Instance
 from .equations import Rows
-from .levels import Level
+from .stencils import Level
 
 WEIGHT: Final = 0.1  # weight of each pixel of the disc about a hint, whose normals differ a little
 _DISC: Final = 0.05  # radius in parts of the root of the number of pixels
@@ -42,8 +42,7 @@ class Hint:
     @property
     def slopes(self) -> Floats:
         """The slopes (dz/dx, dz/dy) of a surface with this normal."""
-        rise: Floats = -np.tan(self.slant) * np.array([np.cos(self.tilt), np.sin(self.tilt)])
-        return rise
+        return np.asarray(-np.tan(self.slant) * np.array([np.cos(self.tilt), np.sin(self.tilt)]))
 
 
 def check_hints(hints: Iterable[Hint], instance: Instance) -> None:

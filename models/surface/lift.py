@@ -15,11 +15,9 @@ from ..instance.grid import Floats, Grid
 from ..processes.deadline import Over, Stop, stop_function
 from ..processes.progress import Progress, silent
 from ..smooth.systems import one_thread
-from .crosses import Crosses
 from .equations import FORGIVEN, Equations, Weights, descended, normals_of
 from .hints import Hint, check_hints, rows_of
-from .levels import Level, levels_of
-from .stencils import Stencils
+from .stencils import Crosses, Level, Stencils, levels_of
 from .surface import Surface
 from .trust import confidence_of, doubts_of, firmness, freedom_of, off_right_angles
 

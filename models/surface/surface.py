@@ -1,7 +1,4 @@
-"""A surface over the mask of an instance: heights at the corners of its pixels.
-
-x runs to the right, y up, z towards the viewer; all three are in pixels.
-"""
+"""A surface over the mask of an instance: heights at the corners of its pixels, in pixels."""
 
 from __future__ import annotations
 

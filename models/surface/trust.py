@@ -11,10 +11,8 @@ from scipy import linalg
 from ..field.field import CrossField
 from ..instance.grid import Floats
 from ..smooth.systems import factored
-from .crosses import Crosses
 from .equations import Equations, Rows, Weights, changes_of_normals
-from .levels import Level
-from .stencils import Stencils, around, scaled
+from .stencils import Crosses, Level, Stencils, around, scaled
 
 OFF: Final = np.radians(10)  # lines whose angle in space deviates more from a right angle do not fit
 UNFIT: Final = 0.25  # share of misfit crosses from which a surface is doubted (docs/surface.md)

@@ -9,7 +9,7 @@ from crossfield.export.pictures.layers import Place, fitted, trimmed
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import sample
-from crossfield.models.smooth.power_field import power_field
+from crossfield.models.smooth.polyvector import power_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from layered import NUMBER, SVG, layers_of, lines_in, numbers

@@ -17,7 +17,7 @@ from crossfield.models.sketch.curves import bounding_box
 from crossfield.models.sketch.pen_strokes import read_curves
 from crossfield.models.sketch.read import read_sketch
 from crossfield.models.sketch.samples import sample
-from crossfield.models.smooth.power_field import power_field
+from crossfield.models.smooth.polyvector import power_field
 from defusedxml import ElementTree
 from layered import SVG, layers_of, lines_in, numbers
 from PIL import Image, ImageDraw

@@ -7,8 +7,7 @@ import crossfield as cf
 import matplotlib as mpl
 import numpy as np
 import pytest
-from crossfield.export.surfaces.files import FILES, surface_facts, write_surface
-from crossfield.export.surfaces.mesh import to_obj
+from crossfield.export.surfaces.files import FILES, surface_facts, to_obj, write_surface
 from crossfield.models.errors import InputError, OutputError
 from hypothesis import given
 from hypothesis import strategies as st

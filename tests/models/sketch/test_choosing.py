@@ -146,14 +146,6 @@ def test_clusters_of_scap_are_chosen_and_are_the_curves_that_are_hidden(tmp_path
         cf.read_sketch(file, curvature=["class=flow"])
 
 
-def test_evaluation_takes_the_curves_that_were_chosen(tmp_path):
-    file = tmp_path / "a.svg"
-    file.write_bytes(lines('class="flow"'))
-    chosen = cf.read_sketch(file, size=40, curvature=["class=flow"])
-    found = curves_of(chosen, file, Choice(curvature=("class=flow",)))
-    assert set(found) - {-1} == {1, 2}
-
-
 # --- silhouettes --------------------------------------------------------------------------------------------
 
 

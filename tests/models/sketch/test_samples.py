@@ -10,7 +10,7 @@ from crossfield.models.instance.angles import line_difference
 from crossfield.models.sketch.samples import SAMPLES, sample, sample_svg, samples
 from crossfield.models.sketch.surfaces import SURFACES, analytic
 from crossfield.models.sketch.svg import read_svg
-from crossfield.models.smooth.power_field import power_field
+from crossfield.models.smooth.polyvector import power_field
 from loops import for_each
 from scipy import ndimage
 

@@ -1,4 +1,4 @@
-"""The bend field and its start: exact on constant crosses, near the truth on surfaces, moved with the sketch."""
+"""The bend field and its start: exact on constant crosses, near the truth on surfaces."""
 
 from dataclasses import replace
 

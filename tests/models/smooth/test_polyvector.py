@@ -8,8 +8,7 @@ from crossfield.models.search.improvement import improved_field
 from crossfield.models.search.search import search_patches
 from crossfield.models.search.starts import polyvector_start
 from crossfield.models.sketch.samples import sample
-from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
-from crossfield.models.smooth.power_field import power_field
+from crossfield.models.smooth.polyvector import HOLDS, polyvector_field, power_field
 from exhaustive import sketch
 from loops import for_each
 from moves import lines
