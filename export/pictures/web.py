@@ -13,8 +13,7 @@ from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE, Area, Frame, Lay
 from .svg import LABEL, web_svg_of
 
 SIDE: Final = 320.0
-CROSSES_UP_TO: Final = 12
-"""Longer side of a grid, in pixels, up to which its crosses are drawn one by one; beyond, streamlines."""
+CROSSES_UP_TO: Final = 12  # longer side of a grid with crosses at all pixels; larger ones have streamlines
 GRID: Final = "#e4e6ea"
 EDGE: Final = "#8b929c"
 CUT: Final = "#c3c8ce"

@@ -17,8 +17,7 @@ from .jumps import best_jumps, label_of, parity_sign, stepped
 
 Norm = Literal[1, 2]
 
-DEGENERATE: Final = np.radians(2.5)
-"""Lines closer than twice this (5 degrees) count as one: |beta| > pi/4 - DEGENERATE."""
+DEGENERATE: Final = np.radians(2.5)  # lines closer than 5 degrees count as one: |beta| > pi/4 - DEGENERATE
 FAR: Final = np.radians(10)  # A stroke that deviates more than this from both lines counts as not followed
 NARROW: Final = QUARTER  # lines that are less than this apart are a narrow cross
 MOST: Final = 0.9  # share of the stroke pixels that deviate no more than `Shape.most_deviation`

@@ -18,8 +18,7 @@ Indices = NDArray[np.intp]
 Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
 
 MARGIN: Final = 0.04  # empty border round a drawing, as a share of its longer side; at least one pixel
-LEAST_R: Final = 0.5
-"""Least R of a pixel with a direction: |cos d| for lines at an angle d, 0.64 for a bend by 90."""
+LEAST_R: Final = 0.5  # least R of a pixel with a direction: |cos d| at an angle d, 0.64 for a bend by 90
 _NUDGE: Final = 1e-9  # of a pixel: a line exactly along a pixel edge is shared by both sides
 
 

@@ -35,10 +35,8 @@ from .svg import read_svg
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
 BYTES_PER_PIXEL: Final = 5000  # while its problem is written
-LEAST_WEIGHT: Final = 0.1
-"""Stroke pixels with a smaller w have no useful direction: grazed corners, crossings."""
-CUT: Final = 0.5 - 1e-9
-"""Least length in pixel sides at which another stroke removes a pixel: a larger one would leave gaps."""
+LEAST_WEIGHT: Final = 0.1  # stroke pixels with a smaller w have no direction: grazed corners, crossings
+CUT: Final = 0.5 - 1e-9  # least length at which another stroke cuts a pixel out; more would leave gaps
 _PICTURES: Final = {
     ".png": rb"\x89PNG",
     ".jpg": rb"\xff\xd8\xff",

@@ -26,8 +26,7 @@ from .read import LEAST_WEIGHT, bytes_of, curves_in, segments_of
 from .samples import SAMPLES, sample_svg
 
 REACH: Final = 2  # rows and columns from a pixel of a chain to the next, across crossings without a direction
-ASIDE: Final = np.radians(27.0)
-"""Greatest angle between a chain's direction and the way to its next pixel: a little more than atan(1/2)."""
+ASIDE: Final = np.radians(27.0)  # greatest angle to the next pixel of a chain; atan(1/2) is less
 TURN: Final = np.radians(15.0)  # greatest turn of a chain per pixel, as on a circle of four pixels in radius
 REDRAWN: Final = 0.5  # least share of its stroke pixels at which a curve only redraws another one
 SEVERAL: Final = -1  # the number of a stroke pixel on several curves

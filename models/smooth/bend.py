@@ -23,15 +23,9 @@ from .systems import factored, one_thread
 
 _Places = NDArray[np.intp]
 
-HARMONIC: Final = 0.05
-"""Weight of plain smoothness next to bend for strokes that tremble by `TREMBLE` or more.
-
-A greater weight smooths rough strokes further, and deviates from too many of them.
-"""
-TREMBLE: Final = np.radians(1.2)
-"""Approximate deviation of lines from strokes at 48 pixels with 3 degrees of noise on each stroke pixel."""
-HOLD: Final = 0.25
-"""Factor of the stroke weights: under the default ones, 3 degrees of noise show in the field from 0.3 on."""
+HARMONIC: Final = 0.05  # weight of plain smoothness for strokes that tremble by `TREMBLE` or more
+TREMBLE: Final = np.radians(1.2)  # about what 3 degrees of noise on strokes cause at 48 pixels
+HOLD: Final = 0.25  # factor of the stroke weights; from 0.3 on, 3 degrees of noise show
 
 _LEAST_HARMONIC: Final = 0.01  # smallest deviation from clean strokes
 _SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size

@@ -22,8 +22,7 @@ from .surface import Surface
 from .trust import confidence_of, doubts_of, firmness, freedom_of, off_right_angles
 
 FIRST: Final = Weights(even=1e-4, facing=1e-2)  # stiff, so that starts converge to the same surface
-WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)
-"""Found on cylinder, torus, vase and spheroid of docs/surface.md, exact and from strokes."""
+WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)  # found on surfaces of docs/surface.md
 CLEARLY: Final = 0.8  # ratio of energies below which a plane's surface is preferred to the dome's
 TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z from -z
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
