@@ -80,7 +80,7 @@ if TYPE_CHECKING:
     from .models.sketch.surfaces import analytic as analytic
     from .models.smooth.bend import bend_field as bend_field
     from .models.smooth.polyvector import polyvector_field as polyvector_field
-    from .models.smooth.power_field import power_field as power_field
+    from .models.smooth.polyvector import power_field as power_field
     from .models.surface.hints import Hint as Hint
     from .models.surface.lift import surface as surface
     from .models.surface.surface import Surface as Surface
@@ -122,7 +122,7 @@ _HOME: Final = {
     "greedy_field": ".models.search.greedy",
     "improved_field": ".models.search.improvement",
     "polyvector_field": ".models.smooth.polyvector",
-    "power_field": ".models.smooth.power_field",
+    "power_field": ".models.smooth.polyvector",
     "preview": ".export.pictures.draw",
     "prove": ".models.proof.prove",
     "read_certificate": ".models.proof.certificate",

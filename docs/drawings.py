@@ -19,8 +19,7 @@ from crossfield.export.bundle.manifest import write_all
 from crossfield.export.verify.checks import Check
 from crossfield.export.verify.verify import verify
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import Instance
-from crossfield.models.instance.weights import REFERENCE
+from crossfield.models.instance.instance import REFERENCE, Instance
 from crossfield.models.sketch.samples import SAMPLES
 
 SUFFIXES: Final = (".svg", ".png", ".scap")

@@ -29,8 +29,7 @@ import numpy as np
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import Instance
-from crossfield.models.instance.weights import STROKE_WEIGHT
+from crossfield.models.instance.instance import STROKE_WEIGHT, Instance
 from crossfield.models.sketch.samples import SAMPLES
 from drawings import SUFFIXES
 from studying.rows import DATA

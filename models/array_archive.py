@@ -92,10 +92,6 @@ class ArrayArchive:
             raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")
         self._unread = set(self._members)
 
-    def holds(self, name: str) -> bool:
-        """Whether the archive holds an array of that name."""
-        return name in self._members
-
     def arrays(self, expected: Mapping[str, Expected], prefix: str = "") -> Arrays:
         """The expected arrays by name, without the prefix. Raises InstanceError for any other array."""
         return {name: self._array(prefix, name, kind) for name, kind in expected.items()}

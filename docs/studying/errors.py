@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 from crossfield.models.evaluation.hidden import Summary, summary
-from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 from scipy.stats import spearmanr
 
 from .rows import Row

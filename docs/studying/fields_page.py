@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 from crossfield.models.evaluation.hidden import summary
-from crossfield.models.instance.weights import STROKE_WEIGHT
+from crossfield.models.instance.instance import STROKE_WEIGHT
 from crossfield.models.sketch.samples import SAMPLES
 
 from .errors import Change, change

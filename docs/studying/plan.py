@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 
 from .fields import MOST_CURVES, PERTURBED, PLAIN, SHARES
 from .instances import curves, drawings, rung, surfaces

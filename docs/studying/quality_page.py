@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 
 from . import errors, plots
 from .errors import Change, Kind, change, is_default, is_surface, usable

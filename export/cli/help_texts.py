@@ -42,8 +42,8 @@ NAMES: Final = {
     "samples": _of("...models.sketch.samples", "SAMPLES"),
     "size": _of("...models.sketch.read", "DEFAULT_SIZE", lambda size: [str(size)]),
     "most weight": _of("...models.instance.instance", "MOST_WEIGHT", lambda weight: [f"{weight:,.0f}"]),
-    "stroke weight": _of("...models.instance.weights", "STROKE_WEIGHT", lambda weight: [f"{weight:g}"]),
-    "skew weight": _of("...models.instance.weights", "SKEW_WEIGHT", lambda weight: [f"{weight:g}"]),
+    "stroke weight": _of("...models.instance.instance", "STROKE_WEIGHT", lambda weight: [f"{weight:g}"]),
+    "skew weight": _of("...models.instance.instance", "SKEW_WEIGHT", lambda weight: [f"{weight:g}"]),
     "pictures": _of("..pictures.draw", "KINDS"),
     "picture side": _of("..shading.raster", "SIDE", lambda side: [str(side)]),
     "light": _of(

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from .drawing import ink_colours
 from .marks import Area, Dots, Lines, Mark, Sheet
 
-_SIDE: Final = 400.0
-"""Points of the longer side of the page."""
+_SIDE: Final = 400.0  # points of the longer side of the page
 _TIP: Final = 1e-3  # of a pixel: else a side could be rounded down by a pixel
 
 
@@ -25,7 +24,9 @@ def page_of(sheet: Sheet) -> Any:
     figure = Figure(figsize=(scale * width / 72, scale * height / 72), facecolor="white")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     cover(axes, x, y, width, height)
-    _ink(axes, sheet)
+    if sheet.drawing is not None and sheet.drawing.ink is not None:
+        (high, wide), side = sheet.drawing.ink.shape, sheet.drawing.scale
+        smooth_image(axes, ink_colours()[sheet.drawing.ink], (0.0, side * wide, side * high, 0.0))
     for layer in sheet.layers:
         if layer.shown:
             paint(axes, layer.parts, scale, layer.opacity)
@@ -65,18 +66,17 @@ def paint(
         if isinstance(mark, Lines):
             _lines(axes, mark, scale, opacity, snap=snap)
         elif isinstance(mark, Dots):
-            _dots(axes, mark, scale)
+            axes.scatter(
+                *mark.centres.T,
+                s=(2 * scale * mark.radii) ** 2,
+                c=mark.colour,
+                edgecolors="white",
+                linewidths=scale * mark.rim,
+                zorder=3,
+                clip_on=False,
+            )
         elif isinstance(mark, Area):
             _area(axes, mark)
-
-
-def _ink(axes: Any, sheet: Sheet) -> None:
-    """The ink of a bitmap, smooth at any size."""
-    if sheet.drawing is None or sheet.drawing.ink is None:
-        return
-    ink, side = sheet.drawing.ink, sheet.drawing.scale
-    high, wide = ink.shape
-    smooth_image(axes, ink_colours()[ink], (0.0, side * wide, side * high, 0.0))
 
 
 def smooth_image(axes: Any, image: Any, extent: tuple[float, float, float, float]) -> None:
@@ -113,15 +113,3 @@ def _path(axes: Any, path: Any, **style: Any) -> None:
     from matplotlib.patches import PathPatch
 
     axes.add_patch(PathPatch(path, clip_on=False, **style))
-
-
-def _dots(axes: Any, part: Dots, scale: float) -> None:
-    axes.scatter(
-        *part.centres.T,
-        s=(2 * scale * part.radii) ** 2,
-        c=part.colour,
-        edgecolors="white",
-        linewidths=scale * part.rim,
-        zorder=3,
-        clip_on=False,
-    )

@@ -1,9 +1,6 @@
 """Pictures of instances, cross fields and surfaces as PNG, SVG or PDF: same input, same bytes.
 
 Most kinds are panels with words round them; `layers` is the bare field in the coordinates of its drawing.
-
-The Agg, SVG and PDF writers of matplotlib are used directly; pyplot and the user's matplotlib settings play
-no part.
 """
 
 from __future__ import annotations
@@ -12,6 +9,8 @@ import io
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +21,7 @@ from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
 from ...models.surface.surface import Surface
+from ..shading.colours import coloured, lit, matcap
 from . import panels
 from .canvas import cover, page_of
 from .drawing import Drawing, read_drawing
@@ -33,9 +33,7 @@ Panel = Callable[[Any, panels.Picture], None]
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of picture: one line of description, its panels with their headings, and what stands round them.
-
-    A kind without panels is the layers of the field on the page of its drawing.
+    """A kind of picture: description, panels with headings; no panels: the layers on the page of a drawing.
 
     size: points of the longer side of a panel. bar: points to the right for a colour bar. legend: keys below.
     """
@@ -76,24 +74,25 @@ KINDS: Final = {
     ),
     LAYERS: Kind("the field in the coordinates of its drawing, on top of it with --underlay", ()),
 }
-"""Every kind of picture of instances and fields, by the name under which it is asked for."""
+"""Kinds of pictures of instances and fields by name."""
 
+_SHADED, _MATCAP, _NORMALS = (partial(panels.draw_surface, colours) for colours in (lit, matcap, coloured))
 SURFACE_KINDS: Final = {
-    "shaded": Kind("surface in the light of a lamp", (("", panels.draw_shaded),)),
-    "matcap": Kind("surface in the material of a glazed ball", (("", panels.draw_matcap),)),
-    "normals": Kind("map of the normals of a surface as colours", (("", panels.draw_normals),)),
+    "shaded": Kind("surface in the light of a lamp", (("", _SHADED),)),
+    "matcap": Kind("surface in the material of a glazed ball", (("", _MATCAP),)),
+    "normals": Kind("map of the normals of a surface as colours", (("", _NORMALS),)),
     "relief": Kind(
         "strokes, normal map, shaded surface and matcap in a row",
         (
             ("strokes", panels.draw_instance),
-            ("normal map", panels.draw_normals),
-            ("shaded", panels.draw_shaded),
-            ("matcap", panels.draw_matcap),
+            ("normal map", _NORMALS),
+            ("shaded", _SHADED),
+            ("matcap", _MATCAP),
         ),
         size=170.0,
     ),
 }
-"""Every kind of picture of surfaces."""
+"""Kinds of pictures of surfaces by name."""
 
 Subject = CrossField | Instance | Surface
 
@@ -155,7 +154,11 @@ def draw(
 
     """
     path = Path(path)
-    suffix = _suffix(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(
+            f"a picture cannot be written as {path.suffix!r}; use one of {', '.join(SUFFIXES)}", file=path
+        )
     kind = kind or _fitting(what, suffix, underlaid=underlay is not None)
     chosen = _kind(kind, what)
     if kind == LAYERS and isinstance(what, CrossField):
@@ -163,7 +166,7 @@ def draw(
     if underlay is not None:
         raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}, or leave it out")
     with own_settings():
-        return write_bytes(path, _saved(_panels(what, chosen, title), suffix))
+        return write_bytes(path, _saved(_page(what, chosen, title), suffix))
 
 
 def preview(what: Subject) -> bytes:
@@ -182,11 +185,11 @@ def preview(what: Subject) -> bytes:
     """
     kind = _kind(_fitting(what, ".png", underlaid=False), what)
     with own_settings():
-        return _saved(_panels(what, kind, None), ".png", dots=_PREVIEW_DOTS)
+        return _saved(_page(what, kind, None), ".png", dots=_PREVIEW_DOTS)
 
 
 def _fitting(what: Subject, suffix: str, *, underlaid: bool) -> str:
-    """The kind of picture where none is asked for."""
+    """The default kind of picture."""
     if isinstance(what, Surface):
         return "shaded"
     if isinstance(what, Instance):
@@ -206,59 +209,30 @@ def _layers(
         return _saved(page_of(layers), suffix, title=title)
 
 
-def _panels(what: Subject, kind: Kind, title: str | None) -> Any:
-    instance = what if isinstance(what, Instance) else what.instance
-    field = what if isinstance(what, CrossField) else None
-    surface = what if isinstance(what, Surface) else None
-    return _page(panels.Picture(instance, field, kind.size, surface), kind, title)
-
-
 @contextmanager
 def own_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
-    """Settings of matplotlib that are always the same, whatever the user's are.
-
-    more: settings on top of these.
-    """
+    """Constant settings of matplotlib, whatever the user's are, and some more."""
     import matplotlib as mpl
 
-    with mpl.rc_context():
-        mpl.rcParams.update(
-            {key: value for key, value in mpl.rcParamsDefault.items() if not key.startswith("backend")}
-        )
-        mpl.rcParams.update(
-            {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": 7.5, "path.simplify": False}
-        )
-        mpl.rcParams.update(more or {})
+    own = {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": 7.5, "path.simplify": False}
+    kept = {key: value for key, value in mpl.rcParamsDefault.items() if not key.startswith("backend")}
+    with mpl.rc_context(kept | own | (more or {})):
         yield
 
 
 def _saved(figure: Any, suffix: str, *, dots: int = _DOTS, title: str | None = None) -> bytes:
-    """The bytes of a figure."""
     metadata = SUFFIXES[suffix] | ({} if title is None else {"Title": title})
     stream = io.BytesIO()
     figure.savefig(stream, format=suffix[1:], dpi=dots, metadata=metadata)
     return stream.getvalue()
 
 
-def _suffix(path: Path) -> str:
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(
-            f"pictures are not written as {suffix or 'a name without suffix'}; "
-            f"use one of {', '.join(SUFFIXES)}",
-            file=path,
-        )
-    return suffix
-
-
 def _kind(kind: str, what: Subject) -> Kind:
     table, other = (SURFACE_KINDS, KINDS) if isinstance(what, Surface) else (KINDS, SURFACE_KINDS)
+    if kind in other and isinstance(what, Surface):
+        raise InputError(f"pictures of kind {kind} show a field; choose one of {', '.join(table)}")
     if kind in other:
-        raise InputError(
-            f"a picture of kind {kind} is one of a field; choose one of {', '.join(table)}"
-            if isinstance(what, Surface)
-            else f"a picture of kind {kind} is one of a surface, which `crossfield shade` makes of a field"
-        )
+        raise InputError(f"pictures of kind {kind} show a surface, which `crossfield shade` makes of a field")
     if kind not in table:
         raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(table)}")
     if table[kind].needs_field and isinstance(what, Instance):
@@ -269,10 +243,13 @@ def _kind(kind: str, what: Subject) -> Kind:
     return table[kind]
 
 
-def _page(picture: panels.Picture, kind: Kind, title: str | None) -> Any:
+def _page(what: Subject, kind: Kind, title: str | None) -> Any:
     """The figure: panels in a row, headings above, legend and caption below; every length in points."""
     from matplotlib.figure import Figure
 
+    instance = what if isinstance(what, Instance) else what.instance
+    field = what if isinstance(what, CrossField) else None
+    picture = panels.Picture(instance, field, kind.size, what if isinstance(what, Surface) else None)
     height, width = (side * picture.unit for side in picture.instance.mask.shape)
     above = _EDGE + _LINE * (any(heading for heading, _ in kind.panels) + (title is not None) * 1.3)
     below = _EDGE + _LINE * (1 + kind.legend)
@@ -295,14 +272,9 @@ def _page(picture: panels.Picture, kind: Kind, title: str | None) -> Any:
     figure.text(0.5, _EDGE / page[1], caption, ha="center", va="bottom", color="#444444")
     if keys:
         place = (0.5, (_EDGE + _LINE - 3) / page[1])
-        style = {
-            "frameon": False,
-            "borderaxespad": 0,
-            "borderpad": 0.2,
-            "handlelength": 1.4,
-            "columnspacing": 1.6,
-        }
-        figure.legend(handles=keys, loc="lower center", bbox_to_anchor=place, ncols=len(keys), **style)
+        spaces = {"borderaxespad": 0, "borderpad": 0.2, "handlelength": 1.4, "columnspacing": 1.6}
+        style = {"bbox_to_anchor": place, "ncols": len(keys), "frameon": False}
+        figure.legend(handles=keys, loc="lower center", **style, **spaces)
     return figure
 
 
@@ -315,10 +287,8 @@ def _caption(picture: panels.Picture, *, full: bool) -> str:
     if picture.field is not None:
         parts.append(counted(picture.field))
     if picture.field is not None and full:
-        parts.append(
-            f"energy {picture.field.energy(2).total:.4g} (2-norm), "
-            f"{picture.field.energy(1).total:.4g} (1-norm)"
-        )
+        squared, absolute = (picture.field.energy(norm).total for norm in (2, 1))
+        parts.append(f"energy {squared:.4g} (2-norm), {absolute:.4g} (1-norm)")
     if full:
         parts.append(f"gauge {instance.gauge}")
     return "  ·  ".join(parts)
@@ -329,9 +299,8 @@ def counted(field: CrossField) -> str:
     values, counts = np.unique(np.round(4 * field.singularities.index).astype(int), return_counts=True)
     if not len(values):
         return "no singularity"
-    names = {1: "1/4", 2: "1/2", 3: "3/4"}
     each = [
-        f"{count} of {'−' if value < 0 else '+'}{names.get(abs(value), f'{abs(value) / 4:g}')}"
+        f"{count} of {'−' if value < 0 else '+'}{Fraction(abs(value), 4)}"
         for value, count in zip(values[::-1].tolist(), counts[::-1].tolist(), strict=True)
     ]
     total = int(counts.sum())

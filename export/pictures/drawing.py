@@ -21,7 +21,7 @@ from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.bitmap import Picture, read_picture
 from ...models.sketch.choice import Choice, view_in
-from ...models.sketch.curves import Curves, bounding_box, lines_as_cubics
+from ...models.sketch.curves import Curves, are_straight, bounding_box, runs
 from ...models.sketch.read import DEFAULT_SIZE, bytes_of, curves_in
 from ...models.sketch.samples import SAMPLES, sample_svg
 
@@ -38,12 +38,10 @@ _LOOKS_RED: Final = 0.5
 class Drawing:
     """Curves or ink, in the drawing's own coordinates, y down.
 
-    page: x, y, width, height of the drawing's page, larger where strokes lie beyond it. box: left, top,
-    right, bottom of the strokes. curves: of each colour of INK the unbroken runs, each (k, 4, 2) cubics or
-    (k, 2, 2) straight pieces.
-    size: width and height of the page with the units that the drawing declares, as `210mm`.
-    ink: uint8 [h, w] of a bitmap, numbers of colours in `ink_colours`; None for curves. scale: side of a
-    pixel of the ink.
+    page: x, y, width, height, larger where strokes lie beyond it. box: left, top, right, bottom of the
+    strokes. curves: unbroken runs by colours of INK, each (k, 4, 2) cubics or (k, 2, 2) straight pieces.
+    size: width and height with the units that the drawing declares, as `210mm`. ink: uint8 [h, w], numbers of
+    colours in `ink_colours`; None for curves. scale: side of a pixel of the ink.
     """
 
     page: Box
@@ -53,24 +51,11 @@ class Drawing:
     ink: NDArray[np.uint8] | None = None
     scale: float = 1.0
 
-    def check(self, instance: Instance) -> None:
-        """Raise InputError where an instance lies elsewhere than this drawing."""
-        left, top = instance.origin
-        right = left + instance.pixel_size * instance.grid.width
-        bottom = top + instance.pixel_size * instance.grid.height
-        if left < self.box[2] and top < self.box[3] and right > self.box[0] and bottom > self.box[1]:
-            return
-        raise InputError(
-            f"the drawing lies elsewhere than the field of {instance.name}, which is at x {left:g} to "
-            f"{right:g}, y {top:g} to {bottom:g}; give the drawing from which its instance was read"
-        )
-
 
 def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
-    """The drawing of an instance: that of a file (SVG, bitmap, .scap) or of a built-in sample.
+    """The drawing of an instance, from a sketch file or a drawn sample; .curves is seen from the same side.
 
-    A .curves file is seen from where the instance was, as its source records. Raises InputError, with the
-    file, for what `read_sketch` could not read, for a computed sample, and for a drawing that lies elsewhere.
+    Raises InputError for an unreadable file, a computed sample, and a drawing that lies elsewhere.
     """
     path = Path(what)
     sampled = not path.is_file() and str(what) in SAMPLES
@@ -78,7 +63,18 @@ def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
     with naming(path):
         curves = curves_in(data, ".svg" if sampled else path.suffix.lower(), Choice(view=view_in(on.source)))
         drawing = _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves, data)
-        drawing.check(on)
+        (left, top), size = on.origin, on.pixel_size
+        right, bottom = left + size * on.grid.width, top + size * on.grid.height
+        if (
+            left >= drawing.box[2]
+            or top >= drawing.box[3]
+            or right <= drawing.box[0]
+            or bottom <= drawing.box[1]
+        ):
+            raise InputError(
+                f"the drawing lies elsewhere than the field of {on.name}, which is at x {left:g} to "
+                f"{right:g}, y {top:g} to {bottom:g}; give the drawing that its instance was read from"
+            )
     return drawing
 
 
@@ -87,14 +83,11 @@ def _of_curves(curves: Curves, data: bytes) -> Drawing:
     x, y, width, height = curves.canvas or (0.0, 0.0, 0.0, 0.0)
     left, top = min(left, x), min(top, y)
     page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
-    ends = np.flatnonzero(np.diff(curves.curve) | (curves.points[1:, 0] != curves.points[:-1, 3]).any(axis=1))
-    drawn = [_plain(run) for run in np.split(curves.points, ends + 1)]
-    red = curves.red[np.concatenate([[0], ends + 1])]
-    runs = {
-        name: [run for run, is_red in zip(drawn, red, strict=True) if is_red == (name == "red")]
-        for name in INK
-    }
-    return Drawing(page, box, runs, _size(data, curves.canvas, page))
+    starts = np.flatnonzero(np.diff(runs(curves.points, curves.curve), prepend=-1))
+    found: dict[str, list[Floats]] = {name: [] for name in INK}
+    for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):
+        found["red" if red else "black"].append(run[:, [0, 3]] if are_straight(run) else run)
+    return Drawing(page, box, found, _size(data, curves.canvas, page))
 
 
 def size_in_units(page: Box) -> tuple[str, str]:
@@ -103,10 +96,7 @@ def size_in_units(page: Box) -> tuple[str, str]:
 
 
 def _size(data: bytes, canvas: Box | None, page: Box) -> tuple[str, str]:
-    """Width and height of the page, as many millimetres a unit as an SVG declares, if it does.
-
-    data: of a sketch that was read.
-    """
+    """Width and height of the page of a sketch, at the millimetres per unit that an SVG declares."""
     from defusedxml.ElementTree import iterparse
 
     try:
@@ -122,17 +112,10 @@ def _size(data: bytes, canvas: Box | None, page: Box) -> tuple[str, str]:
     )
 
 
-def _plain(run: Floats) -> Floats:
-    """The run without the inner control points where all its cubics are straight lines."""
-    straight = lines_as_cubics(run[:, 0], run[:, 3])
-    return run[:, [0, 3]] if np.allclose(run, straight, rtol=1e-9, atol=0) else run
-
-
 def _of_ink(picture: Picture) -> Drawing:
     level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
-    numbers = level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)
+    ink = (level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)).astype(np.uint8)
     page = (0.0, 0.0, float(picture.width), float(picture.height))
-    ink = numbers.astype(np.uint8)
     return Drawing(page, picture.box, {}, size_in_units(page), ink, float(picture.reduced))
 
 

@@ -1,7 +1,7 @@
-"""A field as layers in the coordinates of its drawing, so that it fits when it is laid over it.
+"""A field as layers in the coordinates of its drawing, so that it fits on top of it.
 
-Lengths are in units of the drawing, x to the right and y down; widths and distances follow the longer side of
-the grid, so that fields of 24 and of 96 pixels look alike. Streamlines are smooth curves, few nodes each.
+Lengths are in units of the drawing, y down; widths and distances follow the longer side of the grid, so that
+fields of 24 and of 96 pixels look alike. Streamlines are smooth curves, with few nodes each.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
+from ...models.sketch.curves import lines_as_cubics
 from ..shading.raster import drawn_border
-from .cubics import fitted
 from .drawing import INK, Box, Drawing
 from .marks import FAMILIES, Frame, Layer, Lines, Sheet, runs
 from .streamlines import streamlines
 
-UNITS: Final = 400.0
-"""Parts of the longer side of the grid in which the lengths below are given."""
+UNITS: Final = 400.0  # parts of the longer side of the grid in which the lengths below are given
 _SPACING: Final = 7.6  # of streamlines of one family
 _LINE: Final = 0.95
 _CROSS: Final = 0.7
@@ -37,12 +36,13 @@ _MOST_CROSSES: Final = 64  # along a side; of more, one in several
 
 
 def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
-    """The layers of a field, over its drawing where that is given; crosses are there but not shown."""
+    """The layers of a field, over its drawing if given; crosses are hidden at first."""
     place = Place(field.instance)
+    every = int(np.ceil(max(field.instance.mask.shape) / _MOST_CROSSES))
     layers = (
         *(() if drawing is None else (_drawn(drawing, place),)),
         Layer("strokes", _strokes(place), shown=drawing is None, opacity=0.45),
-        Layer("crosses", _crosses(field, place), shown=False),
+        Layer("crosses", tuple(place.frame.crosses(field, _CROSS * place.unit, every)), shown=False),
         *_streamlines(field, place),
         Layer("singularities", tuple(place.frame.singularities(field, _DOT * place.unit))),
     )
@@ -50,10 +50,7 @@ def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
 
 
 def strokes_sheet(instance: Instance, drawing: Drawing | None = None) -> Sheet:
-    """The strokes alone, on the part of the page that the grid covers.
-
-    They are those of the drawing, or pieces of line at the stroke pixels where none is given.
-    """
+    """The strokes of the drawing, or of the instance, on the part of the page that the grid covers."""
     place = Place(instance)
     layer = Layer("strokes", _strokes(place)) if drawing is None else _drawn(drawing, place)
     size = instance.pixel_size
@@ -79,14 +76,12 @@ class Place:
 
     @property
     def page(self) -> Box:
-        """The page without a drawing: from zero, where pages begin, to the far sides of the mask.
-
-        A mask that reaches more than a pixel beyond zero is the page itself.
-        """
-        rows, columns = np.nonzero(self.instance.mask)
-        size = self.instance.pixel_size
-        low = np.array(self.instance.origin) + size * np.array([columns.min(), rows.min()])
-        high = np.array(self.instance.origin) + size * (np.array([columns.max(), rows.max()]) + 1)
+        """The page without a drawing: from zero, or from a mask beyond zero, to the far sides of the mask."""
+        inside, size = np.argwhere(self.instance.mask)[:, ::-1], self.instance.pixel_size
+        low, high = (
+            np.array(self.instance.origin) + size * end
+            for end in (inside.min(axis=0), inside.max(axis=0) + 1)
+        )
         if (low >= -size).all():
             low = np.zeros(2)
         (x, y), (width, height) = low.tolist(), (high - low).tolist()
@@ -98,27 +93,22 @@ def _drawn(drawing: Drawing, place: Place) -> Layer:
     every = [piece for found in drawing.curves.values() for piece in found]
     length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)
     width = _BELOW * place.unit / np.sqrt(max(length / (_MUCH * UNITS * place.unit), 1.0))
-    return Layer(
-        "drawing",
-        tuple(Lines(INK[name], width, found) for name, found in drawing.curves.items() if found),
-    )
+    lines = (Lines(INK[name], width, found) for name, found in drawing.curves.items() if found)
+    return Layer("drawing", tuple(lines))
 
 
 def _strokes(place: Place) -> tuple[Lines, ...]:
     return tuple(place.frame.strokes(INK["black"], _BELOW * place.unit))
 
 
-def _crosses(field: CrossField, place: Place) -> tuple[Lines, ...]:
-    """A cross on each pixel, on large grids one in several."""
-    every = int(np.ceil(max(field.instance.mask.shape) / _MOST_CROSSES))
-    return tuple(place.frame.crosses(field, _CROSS * place.unit, every))
-
-
 def _streamlines(field: CrossField, place: Place) -> list[Layer]:
     """Evenly spaced lines, a layer for each family; u is above."""
+    from scipy import ndimage
+
     scale = max(field.instance.mask.shape) / UNITS
     found = streamlines(field, _SPACING * scale)
-    depth = _depth(field.instance)
+    blurred = ndimage.gaussian_filter(np.pad(field.instance.mask, 1).astype(np.float64), _BLUR)
+    depth = blurred - _BORDER - _DRAWN_BORDER * drawn_border(field.instance)
     layers = []
     for family, name in ((1, "streamlines-v"), (0, "streamlines-u")):
         inside = [part for line in found for run in runs(line, family) for part in trimmed(run, depth)]
@@ -126,14 +116,6 @@ def _streamlines(field: CrossField, place: Place) -> list[Layer]:
         lines = Lines(FAMILIES[family], _LINE * place.unit, list(map(place.frame.at, smooth)), single=True)
         layers.append(Layer(name, (lines,)))
     return layers
-
-
-def _depth(instance: Instance) -> Floats:
-    """The blurred mask less its level at a smooth border, [height + 2, width + 2] with a rim of a pixel."""
-    from scipy import ndimage
-
-    blurred: Floats = ndimage.gaussian_filter(np.pad(instance.mask, 1).astype(np.float64), _BLUR)
-    return blurred - _BORDER - _DRAWN_BORDER * drawn_border(instance)
 
 
 def trimmed(line: Floats, depth: Floats) -> list[Floats]:
@@ -147,6 +129,38 @@ def trimmed(line: Floats, depth: Floats) -> list[Floats]:
     points = np.insert(line, np.repeat(cut + 1, 2), np.repeat(ends, 2, axis=0), axis=0)
     parts = np.split(points, cut + 1 + 2 * np.arange(len(cut)) + 1)
     return parts[0 if at[0] > 0 else 1 :: 2]
+
+
+def fitted(points: Floats, tolerance: float) -> Floats:
+    """Control points (m, 4, 2) of smooth cubics, end to end, that pass points (k, 2) within the tolerance.
+
+    They are a smoothing spline, periodic for a closed line, that begins and ends at the first and last point.
+    """
+    from scipy.interpolate import BPoly, PPoly, splev, splprep
+
+    points = points[np.concatenate([[True], (np.diff(points, axis=0) != 0).any(axis=1)])]
+    if len(points) < 3:  # no bend
+        return lines_as_cubics(points[:-1], points[1:])
+    if len(points) == 3:  # a cubic spline needs more
+        points = np.insert(points, [1, 2], (points[1:] + points[:-1]) / 2, axis=0)
+    weights = np.ones(len(points))
+    weights[[0, -1]] = 1e3
+    closed = bool((points[0] == points[-1]).all())
+    smoothing = len(points) * (tolerance / 2) ** 2
+    while True:
+        (spline, along), *_ = splprep(points.T, w=weights, s=smoothing, per=closed, full_output=True)
+        off = np.linalg.norm(np.transpose(splev(along, spline)) - points, axis=1)
+        if off.max() <= tolerance:
+            break
+        smoothing /= 4
+    knots, coordinates, degree = spline
+    pieces = [BPoly.from_power_basis(PPoly.from_spline((knots, each, degree))).c.T for each in coordinates]
+    curves: Floats = np.stack(pieces, axis=-1)[np.diff(knots) > 0]
+    curves[0, 1] += points[0] - curves[0, 0]
+    curves[-1, 2] += points[-1] - curves[-1, 3]
+    curves[:, 0] = np.concatenate([points[:1], curves[:-1, 3]])
+    curves[-1, 3] = points[-1]
+    return curves
 
 
 def _length(line: Floats) -> float:

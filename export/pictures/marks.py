@@ -1,7 +1,4 @@
-"""Marks of a picture (lines, dots, areas, words), and those of an instance and its field in any coordinates.
-
-`svg` and `canvas` write the same marks: `svg` as a small SVG file, `canvas` with matplotlib.
-"""
+"""Marks of a picture (lines, dots, areas, words), and those of an instance and its field."""
 
 from __future__ import annotations
 
@@ -15,9 +12,8 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
-from .combing import combed
 from .drawing import Box, Drawing
-from .streamlines import Streamline, streamlines
+from .streamlines import Streamline, combed, streamlines
 
 FAMILIES: Final = ("#00798c", "#e1812c")
 """Teal and orange, which differ for all common kinds of colour blindness."""
@@ -29,15 +25,14 @@ BORDER: Final = "#9a9a9a"
 PAPER: Final = "#ffffff"
 
 _LEVELS: Final = 5  # shades of strokes by their reliability
-_CROWD: Final = 16.0
-"""Dots are drawn smaller from about the square of this many on."""
+_CROWD: Final = 16.0  # root of the number of dots from which on they are drawn smaller
 
 
 @dataclass(frozen=True, eq=False)
 class Lines:
     """Lines of one colour and width: each (m, 4, 2) cubics or (m, 2, 2) straight pieces, end to end.
 
-    single: whether each is an object of its own that a designer may want to pick; otherwise all are one.
+    single: whether each line is an object of its own for a designer.
     """
 
     colour: str
@@ -156,21 +151,14 @@ class Frame:
             if some.any()
         ]
 
-    def border(self, colour: str, width: float) -> Lines:
-        """The outline of the mask along the sides of pixels."""
-        return self._sides(colour, width, between=False)
-
-    def cells(self, colour: str, width: float) -> Lines:
-        """The sides between pixels of the mask."""
-        return self._sides(colour, width, between=True)
+    def sides(self, colour: str, width: float, *, between: bool = False) -> Lines:
+        """The outline of the mask along the sides of pixels, or the sides between its pixels."""
+        ends = np.array(self.corner) + self.pixel * _sides(np.pad(self.instance.mask, 1), between=between)
+        return Lines(colour, width, list(ends[:, None]))
 
     def area(self, colour: str, chosen: Bools) -> Area:
         """The chosen pixels, bool [height, width]."""
         return Area(colour, boxes(chosen) * self.pixel + np.tile(self.corner, 2))
-
-    def _sides(self, colour: str, width: float, *, between: bool) -> Lines:
-        ends = np.array(self.corner) + self.pixel * _sides(np.pad(self.instance.mask, 1), between=between)
-        return Lines(colour, width, list(ends[:, None]))
 
     def _pieces(self, centre: Floats, arm: Floats) -> Floats:
         return self.at(np.stack([centre - arm, centre + arm], axis=1))[:, None]
@@ -202,10 +190,7 @@ def runs(line: Streamline, family: int) -> list[Floats]:
 
 
 def _sides(mask: Bools, *, between: bool) -> Floats:
-    """Sides of pixels as segments (k, 2, 2): between pixels of the padded mask, or at its border.
-
-    Points are (x, y) with y down; pixel [row, column] reaches from (column, row) one further.
-    """
+    """Sides of pixels as segments (k, 2, 2), y down: between pixels of the padded mask, or at its border."""
     found = []
     for one, other, step in ((mask[1:, :], mask[:-1, :], (1, 0)), (mask[:, 1:], mask[:, :-1], (0, 1))):
         end = np.argwhere(one & other if between else one != other)[:, ::-1]

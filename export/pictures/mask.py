@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...models.errors import InputError
 from ...models.input_limits import MAX_PIXELS, MAX_SIDE
@@ -16,7 +15,7 @@ from ...models.storage import replacing
 
 Page = tuple[float, float, float, float]
 
-_TINT: Final = (170, 195, 255)  # of bridged gaps; as light as that, it counts as white when it is read
+_TINT: Final = (170, 195, 255)  # of bridged gaps; so light that it counts as white
 
 
 def write_mask(instance: Instance, path: str | Path) -> Path:
@@ -51,7 +50,7 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
     if page is None:
         raise InputError(
             f"{instance.name} has no page that a mask could cover; give a sketch with a viewBox or a width "
-            f"and height, of 1 to {MAX_SIDE} units a side and {MAX_PIXELS // 10**6} million in all",
+            f"and height, of 1 to {MAX_SIDE} units per side and {MAX_PIXELS // 10**6} million in all",
             file=path,
         )
     white = mask_on_page(instance, page)
@@ -75,27 +74,23 @@ def has_mask(instance: Instance) -> bool:
 
 
 def mask_on_page(instance: Instance, page: Page) -> Bools:
-    """Which pixels of the page, bool [height, width], have their middle in a pixel that is solved for.
-
-    page: x, y, width and height in the units of the drawing; a pixel of it has about one unit a side.
-    """
-    x, y, width, height = page
-    row = _cells(y, height, instance.origin[1], instance.pixel_size)
-    column = _cells(x, width, instance.origin[0], instance.pixel_size)
-    high, wide = instance.mask.shape
-    across = (column >= 0) & (column < wide)
-    down = (row >= 0) & (row < high)
-    white: Bools = np.zeros((len(row), len(column)), dtype=bool)
-    white[np.ix_(down, across)] = instance.mask[np.ix_(row[down], column[across])]
-    return white
+    """Which pixels, of one unit a side, of the page have their middle in a pixel that is solved for."""
+    column, row = (_cells(*axis) for axis in zip(page[:2], page[2:], instance.origin, strict=True))
+    padded = np.pad(instance.mask, 1)
+    return padded[
+        np.ix_(
+            *(
+                np.clip(np.floor(cell / instance.pixel_size) + 1, 0, side - 1).astype(np.int64)
+                for cell, side in zip((row, column), padded.shape, strict=True)
+            )
+        )
+    ]
 
 
-def _cells(start: float, side: float, origin: float, pixel: float) -> NDArray[np.int64]:
-    """The row or column of the grid, on it or beyond, in which the middle of each page pixel lies."""
+def _cells(start: float, side: float, origin: float) -> Floats:
+    """The distances of the middles of page pixels from the origin of the grid."""
     count = round(side)
-    middle: Floats = start + (np.arange(count) + 0.5) * side / count
-    # Far beyond the grid is as good as just beyond it, and is a whole number of 64 bits.
-    return np.floor(np.clip((middle - origin) / pixel, -1, 1e6)).astype(np.int64)
+    return start + (np.arange(count) + 0.5) * side / count - origin
 
 
 def _page(instance: Instance) -> Page | None:

@@ -1,8 +1,4 @@
-"""The panels of a picture: each function draws one kind onto one set of matplotlib axes.
-
-Axes are in points of the printed picture, y down, from the top left corner of the grid. Widths, marks and
-spacings do not depend on the size of a pixel, so that 24 and 200 pixels look alike.
-"""
+"""The panels of a picture: each function draws one kind onto matplotlib axes in points, y down."""
 
 from __future__ import annotations
 
@@ -12,12 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
-from ..shading.colours import coloured, lit, matcap
 from ..shading.raster import Raster, raster
 from .canvas import paint, smooth_image
 from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, Frame, Lines
@@ -27,16 +21,12 @@ OUTSIDE: Final = "#ececec"
 OPENING: Final = "#3056d3"
 
 _DOTS_PER_POINT: Final = 3  # of a surface, as in a PNG
-SPACING: Final = 6.5
-"""Points between streamlines of one family in a panel of full size."""
+SPACING: Final = 6.5  # points between streamlines of one family in a panel of full size
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Contents and size of a panel.
-
-    size: points of the longer side of the grid. surface: of its field, where the picture shows one.
-    """
+    """Contents and size of a panel, in points of the longer side of the grid."""
 
     instance: Instance
     field: CrossField | None
@@ -65,12 +55,8 @@ class Picture:
 
     @property
     def crosses(self) -> CrossField:
-        """The field. Raises InputError where the picture has none."""
-        if self.field is None:
-            raise InputError(
-                f"{self.instance.name} is an instance without a field; draw it with kind instance, "
-                "or solve it first"
-            )
+        """The field, of a picture that has one."""
+        assert self.field is not None
         return self.field
 
 
@@ -106,9 +92,8 @@ def draw_streamlines(axes: Any, picture: Picture) -> None:
 def draw_angle(axes: Any, picture: Picture) -> None:
     """The angle between the two lines in degrees."""
     field = picture.crosses
-    image = _image(
-        axes, picture, field.image(np.degrees(field.angle_between)), vmin=0.0, vmax=90.0, cmap="magma"
-    )
+    degrees = field.image(np.degrees(field.angle_between))
+    image = _image(axes, picture, degrees, vmin=0.0, vmax=90.0, cmap="magma")
     _border(axes, picture)
     _singularities(axes, picture)
     _bar(axes, image, picture, "angle between the lines", ticks=[0, 30, 60, 90], format="%d°")
@@ -124,14 +109,8 @@ def draw_energy(axes: Any, picture: Picture) -> None:
     image = _image(axes, picture, field.image(energy), norm=PowerNorm(0.5, vmin=0.0, vmax=top), cmap="Reds")
     _border(axes, picture)
     _singularities(axes, picture)
-    _bar(
-        axes,
-        image,
-        picture,
-        "smoothness energy in rad²",
-        ticks=[share**2 * top for share in (0, 0.25, 0.5, 0.75, 1)],
-        format="%.2g",
-    )
+    ticks = [share**2 * top for share in (0, 0.25, 0.5, 0.75, 1)]
+    _bar(axes, image, picture, "smoothness energy in rad²", ticks=ticks, format="%.2g")
 
 
 def legend_of(picture: Picture) -> list[Any]:
@@ -162,7 +141,7 @@ def _under(axes: Any, picture: Picture) -> None:
 
 
 def _border(axes: Any, picture: Picture) -> None:
-    paint(axes, [picture.frame.border(BORDER, 0.5 * picture.ink)], snap=True)
+    paint(axes, [picture.frame.sides(BORDER, 0.5 * picture.ink)], snap=True)
 
 
 def _singularities(axes: Any, picture: Picture) -> None:
@@ -187,25 +166,9 @@ def _bar(axes: Any, image: Any, picture: Picture, label: str, **style: Any) -> N
     inset.tick_params(labelsize=6.5, length=2, width=0.5)
 
 
-def draw_shaded(axes: Any, picture: Picture) -> None:
-    """The surface in the light of a lamp."""
-    _draw_surface(axes, picture, lit)
-
-
-def draw_matcap(axes: Any, picture: Picture) -> None:
-    """The surface in the material of a ball."""
-    _draw_surface(axes, picture, matcap)
-
-
-def draw_normals(axes: Any, picture: Picture) -> None:
-    """The normals as colours, smooth."""
-    _draw_surface(axes, picture, coloured)
-
-
-def _draw_surface(axes: Any, picture: Picture, colours: Callable[[Raster], Floats]) -> None:
-    """An image over the whole grid, smooth at any size; a picture without a surface has none."""
-    if picture.surface is None:
-        return
+def draw_surface(colours: Callable[[Raster], Floats], axes: Any, picture: Picture) -> None:
+    """The surface in colours of its raster, smooth at any size."""
+    assert picture.surface is not None
     scale = max(1, round(_DOTS_PER_POINT * picture.unit))
     image = colours(raster(picture.instance, picture.surface.normals, scale))
     smooth_image(axes, image, picture.extent)

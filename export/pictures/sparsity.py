@@ -1,7 +1,6 @@
-"""Pictures of where matrices have entries, as SVG in the reader's light or dark mode; same input, same bytes.
+"""Pictures of the entries of matrices as SVG in the reader's light or dark mode; same input, same bytes.
 
-A matrix with more rows or columns than a picture has cells is binned: a cell stands for a square of its
-entries, and is the stronger the more of them there are. So the file of a large one stays small.
+A cell of a picture stands for a square of entries of a large matrix; cells with more entries are darker.
 """
 
 from __future__ import annotations
@@ -20,8 +19,7 @@ from .web import CUT, EDGE, SIDE, picture, wide
 
 Places = NDArray[np.int64]
 
-CELLS: Final = 160
-"""Cells on the longer side of a picture, at most."""
+CELLS: Final = 160  # cells on the longer side of a picture, at most
 
 _EDGE: Final = 8.0  # around names
 _BELOW: Final = 5.0  # the name of a last row of few is lower than the row
@@ -76,8 +74,8 @@ def sparsity_picture(pattern: Pattern) -> bytes:
     right, bottom = width * unit, height * unit
     scale = unit / pattern.bin
     above, beside = _names(pattern.across, scale), _names(pattern.down, scale)
-    cuts = [(at, 0.0, at, bottom) for at in _cuts(pattern.across, scale)]
-    cuts += [(0.0, at, right, at) for at in _cuts(pattern.down, scale)]
+    cuts = [(scale * at, 0.0, scale * at, bottom) for at in accumulate(pattern.across.counts[:-1])]
+    cuts += [(0.0, scale * at, right, scale * at) for at in accumulate(pattern.down.counts[:-1])]
     frame = straight(np.array([(0, 0), (right, 0), (right, bottom), (0, bottom), (0, 0)]))
     marks: list[Mark] = [
         Area(PAPER, np.array([[0.0, 0.0, right, bottom]])),
@@ -105,11 +103,6 @@ def _cells(pattern: Pattern, height: int, width: int, unit: float) -> list[Area]
             Area(colour, unit * boxes(level == each), each / _LEVELS) for each in np.unique(level[level > 0])
         ]
     return found
-
-
-def _cuts(parts: Parts, scale: float) -> list[float]:
-    """The ends of all parts but the last."""
-    return [end * scale for end in list(accumulate(parts.counts))[:-1]]
 
 
 def _names(parts: Parts, scale: float) -> list[tuple[float, str]]:

@@ -1,14 +1,11 @@
-"""Evenly spaced streamlines of a cross field.
+"""Evenly spaced streamlines of a cross field, after Jobard and Lefer (1997), and combing of its labels.
 
 The direction of a line at a place is the weighted mean over the four pixels round it of the direction that is
 nearest to the line's own. Lines end at the border of the mask, at singularities, where the two lines of a
 cross coincide, and next to other lines of their family.
 
 Positions are complex numbers x + iy in pixel units, y up: pixel [row, column] has its centre at column - i
-row and reaches half a unit to each side.
-
-Placement follows Jobard and Lefer, Creating evenly-spaced streamlines of arbitrary density (1997): new lines
-start at the separation distance from existing lines and end where they come closer than a fraction of it.
+row.
 """
 
 from __future__ import annotations
@@ -22,15 +19,15 @@ from numpy.typing import NDArray
 
 from ...models.errors import InputError
 from ...models.field.field import CrossField
+from ...models.field.jumps import stepped
+from ...models.instance.angles import double_angle
 from ...models.instance.grid import Bools, Floats
-from .combing import combed
 
 Positions = NDArray[np.complex128]
 Labels = NDArray[np.int64]
 _Array = np.ndarray[Any, Any]
 
-CLOSEST: Final = 0.55
-"""Lines of one family end where they come closer than this part of the separation."""
+CLOSEST: Final = 0.55  # lines of one family end where they come closer than this part of the separation
 
 _LONGEST: Final = 0.45  # step in pixels; below 1/2, so that it never leaves the cells that touch its pixel
 _DENSEST: Final = 400  # separations across the grid, at most
@@ -38,14 +35,16 @@ _SHORTEST: Final = 1.2  # lines shorter than this many separations are not worth
 _FINENESS: Final = 6  # raster cells per separation, at least
 _CORNERS: Final = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[..., None]  # of four pixels: below, to the right
 _LEAST_STEP: Final = 1e-3  # pixels to which the end of a line is found
+_SHIFT: Final = 1e-6  # keeps the signed Laplacian of a part without singularities regular
+_ITERATIONS: Final = 12  # of the inverse iteration that places the cuts of the combing
 
 
 @dataclass(frozen=True, eq=False)
 class Streamline:
     """A line of a cross field.
 
-    points: float (k, 2), x and y in pixel units, y up; the last is the first again if the line is closed.
-    families: int (k,), 0 or 1 at each point: the line is nearer to u or to v of the combed field there.
+    points: (k, 2), x and y in pixel units, y up; the last is the first again if the line is closed.
+    families: (k,), 0 or 1 at each point: the line is nearer to u or to v of the combed field there.
     """
 
     points: Floats
@@ -84,11 +83,54 @@ def _points(z: Positions) -> Floats:
     return np.stack([z.real, z.imag], axis=1)
 
 
+def combed(field: CrossField) -> CrossField:
+    """The same crosses with labels that agree between neighbours: p is even but on cuts.
+
+    Singularities and holes force cuts. In each 4-connected part the line that carries most stroke weight
+    becomes u (without strokes: the more horizontal one). alpha may be outside the windows of a gauge.
+    """
+    from scipy import ndimage
+
+    instance = field.instance
+    part = ndimage.label(instance.mask)[0][instance.mask].astype(np.int64) - 1
+    nearer = double_angle(field.u_angle) - double_angle(field.v_angle)  # positive product: nearer to u
+    vector = _lowest_vector(field, part, nearer[:, 0])
+    at = instance.stroke_index
+    carried = np.sign(vector[at]) * instance.w * np.sum(double_angle(instance.theta) * nearer[at], axis=1)
+    strokes = np.round(np.bincount(part[at], carried, part.max() + 1), 9)
+    lying = np.round(np.bincount(part, np.sign(vector) * nearer[:, 0]), 9)
+    side = np.where(np.where(strokes != 0, strokes, lying) < 0, -1, 1)
+    exchanged = (vector * side[part] < 0).astype(np.int64)
+    return CrossField(instance, *stepped(instance.grid, field.alpha, field.beta, field.p, exchanged))
+
+
+def _lowest_vector(field: CrossField, part: _Array, start: Floats) -> Floats:
+    """The lowest eigenvector of the signed Laplacian with signs (-1)^p, by inverse iteration."""
+    # Its signs say which labels are exchanged; its zero lines, the cuts, are short and smooth. A start that
+    # changes its sign with the labels makes the result independent of them.
+    from scipy.sparse import csc_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    grid = field.instance.grid
+    signs = csc_array((1.0 - 2.0 * (field.p & 1), (grid.first, grid.second)), shape=(grid.size, grid.size))
+    degree = np.bincount(grid.first, minlength=grid.size) + np.bincount(grid.second, minlength=grid.size)
+    solver = splu(
+        (diags_array(degree + _SHIFT) - signs - signs.T).tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        options={"SymmetricMode": True},
+    )
+    # Weights keep a symmetric start from being orthogonal to the vector.
+    vector: Floats = start * np.random.default_rng(0).random(grid.size)
+    for _ in range(_ITERATIONS):
+        vector = solver.solve(vector)
+        vector /= np.sqrt(np.bincount(part, vector**2))[part]
+    return vector
+
+
 class _Crosses:
     """Directions of the crosses at any place.
 
-    directions: complex (height + 2, width + 2, 4), u, v, -u, -v of each pixel, 0 outside of the mask; u and v
-    point to the right.
+    directions: complex (height + 2, width + 2, 4), u, v, -u, -v of each pixel, 0 outside of the mask.
     """
 
     def __init__(self, field: CrossField) -> None:
@@ -109,8 +151,7 @@ class _Crosses:
 
     def nearest(self, place: tuple[Labels, Labels], heading: Positions) -> Labels:
         """Number 0..3 of the direction nearest to a heading at places of the table."""
-        number: Labels = np.argmax((self.directions[place] * heading.conj()[..., None]).real, axis=-1)
-        return number
+        return np.asarray(np.argmax((self.directions[place] * heading.conj()[..., None]).real, axis=-1))
 
     def heading(self, z: Positions, before: Positions) -> Positions:
         """Unit vectors of the lines at z that continue the headings before."""
@@ -120,8 +161,7 @@ class _Crosses:
         weight = np.where(_CORNERS[0], down, 1 - down) * np.where(_CORNERS[1], across, 1 - across)
         chosen = np.take_along_axis(self.directions[place], self.nearest(place, before)[..., None], axis=-1)
         total = np.sum(weight * chosen[..., 0], axis=0)
-        unit: Positions = total / np.maximum(np.abs(total), 1e-12)
-        return unit
+        return np.asarray(total / np.maximum(np.abs(total), 1e-12))
 
     def allowed(self, z: Positions, target: Positions) -> Bools:
         """Which lines may go from z to a target: not where pixels meet only in a corner."""
@@ -184,10 +224,7 @@ def _through(crosses: _Crosses, cover: _Cover, seeds: Positions, families: Label
 def _halves(
     crosses: _Crosses, cover: _Cover, seeds: Positions, labels: Labels
 ) -> list[tuple[Positions, Positions, bool]]:
-    """One half line from each seed by the midpoint rule, all at once: positions, headings, if it is closed.
-
-    A line that cannot go on tries again with half of its step.
-    """
+    """One half line from each seed by the midpoint rule, all at once: positions, headings, closed."""
     near = CLOSEST * cover.separation
     line = np.flatnonzero(crosses.allowed(seeds, seeds))
     z, step, way = seeds[line], np.full(len(line), min(0.5 * cover.separation, _LONGEST)), np.zeros(len(line))
@@ -226,8 +263,7 @@ class _Cover:
 
     near: closer than CLOSEST separations to a line: lines end here. wide: closer than the separation: no
     seeds here. shut: no seeds either, because the mask or the crosses end here or because lines from here are
-    too short. A line marks in each pixel the family that is nearest to its own direction, so cuts of the
-    combing do not matter.
+    too short. A line marks in each pixel the family that is nearest to its own direction.
     """
 
     def __init__(self, crosses: _Crosses, separation: float) -> None:
@@ -247,8 +283,7 @@ class _Cover:
 
     def blocked(self, z: Positions, family: Labels) -> Bools:
         """True where a line of a family at z would be too near to another one."""
-        near: Bools = self.near[family, *self._raster(z)]
-        return near
+        return np.asarray(self.near[family, *self._raster(z)])
 
     def covered(self, z: complex, family: int) -> bool:
         """True where a line may no longer start at z."""
@@ -286,10 +321,7 @@ class _Cover:
         raster[self.crosses.nearest(place, np.gradient(z)[point]) % 2, row, column] = True
 
     def fronts(self) -> Iterator[tuple[Positions, Labels]]:
-        """Seeds and families of the next candidates, until everything is covered or given up.
-
-        Seeds lie just outside what is covered; where nothing is, one seed far from all borders.
-        """
+        """Seeds and families of the next candidates, just outside what is covered, until everything is."""
         while not (self.wide | self.shut).all():
             seeds = [self._seeds(family) for family in (0, 1)]
             yield np.concatenate(seeds), np.repeat([0, 1], [len(seed) for seed in seeds])

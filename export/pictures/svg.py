@@ -1,7 +1,6 @@
 """The writer of SVG files: sheets of marks, the same bytes for the same input.
 
-Layers are groups that Inkscape knows as its layers; other programs show their ids. Coordinates are those of
-the sheet, rounded to a small part of the page. Pictures for a browser follow the reader's dark mode.
+Layers are groups that Inkscape shows as layers. Pictures for a browser follow the reader's dark mode.
 """
 
 from __future__ import annotations
@@ -87,25 +86,17 @@ def _mark(part: Mark, step: float) -> Iterator[str]:
 
 
 def _image(ink: NDArray[np.uint8], scale: float) -> str:
-    """The ink of a bitmap on nothing, as PNG inside the file."""
-    high, wide = (scale * side for side in ink.shape)
-    data = base64.b64encode(_png(ink)).decode()
-    return (
-        f'<image x="0" y="0" width="{wide:g}" height="{high:g}" preserveAspectRatio="none" '
-        f'xlink:href="data:image/png;base64,{data}"/>'
-    )
-
-
-def _png(ink: NDArray[np.uint8]) -> bytes:
-    """The ink of a bitmap as a PNG with a palette."""
+    """The ink of a bitmap on nothing, as PNG with a palette inside the file."""
     from PIL import Image
 
-    colours = ink_colours()
-    image = Image.fromarray(ink)
+    colours, image, stream = ink_colours(), Image.fromarray(ink), io.BytesIO()
     image.putpalette(colours[:, :3].tobytes())
-    stream = io.BytesIO()
     image.save(stream, "PNG", transparency=colours[:, 3].tobytes(), optimize=True)
-    return stream.getvalue()
+    high, wide = (scale * side for side in ink.shape)
+    return (
+        f'<image x="0" y="0" width="{wide:g}" height="{high:g}" preserveAspectRatio="none" '
+        f'xlink:href="data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"/>'
+    )
 
 
 def _lines(part: Lines, step: float) -> Iterator[str]:
@@ -147,11 +138,9 @@ def _dots(part: Dots, step: float) -> Iterator[str]:
 def _area(part: Area, step: float) -> Iterator[str]:
     """One path: sides are rounded before they are subtracted, so that neighbours share theirs."""
     sides = np.round(part.boxes / step) + 0.0
+    boxes = step * np.concatenate([sides[:, :2], sides[:, 2:] - sides[:, :2]], axis=1)
     data = "".join(
-        f"M{x:.12g} {y:.12g}h{wide:.12g}v{high:.12g}h-{wide:.12g}z"
-        for x, y, wide, high in (
-            step * np.concatenate([sides[:, :2], sides[:, 2:] - sides[:, :2]], 1)
-        ).tolist()
+        f"M{x:.12g} {y:.12g}h{wide:.12g}v{high:.12g}h-{wide:.12g}z" for x, y, wide, high in boxes.tolist()
     )
     if data:
         yield f'<path fill="{part.colour}"{_faded(part.opacity)} d="{data}"/>'

@@ -41,24 +41,16 @@ class Curve:
 
 
 def curve(name: str, trace: Iterable[Iterable[float | None]]) -> Curve:
-    """The curve of a trace, whose lines are seconds, bound and objective, None where there is none."""
-    rows = [tuple(row) for row in trace]
-    return Curve(name, _points((row[0], row[1]) for row in rows), _points((row[0], row[2]) for row in rows))
-
-
-def _points(pairs: Iterable[tuple[float | None, float | None]]) -> tuple[Point, ...]:
-    """The pairs of which both are finite numbers."""
-    return tuple(
-        (float(x), float(y))
-        for x, y in pairs
-        if x is not None and y is not None and math.isfinite(x) and math.isfinite(y)
-    )
+    """The curve of a trace, whose lines are seconds, bound and objective, or None."""
+    rows = np.array([tuple(row) for row in trace], dtype=np.float64).reshape(-1, 3)
+    bounds, objectives = (rows[:, [0, value]] for value in (1, 2))
+    points = [pairs[np.isfinite(pairs).all(axis=1)].tolist() for pairs in (bounds, objectives)]
+    return Curve(name, *(tuple((x, y) for x, y in pairs) for pairs in points))
 
 
 def trace_picture(curves: list[Curve]) -> bytes:
     """The plot of curves with a point at least: bounds as lines, objectives dashed, a hue for each solver."""
-    points = [point for each in curves for point in (*each.bounds, *each.objectives)]
-    seconds, values = _axis([0.0, *(x for x, _ in points)]), _axis(_worth(curves))
+    seconds, values = _axis([0.0, *(each.end for each in curves)]), _axis(_worth(curves))
     marks = _scales(seconds, values)
 
     def line(colour: str, points: tuple[Point, ...], end: float, *, dashed: bool) -> Lines:
@@ -70,10 +62,9 @@ def trace_picture(curves: list[Curve]) -> bytes:
         return Lines(colour, _PEN, [straight(steps)], dashed=dashed)
 
     for place, (each, hue) in enumerate(zip(curves, cycle(HUES), strict=False)):
-        if each.bounds:
-            marks.append(line(hue, each.bounds, each.end, dashed=False))
-        if each.objectives:
-            marks.append(line(hue, each.objectives, each.end, dashed=True))
+        for points, dashed in ((each.bounds, False), (each.objectives, True)):
+            if points:
+                marks.append(line(hue, points, each.end, dashed=dashed))
         y = _HEIGHT + _BELOW + _LEGEND * (place + 0.3)
         marks += [Lines(hue, _PEN, segments([(0, y, 22, y)])), Text(each.name, 30, y + 3.5)]
     bottom = _HEIGHT + _BELOW + _LEGEND * len(curves)

@@ -1,7 +1,4 @@
-"""Pictures for a web site, in the reader's light or dark mode; same input, same bytes.
-
-The longer side of the mask is 320 units; pixel [row, column] is the square at (column, row) times the unit.
-"""
+"""Pictures for a web site, in the reader's light or dark mode; same input, same bytes."""
 
 from __future__ import annotations
 
@@ -16,8 +13,7 @@ from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE, Area, Frame, Lay
 from .svg import LABEL, web_svg_of
 
 SIDE: Final = 320.0
-CROSSES_UP_TO: Final = 12
-"""Longer side of a grid, in pixels, up to which its crosses are drawn one by one; beyond, streamlines."""
+CROSSES_UP_TO: Final = 12  # longer side of a grid with crosses at all pixels; larger ones have streamlines
 GRID: Final = "#e4e6ea"
 EDGE: Final = "#8b929c"
 CUT: Final = "#c3c8ce"
@@ -25,7 +21,7 @@ HUES: Final = (FAMILIES[0], "#b5179e", "#a35c00", "#2f6b2f", "#4361ee", "#9b2226
 """Colours of curves, one after the other."""
 _SHADE: Final = "#e1e4e9"
 _FAINT: Final = "#d3d6db"
-_NIGHT: Final = {
+_NIGHT: Final = {  # colours in dark mode by those in light mode
     PAPER: "#1d2126",
     _SHADE: "#3a424c",
     GRID: "#30363d",
@@ -40,7 +36,6 @@ _NIGHT: Final = {
     LABEL: "#a3acb6",
     **dict(zip(HUES[1:], ("#f07be0", "#f0a35e", "#7ccf7c", "#8fa2ff", "#ff8a8f"), strict=True)),
 }
-"""Colours in dark mode by those in light mode."""
 _MARGIN: Final = 7.0
 _CHARACTER: Final = 6.2  # the widest digits and letters of usual fonts at the size of the labels
 _SPACING: Final = 10.0  # between streamlines of one family
@@ -88,8 +83,8 @@ def _frame(instance: Instance) -> Frame:
 
 def _ground(frame: Frame) -> list[Area | Lines]:
     """The mask, its pixels where they are large enough, and its outline."""
-    cells = [frame.cells(GRID, 0.8)] if frame.pixel >= _CELLS_FROM else []
-    return [frame.area(PAPER, frame.instance.mask), *cells, frame.border(EDGE, 1.2)]
+    cells = [frame.sides(GRID, 0.8, between=True)] if frame.pixel >= _CELLS_FROM else []
+    return [frame.area(PAPER, frame.instance.mask), *cells, frame.sides(EDGE, 1.2)]
 
 
 def _page(frame: Frame, marks: Iterable[Mark]) -> bytes:

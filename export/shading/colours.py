@@ -1,9 +1,8 @@
 """Colours of a surface: in the light of a lamp, in the material of a ball, and its normals as colours.
 
-A lamp follows Lambert's law, with light from all sides. The ball of the material is computed, a glazed one
-between a large window and a blue wall; each colour is the ball's colour at the same normal, so that it shows
-forms better than a lamp. Normals are the colours (n + 1)/2: red to the right, green up, blue towards the
-viewer.
+A lamp follows Lambert's law, with light from all sides. The ball is glazed, between a large window and a blue
+wall; a surface has the ball's colour at the same normal. Normals are the colours (n + 1)/2: red to the right,
+green up, blue towards the viewer.
 """
 
 from __future__ import annotations
@@ -21,8 +20,7 @@ from .raster import Raster, raster, scale_of
 
 Bytes = NDArray[np.uint8]
 
-CLAY: Final = (0.80, 0.77, 0.73)
-"""Share of red, green and blue light that the surface reflects."""
+CLAY: Final = (0.80, 0.77, 0.73)  # share of red, green and blue light that the surface reflects
 _AMBIENT: Final = 0.04  # light from all sides, on any surface
 _VIEWER: Final = 0.10  # light from the viewer
 _LAMP: Final = 0.95
@@ -76,19 +74,15 @@ class Light:
 
     @property
     def opposite(self) -> Light:
-        """The lamp on the other side, lower."""
+        """A lower lamp on the other side."""
         return Light(self.azimuth + np.pi, self.elevation / 2)
 
 
-UPPER_LEFT: Final = Light()
-"""The default lamp."""
+UPPER_LEFT: Final = Light()  # the default lamp
 
 
 def lit(raster: Raster, light: Light = UPPER_LEFT, colour: tuple[float, float, float] = CLAY) -> Floats:
-    """Red, green, blue and opacity (h, w, 4) in [0, 1], encoded for screens (sRGB), of a dull surface.
-
-    The reflected light of the lamp is the cosine between its direction and the normal, 0 in its own shade.
-    """
+    """Red, green, blue and opacity (h, w, 4) in [0, 1], encoded for screens (sRGB), of a dull surface."""
     lamp = np.maximum(raster.normals @ light.direction, 0.0)
     fill = np.maximum(raster.normals @ light.opposite.direction, 0.0)
     energy = _AMBIENT + _VIEWER * raster.normals[..., 2] + _LAMP * lamp + _FILL * fill
@@ -117,16 +111,13 @@ def ball(normals: Floats) -> Floats:
     side = np.maximum(normals @ fill, 0.0)[..., None] * _WALL_COLOUR
     gloss = np.maximum(normals @ half, 0.0)[..., None] ** _SHINE * _KEY_COLOUR
     rim = np.maximum(1 - normals[..., 2:], 0.0) ** _RIM * (_WALL_COLOUR + 0.25 * soft)
-    energy: Floats = _BODY * (soft + side + _FLOOR) + 0.4 * gloss + 0.55 * rim
-    return energy
+    return np.asarray(_BODY * (soft + side + _FLOOR) + 0.4 * gloss + 0.55 * rim)
 
 
 def normal_map(instance: Instance, normals: Floats, scale: int = 1) -> Bytes:
     """Red, green, blue and opacity, uint8 (h, w, 4), as in OpenGL and Blender (green up).
 
-    normals: (n, 3) at the pixels. scale: 1: one texel per pixel of the grid, with its own normal, opaque only
-    in the mask; more: normals in between, and a smooth outline. Outside it points to the viewer. Raises
-    InputError for another scale.
+    scale: texels per pixel of the grid; at 1, each has its own normal, otherwise they are smooth.
     """
     if scale_of(instance, scale) > 1:
         return eight_bit(coloured(raster(instance, normals, scale)))

@@ -1,9 +1,8 @@
 """A surface on a finer raster: smooth normals inside of a smooth outline.
 
-Normals of the pixels are interpolated by cubic B-splines over the pixels of the mask only, so that no values
-from outside tint the border. The same splines of the mask itself give the share of a place that is inside;
-the outline is where it is one half. A wider blur smooths the stairs of the mask. It may move the outline by
-half a pixel, and by less where the mask or a gap in it is thin, so that these stay.
+Normals are interpolated by cubic B-splines over the pixels of the mask. The outline is where the splines of
+the mask itself are one half. A wider blur smooths its stairs. It may move the outline by half a pixel, and by
+less where the mask or a gap in it is thin.
 """
 
 from __future__ import annotations
@@ -18,13 +17,11 @@ from ...models.input_limits import MAX_PIXELS
 from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
 
-SIDE: Final = 1000
-"""Approximate number of pixels of a picture's longer side unless a scale is given."""
+SIDE: Final = 1000  # pixels, about, of a picture's longer side unless a scale is given
 _BLUR: Final = 2.0  # pixels of the grid over which stairs are smoothed
 _MOVED: Final = 0.33  # at most, of the share of a place that is inside
 _MOVED_THIN: Final = 0.12  # where the mask or a gap is one or two pixels thin
-_SLOPE: Final = 2 / 3
-"""Change of the inside share from a pixel to the next across a straight outline."""
+_SLOPE: Final = 2 / 3  # change of the inside share from a pixel to the next across a straight outline
 _BLURRED_SLOPE: Final = 1 / (_BLUR * np.sqrt(2 * np.pi))
 _DRAWN: Final = 0.4  # pixels from the border to strokes on it, which pass through the middles of pixels
 _TIP: Final = 8  # most pixels of a tip; larger thin regions are parts
@@ -33,21 +30,14 @@ _REACH: Final = 2  # pixels of the grid to each side that a cubic B-spline has
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """Normals and opacity on the pixels of a picture that covers the grid of a surface.
-
-    normals: unit vectors (h, w, 3), x right, y up, z towards the viewer; (0, 0, 1) far from the mask.
-    opacity: (h, w) in [0, 1], the part of each picture pixel inside of the outline.
-    """
+    """Unit normals (h, w, 3), x right, y up, z towards the viewer, and opacity (h, w), of a picture."""
 
     normals: Floats
     opacity: Floats
 
 
 def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Raster:
-    """The normals of a surface, (n, 3) at the pixels, with `scale` x `scale` pixels per pixel of the grid.
-
-    scale: 1 or more; None: chosen so that the longer side is about SIDE. Raises InputError for another one.
-    """
+    """The normals of a surface, (n, 3) at the pixels of the grid, at a scale as in `scale_of`."""
     from scipy import ndimage
 
     scale = scale_of(instance, scale)
@@ -69,11 +59,15 @@ def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Ras
     blurred = ndimage.gaussian_filter(solid, _BLUR, mode="constant")
     narrow, wide = spread(solid) - _SLOPE * within, spread(blurred) - _BLURRED_SLOPE * within
     most = _MOVED + thin * (_MOVED_THIN - _MOVED)
-    return Raster(unit, _opacity(narrow + np.clip(wide - narrow, -most, most)))
+    # The part of each pixel inside of the outline, where the level is one half.
+    depth = np.pad(narrow + np.clip(wide - narrow, -most, most) - 0.5, 1, mode="edge")
+    steepness = np.hypot(*np.gradient(depth))
+    opacity = np.clip(0.5 + depth / np.maximum(steepness, 1e-9), 0.0, 1.0)
+    return Raster(unit, opacity[1:-1, 1:-1])
 
 
 def scale_of(instance: Instance, scale: int | None) -> int:
-    """Picture pixels per pixel of the grid. Raises InputError for a scale out of range."""
+    """Picture pixels per pixel of the grid, by default for a longer side of SIDE. Raises InputError."""
     height, width = instance.mask.shape
     if scale is None:
         return max(1, round(SIDE / int(max(height, width))))
@@ -108,8 +102,7 @@ def _thin(mask: Bools) -> Bools:
     changed = (ndimage.binary_opening(wide, block) != wide) | (ndimage.binary_closing(wide, block) != wide)
     part, _ = ndimage.label(changed, block)
     long = np.bincount(part.ravel()) > _TIP
-    thin: Bools = ndimage.binary_dilation(changed & long[part], block)[3:-3, 3:-3]
-    return thin
+    return np.asarray(ndimage.binary_dilation(changed & long[part], block)[3:-3, 3:-3])
 
 
 def drawn_border(instance: Instance) -> float:
@@ -119,11 +112,3 @@ def drawn_border(instance: Instance) -> float:
     mask = np.pad(instance.mask, 1)
     border = (mask & ~ndimage.binary_erosion(mask))[1:-1, 1:-1]
     return float(border[tuple(instance.stroke_pixels.T)].sum() / border.sum())
-
-
-def _opacity(level: Floats) -> Floats:
-    """The part of each pixel inside of the outline, where the level is one half."""
-    depth = np.pad(level - 0.5, 1, mode="edge")
-    steepness = np.hypot(*np.gradient(depth))
-    part: Floats = np.clip(0.5 + depth / np.maximum(steepness, 1e-9), 0.0, 1.0)
-    return part[1:-1, 1:-1]

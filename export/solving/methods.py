@@ -21,8 +21,7 @@ from ...models.search.greedy import greedy_field
 from ...models.search.search import Search
 from ...models.search.starts import first_field, polyvector_start
 from ...models.smooth.bend import bend_field
-from ...models.smooth.polyvector import HOLDS, polyvector_field
-from ...models.smooth.power_field import power_field
+from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
 from ..solutions.solution import Solution
 from .compiling import compile_proofs, is_compiled
 from .two_stage import find_jumps, fit_angles, jumps_until

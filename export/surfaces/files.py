@@ -1,4 +1,8 @@
-"""The folder of a surface: pictures, heights, a mesh for other programs, and a report."""
+"""The folder of a surface: pictures, heights, a report, and a mesh (.obj) with a quad for each pixel.
+
+x runs to the right, y up, z towards the viewer, all in pixels; the lower left corner of the grid is at
+x = y = 0. Texture coordinates cover the grid.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.field.rawfield import vertices_of
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import make_folder, write_bytes
@@ -23,30 +28,27 @@ from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.layers import strokes_sheet
 from ..shading.colours import UPPER_LEFT, Light, eight_bit, lit, matcap, normal_map
 from ..shading.raster import raster, scale_of
-from .mesh import to_mtl, to_obj
 
-NORMALS: Final = "normals.png"
 SHADED: Final = "shaded.png"
-MATCAP: Final = "matcap.png"
-OVERLAY: Final = "overlay.png"
 DRAWING: Final = "drawing.png"
-HEIGHTS: Final = "heights.npy"
-MESH: Final = "surface.obj"
 MATERIALS: Final = "surface.mtl"
 REPORT: Final = "surface.json"
 FILES: Final = {
-    NORMALS: "normals as colours, a texel a pixel",
+    "normals.png": "normals as colours, a texel a pixel",
     SHADED: "in the light of a lamp",
-    MATCAP: "in the material of a glazed ball",
-    OVERLAY: "in the light of a lamp, with the strokes",
-    HEIGHTS: "heights at the corners of pixels",
-    MESH: "mesh with texture coordinates and normals",
+    "matcap.png": "in the material of a glazed ball",
+    "overlay.png": "in the light of a lamp, with the strokes",
+    "heights.npy": "heights at the corners of pixels",
+    "surface.obj": "mesh with texture coordinates and normals",
     MATERIALS: "its material",
     DRAWING: "the strokes on paper, its texture",
     REPORT: "facts, doubts and freedom",
 }
 """The files of a surface, and the content of each."""
 _PAPER: Final = (0.93, 0.91, 0.88)
+_MATERIAL: Final = "drawing"
+_MTL: Final = f"newmtl {_MATERIAL}\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {DRAWING}\n"
+_WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
 
 def write_surface(
@@ -99,13 +101,21 @@ def write_surface(
     (folder / REPORT).unlink(missing_ok=True)
     found = raster(surface.instance, surface.normals, fine)
     shaded, ink = lit(found, light), strokes(surface.instance, drawing, fine)
-    write_bytes(folder / NORMALS, png_of(normal_map(surface.instance, surface.normals, scale or 1)))
-    pictures = {SHADED: shaded, MATCAP: matcap(found), OVERLAY: over(ink, shaded), DRAWING: _on_paper(ink)}
+    paper = np.broadcast_to((*_PAPER, 1.0), ink.shape)
+    pictures = {
+        "normals.png": normal_map(surface.instance, surface.normals, scale or 1),
+        SHADED: eight_bit(shaded),
+        "matcap.png": eight_bit(matcap(found)),
+        "overlay.png": eight_bit(over(ink, shaded)),
+        DRAWING: eight_bit(over(ink, paper)[..., :3]),
+    }
     for name, picture in pictures.items():
-        write_bytes(folder / name, png_of(eight_bit(picture)))
-    write_bytes(folder / HEIGHTS, _npy(surface.heights))
-    write_bytes(folder / MATERIALS, to_mtl(DRAWING))
-    write_bytes(folder / MESH, to_obj(surface, MATERIALS))
+        write_bytes(folder / name, png_of(picture))
+    heights = io.BytesIO()
+    np.save(heights, surface.heights, allow_pickle=False)
+    write_bytes(folder / "heights.npy", heights.getvalue())
+    write_bytes(folder / MATERIALS, _MTL.encode())
+    write_bytes(folder / "surface.obj", to_obj(surface, MATERIALS))
     document = surface_document(surface, about) | {"files": FILES}
     write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
     return folder
@@ -125,17 +135,8 @@ def png_of(picture: NDArray[np.uint8]) -> bytes:
     return stream.getvalue()
 
 
-def _npy(heights: NDArray[np.float64]) -> bytes:
-    stream = io.BytesIO()
-    np.save(stream, heights, allow_pickle=False)
-    return stream.getvalue()
-
-
 def strokes(instance: Instance, drawing: Drawing | None, scale: int) -> Floats:
-    """Red, green, blue and opacity (h, w, 4) in [0, 1] of the strokes, `scale` pixels per pixel of the grid.
-
-    They come from the drawing, or are pieces of line at the stroke pixels without one.
-    """
+    """Red, green, blue and opacity (h, w, 4) in [0, 1] of the strokes of the drawing, or of the instance."""
     height, width = (side * scale for side in instance.mask.shape)
     with own_settings():
         drawn: Floats = pixels_of(strokes_sheet(instance, drawing), width, height) / 255.0
@@ -148,11 +149,6 @@ def over(above: Floats, below: Floats) -> Floats:
     opacity = front + back
     colour = (front * above[..., :3] + back * below[..., :3]) / np.maximum(opacity, 1e-9)
     return np.concatenate([colour, opacity], axis=-1)
-
-
-def _on_paper(drawn: Floats) -> Floats:
-    """Red, green and blue (h, w, 3) of the strokes on paper, as the texture of a mesh."""
-    return over(drawn, np.broadcast_to((*_PAPER, 1.0), drawn.shape))[..., :3]
 
 
 def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -180,21 +176,48 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
     """Whether a surface can be trusted, doubts, and freedom; in pixels and degrees."""
     off = np.degrees(off_right_angles(surface.field, surface.heights))
     slant = np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1.0, 1.0)))
+    numbers = {
+        "firmness": surface.firmness,
+        "confidence_mean": surface.confidence.mean(),
+        "confidence_least_tenth": np.percentile(surface.confidence, 10),
+        "right_angle_error_mean_degrees": off.mean(),
+        "right_angle_error_90_percent_degrees": np.percentile(off, 90),
+        "slant_mean_degrees": slant.mean(),
+        "slant_most_degrees": slant.max(),
+        "height_range_pixels": np.ptp(surface.corners),
+    }
     return {
         "trusted": not surface.doubts,
         "doubts": list(surface.doubts),
         "freedom": list(surface.freedom),
-        "firmness": _rounded(surface.firmness),
-        "confidence_mean": _rounded(surface.confidence.mean()),
-        "confidence_least_tenth": _rounded(np.percentile(surface.confidence, 10)),
-        "right_angle_error_mean_degrees": _rounded(off.mean()),
-        "right_angle_error_90_percent_degrees": _rounded(np.percentile(off, 90)),
-        "slant_mean_degrees": _rounded(slant.mean()),
-        "slant_most_degrees": _rounded(slant.max()),
-        "height_range_pixels": _rounded(np.ptp(surface.corners)),
+        **{name: round(float(value), 4) for name, value in numbers.items()},
     }
 
 
-def _rounded(value: Any) -> float:
-    """A number to four decimals, so that files are short."""
-    return round(float(value), 4)
+def to_obj(surface: Surface, materials: str) -> bytes:
+    """The mesh as text. materials: name of the .mtl file in its folder."""
+    instance = surface.instance
+    places, corners = vertices_of(instance.grid)
+    height, width = instance.mask.shape
+    row, column = places.T
+    points = np.column_stack([column, height - row, surface.heights[row, column]])
+    texture = np.column_stack([column / width, 1 - row / height])
+    normals = np.zeros((len(places), 3))
+    np.add.at(normals, corners, surface.normals[:, None, :])
+    faces = corners[:, _WALK] + 1
+    return "".join(
+        [
+            f"# {instance.name}: quad k is pixel k = 1, 2, ... of the mask, row by row; y up, z to you\n",
+            f"mtllib {materials}\n",
+            _lines("v", points),
+            _lines("vt", texture),
+            _lines("vn", normals / np.linalg.norm(normals, axis=1, keepdims=True)),
+            f"usemtl {_MATERIAL}\ns 1\n",
+            *("f " + " ".join(f"{k}/{k}/{k}" for k in face) + "\n" for face in faces.tolist()),
+        ]
+    ).encode()
+
+
+def _lines(lead: str, table: np.ndarray[Any, Any]) -> str:
+    form = lead + " {:.6f}" * table.shape[1] + "\n"
+    return "".join(form.format(*row) for row in (np.round(table, 6) + 0.0).tolist())

@@ -13,10 +13,8 @@ from ..field.field import CrossField
 from ..instance.grid import Floats, Ints
 from ..instance.instance import Instance
 
-SHORTEST: Final = 3
-"""Fewest stroke pixels of a curve that is hidden."""
-MOST: Final = 0.5
-"""Greatest share of the stroke pixels that a hidden curve may have: a larger one is most of the drawing."""
+SHORTEST: Final = 3  # fewest stroke pixels of a curve that is hidden
+MOST: Final = 0.5  # greatest share of the stroke pixels that a hidden curve may have
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +36,7 @@ class HiddenCurve:
         return self.instance.with_strokes(kept)
 
     def deviation(self, field: CrossField) -> float:
-        """The mean angle from the curve to the nearer line of the crosses on it, in [0, pi/2] radians.
-
-        Random crosses with lines at right angles have pi/8 on average.
-        field: a field on the same grid. Raises InstanceError for another grid.
-        """
+        """The mean angle, in [0, pi/2] radians, from the curve to the nearer line of a field on its grid."""
         if not np.array_equal(field.instance.mask, self.instance.mask):
             raise InstanceError(f"the field is not on the pixels of {self.instance.name}")
         at, theta = self.instance.stroke_index, self.instance.theta
@@ -52,15 +46,16 @@ class HiddenCurve:
 def hidden_curves(instance: Instance, curve: Ints, most: int) -> list[HiddenCurve]:
     """Up to `most` curves that can be hidden, those with most stroke pixels first.
 
-    curve: int (s,), number of the only curve at each stroke pixel, negative where several curves meet; those
-    pixels are never hidden. Excluded are curves of fewer than SHORTEST pixels and of more than a share MOST
-    of all. Also excluded are curves whose absence would leave a part of the mask without strokes.
+    curve: int (s,), number of the only curve at each stroke pixel, negative where several curves meet.
+    Curves whose absence would leave a part of the mask without strokes are excluded.
     """
+    from scipy import ndimage
+
     numbers, count = np.unique(curve[curve >= 0], return_counts=True)
     wanted = (count >= SHORTEST) & (count <= MOST * len(curve))
     order = np.argsort(-count[wanted], kind="stable")
     found: list[HiddenCurve] = []
-    part = _parts(instance)
+    part = ndimage.label(instance.mask)[0][tuple(instance.stroke_pixels.T)]
     for number in numbers[wanted][order]:
         hidden = curve == number
         if len(found) < most and np.isin(part[hidden], part[~hidden]).all():
@@ -70,11 +65,7 @@ def hidden_curves(instance: Instance, curve: Ints, most: int) -> list[HiddenCurv
 
 @dataclass(frozen=True)
 class Summary:
-    """Statistics of the angles of several curves: count, mean, median, and standard error of the mean.
-
-    error: sample deviation over the root of the count; None for a single angle. The curves of one drawing
-    are correlated, so means differ more between drawings.
-    """
+    """Count, mean and median of the angles of several curves; standard error, None for a single angle."""
 
     count: int
     mean: float
@@ -89,12 +80,3 @@ def summary(angles: Floats) -> Summary | None:
         return None
     error = float(angles.std(ddof=1) / np.sqrt(count)) if count > 1 else None
     return Summary(count, float(angles.mean()), float(np.median(angles)), error)
-
-
-def _parts(instance: Instance) -> Ints:
-    """The number of the 4-connected part of the mask that contains each stroke, shape (s,)."""
-    from scipy import ndimage
-
-    row, column = instance.stroke_pixels.T
-    parts: Ints = ndimage.label(instance.mask)[0][row, column]
-    return parts

@@ -1,9 +1,4 @@
-"""A cross field: two lines at every pixel, the jumps between neighbours, and their meaning.
-
-A cross has line u at angle alpha + beta and line v at angle alpha + pi/2 - beta. For a pair e = (i, j) with
-jump p the residuals are A = alpha_i - alpha_j + pi/2 p and B = (-1)^p beta_i - beta_j (equation (4) of the
-paper).
-"""
+"""A cross field: two lines at every pixel, the jumps between neighbours, and their meaning."""
 
 from __future__ import annotations
 
@@ -22,14 +17,10 @@ from .jumps import best_jumps, label_of, parity_sign, stepped
 
 Norm = Literal[1, 2]
 
-DEGENERATE: Final = np.radians(2.5)
-"""Lines closer than twice this (5 degrees) count as one: |beta| > pi/4 - DEGENERATE."""
-FAR: Final = np.radians(10)
-"""A stroke that deviates more than this from both lines counts as not followed."""
-NARROW: Final = QUARTER
-"""Lines that are less than this apart are a narrow cross."""
-MOST: Final = 0.9
-"""Share of the stroke pixels that deviate no more than `Shape.most_deviation`."""
+DEGENERATE: Final = np.radians(2.5)  # lines closer than 5 degrees count as one: |beta| > pi/4 - DEGENERATE
+FAR: Final = np.radians(10)  # A stroke that deviates more than this from both lines counts as not followed
+NARROW: Final = QUARTER  # lines that are less than this apart are a narrow cross
+MOST: Final = 0.9  # share of the stroke pixels that deviate no more than `Shape.most_deviation`
 _EQUAL: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
 _ROUNDING: Final = 1e-12  # quarter turns by which a label may miss its window
 
@@ -52,11 +43,9 @@ class Energy:
 class Shape:
     """Measures of a field that a designer sees, independent of energy and weights.
 
-    mean_deviation, most_deviation: mean and 90 % quantile over the stroke pixels of the angle between the
-    stroke and its line, in [0, pi/2] radians (`CrossField.stroke_deviation`).
-    far_strokes: share of the strokes where this angle exceeds 10 degrees. narrow_pixels: share of all pixels
-    whose lines are less than 45 degrees apart. Inside the bounds lines are pi/2 - 2|beta| apart, so these are
-    the pixels with |beta| > pi/8.
+    mean_deviation, most_deviation: mean and 90 % quantile of `CrossField.stroke_deviation`. far_strokes:
+    share of the strokes where it exceeds 10 degrees. narrow_pixels: share of all pixels whose lines are less
+    than 45 degrees apart.
     """
 
     mean_deviation: float
@@ -69,8 +58,7 @@ class Shape:
 class Singularities:
     """Quads of 2 x 2 pixels around which the crosses turn.
 
-    row, column: int (k,), the quad's common corner is the lower right corner of pixel [row, column].
-    index: float (k,), turns of the cross on a counter-clockwise walk (y up): multiples of 1/4.
+    row, column: of the upper left pixel, (k,). index: turns of the cross on a counter-clockwise walk, (k,).
     """
 
     row: Ints
@@ -126,10 +114,8 @@ class CrossField(Pictured):
             object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
-        return (
-            f"<CrossField on {self.instance.summary}: energy {self.energy().total:.6g}, "
-            f"singularities {len(self.singularities.index)}>"
-        )
+        energy, singular = self.energy().total, len(self.singularities.index)
+        return f"<CrossField on {self.instance.summary}: energy {energy:.6g}, singularities {singular}>"
 
     @classmethod
     def from_lines(cls, instance: Instance, u_angle: Floats, v_angle: Floats) -> CrossField:
@@ -162,8 +148,7 @@ class CrossField(Pictured):
 
         """
         alpha, beta = label_of(_angles(instance, u_angle, "u_angle"), _angles(instance, v_angle, "v_angle"))
-        steps = _window_steps(instance, alpha)
-        steps[instance.stroke_index] = _nearer_steps(instance, alpha, beta, steps)
+        steps = _steps(instance, alpha, beta, inside=True)
         alpha = np.clip(alpha + HALF * steps, instance.alpha_lower, instance.alpha_upper)
         beta = np.clip(parity_sign(steps) * beta, -QUARTER, QUARTER)
         return cls(instance, alpha, beta, best_jumps(instance, alpha, beta))
@@ -189,12 +174,12 @@ class CrossField(Pictured):
     @cached_property
     def u(self) -> Floats:
         """Unit vectors (x, y), y up, of line u; shape (n, 2)."""
-        return _unit(self.u_angle)
+        return np.stack([np.cos(self.u_angle), np.sin(self.u_angle)], axis=-1)
 
     @cached_property
     def v(self) -> Floats:
         """Unit vectors (x, y), y up, of line v; shape (n, 2)."""
-        return _unit(self.v_angle)
+        return np.stack([np.cos(self.v_angle), np.sin(self.v_angle)], axis=-1)
 
     @property
     def residual_a(self) -> Floats:
@@ -234,8 +219,7 @@ class CrossField(Pictured):
         grid = self.instance.grid
         share = self.residual_a**2 + self.residual_b**2
         ends, halves = np.concatenate([grid.first, grid.second]), np.concatenate([share, share])
-        at_pixel: Floats = np.bincount(ends, halves, grid.size).astype(np.float64)
-        return at_pixel
+        return np.bincount(ends, halves, grid.size).astype(np.float64)
 
     @cached_property
     def singularities(self) -> Singularities:
@@ -250,8 +234,7 @@ class CrossField(Pictured):
     @cached_property
     def degenerate(self) -> Bools:
         """True where both lines are the same to within 5 degrees; shape (n,)."""
-        close: Bools = np.abs(self.beta) > QUARTER - DEGENERATE
-        return close
+        return np.asarray(np.abs(self.beta) > QUARTER - DEGENERATE)
 
     @property
     def angle_between(self) -> Floats:
@@ -312,9 +295,8 @@ class CrossField(Pictured):
 
     def with_best_jumps(self) -> CrossField:
         """The field with the jump of least energy on each pair, within the instance's p_min and p_max."""
-        return CrossField(
-            self.instance, self.alpha, self.beta, best_jumps(self.instance, self.alpha, self.beta)
-        )
+        jumps = best_jumps(self.instance, self.alpha, self.beta)
+        return CrossField(self.instance, self.alpha, self.beta, jumps)
 
     def image(self, values: np.ndarray[Any, Any], fill: float = np.nan) -> Floats:
         """Values (n,) of the pixels as a picture [height, width], `fill` outside the mask."""
@@ -324,19 +306,14 @@ class CrossField(Pictured):
 
 
 def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:
-    """The same crosses with every alpha in its window of the instance's gauge and |beta| <= pi/4.
+    """The same crosses with every alpha in its window of the gauge and |beta| <= pi/4, or clipped to that.
 
-    alpha and beta may be any real numbers. Values outside every window are clipped: |beta| > pi/4, and under
-    the gauge `box` the alpha of a stroke that no label inside the box has. Then each pair gets its best jump;
-    without clipping the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
+    Each pair gets its best jump; without clipping the energy does not rise.
     """
-    lower = instance.alpha_lower
-    steps = _window_steps(instance, alpha)
-    steps[instance.stroke_index] = _stroke_steps(instance, alpha, beta, steps)
-    alpha, beta, p = stepped(instance.grid, alpha, beta, p, steps)
+    alpha, beta, p = stepped(instance.grid, alpha, beta, p, _steps(instance, alpha, beta, inside=False))
     kept = CrossField(
         instance,
-        np.clip(alpha, lower, instance.alpha_upper),
+        np.clip(alpha, instance.alpha_lower, instance.alpha_upper),
         np.clip(beta, -QUARTER, QUARTER),
         np.clip(p, instance.p_min, instance.p_max),
     )
@@ -344,48 +321,26 @@ def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> Cros
     return best if best.energy().total < kept.energy().total else kept
 
 
-def _window_steps(instance: Instance, alpha: Floats) -> Ints:
-    """The step that moves each label into its window, shape (n,)."""
-    return np.ceil((instance.alpha_lower - alpha) / HALF - _ROUNDING).astype(np.int32)
+def _steps(instance: Instance, alpha: Floats, beta: Floats, *, inside: bool) -> Ints:
+    """The step of each label, (n,), into its window; on an edge, the one nearer to the stroke.
 
-
-def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
-    """The step of each stroke pixel's label with the least clipping and misfit of three; shape (s,).
-
-    The candidates: the label in the window, the next one (on the window's edge both fit), and the label whose
-    u stays nearest to the stroke. Under the gauge `box` a label inside the window may give the stroke to v,
-    which the energy penalises.
+    If not inside, the label of a stroke may leave its window for the least clipping and misfit.
     """
-    at = instance.stroke_index
-    faithful = 2 * np.round((instance.target - alpha[at] - beta[at]) / np.pi).astype(np.int32)
-    candidates = np.stack([steps[at], steps[at] + 1, faithful])
-    clipped, misfit = _losses(instance, alpha, beta, candidates)
-    return _cheapest(candidates, clipped + misfit)
-
-
-def _nearer_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
-    """The step of each stroke pixel's label into its window, (s,); on an edge, nearer to the stroke."""
-    at = instance.stroke_index
-    candidates = np.stack([steps[at], steps[at] + 1])
-    clipped, misfit = _losses(instance, alpha, beta, candidates)
-    fits = clipped <= 2 * HALF * _ROUNDING
-    fits[0] = True
-    return _cheapest(candidates, np.where(fits, misfit, np.inf))
-
-
-def _losses(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> tuple[Floats, Floats]:
-    """Clipping of alpha and remaining misfit for steps (k, s) of strokes; shape (k, s) each."""
-    at = instance.stroke_index
-    moved = alpha[at] + HALF * steps
+    steps = np.ceil((instance.alpha_lower - alpha) / HALF - _ROUNDING).astype(np.int32)
+    at, target = instance.stroke_index, instance.target
+    # The label in the window, the next one, which also fits on an edge, and the one with u at the stroke.
+    faithful = 2 * np.round((target - alpha[at] - beta[at]) / np.pi).astype(np.int32)
+    candidates = np.stack([steps[at], steps[at] + 1, faithful][: 2 if inside else 3])
+    moved = alpha[at] + HALF * candidates
     shifted = np.clip(moved, instance.alpha_lower[at], instance.alpha_upper[at])
-    turned = np.clip(parity_sign(steps) * beta[at], -QUARTER, QUARTER)
-    misfit = np.abs(shifted + turned - instance.target)
-    return np.abs(moved - shifted), misfit
-
-
-def _cheapest(candidates: Ints, cost: Floats) -> Ints:
-    best: Ints = candidates[np.argmin(np.round(cost, 12), axis=0), np.arange(candidates.shape[1])]
-    return best
+    misfit = np.abs(shifted + np.clip(parity_sign(candidates) * beta[at], -QUARTER, QUARTER) - target)
+    clipped = np.abs(moved - shifted)
+    if inside:
+        cost = np.stack([misfit[0], np.where(clipped[1] <= 2 * HALF * _ROUNDING, misfit[1], np.inf)])
+    else:
+        cost = clipped + misfit
+    steps[at] = candidates[np.argmin(np.round(cost, 12), axis=0), np.arange(len(at))]
+    return steps
 
 
 def _angles(instance: Instance, given: Any, name: str) -> Floats:
@@ -406,7 +361,3 @@ def _angles(instance: Instance, given: Any, name: str) -> Floats:
             f"give radians up to {MOST_ANGLE:g}"
         )
     return angles
-
-
-def _unit(angle: Floats) -> Floats:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -1,9 +1,7 @@
-"""Field files: .npz and JSON, with field and instance, and .rawfield with its mesh (rawfield.py).
+"""Field files: .npz and JSON (field.schema.json), with field and instance, and .rawfield (rawfield.py).
 
-.npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
-            version as JSON text, and the arrays of the instance's own .npz, their names preceded by
-            `instance_`. Other content is refused (models/array_archive.py).
-.json       field.schema.json; one line per pixel. Numbers are the shortest that give back the same doubles.
+An .npz holds alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
+version as JSON text, and the arrays of the instance's own .npz, their names preceded by `instance_`.
 """
 
 from __future__ import annotations
@@ -108,25 +106,16 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
 
     """
     path = Path(path)
-    if path.suffix.lower() == ".rawfield":
-        return _read_rawfield(path, on)
-    read = _of_suffix(_READERS, path, "read", ".rawfield")
     with naming(path):
+        if path.suffix.lower() == ".rawfield":
+            if on is None:
+                raise InputError("holds no instance; give the instance: read_field(path, on=instance)")
+            return of_rawfield(read_bytes(path, most_bytes(on)), on)
+        read = _of_suffix(_READERS, path, "read", ".rawfield")
         field = read(read_bytes(path, MAX_ARCHIVE))
         if on is not None:
             field.check_instance(on)
         return field
-
-
-def _read_rawfield(path: Path, on: Instance | None) -> CrossField:
-    if on is None:
-        raise InputError(
-            "holds no instance, so the pixels of its rows are unknown; give the instance: "
-            "read_field(path, on=instance)",
-            file=path,
-        )
-    with naming(path):
-        return of_rawfield(read_bytes(path, most_bytes(on)), on)
 
 
 def _of_suffix(table: dict[str, _Kind], path: Path, verb: str, *others: str) -> _Kind:
@@ -160,7 +149,6 @@ def _of_npz(data: bytes) -> CrossField:
 
 
 def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
-    """The instance inside a field file; errors state that they concern it."""
     try:
         return read(source)
     except InstanceError as error:
@@ -170,13 +158,8 @@ def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
 def field_to_json(field: CrossField) -> bytes:
     """Return the bytes of the field's JSON file, its instance included."""
     grid = field.instance.grid
-    columns: tuple[np.ndarray[Any, Any], ...] = (
-        grid.rows,
-        grid.columns,
-        field.alpha,
-        field.beta,
-        *(_jumps(field, table) for table in grid.pair_number),
-    )
+    upper, right = (_jumps(field, table) for table in grid.pair_number)
+    columns = (grid.rows, grid.columns, field.alpha, field.beta, upper, right)
     rows = zip(*(column.tolist() for column in columns), strict=True)
     pixels = ",\n".join(f"    {json.dumps(row)}" for row in rows)
     instance = to_json(field.instance).rstrip().replace("\n", "\n  ")
@@ -193,10 +176,7 @@ def _jumps(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
 
 
 def field_of_json(data: bytes) -> CrossField:
-    """Read a field from the bytes of a JSON file.
-
-    Raises InstanceError with the place in the document.
-    """
+    """Read a field from the bytes of a JSON file. Raises InstanceError with the place in the document."""
     document = parse_json(decoded(data))
     check_version(document, FORMAT, VERSION)
     checked = check_schema(document, "field", __package__, rows={"pixels": _are_pixels})
@@ -229,7 +209,7 @@ def _field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:
         size = np.abs(np.asarray(values, dtype=np.float64))
         if (np.isfinite(size) & (size > MOST_ANGLE)).any():  # CrossField refuses numbers that are not finite
             raise InstanceError(
-                f"{name} holds numbers beyond {MOST_ANGLE:g}, which are not angles; write it again"
+                f"{name} has numbers beyond {MOST_ANGLE:g}, which are not angles; write it again"
             )
     return CrossField(instance, alpha, beta, p)
 

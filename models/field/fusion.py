@@ -1,10 +1,8 @@
 """Fusion of two fields: at every pixel the cross of one of them, so that the energy is least.
 
-Fields that strategies find for one sketch agree in most places and differ in some regions, each being better
-in some of them. The choice of least energy is a minimum cut, the fusion move of Lempitsky, Rother, Roth,
-Blake (Fusion Moves for Markov Random Field Optimization, IEEE PAMI 32, 2010). Crosses are not turned, so
-the energy of a choice is a sum over pixels and pairs of neighbours. A cut cannot express that two neighbours
-of the same field cost more than a mixed pair; then the mixed pair counts as much.
+The choice of least energy is a minimum cut, the fusion move of Lempitsky, Rother, Roth, Blake (Fusion Moves
+for Markov Random Field Optimization, IEEE PAMI 32, 2010). A cut cannot express that two neighbours of the
+same field cost more than a mixed pair; then the mixed pair counts as much.
 """
 
 from __future__ import annotations
@@ -76,11 +74,8 @@ def _least_of_pairs(pairs: Ints, first: CrossField, second: CrossField) -> Float
 
 
 def _least_cut(free: Bools, price: Floats, links: Ints, excess: Floats) -> Bools:
-    """The set of free pixels that pay, at the least total of prices and excesses.
-
-    An excess is due for each link from a pixel that does not pay to one that does. Shapes (n,), links (2, k),
-    excess (k,); whole numbers.
-    """
+    """The free pixels that pay, at the least total of prices (n,) and excesses (k,) of links (2, k)."""
+    # An excess is due for each link from a pixel that does not pay to one that does.
     count = int(free.sum())
     number = np.cumsum(free) - 1
     source, sink, place = count, count + 1, np.arange(count)

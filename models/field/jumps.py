@@ -1,8 +1,4 @@
-"""Labels of crosses, and jumps between labels of neighbouring pixels: signs of beta, best jumps, steps.
-
-The label of a cross is (alpha, beta); its step by k is (alpha + k pi/2, (-1)^k beta), which is the same
-cross.
-"""
+"""Labels (alpha, beta) of crosses, jumps between them, and steps: (alpha + k pi/2, (-1)^k beta)."""
 
 from __future__ import annotations
 

@@ -1,14 +1,11 @@
 """Directional's raw field of a mesh (.rawfield), its singularities (.sings), and the mesh (.obj).
 
-A line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z. Rows are written counter-clockwise,
-because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
+A line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z, counter-clockwise.
+The mesh has two triangles per pixel, 2k and 2k + 1 of pixel k, counter-clockwise with y up, and the field is
+per face. Pixels that meet only in a corner each get their own vertex there, so that the mesh is a manifold.
+Coordinates are the sketch's, with y negated and z = 0.
 
-The mesh has two triangles per pixel, counter-clockwise with y up, and the field is per face, as Directional's
-examples read it. Vertices at the pixels' centres would lose every pixel that is in no quad of the mask.
-Pixels that meet only in a corner each get their own vertex there, so that the mesh is a manifold. Faces
-2k and 2k + 1 are pixel k. Coordinates are the sketch's, with y negated and z = 0.
-
-Fields by others are read too: vectors of any length and order that form two pairs of opposite vectors in the
+Other fields are read too: vectors of any length and order that form two pairs of opposite vectors in the
 plane of the mesh. Where the two triangles of a pixel differ, the pixel gets the lines between.
 """
 
@@ -21,8 +18,7 @@ import numpy as np
 
 from ..errors import InstanceError, shortened
 from ..input_limits import MAX_NUMBER
-from ..instance.angles import double_angle, line_difference, line_of
-from ..instance.elementary import arctangent
+from ..instance.angles import arctangent, double_angle, line_difference, line_of
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import Instance
 from .field import CrossField
@@ -30,7 +26,9 @@ from .field import CrossField
 _ROW: Final = 12  # numbers per face
 _OPPOSITE: Final = 1e-3  # radians by which the two vectors of a line may fail to be opposite
 _FLAT: Final = 1e-6  # share of a vector that may point out of the plane
-_NUMBERS: Final = re.compile(rb"[-+.0-9eE \t]*")
+_NUMBERS: Final = re.compile(
+    rb"(?:[ \t]*+[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?(?![^ \t]))*+[ \t]*+"
+)
 
 
 def to_rawfield(field: CrossField) -> bytes:
@@ -55,11 +53,7 @@ def to_obj(instance: Instance) -> bytes:
 
 
 def to_sings(field: CrossField) -> bytes:
-    """The text of the field's singularities in Directional's format: a line `4 k`, then vertex and 4 index.
-
-    Vertices count from 0 in the order of the .obj. The index, turns of the cross counter-clockwise, follows
-    the field's jumps.
-    """
+    """The text of the singularities: a line `4 k`, then vertex, from 0 as in the .obj, and 4 index."""
     places, _ = vertices_of(field.instance.grid)
     found = field.singularities
     across = field.instance.grid.width + 1
@@ -70,11 +64,7 @@ def to_sings(field: CrossField) -> bytes:
 
 
 def vertices_of(grid: Grid) -> tuple[Ints, Ints]:
-    """Vertices [row, column] (k, 2), and the vertex at each corner of each pixel (n, 4), row by row.
-
-    Row 0, column 0 is the upper left corner of the grid. Pixels that meet only in a corner each have
-    their own vertex there.
-    """
+    """Vertices [row, column] (k, 2), and the vertex at each corner of each pixel (n, 4), row by row."""
     down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
     inside = np.pad(grid.mask, 1)
@@ -98,10 +88,7 @@ def most_bytes(instance: Instance) -> int:
 
 
 def of_rawfield(data: bytes, instance: Instance) -> CrossField:
-    """Read the field of a .rawfield on the instance, with two faces per pixel or one.
-
-    Raises InstanceError that names the line.
-    """
+    """Read the field of a .rawfield on the instance. Raises InstanceError that names the line."""
     lines = data.splitlines()
     rows = _faces(lines[0] if lines else b"", instance)
     body = [(number, line) for number, line in enumerate(lines[1:], 2) if line.strip()]
@@ -118,9 +105,7 @@ def _faces(head: bytes, instance: Instance) -> int:
     """The number of faces that the first line states."""
     words = head.split()
     if len(words) != 2 or not all(word.isdigit() and len(word) < MAX_NUMBER for word in words):
-        raise InstanceError(
-            f"line 1: is {_shown(head)}, not the degree 4 and the number of faces; give a .rawfield as text"
-        )
+        raise InstanceError(f"line 1: is {_shown(head)}, not the degree 4 and the number of faces as text")
     degree, faces = map(int, words)
     if degree != 4:
         raise InstanceError(f"line 1: has {degree} vectors per face; crosses have 4: u, v, -u, -v")
@@ -141,19 +126,7 @@ def _vectors(body: list[tuple[int, bytes]]) -> Floats:
             raise InstanceError(f"line {number}: has {words} numbers; give {_ROW}, x y z of four vectors")
         if not _NUMBERS.fullmatch(line):
             raise InstanceError(f"line {number}: holds something other than numbers: {_shown(line)}")
-    try:
-        return np.array(b" ".join(line for _, line in body).split(), dtype=np.float64)
-    except ValueError:
-        number, line = next((number, line) for number, line in body if not _are_numbers(line))
-        raise InstanceError(f"line {number}: holds something other than numbers: {_shown(line)}") from None
-
-
-def _are_numbers(line: bytes) -> bool:
-    try:
-        np.array(line.split(), dtype=np.float64)
-    except ValueError:
-        return False
-    return True
+    return np.array(b" ".join(line for _, line in body).split(), dtype=np.float64)
 
 
 def _shown(line: bytes) -> str:
@@ -191,11 +164,7 @@ def _between(u: Floats, v: Floats) -> tuple[Floats, Floats]:
     straight = line_difference(u[0], u[1]) + line_difference(v[0], v[1])
     crossed = line_difference(u[0], v[1]) + line_difference(v[0], u[1])
     swap = crossed < straight
-    second = np.where(swap, v[1], u[1]), np.where(swap, u[1], v[1])
-    return _middle(u[0], second[0]), _middle(v[0], second[1])
-
-
-def _middle(first: Floats, second: Floats) -> Floats:
-    """The line between two lines, (n,); the first where they are equal."""
+    first, second = np.stack([u[0], v[0]]), np.where(swap, [v[1], u[1]], [u[1], v[1]])
     middle = line_of(double_angle(first) + double_angle(second))
-    return np.where(line_difference(first, second) < _OPPOSITE * 1e-9, first, middle)
+    between = np.where(line_difference(first, second) < _OPPOSITE * 1e-9, first, middle)
+    return between[0], between[1]

@@ -41,10 +41,6 @@ _ARCHIVE: Final = {
     "theta": Expected(1, MAX_GRID**2),
     "w": Expected(1, MAX_GRID**2),
 }
-_RETIRED: Final = {
-    "crossings": "holds crossings (two strokes at one pixel) and was made by an earlier version; "
-    "read the sketch again"
-}
 
 
 def write_instance(instance: Instance, path: str | Path) -> Path:
@@ -69,7 +65,8 @@ def write_instance(instance: Instance, path: str | Path) -> Path:
 
     """
     path = Path(path)
-    return write_bytes(path, _npz(instance) if path.suffix.lower() == ".npz" else to_json(instance).encode())
+    packed = path.suffix.lower() == ".npz"
+    return write_bytes(path, pack_arrays(arrays_of(instance)) if packed else to_json(instance).encode())
 
 
 def read_instance(path: str | Path) -> Instance:
@@ -95,27 +92,30 @@ def read_instance(path: str | Path) -> Instance:
     """
     data = read_bytes(path, MAX_ARCHIVE)
     with naming(path):
-        return _of_npz(data) if data[:2] == b"PK" else of_json(decoded(data))
+        if data[:2] != b"PK":
+            return of_document(parse_json(decoded(data)))
+        archive = ArrayArchive(data)
+        instance = of_archive(archive)
+        archive.finish()
+        return instance
 
 
 def to_json(instance: Instance) -> str:
     """The instance as JSON text, one line per stroke pixel [row, column, theta, w] and per mask row."""
-    rows = ["".join("#" if inside else "." for inside in row) for row in instance.mask]
-    strokes = _lines(instance)
-    head = (
-        {"format": FORMAT, "version": VERSION}
-        | {key: getattr(instance, name) for key, name in _SCALARS.items()}
-        | {"origin": list(instance.origin)}
-    )
+    head = _head(instance) | {"origin": list(instance.origin)}
     lines = [f"  {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
-    mask = ",\n".join(f'    "{row}"' for row in rows)
+    mask = ",\n".join(
+        '    "' + "".join("#" if inside else "." for inside in row) + '"' for row in instance.mask
+    )
+    rows = zip(instance.stroke_pixels.tolist(), instance.theta.tolist(), instance.w.tolist(), strict=True)
+    strokes = ",\n".join(f"    [{r}, {c}, {angle!r}, {weight!r}]" for (r, c), angle, weight in rows)
     return "{\n" + "\n".join(lines) + f'\n  "mask": [\n{mask}\n  ],\n  "strokes": [\n{strokes}\n  ]' + "\n}\n"
 
 
-def _lines(instance: Instance) -> str:
-    """Strokes as JSON text, one per line."""
-    rows = zip(instance.stroke_pixels.tolist(), instance.theta.tolist(), instance.w.tolist(), strict=True)
-    return ",\n".join(f"    [{r}, {c}, {angle!r}, {weight!r}]" for (r, c), angle, weight in rows)
+def _head(instance: Instance) -> dict[str, Any]:
+    """Format, version and scalars."""
+    scalars = {key: getattr(instance, name) for key, name in _SCALARS.items()}
+    return {"format": FORMAT, "version": VERSION} | scalars
 
 
 def decoded(data: bytes) -> str:
@@ -126,11 +126,6 @@ def decoded(data: bytes) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InstanceError("is neither JSON nor .npz; expected a file written by crossfield") from error
-
-
-def of_json(text: str) -> Instance:
-    """Read an instance from JSON text. Raises InstanceError with the place in the document."""
-    return of_document(parse_json(text))
 
 
 def parse_json(text: str) -> object:
@@ -153,10 +148,9 @@ def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
 def read_document(
     path: Path, form: str, version: int, schema: str, package: str, *, remedy: str
 ) -> dict[str, Any]:
-    """Return the JSON document in a file of at most MAX_BYTES, of a format and version, that obeys a schema.
+    """Return the JSON document in a file, if it has this format and version and obeys the schema.
 
-    Raises InputError when the file cannot be read. Raises InstanceError, with file and place, when it breaks
-    a rule, or holds a text or a number that no JSON file in UTF-8 can hold.
+    Raises InputError when the file cannot be read, and InstanceError with file and place.
     """
     try:
         text = read_bytes(path, MAX_BYTES).decode()
@@ -170,11 +164,8 @@ def read_document(
 
 
 def _check_writable(document: object) -> None:
-    """Raise InstanceError unless the document can be written as JSON in UTF-8 again.
-
-    Python reads infinite numbers and halves of surrogate pairs, which other programs need not accept.
-    """
-    try:
+    """Raise InstanceError unless the document can be written as JSON in UTF-8 again."""
+    try:  # Python reads infinite numbers and halves of surrogate pairs, other programs need not
         json.dumps(document, ensure_ascii=False, allow_nan=False).encode()
     except UnicodeEncodeError as error:
         raise InstanceError("has a text with half of a surrogate pair; write it again") from error
@@ -185,9 +176,7 @@ def _check_writable(document: object) -> None:
 def of_document(document: object) -> Instance:
     """Read an instance from a parsed JSON document. Raises InstanceError with the place in the document."""
     check_version(document, FORMAT, VERSION)
-    if isinstance(document, dict):
-        for key in _RETIRED.keys() & document.keys():
-            raise InstanceError(_RETIRED[key])
+
     document = check_schema(document, "instance", __package__, rows={"strokes": _are_strokes})
     width = len(document["mask"][0])
     for number, row in enumerate(document["mask"]):
@@ -216,7 +205,7 @@ def check_counts(strokes: int, pixels: int) -> None:
     """Raise InstanceError if there are more stroke pixels than pixels."""
     if strokes > pixels:
         raise InstanceError(
-            f"lists {strokes} stroke pixels, but its mask has {pixels} pixels; list each stroke pixel once"
+            f"lists {strokes} stroke pixels, but its mask has {pixels} pixels; list each once"
         )
 
 
@@ -249,10 +238,9 @@ def number_table(rows: list[Any], width: int) -> Floats | None:
 def check_schema(
     document: object, schema: str, package: str, rows: Mapping[str, Callable[[list[Any]], bool]] | None = None
 ) -> dict[str, Any]:
-    """Return the document if it obeys the `<schema>.schema.json` that ships with a package.
+    """Return the document if it obeys the `<schema>.schema.json` of a package; else raise InstanceError.
 
-    rows: for keys with long lists, a fast test whether all entries obey the schema, which replaces the check
-    of single entries. Raises InstanceError with the place.
+    rows: for keys with long lists, a fast test whether all entries obey the schema.
     """
     assert isinstance(document, dict)
     quick = {
@@ -267,10 +255,7 @@ def check_schema(
 
 
 def schema_error(document: dict[str, Any], schema: str, package: str) -> Any | None:
-    """The outermost jsonschema.ValidationError of a document, None when it obeys its schema.
-
-    A text of the format `line` has printable characters only.
-    """
+    """The outermost jsonschema.ValidationError of a document, None when it obeys its schema."""
     import jsonschema
 
     lines = jsonschema.FormatChecker(formats=())
@@ -282,9 +267,8 @@ def schema_error(document: dict[str, Any], schema: str, package: str) -> Any | N
 
 @cache
 def _schema(name: str, package: str) -> dict[str, Any]:
-    return cast(
-        "dict[str, Any]", json.loads(files(package).joinpath(f"{name}.schema.json").read_text("utf-8"))
-    )
+    text = files(package).joinpath(f"{name}.schema.json").read_text("utf-8")
+    return cast("dict[str, Any]", json.loads(text))
 
 
 def check_version(document: object, form: str, version: int) -> None:
@@ -298,39 +282,17 @@ def check_version(document: object, form: str, version: int) -> None:
         )
 
 
-def _npz(instance: Instance) -> bytes:
-    """The .npz bytes; dates are fixed so that equal instances give equal bytes."""
-    return pack_arrays(arrays_of(instance))
-
-
 def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
     """The instance as named arrays; `head` is JSON text with format, version and scalars."""
-    head = {"format": FORMAT, "version": VERSION} | {
-        key: getattr(instance, name) for key, name in _SCALARS.items()
-    }
     arrays = {
-        "head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8),
+        "head": np.frombuffer(json.dumps(_head(instance)).encode(), dtype=np.uint8),
         "origin": np.array(instance.origin),
     }
     return arrays | {key: getattr(instance, key) for key in _ARRAYS}
 
 
-def _of_npz(data: bytes) -> Instance:
-    """Read an instance from an .npz that holds nothing else. Raises InstanceError with the array's name."""
-    archive = ArrayArchive(data)
-    instance = of_archive(archive)
-    archive.finish()
-    return instance
-
-
 def of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
-    """Read an instance from arrays of an archive whose names start with a prefix.
-
-    Raises InstanceError with the array's name.
-    """
-    for name, message in _RETIRED.items():
-        if archive.holds(prefix + name):
-            raise InstanceError(message)
+    """Read an instance from arrays whose names start with a prefix. Raises InstanceError."""
     return of_arrays(archive.arrays(_ARCHIVE, prefix))
 
 

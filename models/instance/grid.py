@@ -1,7 +1,4 @@
-"""The pixel grid: mask, numbering, neighbour pairs and quads as index arrays.
-
-Arrays are indexed [row, column], row 0 at the top; x = column, y = -row (y up).
-"""
+"""The pixel grid as index arrays [row, column], row 0 at the top; x = column, y = -row (y up)."""
 
 from __future__ import annotations
 
@@ -18,10 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Pixels of a mask, numbered row by row, and their ordered neighbour pairs.
-
-    mask: bool [height, width], True where the field is solved for.
-    """
+    """Pixels of a mask [height, width], numbered row by row, and their ordered neighbour pairs."""
 
     mask: Bools
 

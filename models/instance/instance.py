@@ -13,18 +13,7 @@ import numpy as np
 from ..errors import InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import MOST_ANGLE, wrap
-from .digits import in_digits
 from .grid import Bools, Floats, Grid, Ints
-from .reading import Reading
-from .stroke_terms import StrokeTerms
-from .weights import (
-    SKEW_WEIGHT,
-    STROKE_WEIGHT,
-    skew_coefficient,
-    skew_weight,
-    stroke_coefficient,
-    stroke_weight,
-)
 
 Gauge = Literal["strokes", "box"]
 GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
@@ -37,20 +26,56 @@ _FINE = 1e-3  # reliabilities up to here would lose digits that count
 _FARTHEST = 1e100  # coordinates whose squares are finite numbers
 _SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds and at the ends of ranges
 
-MOST_WEIGHT: Final = 1e6
-"""Greatest weight of a term of the energy."""
-
+MOST_WEIGHT: Final = 1e6  # greatest weight of a term of the energy
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
 """Instance names that instance libraries allow: at most 32 lower-case letters, digits and `_`."""
-
+REFERENCE: Final = 24  # pixels of the longer side of the grid on which weights are coefficients
+STROKE_WEIGHT: Final = 20.0  # see docs/weights.md
+SKEW_WEIGHT: Final = 1e-6
+# On a finer grid the smoothness keeps its value, strokes have more pixels, and areas the square of that.
+_POWERS: Final = {"stroke": 1, "skew": 2}
 _NOT_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")  # would break a comment line, or have no UTF-8
 
 
-def whole_numbers(values: Any, name: str) -> Ints:
-    """The values as int32 of the same shape.
+@dataclass(frozen=True)
+class Reading:
+    """How an instance was read from a drawing; not part of its content, files or hash.
 
-    Raises InstanceError for fractions and for numbers beyond int32, which a plain cast would change silently.
+    page: x, y, width and height of the page in the drawing's units, y down, None without one. warnings:
+    possible misreadings, one line each. openings: both ends of each gap in the outline that was bridged.
     """
+
+    page: tuple[float, float, float, float] | None
+    warnings: tuple[str, ...] = ()
+    openings: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeTerms:
+    """One residual R = alpha + beta - goal for each stroke pixel, shapes (s,).
+
+    goal: direction in the gauge's range. weight: reliability times the instance's `stroke_coefficient`.
+    """
+
+    pixel: Ints
+    goal: Floats
+    weight: Floats
+
+    def residuals(self, alpha: Floats, beta: Floats) -> Floats:
+        """R of each term in radians, shape (s,), of the angles (n,) of all pixels."""
+        return alpha[self.pixel] + beta[self.pixel] - self.goal
+
+    def at_pixels(self, values: Floats, size: int) -> Floats:
+        """Sums of the terms' values at each of `size` pixels, shape (size,)."""
+        return np.bincount(self.pixel, values, size).astype(np.float64, copy=False)
+
+    def chosen(self, terms: Ints, number: Ints) -> StrokeTerms:
+        """Some of the terms, by their numbers, at pixels renumbered by `number` (n,)."""
+        return StrokeTerms(number[self.pixel[terms]], self.goal[terms], self.weight[terms])
+
+
+def whole_numbers(values: Any, name: str) -> Ints:
+    """The values as int32. Raises InstanceError for fractions and for numbers beyond int32."""
     given = np.asarray(values)
     if given.dtype.kind == "f":
         given = given.astype(np.float64)  # the limits are beyond the numbers of half precision
@@ -63,16 +88,17 @@ def whole_numbers(values: Any, name: str) -> Ints:
     return given.astype(np.int32)
 
 
+def in_digits(value: float) -> float:
+    """The number to 12 significant digits, equal on processors that differ in the last digit."""
+    return float(f"{value:.12g}") + 0.0  # no -0.0
+
+
 def _check_weight(name: str, value: float) -> None:
     if not 0 <= value <= MOST_WEIGHT:
-        raise InstanceError(
-            f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}, "
-            "beyond which rounding hides the other terms"
-        )
+        raise InstanceError(f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}")
 
 
 def _check_lines(at: Ints, theta: Floats, w: Floats, outside: Bools) -> None:
-    """Raise InstanceError, with the pixel, unless the strokes at those pixels obey the rules."""
     for label, wrong in (
         ("theta is not a finite number", ~np.isfinite(theta)),
         (f"theta is beyond {MOST_ANGLE:g} radians", ~(np.abs(theta) <= MOST_ANGLE)),
@@ -82,17 +108,6 @@ def _check_lines(at: Ints, theta: Floats, w: Floats, outside: Bools) -> None:
         if wrong.any():
             row, column = at[int(np.argmax(wrong))]
             raise InstanceError(f"stroke pixel [{row}, {column}]: {label} ({int(wrong.sum())} in all)")
-
-
-def _directions(angle: Floats) -> Floats:
-    """Line directions in [0, pi), rounded."""
-    theta = np.round(wrap(angle, 0.0, np.pi), _DECIMALS)
-    return np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta)
-
-
-def _reliabilities(w: Floats) -> Floats:
-    """Reliabilities, rounded unless they are tiny."""
-    return np.where(w > _FINE, np.round(w, _DECIMALS), w)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +179,9 @@ class Instance(Pictured):
         object.__setattr__(self, "pixel_size", in_digits(self.pixel_size))
         self._check_scalars()
         self._check_strokes()
-        self._freeze("theta", _directions(self.theta))
-        self._freeze("w", _reliabilities(self.w))
+        theta = np.round(wrap(self.theta, 0.0, np.pi), _DECIMALS)
+        self._freeze("theta", np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta))
+        self._freeze("w", np.where(self.w > _FINE, np.round(self.w, _DECIMALS), self.w))
 
     def __repr__(self) -> str:
         return f"<Instance {self.summary}>"
@@ -194,45 +210,32 @@ class Instance(Pictured):
                 f"origin is {self.origin}; it must be two numbers between {-_FARTHEST:g} and {_FARTHEST:g}"
             )
         if not isinstance(self.source, str) or _NOT_TEXT.search(self.source):
-            raise InstanceError(
-                "source holds a line break, a control character or no text; give one line of printable text"
-            )
+            raise InstanceError("source holds a line break, a control character or no text; give one line")
 
     def _check_strokes(self) -> None:
         if self.mask.ndim != 2 or not self.mask.any():
             raise NoStrokeError("the mask has no pixel to solve for; draw something white in it")
         if max(self.mask.shape) > 9999:
-            raise InstanceError(
-                f"the grid is {self.mask.shape[1]} x {self.mask.shape[0]}; "
-                "at most 9999 pixels per side are allowed"
-            )
+            height, width = self.mask.shape
+            raise InstanceError(f"the grid is {width} x {height}; at most 9999 pixels per side are allowed")
         if self.stroke_pixels.size == 0:
             raise NoStrokeError("no stroke lies inside the mask; move the mask or draw a curvature line")
         if self.stroke_pixels.ndim != 2 or self.stroke_pixels.shape[1] != 2:
-            raise InstanceError(
-                f"stroke_pixels has shape {self.stroke_pixels.shape}; give a row [row, "
-                "column] for each stroke pixel"
-            )
+            shape = self.stroke_pixels.shape
+            raise InstanceError(f"stroke_pixels has shape {shape}; give [row, column] for each stroke pixel")
         count = len(self.stroke_pixels)
         if self.theta.shape != (count,) or self.w.shape != (count,):
-            raise InstanceError(
-                f"{count} stroke pixels need as many theta and w, "
-                f"but there are {self.theta.size} and {self.w.size}"
-            )
-        _check_lines(self.stroke_pixels, self.theta, self.w, ~self._inside())
-        key = self.stroke_pixels[:, 0].astype(np.int64) * self.mask.shape[1] + self.stroke_pixels[:, 1]
-        if (np.diff(key) <= 0).any():
-            row, column = self.stroke_pixels[int(np.argmax(np.diff(key) <= 0)) + 1]
-            raise InstanceError(
-                f"stroke pixel [{row}, {column}] is out of order or listed twice; list each once, row by row"
-            )
-
-    def _inside(self) -> Bools:
+            sizes = f"{self.theta.size} and {self.w.size}"
+            raise InstanceError(f"{count} stroke pixels need as many theta and w, but there are {sizes}")
         row, column = self.stroke_pixels.T
         height, width = self.mask.shape
         on_grid = (row >= 0) & (column >= 0) & (row < height) & (column < width)
-        inside: Bools = on_grid & self.mask[np.where(on_grid, row, 0), np.where(on_grid, column, 0)]
-        return inside
+        inside = on_grid & self.mask[np.where(on_grid, row, 0), np.where(on_grid, column, 0)]
+        _check_lines(self.stroke_pixels, self.theta, self.w, ~inside)
+        key = self.stroke_pixels[:, 0].astype(np.int64) * self.mask.shape[1] + self.stroke_pixels[:, 1]
+        if (np.diff(key) <= 0).any():
+            row, column = self.stroke_pixels[int(np.argmax(np.diff(key) <= 0)) + 1]
+            raise InstanceError(f"stroke pixel [{row}, {column}] is out of order or listed twice; sort them")
 
     @cached_property
     def grid(self) -> Grid:
@@ -243,8 +246,7 @@ class Instance(Pictured):
     def stroke_index(self) -> Ints:
         """Pixel number of each stroke pixel, shape (s,)."""
         row, column = self.stroke_pixels.T
-        number: Ints = self.grid.number[row, column]
-        return number
+        return np.asarray(self.grid.number[row, column])
 
     @cached_property
     def target(self) -> Floats:
@@ -315,24 +317,26 @@ class Instance(Pictured):
 
         """
         changed: dict[str, Any] = {}
-        for weight, given, coefficient in (
-            ("stroke_weight", stroke_weight, stroke_coefficient),
-            ("skew_weight", skew_weight, skew_coefficient),
-        ):
+        for term, given in (("stroke", stroke_weight), ("skew", skew_weight)):
             if given is not None:
-                _check_weight(weight, given)
-                changed[coefficient.__name__] = coefficient(given, max(self.mask.shape))
+                _check_weight(f"{term}_weight", given)
+                power = _POWERS[term]
+                changed[f"{term}_coefficient"] = given * REFERENCE**power / max(self.mask.shape) ** power
         return replace(self, **changed) if changed else self
 
     @property
     def stroke_weight(self) -> float:
         """Weight of the strokes that means the same on every grid; the coefficient on a grid of 24 pixels."""
-        return stroke_weight(self.stroke_coefficient, max(self.mask.shape))
+        return self._weight("stroke")
 
     @property
     def skew_weight(self) -> float:
         """Weight of the skew that means the same on every grid; the coefficient on a grid of 24 pixels."""
-        return skew_weight(self.skew_coefficient, max(self.mask.shape))
+        return self._weight("skew")
+
+    def _weight(self, term: str) -> float:
+        side, power = max(self.mask.shape), _POWERS[term]
+        return in_digits(getattr(self, f"{term}_coefficient") * side**power / REFERENCE**power)
 
     def with_strokes(self, kept: Bools, mask: Bools | None = None) -> Instance:
         """Return the same instance with a part of its strokes.

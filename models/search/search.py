@@ -20,7 +20,7 @@ from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over, Progress, never, silent
 from ..processes.groups import interruptible
 from ..processes.side_by_side import checked, side_by_side
-from ..smooth.power_field import power_field
+from ..smooth.polyvector import power_field
 from ..smooth.systems import one_thread
 from .box_qp import FreeField, free_bounds
 from .coarse import halved, prolonged

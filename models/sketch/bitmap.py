@@ -1,9 +1,8 @@
 """Reader of bitmaps: ink on paper, and stroke directions by a structure tensor.
 
-The paper may have any colour lighter than the strokes, and any light on it: its level is taken from the
-picture, place by place where the light is uneven. Directions are found at the picture's own resolution and
-then averaged over grid pixels by the double angle, weighted by darkness and coherence, so that junctions and
-corners drop out (docs/mathematics.md, 1).
+The paper may have any colour lighter than the strokes, and any light on it. Directions are found at the
+picture's own resolution and then averaged over grid pixels by the double angle, weighted by darkness and
+coherence, so that junctions and corners drop out (docs/mathematics.md, 1).
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ Ink = NDArray[np.float32]
 
 FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
 """Formats that Pillow decodes by itself, without starting other programs."""
-_ENOUGH: Final = 8  # picture pixels per grid pixel; finer pictures are averaged down by whole factors first
+_ENOUGH: Final = 8  # picture pixels per grid pixel; finer pictures are reduced by whole factors
 _WORKING_SIDE: Final = 2048
 _DARKEST_PAPER: Final = 64.0  # of 255
 _LIGHT_SIDE: Final = 256  # blocks on the longer side in which the light on the paper is found
@@ -50,10 +49,9 @@ _COLOUR_SHARE: Final = 0.03  # of all ink, for red and for other strokes, before
 class Picture:
     """A bitmap sketch, ready for any frame.
 
-    ink: float32 [h, w] in [0, 1], 0 = paper, 1 = as dark as the strokes of the picture.
-    red: float32 [h, w] in [0, 1], the part of the ink that is red.
-    reduced: pixels of the file per pixel of these arrays in each direction.
-    width, height: size of the file in pixels.
+    ink: [h, w], 0 for paper to 1 for ink as dark as the strokes. red: [h, w] in [0, 1], the part of the ink
+    that is red. reduced: pixels of the file per pixel of these arrays in each direction. width, height: size
+    of the file in pixels.
     """
 
     ink: Ink
@@ -66,17 +64,15 @@ class Picture:
     def box(self) -> tuple[float, float, float, float]:
         """Left, top, right, bottom of the ink in pixels of the file."""
         rows, columns = (np.nonzero((self.ink > 0.3).any(axis=axis))[0] for axis in (1, 0))
-        left, top, right, bottom = (
-            self.reduced * float(edge) for edge in (columns[0], rows[0], columns[-1] + 1, rows[-1] + 1)
-        )
+        edges = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1], dtype=float)
+        left, top, right, bottom = (self.reduced * edges).tolist()
         return left, top, right, bottom
 
     @cached_property
     def stroke_width(self) -> float:
         """Typical width of a stroke in pixels of the arrays, at least 1: twice area over length of edges."""
         down, right = np.diff(self.ink, axis=0) ** 2, np.diff(self.ink, axis=1) ** 2
-        # Mean of the two differences along each axis of a 2 x 2 block: equal for every orientation of the
-        # picture.
+        # The mean over both sides of a 2 x 2 block is equal for every orientation of the picture.
         edges = float(np.sqrt((down[:, :-1] + down[:, 1:] + right[:-1] + right[1:]) / 2).sum())
         return max(1.0, 2 * float(self.ink.sum()) / edges) if edges > 0 else 1.0
 
@@ -117,16 +113,11 @@ def stroke_directions(ink: Ink, width: float) -> Ink:
     cosine, sine, energy = (
         ndimage.gaussian_filter(part, scale, mode="constant", truncate=3.0) for part in tensor
     )
-    direction: Ink = np.stack([cosine, sine], axis=-1) / np.maximum(energy, 1e-8)[..., None]
-    return direction
+    return np.asarray(np.stack([cosine, sine], axis=-1) / np.maximum(energy, 1e-8)[..., None])
 
 
 def read_picture(data: bytes, size: int) -> Picture:
-    """The ink of a bitmap, fine enough for a grid of `size` pixels.
-
-    Raises InputError when the bytes are not a picture, are cut off, declare absurd dimensions, or show only
-    paper, or ink on half of it.
-    """
+    """The ink of a bitmap, fine enough for a grid of `size` pixels. Raises InputError for other content."""
     image = _opened(data)
     width, height = image.size
     reduced = max(1, max(width, height) // max(_WORKING_SIDE, _ENOUGH * size))
@@ -154,17 +145,13 @@ def read_picture(data: bytes, size: int) -> Picture:
 def read_white(data: bytes) -> Bools:
     """The white part of a mask picture, bool [h, w]. Raises InputError like read_picture."""
     image = _opened(data)
-    white = np.empty(image.size[::-1], dtype=bool)
-    top = 0
-    for pixels in _bands(image, 1):
-        white[top : top + len(pixels)] = pixels.mean(axis=-1, dtype=np.float32) >= 127.5
-        top += len(pixels)
-    return white
+    bands = [pixels.mean(axis=-1, dtype=np.float32) >= 127.5 for pixels in _bands(image, 1)]
+    return np.concatenate(bands)
 
 
 def _opened(data: bytes) -> Any:
     """The decoded picture, upright. Its size is checked before its pixels."""
-    from PIL import Image, ImageOps
+    from PIL import Image, ImageOps, UnidentifiedImageError
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -180,30 +167,23 @@ def _opened(data: bytes) -> Any:
         except Image.DecompressionBombError as error:
             raise InputError("declares absurdly many pixels; scale it down") from error
         except Exception as error:  # damaged pictures make decoders raise nearly anything
-            raise InputError(
-                f"is not a whole picture ({_short(error)}); expected {', '.join(FORMATS)}"
-            ) from error
+            unknown = isinstance(error, UnidentifiedImageError)
+            reason = "unknown format" if unknown else shortened(error) or type(error).__name__
+            raise InputError(f"is not a whole picture ({reason}); expected {', '.join(FORMATS)}") from error
     return image
 
 
 def _check_size(width: int, height: int) -> None:
     if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
         raise InputError(
-            f"declares {width} x {height} pixels; "
-            f"at most {MAX_SIDE} a side and {MAX_PIXELS // 10**6} million in all are read, scale it down"
+            f"declares {width} x {height} pixels; at most {MAX_SIDE} a side and "
+            f"{MAX_PIXELS // 10**6} million in all are read, scale it down"
         )
 
 
-def _short(error: Exception) -> str:
-    text = str(error)
-    return "unknown format" if "cannot identify" in text else shortened(text) or type(error).__name__
-
-
 def _bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
-    """The picture on white as uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows.
-
-    Colours of all pixels at once would take many times the memory of the picture.
-    """
+    """The picture on white, uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows."""
+    # Colours of all pixels at once would take many times the memory of the picture.
     width, height = image.size
     rows = max(1, _BAND // (width * multiple)) * multiple
     bands = [(0, top, width, min(top + rows, height)) for top in range(0, height, rows)]
@@ -212,10 +192,7 @@ def _bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
 
 
 def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
-    """The value of white in pictures of 16 bit and floating point greys, None for other pictures.
-
-    Raises InputError for values that are not finite.
-    """
+    """The value of white in pictures of 16 bit and floating point greys, None for other pictures."""
     if image.mode.startswith("I;16") or image.mode == "I":
         return 65535.0
     if image.mode != "F":
@@ -269,15 +246,11 @@ def _on_paper(pixels: NDArray[np.uint8]) -> Floats:
 
 
 def _light(colours: Floats) -> Ink:
-    """The light on the paper [h, w], 1 where it equals the light of the whole picture.
-
-    colours: [h, w, 1 or 3] relative to the paper of the whole. A grey closing by a square lets lighter
-    surroundings cover darker regions narrower than _SHADOW, in linear time. So strokes vanish while shadows
-    stay, whether gradual or sharp. Light is found on blocks of pixels whose mean is taken first, which
-    removes noise, and interpolated linearly between them.
-    """
+    """The light on the paper [h, w], 1 where it equals the light of the whole picture."""
     from scipy import ndimage
 
+    # A grey closing lets lighter surroundings cover darker regions narrower than _SHADOW, in linear time. So
+    # strokes vanish, and shadows stay, whether gradual or sharp. Means over blocks remove noise first.
     height, width = colours.shape[:2]
     block = max(1, max(height, width) // _LIGHT_SIDE)
     rows, columns = (np.append(np.arange(0, side, block), side) for side in (height, width))
@@ -288,8 +261,7 @@ def _light(colours: Floats) -> Ink:
         np.interp(np.arange(side) + 0.5, (edges[:-1] + edges[1:]) / 2, np.arange(len(edges) - 1.0))
         for side, edges in ((height, rows), (width, columns))
     ]
-    light: Ink = _between(_between(smooth.astype(np.float32), places[0]).T, places[1]).T
-    return light
+    return _between(_between(smooth.astype(np.float32), places[0]).T, places[1]).T
 
 
 def _between(rows: Ink, place: Floats) -> Ink:
@@ -297,8 +269,7 @@ def _between(rows: Ink, place: Floats) -> Ink:
     below = np.minimum(place.astype(np.intp), max(len(rows) - 2, 0))
     above = np.minimum(below + 1, len(rows) - 1)
     part = (place - below).astype(np.float32)[:, None]
-    between: Ink = rows[below] * (1 - part) + rows[above] * part
-    return between
+    return np.asarray(rows[below] * (1 - part) + rows[above] * part)
 
 
 def _specks(ink: Ink) -> Bools:
@@ -307,8 +278,7 @@ def _specks(ink: Ink) -> Bools:
 
     label, count = ndimage.label(ink > 0, structure=np.ones((3, 3)))
     weight = np.bincount(label.ravel(), ink.ravel(), count + 1)
-    specks: Bools = weight[label] < _SPECK
-    return specks
+    return np.asarray(weight[label] < _SPECK)
 
 
 def _red_part(rgb: Floats, ink: Floats) -> Ink:
@@ -318,5 +288,4 @@ def _red_part(rgb: Floats, ink: Floats) -> Ink:
     if rgb.shape[-1] == 1:
         return np.zeros(ink.shape, dtype=np.float32)
     red, all_ink = (ndimage.gaussian_filter(part, 1.5) for part in (redness(rgb), ink))
-    part: Ink = (red > REDDISH * all_ink).astype(np.float32)
-    return part
+    return np.asarray((red > REDDISH * all_ink).astype(np.float32))

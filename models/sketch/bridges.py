@@ -12,27 +12,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.elementary import length as vector_length
+from ..instance.angles import length as vector_length
 from ..instance.grid import Bools, Floats
-from ..instance.reading import Point
 from .cover import Frame, block_means, covering_curves
 from .outline import enclosed, place
 
 Indices = NDArray[np.intp]
 
-LONGEST: Final = 0.08
-"""Longest bridge, as a share of the grid's longer side: with a wider gap a drawing is meant to be open."""
-WIDER: Final = 0.7
-"""Least side of a square as large as the room that a bridge closes off, relative to the bridge's pixels.
-
-A line takes up to 1 / 0.7 pixels per unit of its length: the room behind a gap is as wide as the gap.
-"""
+LONGEST: Final = 0.08  # longest bridge, as a share of the grid's longer side; wider gaps are meant
+WIDER: Final = 0.7  # least width of the room behind a bridge per pixel of the bridge
 AHEAD: Final = 0.5
-ASIDE: Final = -0.1
-"""Least cosines of the turns from the two strokes into the bridge: 60 and 96 degrees.
-
-A corner may lie in a gap, or at its beginning.
-"""
+ASIDE: Final = -0.1  # least cosines of the turns from the two strokes into the bridge
 _TAIL: Final = 11  # pixels round the end of a thinned line that determine its continuation
 _NEAREST: Final = 8  # most other ends that an end may be bridged to: the work stays linear
 _THINNED: Final = 512  # pixels on the longer side of a bitmap while its ends are sought
@@ -44,10 +34,7 @@ _MOST_PLACES: Final = 5  # in one warning
 
 
 def curve_ends(points: Floats) -> Floats:
-    """Ends of single pieces of all cubics (k, 4, 2): point and way out, (n, 2, 2).
-
-    The way out is the direction (x, y) of the curve's continuation, of any length.
-    """
+    """Ends that no other cubic (k, 4, 2) shares: point and direction of continuation, (n, 2, 2)."""
     ends = np.concatenate([points[:, 0], points[:, 3]])
     inside = np.concatenate([points[:, 1:], points[:, 2::-1]])
     grain = max(_SAME * float(np.ptp(ends, axis=0).max()), np.finfo(float).tiny)
@@ -59,11 +46,8 @@ def curve_ends(points: Floats) -> Floats:
 
 
 def ink_ends(ink: NDArray[np.float32], width: float) -> Floats:
-    """Ends of thin strokes: point in pixels of `ink` [h, w] and way out, (n, 2, 2), as (x, y).
-
-    width: of a stroke in pixels. The ink is thinned to lines of one pixel; a line ends at a pixel that has a
-    single neighbour. A stroke extends half its width further, which is far below the gaps that count.
-    """
+    """Ends of strokes of some width: point in pixels of `ink` [h, w] and way out, (n, 2, 2), as (x, y)."""
+    # A stroke extends half its width beyond its thinned line, which is far below the gaps that count.
     from scipy import ndimage
 
     reduced = max(1.0, max(ink.shape) / _THINNED)
@@ -83,11 +67,7 @@ def ink_ends(ink: NDArray[np.float32], width: float) -> Floats:
 
 
 def thinned(shape: Bools) -> Bools:
-    """The shape [h, w] thinned to lines one pixel wide.
-
-    T. Y. Zhang, C. Y. Suen: A fast parallel algorithm for thinning digital patterns, Communications of the
-    ACM 27 (1984).
-    """
+    """The shape [h, w] thinned to lines one pixel wide, after Zhang and Suen (Commun. ACM 27, 1984)."""
     line = np.pad(shape, 1)
     while True:
         before = int(line.sum())
@@ -107,18 +87,15 @@ def _removable(line: Bools, *, first: bool) -> Bools:
     count = around.sum(axis=0, dtype=np.uint8)
     turns = (~around & np.roll(around, -1, axis=0)).sum(axis=0, dtype=np.uint8)
     sides = (up & right & down) | (right & down & left) if first else (up & right & left) | (up & down & left)
-    removable: Bools = (count >= 2) & (count <= 6) & (turns == 1) & ~sides
-    return removable
+    return np.asarray((count >= 2) & (count <= 6) & (turns == 1) & ~sides)
 
 
 def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
     """The walls with the bridges that close an outline, and those bridges, (m, 2, 2) with x and y.
 
     walls: bool [height, width], pixels that strokes cover. ends: (n, 2, 2), points and ways out. A bridge
-    leads from an end at the outside to another such end, or to the next stroke. It is at most
-    LONGEST, and no longer than the extents of the connected strokes at its ends. It continues them (AHEAD,
-    ASIDE), and closes off room as wide as the gap (WIDER). Walls that already enclose all possible room are
-    returned unchanged.
+    leads from an end at the outside to another such end, or to the next stroke. It is no longer than LONGEST
+    and than the strokes that it connects, continues them, and closes off room as wide as the gap.
     """
     outside = ~enclosed(walls)
     bridges = _candidates(walls, outside, ends, frame)
@@ -148,19 +125,13 @@ def opened(openings: Floats) -> tuple[str, ...]:
     return (warning,)
 
 
-def as_points(segments: Floats) -> tuple[tuple[Point, Point], ...]:
-    """Both ends of each segment (m, 2, 2) as tuples (x, y)."""
-    return tuple(((a, b), (c, d)) for (a, b), (c, d) in segments.tolist())
-
-
 def _extents(walls: Bools, row: Indices, column: Indices) -> Floats:
     """Extents (n,) in pixels of the connected strokes that are at or next to these pixels."""
     from scipy import ndimage
 
     label, _ = ndimage.label(walls, np.ones((3, 3), dtype=bool))
     sides = [0, *(max(part.stop - part.start for part in box) for box in ndimage.find_objects(label))]
-    extents: Floats = ndimage.maximum_filter(np.array(sides, dtype=np.float64)[label], size=3)[row, column]
-    return extents
+    return np.asarray(ndimage.maximum_filter(np.array(sides, dtype=np.float64)[label], size=3)[row, column])
 
 
 def _candidates(walls: Bools, outside: Bools, ends: Floats, frame: Frame) -> Floats:
@@ -175,15 +146,11 @@ def _candidates(walls: Bools, outside: Bools, ends: Floats, frame: Frame) -> Flo
     first = slice(_MOST_BRIDGES)
     on = _prolonged(walls, on_grid[first], longest[first]) * frame.pixel + (frame.x, frame.y)
     # Of two equivalent lines the later one is kept, which is between two ends.
-    lines: Floats = np.concatenate([on, _between(ends[open_there], longest * frame.pixel)])
-    return lines
+    return np.concatenate([on, _between(ends[open_there], longest * frame.pixel)])
 
 
 def _between(ends: Floats, longest: Floats) -> Floats:
-    """The straight lines (m, 2, 2) from each end to the ends near and ahead of it, each once.
-
-    longest: (n,), greatest length of a line from each end.
-    """
+    """The straight lines (m, 2, 2) from each end to the ends near and ahead of it, each once."""
     from scipy.spatial import KDTree
 
     if len(ends) < 2:
@@ -202,15 +169,11 @@ def _between(ends: Floats, longest: Floats) -> Floats:
     cosine = np.sort((way * line).sum(axis=-1) / np.maximum(length, np.finfo(float).tiny), axis=1)
     ahead = (cosine[:, 0] >= ASIDE) & (cosine[:, 1] >= AHEAD) & (far <= longest[pairs].min(axis=1))
     shortest = np.argsort(far[ahead], kind="stable")[:_MOST_BRIDGES]
-    lines: Floats = point[pairs[ahead][np.sort(shortest)]]
-    return lines
+    return np.asarray(point[pairs[ahead][np.sort(shortest)]])
 
 
 def _prolonged(walls: Bools, ends: Floats, longest: Floats) -> Floats:
-    """The straight continuations (m, 2, 2) of strokes up to another stroke, all in pixels.
-
-    ends: (n, 2, 2), points and ways out; longest: (n,), greatest length of each line.
-    """
+    """The straight continuations (m, 2, 2) of strokes up to another stroke, all in pixels."""
     point, out = ends[:, 0], ends[:, 1]
     unit = out / np.maximum(vector_length(*out.T), np.finfo(float).tiny)[:, None]
     step = np.arange(0.0, max(longest.max(initial=0.0), 1.0), 0.5)
@@ -223,8 +186,7 @@ def _prolonged(walls: Bools, ends: Floats, longest: Floats) -> Floats:
     meets = stroke & left & (step <= longest[:, None])
     ahead = meets.any(axis=1)
     met = way[np.arange(len(way)), np.argmax(meets, axis=1)]
-    lines: Floats = np.stack([point, met], axis=1)[ahead]
-    return lines
+    return np.asarray(np.stack([point, met], axis=1)[ahead])
 
 
 def _with(walls: Bools, pixels: tuple[Indices, Indices, Indices], kept: Indices) -> Bools:
@@ -237,10 +199,7 @@ def _with(walls: Bools, pixels: tuple[Indices, Indices, Indices], kept: Indices)
 
 
 def _rooms(walls: Bools, outside: Bools, row: Indices, column: Indices) -> tuple[Bools, Bools]:
-    """The room that bridges at these pixels close off, where it is as wide as its gaps, and those gaps.
-
-    Both bool [height, width]; the gaps are the bridges' pixels between room and outside.
-    """
+    """The room, as wide as its gaps, that bridges at these pixels close off, and their pixels in the gaps."""
     from scipy import ndimage
 
     drawn = walls.copy()

@@ -1,7 +1,6 @@
 """Selection of curvature lines of a drawing by labels, beyond its colours.
 
-Strokes are chosen by labels: `colour=`, `class=`, `id=` and `layer=` in SVG, `cluster=` in .scap. Elements in
-a group have the labels of the group too. The strokes that are not chosen cut the field.
+Labels are `colour=`, `class=`, `id=` and `layer=` in SVG, also of groups, and `cluster=` in .scap.
 """
 
 from __future__ import annotations
@@ -12,31 +11,27 @@ from typing import Final, Literal, get_args
 
 from ..errors import InputError, printable, shortened
 
+Kind = Literal["svg", "scap", "curves", "picture"]
 Silhouette = Literal["none", "outer"]
+_UNLABELLED: Final = {
+    "curves": "is a .curves file, whose strokes have no labels",
+    "picture": "is a picture, whose strokes have no labels: only red strokes are recognised",
+}
 KINDS: Final = ("colour", "class", "id", "layer", "cluster")
 """Kinds of labels by which strokes can be chosen."""
 _FEW: Final = 4  # labels of each kind that an error lists
-_LONGEST: Final = 40  # characters of each of them there
 _SEEN_FROM: Final = ", seen from "
-_EXAMPLES: Final = "colour=red, class=flow, id=group2, layer=Flow or cluster=3"
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Which strokes of a drawing are curvature lines, and the view of a drawing in space.
-
-    silhouette: "outer": lines along the outline of the drawing carry no direction; "none": all
-    curvature lines count. curvature: labels such as "class=flow"; a curvature line has one of them. Without
-    labels the drawing's colours decide. view: of a .curves file, as in `read_curves`; None: by its principal
-    axes. Raises InputError for other values.
-    """
+    """The choice of curvature lines in a drawing, and the view, as for `read_sketch`. Checks its values."""
 
     silhouette: Silhouette = "none"
     curvature: tuple[str, ...] = ()
     view: str | None = None
 
     def __post_init__(self) -> None:
-        """Check the values that do not depend on a drawing."""
         if self.silhouette not in get_args(Silhouette):
             known = " or ".join(get_args(Silhouette))
             raise InputError(f"there is no silhouette {shortened(self.silhouette)!r}; choose {known}")
@@ -48,25 +43,17 @@ class Choice:
         return Chooser(frozenset(self.curvature)) if self.curvature else None
 
     def source(self, file: str) -> str:
-        """Source of an instance read from a file of that name: one printable line, with the view if any.
-
-        `view_in` recovers the view, so that the file can be seen from the same side again.
-        """
+        """Source of an instance read from a file of that name: one line, with the view for `view_in`."""
         seen = "" if self.view is None else f"{_SEEN_FROM}{self.view}"
         return printable(f"{file}{seen}")
 
-    def refuse_labels(self, what: str) -> None:
-        """Raise InputError if strokes are chosen in a sketch without labels."""
-        if self.curvature:
-            raise InputError(f"{what}; leave the choice of {self.curvature[0]} out")
-
-    def refuse_view(self) -> None:
-        """Raise InputError if a view is chosen for a flat sketch."""
-        if self.view is not None:
-            raise InputError(
-                f"is flat: only a .curves file can be seen from {shortened(self.view)}; give one, or leave "
-                "the view out"
-            )
+    def check(self, kind: Kind) -> None:
+        """Raise InputError if strokes or a view are chosen in a sketch that has none."""
+        if self.curvature and kind in _UNLABELLED:
+            raise InputError(f"{_UNLABELLED[kind]}; leave the choice of {self.curvature[0]} out")
+        if self.view is not None and kind != "curves":
+            view = shortened(self.view)
+            raise InputError(f"is flat: only a .curves file can be seen from {view}; leave the view out")
 
 
 def view_in(source: str) -> str | None:
@@ -74,16 +61,12 @@ def view_in(source: str) -> str | None:
     return source.rpartition(_SEEN_FROM)[2] if _SEEN_FROM in source else None
 
 
-AS_DRAWN: Final = Choice()
-"""Selects everything drawn in red, or in the only colour."""
+AS_DRAWN: Final = Choice()  # selects everything drawn in red, or in the only colour
 
 
 @dataclass(eq=False)
 class Chooser:
-    """A matcher of labels while a drawing is read.
-
-    wanted: the labels of curvature lines. found: those of them that the drawing has; seen: a few of all.
-    """
+    """A matcher of labels while a drawing is read. seen: a few labels of each kind that the drawing has."""
 
     wanted: frozenset[str]
     found: set[str] = field(default_factory=set)
@@ -102,12 +85,9 @@ class Chooser:
         return taken
 
     def check(self, *, taken: bool) -> None:
-        """Raise InputError if a wanted label is missing, or only on elements that draw nothing.
-
-        taken: whether a stroke was chosen.
-        """
+        """Raise InputError if a wanted label is missing, or if no stroke was taken."""
         if missing := sorted(self.wanted - self.found):
-            there = [shortened(label, _LONGEST) for some in self.seen.values() for label in some]
+            there = [shortened(label, 40) for some in self.seen.values() for label in some]
             listed = f"it has {', '.join(there)}" if there else "its strokes have no labels at all"
             raise InputError(f"has no stroke of {shortened(missing[0])}; {listed}")
         if not taken:
@@ -119,7 +99,10 @@ def label_of(selector: str) -> str:
     kind, _, value = (part.strip() for part in selector.partition("="))
     kind = "colour" if kind == "color" else kind
     if kind not in KINDS or not value:
-        raise InputError(f"{shortened(selector)!r} chooses no strokes; write {_EXAMPLES}")
+        raise InputError(
+            f"{shortened(selector)!r} chooses no strokes; "
+            "write colour=red, class=flow, id=group2, layer=Flow or cluster=3"
+        )
     return _of_colour(value) if kind == "colour" else f"{kind}={value}"
 
 

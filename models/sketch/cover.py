@@ -1,7 +1,4 @@
-"""Strokes on the pixel grid: their cover of each pixel, and its direction.
-
-Sketches have y down, instances have y up; this module converts between them.
-"""
+"""Strokes on the pixel grid: their cover of each pixel, y down, and its direction, y up."""
 
 from __future__ import annotations
 
@@ -14,20 +11,14 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..input_limits import MAX_PIECES
-from ..instance.elementary import length as vector_length
+from ..instance.angles import length as vector_length
 from ..instance.grid import Bools, Floats, Ints
 
 Indices = NDArray[np.intp]
 Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
 
-MARGIN: Final = 0.04
-"""Empty border round a drawing, as a share of its longer side; at least one pixel."""
-LEAST_R: Final = 0.5
-"""Least R of a pixel with a direction.
-
-Two lines at an angle d in equal parts have R = |cos d| and a mean that is neither of them; a single line
-that bends by a right angle inside the pixel still has R = 0.64.
-"""
+MARGIN: Final = 0.04  # empty border round a drawing, as a share of its longer side; at least one pixel
+LEAST_R: Final = 0.5  # least R of a pixel with a direction: |cos d| at an angle d, 0.64 for a bend by 90
 _NUDGE: Final = 1e-9  # of a pixel: a line exactly along a pixel edge is shared by both sides
 
 
@@ -58,9 +49,8 @@ class Frame:
 class Cover:
     """Cover of each pixel by one kind of stroke.
 
-    amount: float [height, width], length of stroke in pixel sides; 1 = one stroke straight across.
-    direction: float [height, width, 2], mean double-angle vector (y up) weighted by length; its length R is 1
-    for one direction and near 0 at crossings and corners.
+    amount: [height, width], length of stroke in pixel sides. direction: [height, width, 2], mean double-angle
+    vector (y up) weighted by length; its length R is 1 for one direction and near 0 at crossings and corners.
     """
 
     amount: Floats
@@ -70,8 +60,7 @@ class Cover:
     def weight(self) -> Floats:
         """Weight [height, width], min(1, amount) R or 0 where R < LEAST_R (docs/mathematics.md, 1)."""
         single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
-        weight: Floats = np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
-        return weight
+        return np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
 
 
 def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
@@ -93,17 +82,17 @@ def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool
 
 
 def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
-    """The cover by straight segments (m, 2, 2), each cut exactly at the pixel edges.
-
-    Raises InputError if there would be more than MAX_PIECES pieces.
-    """
+    """The cover by straight segments (m, 2, 2), each cut exactly at the pixel edges. Raises InputError."""
     cut = _cut(segments, frame)
     unit = cut.unit
     double = np.stack([np.ones(len(unit)), unit[:, 0] ** 2 - unit[:, 1] ** 2, -2 * unit[:, 0] * unit[:, 1]])
     amount, cosine, sine = np.zeros((3, *frame.shape))
     for nudge in product((-_NUDGE, _NUDGE), repeat=2):
-        quarter = _binned(cut.middle + nudge, cut.covered / 4 * double, frame)
-        amount, cosine, sine = amount + quarter[0], cosine + quarter[1], sine + quarter[2]
+        cell, kept = _cells(cut.middle + nudge, frame)
+        amount, cosine, sine = (
+            total + np.bincount(cell, value[kept], total.size).reshape(frame.shape)
+            for total, value in zip((amount, cosine, sine), cut.covered / 4 * double, strict=True)
+        )
     return Cover(amount, np.stack([cosine, sine], axis=-1) / np.where(amount > 0, amount, 1)[..., None])
 
 
@@ -173,10 +162,7 @@ def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
     first = np.floor(low) + 1
     crossings = np.maximum(np.ceil(high) - first, 0).astype(np.int64)
     if count + crossings.sum() > MAX_PIECES:
-        raise InputError(
-            f"its strokes fall into more than {MAX_PIECES} pieces on this grid; "
-            "simplify the drawing or choose a smaller size"
-        )
+        raise InputError(f"has more than {MAX_PIECES} pieces of strokes; choose a smaller size")
     owners, cuts = [np.arange(count)], [np.zeros(count)]
     for axis in (0, 1):
         many = crossings[:, axis]
@@ -192,14 +178,6 @@ def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
     return number, start, end
 
 
-def _binned(points: Floats, values: Floats, frame: Frame) -> Floats:
-    """Sums [c, height, width] of values (c, m) at points (m, 2) in pixels on the grid."""
-    cell, kept = _cells(points, frame)
-    size = frame.height * frame.width
-    sums = [np.bincount(cell, value[kept], size) for value in values]
-    return np.array(sums, dtype=np.float64).reshape(-1, *frame.shape)
-
-
 def _cells(points: Floats, frame: Frame) -> tuple[Indices, Bools]:
     """Numbers of the pixels, row by row, at the points (m, 2) on the grid, and which points these are."""
     column, row = np.floor(points).astype(np.int64).T
@@ -208,10 +186,7 @@ def _cells(points: Floats, frame: Frame) -> tuple[Indices, Bools]:
 
 
 def block_means(image: Pixels, rows: Floats, columns: Floats) -> Floats:
-    """Exact area means of a picture [h, w, ...] over the cells between fractional row and column edges.
-
-    Cells cover whole pixels and parts of pixels; values outside the picture are 0.
-    """
+    """Area means of a picture [h, w, ...], 0 outside, over cells between fractional row and column edges."""
     means = _strip_means(np.moveaxis(_strip_means(image, rows), 1, 0), columns)
     return np.moveaxis(means, 1, 0)
 
@@ -222,5 +197,4 @@ def _strip_means(image: Pixels, edges: Floats) -> Floats:
     below = np.minimum(place.astype(np.int64), len(image) - 1)
     part = (place - below).reshape(-1, *[1] * (image.ndim - 1))
     at = sums[below] * (1 - part) + sums[below + 1] * part
-    means: Floats = np.diff(at, axis=0) / np.diff(edges).reshape(-1, *[1] * (image.ndim - 1))
-    return means
+    return np.asarray(np.diff(at, axis=0) / np.diff(edges).reshape(-1, *[1] * (image.ndim - 1)))

@@ -44,33 +44,30 @@ class Curves:
 def lines_as_cubics(start: Floats, end: Floats) -> Floats:
     """Control points (k, 4, 2) of the straight lines from start (k, 2) to end (k, 2)."""
     thirds = np.arange(4.0).reshape(1, 4, 1) / 3
-    cubics: Floats = start[:, None] * (1 - thirds) + end[:, None] * thirds
-    return cubics
+    return start[:, None] * (1 - thirds) + end[:, None] * thirds
+
+
+def are_straight(cubics: Floats) -> bool:
+    """Whether all cubics (k, 4, 2) are straight lines with even steps."""
+    return np.allclose(cubics, lines_as_cubics(cubics[:, 0], cubics[:, 3]), rtol=1e-9, atol=0)
 
 
 def runs(points: Floats, shape: Ints) -> Ints:
-    """The number (k,), from 0, of the unbroken run of one shape that contains each cubic (k, 4, 2).
-
-    shape: int (k,), equal for all pieces of a shape. A run ends where the next piece starts elsewhere.
-    """
+    """The number (k,), from 0, of the unbroken run of one shape (k,) that contains each cubic (k, 4, 2)."""
     apart = (points[1:, 0] != points[:-1, 3]).any(axis=1) | (np.diff(shape) != 0)
-    numbers: Ints = np.concatenate([[0], np.cumsum(apart)]).astype(np.int32)
-    return numbers
+    return np.concatenate([[0], np.cumsum(apart)]).astype(np.int32)
 
 
 def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]:
     """Segments (m, 2, 2) within `tolerance` of the curves (k, 4, 2), and the curve (m,) of each.
 
-    A cubic cut into n equal steps deviates by at most 3/4 M / n^2, with M the longer second difference of its
-    control points, because |B''| <= 6 M. Raises InputError for more than MAX_SEGMENTS segments.
+    Raises InputError for more than MAX_SEGMENTS segments.
     """
+    # In n equal steps a cubic deviates by at most 3/4 M / n^2, M the longer second difference of its points.
     bend = np.sqrt((np.diff(points, n=2, axis=1) ** 2).sum(axis=-1)).max(axis=1, initial=0.0)
     steps = np.clip(np.ceil(np.sqrt(0.75 * bend / tolerance)), 1, MAX_SEGMENTS + 1).astype(np.int64)
     if steps.sum() > MAX_SEGMENTS:
-        raise InputError(
-            f"has more than {MAX_SEGMENTS} segments at this size; "
-            "simplify the drawing or choose a smaller size"
-        )
+        raise InputError(f"has more than {MAX_SEGMENTS} segments; simplify it, or choose a smaller size")
     owner = np.repeat(np.arange(len(points)), steps)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)
     ends = [_at(points[owner], (step + side) / steps[owner]) for side in (0, 1)]

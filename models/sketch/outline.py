@@ -6,47 +6,37 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.angles import line_of
-from ..instance.elementary import cosine, sine
+from ..instance.angles import cosine, line_of, sine
 from ..instance.grid import Bools, Floats
 from .cover import Frame
 
-GAPS: Final = (0.03, 0.06, 0.12)
-"""Gaps in an outline that count as closed, as shares of the grid's longer side, tried in turn."""
-ENCLOSED: Final = 0.25
-"""Least share of the strokes' convex hull that a closed drawing fills; otherwise it is open."""
-CRUMB: Final = 0.01
-"""Least share of a region for a separate part: a stroke that grazes the outline cuts off less."""
-HELD: Final = 2.0
-"""Least stroke length, in pixel sides, in a separate part: a stroke's loose end has less."""
-
-STEP: Final = 3.0
-"""Distance in pixels over which a stroke is followed to determine whether it runs along the outline."""
-
-THICKER: Final = 1.25
-"""Width of strokes of a picture that are thicker than most."""
-
+GAPS: Final = (0.03, 0.06, 0.12)  # shares of the longer side: gaps that count as closed, tried in turn
+ENCLOSED: Final = 0.25  # least share of the strokes' convex hull that a closed drawing fills
+CRUMB: Final = 0.01  # least share of a region for a separate part; a grazing stroke cuts off less
+HELD: Final = 2.0  # least stroke length, in pixel sides, in a separate part: a stroke's loose end has less
+STEP: Final = 3.0  # pixels over which a stroke is compared with the outline
+THICKER: Final = 1.25  # width of the thickest strokes of a picture relative to typical ones
+BLOCK: Final = 4  # side in pixels of a block filled by strokes; no sample has one from 16 pixels on
+CROWDED: Final = 0.1  # least share of the solved pixels in blocks filled by strokes that causes a warning
+OFF: Final = 0.01  # least share of the solved pixels more than a pixel off the page that causes a warning
 _NUDGE: Final = 1e-9  # of a pixel: the limit of exactly 30 degrees is decided equally on every processor
-
-BLOCK: Final = 4
-"""Side in pixels of a block filled by strokes; no sample has one from 16 pixels on."""
-CROWDED: Final = 0.1
-"""Least share of the solved pixels in connected blocks filled by strokes that causes a warning."""
-
-OFF: Final = 0.01
-"""Least share of the solved pixels more than a pixel off the page that causes a warning."""
 
 
 def inside_outline(strokes: Bools) -> Bools:
-    """The pixels [height, width] that cannot be reached from outside through gaps of the strokes.
+    """The pixels [height, width] of strokes, or not reached from outside through their gaps.
 
     The narrowest of GAPS for which the drawing encloses something decides. An open drawing, which encloses
-    almost nothing at any of them, gets the full rectangle. Stroke pixels always belong to the region.
+    almost nothing at any of them, gets the full rectangle.
     """
-    hull = _hull_area(strokes)
+    from scipy import ndimage
+    from scipy.spatial import ConvexHull
+
+    row, column = np.nonzero(strokes)
+    corners = np.concatenate([np.stack([row + a, column + b], axis=1) for a in (0, 1) for b in (0, 1)])
+    hull = ConvexHull(corners).volume
     for gap in GAPS:
         region = enclosed(strokes, gap)
-        if _solid(region) >= ENCLOSED * hull:
+        if ndimage.binary_opening(region, np.ones((3, 3))).sum() >= ENCLOSED * hull:
             return region
     return np.ones_like(strokes)
 
@@ -54,9 +44,7 @@ def inside_outline(strokes: Bools) -> Bools:
 def parts_with(region: Bools, weight: Floats) -> Bools:
     """The 4-connected parts of a region that contain curvature lines; other parts have no data.
 
-    weight: float [height, width], w of the stroke pixels and 0 elsewhere. A part needs strokes of HELD in
-    all, at least CRUMB of the region, and four pixels. The part with most strokes is
-    always kept.
+    weight: [height, width], w of the stroke pixels, else 0. The part with most strokes is always kept.
     """
     from scipy import ndimage
 
@@ -66,18 +54,15 @@ def parts_with(region: Bools, weight: Floats) -> Bools:
     kept = (held >= HELD) & (size >= max(4, CRUMB * region.sum()))
     kept[np.argmax(held)] = held.max() > 0
     kept[0] = False
-    parts: Bools = kept[label]
-    return parts
+    return np.asarray(kept[label])
 
 
 def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
-    """The pixels [height, width] at the border of a region whose strokes run along it.
+    """The pixels [height, width] at the border of a region whose strokes, of this width, run along it.
 
-    direction: float [height, width, 2], double-angle vectors (y up); width: of a typical stroke, in pixels,
-    some are THICKER. At the border is a pixel from which such a line can reach the outside: a line without
-    width covers two adjacent pixels. A stroke is followed by STEP pixels to both sides. It runs along the
-    border if, on at least one side, its distance from the outside changes by at most half of that: 30
-    degrees. A region without an outside, as in an open drawing, has no border.
+    direction: [height, width, 2], double-angle vectors (y up). A stroke is followed by STEP pixels to both
+    sides. It runs along the border if, on at least one side, its distance from the outside changes by at most
+    half of that: 30 degrees. A region without an outside, as in an open drawing, has no border.
     """
     from scipy import ndimage
 
@@ -86,11 +71,8 @@ def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
     pad = int(STEP) + 1
     padded = np.pad(region, pad)
     # Half a pixel from the centres of the pixels to the edges between inside and outside.
-    depth = np.where(
-        padded,
-        ndimage.distance_transform_edt(padded) - 0.5,
-        0.5 - ndimage.distance_transform_edt(~padded),
-    )
+    inside, outside = (ndimage.distance_transform_edt(side) - 0.5 for side in (padded, ~padded))
+    depth = np.where(padded, inside, -outside)
     at = np.argwhere(region & (depth[pad:-pad, pad:-pad] <= 1.5 + THICKER * width))
     theta = line_of(direction[tuple(at.T)])
     way = STEP * np.stack([-sine(theta), cosine(theta)], axis=1)
@@ -113,10 +95,7 @@ def boundless(region: Bools) -> tuple[str, ...]:
 
 
 def crowded(filled: Bools, solve: Bools, frame: Frame) -> tuple[str, ...]:
-    """A warning about the largest place where strokes leave no room between them, or none.
-
-    filled: bool [height, width], pixels covered by a stroke or ink for half or more.
-    """
+    """A warning about the largest place filled by strokes, which leave no room between them, or none."""
     from scipy import ndimage
 
     label, count = ndimage.label(ndimage.binary_opening(filled & solve, np.ones((BLOCK, BLOCK))))
@@ -156,10 +135,7 @@ def place(point: Floats) -> str:
 
 
 def enclosed(strokes: Bools, gap: float = GAPS[0]) -> Bools:
-    """The region that a disc rolling in from outside cannot reach without touching a stroke.
-
-    gap: diameter of the disc as a share of the grid's longer side; it is two pixels at least.
-    """
+    """The region that a disc, of a share `gap` of the longer side, cannot reach without touching a stroke."""
     from scipy import ndimage
 
     radius = max(1.0, gap * max(strokes.shape) / 2)
@@ -168,24 +144,7 @@ def enclosed(strokes: Bools, gap: float = GAPS[0]) -> Bools:
     free = ndimage.distance_transform_edt(~walls) > radius
     label, _ = ndimage.label(free)
     outside = ndimage.distance_transform_edt(label != label[0, 0]) <= radius
-    region: Bools = (~outside | walls)[pad:-pad, pad:-pad]
-    return region
-
-
-def _solid(region: Bools) -> int:
-    """Number of pixels left after removing lines one or two pixels wide."""
-    from scipy import ndimage
-
-    return int(ndimage.binary_opening(region, np.ones((3, 3), dtype=bool)).sum())
-
-
-def _hull_area(strokes: Bools) -> float:
-    """Area in pixels of the convex hull of the stroke pixels' corners."""
-    from scipy.spatial import ConvexHull
-
-    row, column = np.nonzero(strokes)
-    corners = np.concatenate([np.stack([row + a, column + b], axis=1) for a in (0, 1) for b in (0, 1)])
-    return float(ConvexHull(corners).volume)
+    return np.asarray((~outside | walls)[pad:-pad, pad:-pad])
 
 
 def largest_part(mask: Bools) -> Bools:
@@ -193,5 +152,4 @@ def largest_part(mask: Bools) -> Bools:
     from scipy import ndimage
 
     label, _ = ndimage.label(mask)
-    part: Bools = label == 1 + np.argmax(np.bincount(label.ravel(), minlength=2)[1:])
-    return part
+    return np.asarray(label == 1 + np.argmax(np.bincount(label.ravel(), minlength=2)[1:]))

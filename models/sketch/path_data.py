@@ -1,8 +1,7 @@
 """The outlines of SVG shapes: path data, point lists and basic shapes as straight lines and cubic Beziers.
 
-svgelements parses path data, arcs and basic shapes. Its own paths look back to the last move at each close,
-which takes time that grows with the square of their length. So its lexer draws on an outline of this module,
-in one pass.
+svgelements parses path data, arcs and basic shapes. Its own paths take time that grows with the square of
+their length, so its lexer draws on an outline of this module.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
@@ -30,16 +30,12 @@ _BASIC: Final = {
 SHAPES: Final = frozenset({"path", "polyline", "polygon", *_BASIC})
 _NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
-Coordinates = tuple[float, float] | str
+_Coordinates = tuple[float, float] | str
 """A point, or the letter that closes the subpath in place of its last point."""
 
 
 def outline(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
-    """Control points (k, 4, 2) of a shape in its own units. page: width and height for percentages.
-
-    Raises InputError, which does not name the shape, for damaged numbers and for more than MAX_CURVES
-    segments.
-    """
+    """Control points (k, 4, 2) of a shape in its own units; percentages refer to the page. May raise."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # refused when placed
             return _points(tag, attributes, page)
@@ -76,9 +72,7 @@ def _trace(data: str, drawn: _Outline) -> None:
 
     data = data.strip()
     if data and data != "none" and data[0] not in "Mm":
-        raise InputError(
-            f"its path data begins with {data[:10]!r}, not with a move (M); export the drawing again"
-        )
+        raise InputError(f"its path data begins with {data[:10]!r}, not with a move (M); export it again")
     SVGLexicalParser().parse(drawn, data)
 
 
@@ -96,9 +90,8 @@ def _draw_basic(tag: str, attributes: Mapping[str, str], page: tuple[float, floa
     import svgelements
 
     kind, keys = _BASIC[tag]
-    shape = getattr(svgelements, kind)(
-        {key: _readable(attributes[key]) for key in keys if attributes.get(key)}
-    )
+    lengths = {key: _readable(attributes[key]) for key in keys if attributes.get(key)}
+    shape = getattr(svgelements, kind)(lengths)
     shape.render(ppi=PPI, width=page[0], height=page[1])
     for segment in shape.segments():
         drawn.add(segment)
@@ -116,26 +109,12 @@ def _readable(length: str) -> str | float:
 
 def too_many_curves() -> InputError:
     """The error for a drawing with more than MAX_CURVES segments."""
-    return InputError(
-        f"draws more than {MAX_CURVES} segments of curves, those repeated by <use> counted each time; "
-        "simplify the drawing"
-    )
-
-
-@dataclass(frozen=True)
-class _Point:
-    """A point with the attributes that svgelements' lexer needs."""
-
-    x: float
-    y: float
+    return InputError(f"draws more than {MAX_CURVES} segments of curves, with <use>; simplify the drawing")
 
 
 @dataclass(eq=False)
 class _Outline:
     """The target of svgelements' lexer: straight lines and cubics as points of the complex plane.
-
-    The lexer passes absolute points together with their kind; only `horizontal` and `vertical` remain to be
-    resolved.
 
     smooth: the kind of the last curve (2: quadratic, 3: cubic) and its last control point.
     """
@@ -147,8 +126,8 @@ class _Outline:
     smooth: tuple[int, complex] = (0, 0j)
 
     @property
-    def current_point(self) -> _Point:
-        return _Point(self.here.real, self.here.imag)
+    def current_point(self) -> SimpleNamespace:
+        return SimpleNamespace(x=self.here.real, y=self.here.imag)
 
     def points(self) -> Floats:
         """Control points (k, 4, 2)."""
@@ -161,11 +140,11 @@ class _Outline:
     def end(self) -> None:
         pass
 
-    def move(self, point: Coordinates, **_: bool) -> None:
+    def move(self, point: _Coordinates, **_: bool) -> None:
         self.here = self.begin = self._at(point)
         self.smooth = (0, 0j)
 
-    def line(self, point: Coordinates, **_: bool) -> None:
+    def line(self, point: _Coordinates, **_: bool) -> None:
         end = self._at(point)
         self._room()
         self.lines.append((self.here, end))
@@ -180,26 +159,25 @@ class _Outline:
     def closed(self, **_: bool) -> None:
         self.line("z")
 
-    def cubic(self, first: Coordinates, second: Coordinates, point: Coordinates, **_: bool) -> None:
+    def cubic(self, first: _Coordinates, second: _Coordinates, point: _Coordinates, **_: bool) -> None:
         control, end = self._at(second), self._at(point)
         self._curve(self._at(first), control, end)
         self.smooth = (3, control)
 
-    def smooth_cubic(self, second: Coordinates, point: Coordinates, **_: bool) -> None:
+    def smooth_cubic(self, second: _Coordinates, point: _Coordinates, **_: bool) -> None:
         first = self._reflected(3)
         self.cubic((first.real, first.imag), second, point)
 
-    def quad(self, middle: Coordinates, point: Coordinates, **_: bool) -> None:
+    def quad(self, middle: _Coordinates, point: _Coordinates, **_: bool) -> None:
         control, end = self._at(middle), self._at(point)
         self._curve((self.here + 2 * control) / 3, (end + 2 * control) / 3, end)
         self.smooth = (2, control)
 
-    def smooth_quad(self, point: Coordinates, **_: bool) -> None:
+    def smooth_quad(self, point: _Coordinates, **_: bool) -> None:
         control = self._reflected(2)
         self.quad((control.real, control.imag), point)
 
     def arc(self, rx: float, ry: float, *others: Any, **_: bool) -> None:
-        """Add an arc; others: rotation, large, sweep, point."""
         from svgelements import Arc
 
         rotation, large, sweep, point = others
@@ -240,7 +218,7 @@ class _Outline:
         """A smooth curve's first control point: the last one reflected after a curve of its kind."""
         return 2 * self.here - self.smooth[1] if self.smooth[0] == kind else self.here
 
-    def _at(self, point: Coordinates) -> complex:
+    def _at(self, point: _Coordinates) -> complex:
         return self.begin if isinstance(point, str) else complex(*point)
 
 

@@ -2,15 +2,11 @@
 
 .scap is the format of StrokeStrip and StripMaker for over-sketched drawings. Line 1 is `#width height`, then
 optionally `@thickness`, then strokes: `{`, `#stroke cluster`, optionally `@thickness`, one sample
-`x y pressure` per line, `}`. Fields are separated by tabs or blanks; y runs downwards. The declared size need
-not bound the samples. Strokes of one cluster are meant as one curve, and form one when a curve is requested
-by its number; their directions count separately. If all strokes of a file are in one cluster, each stroke is
-a curve of its own.
+`x y pressure` per line, `}`. Fields are separated by tabs or blanks; y runs downwards. Strokes of one cluster
+are one curve, unless all strokes of a file are in one cluster: then each stroke is a curve.
 
-.curves is the format of CASSIE: for each stroke a line `v N` and N lines `x y z`, y upwards. The strokes are
-projected at right angles to a plane; strokes at the back are drawn too. CASSIE: E. Yu, R. Arora, T. Stanko,
-J. A. Baerentzen, K. Singh, A. Bousseau, *CASSIE: Curve and Surface Sketching in Immersive Environments*,
-2021.
+.curves is the format of CASSIE (Yu et al.: Curve and Surface Sketching in Immersive Environments, 2021): for
+each stroke a line `v N` and N lines `x y z`, y upwards. Strokes at the back are drawn too.
 """
 
 from __future__ import annotations
@@ -22,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError, shortened
 from ..input_limits import LEAST_LENGTH, MAX_LINES
-from ..instance.elementary import cosine, sine, turned
+from ..instance.angles import cosine, sine, turned
 from ..instance.grid import Bools, Floats, Ints
 from .choice import Chooser
 from .curves import Curves, lines_as_cubics
@@ -30,19 +26,16 @@ from .curves import Curves, lines_as_cubics
 _GREATEST: Final = 1e9
 SPATIAL: Final = re.compile(rb"v[ \t]+\d+[ \t]*[\r\n]")
 """First line of a .curves file; a mesh, whose vertices begin with v as well, has three numbers there."""
-SIDE: Final = 1000.0
-"""Longer side of the projected drawing, in the units of its page."""
-BORDER: Final = 40.0
-"""Empty border of the page round it."""
+SIDE: Final = 1000.0  # longer side of the projected drawing, in the units of its page
+BORDER: Final = 40.0  # empty border of the page round it
 VIEWS: Final = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 90.0)}
 """Directions of views: azimuth, from z towards x, and elevation, in degrees."""
 
 
 def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
-    """Read the strokes of a .scap file.
+    """Read the strokes of a .scap file. Raises InputError with the number of the line at fault.
 
-    chooser: matches the clusters of curvature lines, cluster=NAME; None: all strokes are. Raises InputError
-    with the number of the line that breaks the layout, and for missing clusters.
+    chooser: matches the clusters of curvature lines, cluster=NAME; None: all strokes are.
     """
     lines = _lines(data)
     canvas = _canvas(lines[0] if lines else "")
@@ -54,20 +47,21 @@ def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
         if line == "{":
             if opened:
                 raise InputError(
-                    f"line {number}: a stroke starts inside the stroke of line {opened}; "
-                    "close that one with }"
+                    f"line {number}: a stroke starts inside the stroke of line {opened}; close it"
                 )
             samples, opened = [], number
         elif line == "}":
             if not opened:
                 raise InputError(f"line {number}: a stroke ends that did not start; remove the line")
-            clusters.append(_cluster(lines[opened], len(strokes)))
+            fields = lines[opened].strip().removeprefix("#").split()
+            named = len(fields) == 2 and lines[opened].strip().startswith("#")
+            clusters.append(fields[1] if named else f"stroke {len(strokes)}")
             strokes.append(samples)
             opened = 0
         elif line and line[0] not in "#@":
             if not opened:
                 raise InputError(
-                    f"line {number}: a sample stands outside of any stroke; put it between {{ and }}"
+                    f"line {number}: a sample stands outside of strokes; put it between {{ and }}"
                 )
             x, y = _numbers_in(line, number, "x y pressure", 2)
             samples.append((x, y))
@@ -77,12 +71,9 @@ def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
 
 
 def read_curves(data: bytes, view: str | None = None) -> Curves:
-    """Read the strokes of a .curves file as seen from one side, on a page of their own.
+    """Read the strokes of a .curves file as seen from one side, on a page of their own. Raises InputError.
 
-    view: "front", "side", "top", or azimuth and elevation in degrees as in "30,25"; None: along the third of
-    the strokes' principal axes. The longer side of the drawing becomes SIDE, and the page, in whole units,
-    has a border of BORDER. Raises InputError with the number of the line that breaks the layout, and for an
-    unknown view.
+    view: as in `axes_of`; None: along the third of the strokes' principal axes.
     """
     strokes = _spatial(data)
     axes = _principal(strokes) if view is None else axes_of(view)
@@ -98,7 +89,7 @@ def read_curves(data: bytes, view: str | None = None) -> Curves:
 
 
 def axes_of(view: str) -> Floats:
-    """The directions (2, 3) in space that point to the right and down in a view. Raises InputError."""
+    """The directions (2, 3) to the right and down in a view, as "top" or "30,25". Raises InputError."""
     try:
         azimuth, elevation = np.radians(VIEWS.get(view) or [float(part) for part in view.split(",")])
     except ValueError:
@@ -114,11 +105,7 @@ def axes_of(view: str) -> Floats:
 
 
 def _principal(strokes: list[Floats]) -> Floats:
-    """The two principal axes (2, 3) along which strokes extend farthest, as in `axes_of`.
-
-    The axis nearer to the vertical of space points up. A piece of a stroke counts by its length, regardless
-    of its number of samples.
-    """
+    """The two principal axes (2, 3) along which strokes extend farthest; the more vertical one points up."""
     starts = np.concatenate([stroke[:-1] for stroke in strokes])
     ends = np.concatenate([stroke[1:] for stroke in strokes])
     scale = 2 * (max(np.abs(starts).max(), np.abs(ends).max()) or 1.0)
@@ -144,13 +131,14 @@ def _spatial(data: bytes) -> list[Floats]:
     place = 0
     while place < len(lines):
         number, line = lines[place]
-        count = _announced(line, number)
+        match = re.fullmatch(r"v\s+([0-9]{1,9})", line)
+        if match is None:
+            raise InputError(f"line {number}: expected 'v N', found {line[:30]!r}")
+        count = int(match[1])
         samples = [_numbers_in(text, at, "x y z", 3) for at, text in lines[place + 1 : place + 1 + count]]
         if len(samples) < count:
-            raise InputError(
-                f"line {number}: this stroke announces {count} points, and {len(samples)} follow; "
-                "the file is cut off"
-            )
+            follow = f"announces {count} points, and {len(samples)} follow"
+            raise InputError(f"line {number}: this stroke {follow}; the file is cut off")
         if count > 1:
             strokes.append(np.array(samples))
         place += 1 + count
@@ -159,16 +147,8 @@ def _spatial(data: bytes) -> list[Floats]:
     return strokes
 
 
-def _announced(line: str, number: int) -> int:
-    """The number of points announced in the first line of a stroke."""
-    match = re.fullmatch(r"v\s+([0-9]{1,9})", line)
-    if match is None:
-        raise InputError(f"line {number}: expected 'v N', found {line[:30]!r}")
-    return int(match[1])
-
-
 def _lines(data: bytes) -> list[str]:
-    """The lines of a text of strokes. Raises InputError when there are more than MAX_LINES."""
+    """The lines of a text of strokes, at most MAX_LINES."""
     if sum(data.count(end) for end in (b"\n", b"\r")) > MAX_LINES:
         raise InputError(f"has more than {MAX_LINES} lines; simplify the drawing")
     text = data.decode("utf-8", errors="replace").lstrip("\ufeff")
@@ -176,7 +156,7 @@ def _lines(data: bytes) -> list[str]:
 
 
 def _numbers_in(line: str, number: int, layout: str, count: int) -> list[float]:
-    """The first `count` coordinates in a line; an InputError names the line and its layout."""
+    """The first `count` coordinates in a line."""
     fields = line.split(maxsplit=count)[:count]
     try:
         found = [float(field) for field in fields]
@@ -192,10 +172,7 @@ def _numbers_in(line: str, number: int, layout: str, count: int) -> list[float]:
 def _polylines(
     strokes: list[Floats], curve: Ints, canvas: tuple[float, float, float, float], taken: Bools | None = None
 ) -> Curves:
-    """The curves of pen strokes, each of two or more samples (n, 2).
-
-    curve: int (s,), the number of each stroke's curve; taken: bool (s,), which were chosen, None: no choice.
-    """
+    """The curves of pen strokes of two or more samples (n, 2), by the numbers (s,) of their curves."""
     count = [len(stroke) - 1 for stroke in strokes]
     points = np.concatenate([lines_as_cubics(stroke[:-1], stroke[1:]) for stroke in strokes])
     chosen = None if taken is None else np.repeat(taken, count)
@@ -212,25 +189,14 @@ def _curves(
     if not drawn:
         raise InputError("holds no stroke of two or more samples")
     names = [clusters[number] for number in drawn]
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
+    curve = [numbers[name] for name in names] if len(numbers) > 1 else range(len(names))
     taken = None
     if chooser is not None:
         taken = np.array([chooser.takes([f"cluster={name}"] if " " not in name else []) for name in names])
         chooser.check(taken=bool(taken.any()))
-    return _polylines([np.array(strokes[number]) for number in drawn], _numbers(names), canvas, taken)
-
-
-def _cluster(line: str, stroke: int) -> str:
-    """The name of the cluster in a stroke's first line, `#stroke cluster`; without one the stroke's own."""
-    fields = line.strip().removeprefix("#").split()
-    return fields[1] if len(fields) == 2 and line.strip().startswith("#") else f"stroke {stroke}"
-
-
-def _numbers(clusters: list[str]) -> Ints:
-    """The number of each stroke's curve: its cluster, or the stroke itself if there is only one cluster."""
-    numbers = {name: number for number, name in enumerate(dict.fromkeys(clusters))}
-    return np.array(
-        [numbers[name] for name in clusters] if len(numbers) > 1 else range(len(clusters)), dtype=np.int32
-    )
+    samples = [np.array(strokes[number]) for number in drawn]
+    return _polylines(samples, np.array(curve, dtype=np.int32), canvas, taken)
 
 
 def _canvas(line: str) -> tuple[float, float, float, float]:
@@ -241,7 +207,6 @@ def _canvas(line: str) -> tuple[float, float, float, float]:
         raise InputError(f"line 1: expected '#width height', found {line.strip()[:30]!r}") from error
     if not (min(width, height) >= LEAST_LENGTH and max(width, height) <= _GREATEST):
         raise InputError(
-            f"line 1: the size {line.strip()[:30]!r} is not two positive numbers from {LEAST_LENGTH:g} to "
-            f"{_GREATEST:g}"
+            f"line 1: the size {line.strip()[:30]!r} is not two numbers from {LEAST_LENGTH} to {_GREATEST:g}"
         )
     return 0.0, 0.0, width, height

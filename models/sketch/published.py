@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..input_limits import MAX_DATA
 from ..instance.grid import Floats
-from .curves import Curves, bounding_box, lines_as_cubics
+from .curves import Curves, are_straight, bounding_box
 from .read import kind_of, suffix_of_picture
 from .svg import read_svg
 
@@ -19,13 +19,10 @@ _RED: Final = ' stroke="#c8102e"'
 
 
 def published(data: bytes, suffix: str) -> tuple[bytes, str]:
-    """Content under which a sketch is published, and the suffix of its published file.
+    """Content under which a sketch is published, and the suffix of its published file. Raises InputError.
 
-    data: content of the file; suffix: of its name, for content that does not reveal its kind. An SVG drawing
-    is drawn again from the strokes that were read, so that no script, link, style or text of the file is
-    published. Other kinds execute nothing and are not changed. The suffix follows from the content.
-    Publishing a published sketch again does not change it. Raises InputError for a drawing that is unreadable
-    or too large.
+    An SVG drawing is drawn again from the strokes that were read, so that no script, link, style or text of
+    the file is published. Other kinds execute nothing and are not changed.
     """
     kind = kind_of(data, suffix)
     if kind == "svg":
@@ -34,11 +31,7 @@ def published(data: bytes, suffix: str) -> tuple[bytes, str]:
 
 
 def redrawn(curves: Curves) -> bytes:
-    """SVG of only these curves. Reading it gives the same numbers, except control points of straight lines.
-
-    Red strokes are red and all others are black, in lines of one width. Raises InputError for more than
-    MAX_DATA characters.
-    """
+    """SVG of only these curves; reading it gives the same numbers, except controls of straight lines."""
     left, top, right, bottom = bounding_box(curves.points)
     box = curves.canvas or (left, top, right - left, bottom - top)
     page = f' viewBox="{_numbers(np.array(box))}"' if curves.canvas else ""
@@ -57,31 +50,21 @@ def redrawn(curves: Curves) -> bytes:
 
 
 def _paths(curves: Curves) -> list[tuple[bool, list[str]]]:
-    """Path data by path, for consecutive runs of one colour and one letter that do not touch.
-
-    A reader lists lines of a path before its cubics, and joins runs of a path that touch.
-    """
+    """Path data by path, for consecutive runs of one colour and one letter that do not touch."""
+    # A reader lists lines of a path before its cubics, and joins runs of a path that touch.
     starts = np.flatnonzero(np.diff(curves.curve, prepend=-1)).tolist()
     found: list[tuple[bool, list[str]]] = []
     before: tuple[bool, bool] | None = None
     end: list[float] = []
     for first, after in pairwise([*starts, len(curves.points)]):
         run, red = curves.points[first:after], bool(curves.red[first])
-        straight = _is_straight(run)
+        straight = are_straight(run)
         if (red, straight) != before or run[0, 0].tolist() == end:
             found.append((red, []))
-        found[-1][1].append(_data(run, straight=straight))
+        moves = f"L{_numbers(run[:, 3:])}" if straight else f"C{_numbers(run[:, 1:])}"
+        found[-1][1].append(f"M{_numbers(run[0, 0])}{moves}")
         before, end = (red, straight), run[-1, 3].tolist()
     return found
-
-
-def _is_straight(run: Floats) -> bool:
-    return np.allclose(run, lines_as_cubics(run[:, 0], run[:, 3]), rtol=1e-9, atol=0)
-
-
-def _data(run: Floats, *, straight: bool) -> str:
-    moves = run[:, 3:] if straight else run[:, 1:]
-    return f"M{_numbers(run[0, 0])}{'L' if straight else 'C'}{_numbers(moves)}"
 
 
 def _numbers(values: Floats) -> str:

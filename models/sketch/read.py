@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
@@ -20,14 +20,12 @@ from ..errors import InputError, NoStrokeError, naming
 from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import Gauge, Instance
-from ..instance.reading import Reading
-from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading
 from ..memory import available_memory
 from ..storage import read_bytes
-from .bitmap import read_picture, read_white
-from .bridges import as_points, closing, curve_ends, opened
-from .choice import AS_DRAWN, Choice, Silhouette
+from .bitmap import Picture, read_picture, read_white
+from .bridges import closing, curve_ends, opened
+from .choice import AS_DRAWN, Choice, Kind, Silhouette
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
 from .outline import along_outline, boundless, crowded, inside_outline, off_page, parts_with
@@ -36,16 +34,9 @@ from .svg import read_svg
 
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
-BYTES_PER_PIXEL: Final = 5000
-"""Memory for one pixel of the grid while its problem is written."""
-LEAST_WEIGHT: Final = 0.1
-"""Stroke pixels with a smaller w carry no useful direction: grazed corners, crossings."""
-CUT: Final = 0.5 - 1e-9
-"""Least length in pixel sides at which another stroke (silhouette, crease) removes a pixel from the mask.
-
-A line crosses each column (or row, if it is steep) over a length of at least one pixel, in two pixels at
-most: so one half is the greatest threshold that never leaves a gap between 4-neighbours.
-"""
+BYTES_PER_PIXEL: Final = 5000  # while its problem is written
+LEAST_WEIGHT: Final = 0.1  # stroke pixels with a smaller w have no direction: grazed corners, crossings
+CUT: Final = 0.5 - 1e-9  # least length at which another stroke cuts a pixel out; more would leave gaps
 _PICTURES: Final = {
     ".png": rb"\x89PNG",
     ".jpg": rb"\xff\xd8\xff",
@@ -57,7 +48,7 @@ _PICTURES: Final = {
 }
 """First bytes of pictures, by the suffix of their files."""
 _PICTURE: Final = re.compile(b"|".join(_PICTURES.values()), re.DOTALL)
-Kind = Literal["svg", "scap", "curves", "picture"]
+
 _FLATNESS: Final = 0.02  # of a pixel
 
 
@@ -65,10 +56,8 @@ _FLATNESS: Final = 0.02  # of a pixel
 class _Sketch:
     """Attributes of every kind of sketch, in its own units with y down.
 
-    box: left, top, right, bottom of the strokes; page: x, y, width, height, or None.
-    covers: the cover of a frame by curvature lines and by other strokes. ends: ends of strokes,
-    points and ways out (n, 2, 2). stroke_width: as drawn in a picture, 0 for the lines without width of a
-    vector sketch.
+    box: left, top, right, bottom of the strokes; page: x, y, width, height. covers: by curvature lines and by
+    other strokes. ends: points and ways out (n, 2, 2). stroke_width: as drawn in a picture, 0 for curves.
     """
 
     box: tuple[float, float, float, float]
@@ -146,13 +135,7 @@ def read_sketch(
         with naming(path):
             name = name or name_from(path.stem)
             read = instance_of(
-                data,
-                size=size,
-                mask=with_mask,
-                gauge=gauge,
-                name=name,
-                source=path.name,
-                choice=choice,
+                data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name, choice=choice
             )
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
@@ -170,18 +153,22 @@ def instance_of(
     choice: Choice = AS_DRAWN,
 ) -> Instance:
     """Read the instance of a sketch from a file's bytes, with the default weights. Raises InputError."""
-    sketch = _sketch(data, size, Path(source).suffix.lower(), choice)
+    curves = curves_in(data, Path(source).suffix.lower(), choice)
+    sketch = _of_picture(read_picture(data, size)) if curves is None else _of_curves(curves)
     if mask is None:
         frame, given = _framed(sketch.box, size, margin=True), None
     else:
-        frame, given = _masked(mask, sketch.page, size)
+        with naming(mask):
+            frame, given = _mask_on_grid(read_white(bytes_of(mask)), sketch.page, size)
     lines, others = sketch.covers(frame)
     solve, found = _solve_mask(lines, others, given, sketch, frame)
     weight = np.where(solve, lines.weight, 0.0)
     if choice.silhouette == "outer":
         region = solve | (others.amount >= CUT) if given is None else given
         weight[along_outline(region, lines.direction, sketch.stroke_width / frame.pixel)] = 0.0
-        solve = _left(solve, weight) if given is None else solve
+        if not (held := _held(weight)).any() and given is None:
+            raise InputError("every stroke runs along the outline; choose the silhouette none")
+        solve = parts_with(solve, held) if given is None else solve
     stroke = solve & (weight >= LEAST_WEIGHT)
     if not stroke.any():
         raise NoStrokeError("no stroke lies inside the mask; draw a curvature line there or move the mask")
@@ -231,39 +218,17 @@ def bytes_of(path: Path) -> bytes:
     return data
 
 
-def _sketch(data: bytes, size: int, suffix: str, choice: Choice) -> _Sketch:
-    """The sketch in a file's bytes, by content first and suffix second."""
-    curves = curves_in(data, suffix, choice)
-    if curves is not None:
-        return _of_curves(curves)
-    picture = read_picture(data, size)
-    page = (0.0, 0.0, picture.width, picture.height)
-    width = picture.stroke_width * picture.reduced
-    return _Sketch(picture.box, page, picture.covers, picture.ends, stroke_width=width)
-
-
 def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | None:
-    """The curves of a vector sketch, None for a picture. Raises InputError.
-
-    suffix: of the file, for content that does not reveal its kind. choice: of curvature lines and of the
-    view.
-    """
+    """The curves of a vector sketch, None for a picture. Raises InputError."""
     kind = kind_of(data, suffix)
+    choice.check(kind)
     if kind == "curves":
-        choice.refuse_labels("is a .curves file, whose strokes have no labels")
         return read_curves(data, choice.view)
-    choice.refuse_view()
-    if kind != "picture":
-        return (read_svg if kind == "svg" else read_scap)(data, choice.chooser)
-    choice.refuse_labels("is a picture, whose strokes have no labels: only red strokes are recognised")
-    return None
+    return None if kind == "picture" else (read_svg if kind == "svg" else read_scap)(data, choice.chooser)
 
 
 def kind_of(data: bytes, suffix: str) -> Kind:
-    """Kind of a sketch, by its content first and the suffix of its file second.
-
-    Raises InputError for a compressed file.
-    """
+    """Kind of a sketch, by its content first and the suffix of its file second. Raises InputError."""
     start = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
     if data[:2] == b"\x1f\x8b":
         raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
@@ -280,6 +245,12 @@ def kind_of(data: bytes, suffix: str) -> Kind:
 def suffix_of_picture(data: bytes) -> str:
     """Suffix of a picture by its content; Netpbm's for unknown content."""
     return next((suffix for suffix, start in _PICTURES.items() if re.match(start, data)), ".pnm")
+
+
+def _of_picture(picture: Picture) -> _Sketch:
+    page = (0.0, 0.0, picture.width, picture.height)
+    width = picture.stroke_width * picture.reduced
+    return _Sketch(picture.box, page, picture.covers, picture.ends, stroke_width=width)
 
 
 def _of_curves(curves: Curves) -> _Sketch:
@@ -305,24 +276,17 @@ def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) 
     return frame
 
 
-def _masked(path: Path, page: tuple[float, float, float, float] | None, size: int) -> tuple[Frame, Bools]:
-    """The frame round the white part of a mask file, and the mask on it. Raises InputError about the file."""
-    with naming(path):
-        return _mask_on_grid(read_white(bytes_of(path)), page, size)
-
-
 def _mask_on_grid(
     white: Bools, page: tuple[float, float, float, float] | None, size: int
 ) -> tuple[Frame, Bools]:
+    """The frame round the white part of a mask picture, and the mask on it."""
     if page is None:
         raise InputError("cannot be placed: the sketch has neither a viewBox nor a width and height; add one")
     x, y, width, height = page
     wanted = (round(width), round(height))
     if white.shape[::-1] != wanted:
-        raise InputError(
-            f"the mask has {white.shape[1]} x {white.shape[0]} pixels, "
-            f"but the sketch {wanted[0]} x {wanted[1]}; make them equal"
-        )
+        given = f"{white.shape[1]} x {white.shape[0]} pixels"
+        raise InputError(f"the mask has {given}, but the sketch {wanted[0]} x {wanted[1]}; make them equal")
     if not white.any():
         raise InputError("the mask is black all over; paint the region to solve white")
     across, down = width / wanted[0], height / wanted[1]
@@ -338,11 +302,7 @@ def _mask_on_grid(
 def _solve_mask(
     lines: Cover, others: Cover, given: Bools | None, sketch: _Sketch, frame: Frame
 ) -> tuple[Bools, Reading]:
-    """The pixels to solve for, and warnings about them.
-
-    They are the mask, or the inside of the outline with its gaps bridged, without the pixels of other
-    strokes.
-    """
+    """The mask or the inside of the bridged outline, without pixels of other strokes, and warnings."""
     cut = others.amount >= CUT
     filled = lines.amount + others.amount >= CUT
     if given is not None:
@@ -353,7 +313,7 @@ def _solve_mask(
         raise NoStrokeError("no stroke is left on so coarse a grid; choose a larger size")
     closed, openings = closing(walls, sketch.ends(), frame)
     region = inside_outline(closed)
-    solve = parts_with(region & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0))
+    solve = parts_with(region & ~cut, _held(lines.weight))
     if not solve.any():
         raise NoStrokeError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
@@ -364,12 +324,10 @@ def _solve_mask(
         *crowded(filled, solve, frame),
         *off_page(solve, frame, sketch.page),
     )
-    return solve, Reading(sketch.page, warnings, as_points(openings))
+    gaps = tuple(((a, b), (c, d)) for (a, b), (c, d) in openings.tolist())
+    return solve, Reading(sketch.page, warnings, gaps)
 
 
-def _left(solve: Bools, weight: Floats) -> Bools:
-    """The parts of a mask that have curvature lines besides their outline. Raises InputError without any."""
-    held = np.where(weight >= LEAST_WEIGHT, weight, 0.0)
-    if not held.any():
-        raise InputError("every stroke runs along the outline; choose the silhouette none, or add strokes")
-    return parts_with(solve, held)
+def _held(weight: Floats) -> Floats:
+    """The weights of pixels with a direction, 0 elsewhere."""
+    return np.where(weight >= LEAST_WEIGHT, weight, 0.0)

@@ -7,8 +7,7 @@ from importlib.resources import files
 from typing import Final, Literal
 
 from ..errors import InputError
-from ..instance.instance import Gauge, Instance
-from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from .choice import AS_DRAWN, Choice, Silhouette
 from .read import DEFAULT_SIZE, check_size, instance_of
 from .surfaces import analytic
@@ -25,44 +24,27 @@ class Sample:
     description: str
 
 
+_DRAWN: Final = {
+    "cylinder_bend": "a pipe with a bend; red curvature lines, black silhouette",
+    "mouse": "a computer mouse with cross-section lines, all in one colour",
+    "bottle": "a bottle, a surface of revolution; red curvature lines, black silhouette",
+    "saddle": "a saddle bounded and crossed by its curvature lines, all in one colour",
+    "skew": "a tilted flat sheet; two straight families that cross at 65 degrees, constant answer",
+    "singular": "a rounded cube seen on its corner; red lines turn round a singularity of index +1/4",
+    "ring": "a torus with its hole; red curvature lines, black silhouette",
+}
+_COMPUTED: Final = {
+    "tilted_cylinder": "half a cylinder, tilted; exact answer, strokes on a third of the pixels",
+    "torus_patch": "a quarter of a torus; exact answer, strokes on a fifth of the pixels",
+    "wave_sheet": "a wavy sheet; exact answer, strokes on a fifth of the pixels",
+    "cone": "half a truncated cone; exact answer, strokes on a quarter of the pixels",
+    "vase": "half a vase; exact answer, strokes on a quarter of the pixels",
+    "spheroid": "half a spheroid; exact answer, strokes on a quarter of the pixels",
+    "ellipsoid": "an ellipsoid with three different axes; exact answer, strokes on a quarter of the pixels",
+}
 SAMPLES: Final[dict[str, Sample]] = {
-    sample.name: sample
-    for sample in (
-        Sample("cylinder_bend", "sketch", "a pipe with a bend; red curvature lines, black silhouette"),
-        Sample("mouse", "sketch", "a computer mouse with cross-section lines, all in one colour"),
-        Sample(
-            "bottle", "sketch", "a bottle, a surface of revolution; red curvature lines, black silhouette"
-        ),
-        Sample("saddle", "sketch", "a saddle bounded and crossed by its curvature lines, all in one colour"),
-        Sample(
-            "skew",
-            "sketch",
-            "a tilted flat sheet; two straight families that cross at 65 degrees, constant answer",
-        ),
-        Sample(
-            "singular",
-            "sketch",
-            "a rounded cube seen on its corner; red lines turn round a singularity of index +1/4",
-        ),
-        Sample("ring", "sketch", "a torus with its hole; red curvature lines, black silhouette"),
-        Sample(
-            "tilted_cylinder",
-            "analytic",
-            "half a cylinder, tilted; exact answer, strokes on a third of the pixels",
-        ),
-        Sample(
-            "torus_patch", "analytic", "a quarter of a torus; exact answer, strokes on a fifth of the pixels"
-        ),
-        Sample("wave_sheet", "analytic", "a wavy sheet; exact answer, strokes on a fifth of the pixels"),
-        Sample("cone", "analytic", "half a truncated cone; exact answer, strokes on a quarter of the pixels"),
-        Sample("vase", "analytic", "half a vase; exact answer, strokes on a quarter of the pixels"),
-        Sample("spheroid", "analytic", "half a spheroid; exact answer, strokes on a quarter of the pixels"),
-        Sample(
-            "ellipsoid",
-            "analytic",
-            "an ellipsoid with three different axes; exact answer, strokes on a quarter of the pixels",
-        ),
-    )
+    **{name: Sample(name, "sketch", text) for name, text in _DRAWN.items()},
+    **{name: Sample(name, "analytic", text) for name, text in _COMPUTED.items()},
 }
 
 
@@ -123,8 +105,7 @@ def sample(
 def sample_svg(name: str) -> str:
     """The SVG text of a built-in sketch. Raises InputError for an unknown name and for a computed sample."""
     if _known(name).kind == "analytic":
-        drawings = ", ".join(sample.name for sample in samples() if sample.kind == "sketch")
-        raise InputError(f"sample {name!r} is computed, not drawn; choose one of {drawings}")
+        raise InputError(f"sample {name!r} is computed, not drawn; choose one of {', '.join(_DRAWN)}")
     return files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")
 
 

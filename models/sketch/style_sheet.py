@@ -1,8 +1,7 @@
 """Style sheets of SVG drawings: the properties that they give to an element.
 
-tinycss2 parses, in time linear in the text. Only simple selectors count: a tag, an id, classes, and
-combinations of these. Selectors that depend on other elements are ignored, because matching them takes time
-that grows without bound in the depth of a drawing.
+tinycss2 parses, in time linear in the text. Only simple selectors of tag, id and classes count; the time of
+others grows with the depth of a drawing.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 from ..errors import InputError
@@ -23,8 +23,6 @@ KNOWN: Final = frozenset({*PAINT, "display", "opacity", "transform"})
 
 
 class _Selector(NamedTuple):
-    """A simple selector: tag (or empty), id (or empty), classes."""
-
     tag: str
     id: str
     classes: frozenset[str]
@@ -43,18 +41,14 @@ class _Selector(NamedTuple):
 
 @dataclass(eq=False)
 class StyleSheet:
-    """The rules of a drawing: for each simple selector its properties, with the place of each."""
+    """The rules of a drawing: for each simple selector its properties, with the number of each."""
 
     rules: dict[str, dict[_Selector, dict[str, tuple[int, str]]]] = field(default_factory=dict)
     checks: int = 0
     _known: dict[tuple[str, str, str], Mapping[str, str]] = field(default_factory=dict)
 
     def properties(self, tag: str, identifier: str, classes: str) -> Mapping[str, str]:
-        """The properties of an element: the most specific rule decides, and of equal ones the last.
-
-        Raises InputError when the search through rules and elements takes more than MAX_RULE_CHECKS
-        comparisons.
-        """
+        """The properties of an element: the most specific rule decides, and of equal ones the last."""
         asked = (tag, identifier if f"#{identifier}" in self.rules else "", classes)
         if asked not in self._known:
             self._known[asked] = self._found(*asked)
@@ -78,14 +72,8 @@ class StyleSheet:
         self.checks += more
         if self.checks > MAX_RULE_CHECKS:
             raise InputError(
-                f"its style sheets take more than {MAX_RULE_CHECKS} comparisons of rules with elements; "
-                "export it without style sheets"
+                f"its style sheets take more than {MAX_RULE_CHECKS} comparisons; export it without"
             )
-
-    def add(self, selector: _Selector, properties: Mapping[str, str], place: int) -> None:
-        """Add a rule; place: its number in the order of the rules."""
-        held = self.rules.setdefault(selector.key, {}).setdefault(selector, {})
-        held.update((name, (place, value)) for name, value in properties.items())
 
 
 def style_sheet(texts: Iterable[str]) -> StyleSheet:
@@ -96,9 +84,7 @@ def style_sheet(texts: Iterable[str]) -> StyleSheet:
     for text in texts:
         length += len(text)
         if length > MAX_STYLE:
-            raise InputError(
-                f"its style sheets have more than {MAX_STYLE} characters; export it without them"
-            )
+            raise InputError(f"its style sheets have more than {MAX_STYLE} characters; export it without")
         try:
             rules = tinycss2.parse_stylesheet(text, skip_comments=True, skip_whitespace=True)
         except ValueError:  # a whole number of thousands of digits
@@ -108,7 +94,8 @@ def style_sheet(texts: Iterable[str]) -> StyleSheet:
                 properties = _declared(rule.content)
                 for selector in _selectors(rule.prelude) if properties else ():
                     sheet.count(1)
-                    sheet.add(selector, properties, sheet.checks)
+                    held = sheet.rules.setdefault(selector.key, {}).setdefault(selector, {})
+                    held.update((name, (sheet.checks, value)) for name, value in properties.items())
     return sheet
 
 
@@ -134,7 +121,6 @@ def _declared(content: Any) -> dict[str, str]:
 
 
 def _text(tokens: list[Any]) -> str:
-    """The value as text; empty when it is nested too deeply."""
     import tinycss2
 
     try:
@@ -145,27 +131,21 @@ def _text(tokens: list[Any]) -> str:
 
 def _selectors(prelude: list[Any]) -> Iterator[_Selector]:
     """The simple selectors of a rule."""
-    part: list[Any] = []
-    for each in (*prelude, None):
-        if each is None or each == ",":
-            found = _selector(part)
-            part = []
-            if found is not None:
-                yield found
-        elif each.type != "comment":
-            part.append(each)
+    tokens = [each for each in prelude if each.type != "comment"]
+    ends = [place for place, each in enumerate(tokens) if each == ","]
+    for start, end in pairwise([-1, *ends, len(tokens)]):
+        found = _selector(tokens[start + 1 : end])
+        if found is not None:
+            yield found
 
 
 def _selector(part: list[Any]) -> _Selector | None:
     """The selector formed by tokens, None when it is not a simple one."""
     tag, ids, classes = "", set[str](), set[str]()
-    left = deque(part)
-    while left and left[0].type == "whitespace":
-        left.popleft()
-    while left and left[-1].type == "whitespace":
-        left.pop()
-    if not left:
+    blank = [each.type == "whitespace" for each in part]
+    if all(blank):
         return None
+    left = deque(part[blank.index(False) : len(part) - blank[::-1].index(False)])
     if left[0].type == "ident" or left[0] == "*":
         first = left.popleft()
         tag = first.value.replace("*", "")

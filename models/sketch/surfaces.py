@@ -1,8 +1,7 @@
 """Instances with a known answer: curved surfaces, projected, with their exact curvature lines.
 
-Each surface is parametrised by its lines of curvature: position(s, t), turned in space and viewed along
--z. A line s = const or t = const of the drawing is then exactly a projected curvature line. x runs to the
-right, y up, z towards the viewer.
+Each surface is parametrised by its lines of curvature, s = const and t = const, turned in space and viewed
+along -z. x runs to the right, y up, z towards the viewer.
 """
 
 from __future__ import annotations
@@ -14,11 +13,9 @@ from typing import Final
 import numpy as np
 
 from ..errors import InputError
-from ..instance.angles import wrap
-from ..instance.elementary import arctangent, cosine, length, sine, turned
+from ..instance.angles import arctangent, cosine, length, sine, turned, wrap
 from ..instance.grid import Bools, Floats
-from ..instance.instance import Gauge, Instance
-from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from .cover import Frame, cover_by_segments, fit_frame
 from .outline import largest_part
 from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_size
@@ -28,10 +25,8 @@ _SEEDS: Final = 120  # lattice of starting points per side
 _SAMPLES: Final = 600  # points along a drawn line
 _BISECTIONS: Final = 12
 
-Chart = Callable[[Floats, Floats], Floats]
-"""From s, t of any common shape to points or vectors (..., 3)."""
-Profile = Callable[[Floats], Floats]
-"""From t to a radius, or to its derivative."""
+_Chart = Callable[[Floats, Floats], Floats]
+_Profile = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True)
@@ -39,13 +34,12 @@ class CurvaturePatch:
     """A patch of a surface, parametrised by its curvature lines and turned towards the viewer.
 
     position, along_s, along_t: the point and its derivatives by s and t, before turning, shape (..., 3).
-    s_range, t_range: ends of the parameters. turn: rotation matrix (3, 3) applied to all of them.
     share: intended part of the pixels with strokes.
     """
 
-    position: Chart
-    along_s: Chart
-    along_t: Chart
+    position: _Chart
+    along_s: _Chart
+    along_t: _Chart
     s_range: tuple[float, float]
     t_range: tuple[float, float]
     turn: Floats
@@ -88,15 +82,12 @@ def _vectors(x: Floats, y: Floats, z: Floats) -> Floats:
 
 
 def _revolved(
-    profile: tuple[Profile, Profile],
-    slopes: tuple[Profile, Profile],
+    profile: tuple[_Profile, _Profile],
+    slopes: tuple[_Profile, _Profile],
     t_range: tuple[float, float],
     cut: float,
 ) -> CurvaturePatch:
-    """The front of a surface of revolution about the y axis, up to `cut` radians from its sides.
-
-    profile: radius and y by t; slopes: their derivatives.
-    """
+    """The front, up to `cut` radians from the sides, of a profile (radius, y) revolved about the y axis."""
     (radius, y), (widening, rise) = profile, slopes
     return CurvaturePatch(
         position=lambda s, t: _vectors(radius(t) * cosine(s), y(t), radius(t) * sine(s)),
@@ -110,14 +101,10 @@ def _revolved(
 
 
 def _ellipsoid(long: float, deep: float, short: float) -> CurvaturePatch:
-    """The front of an ellipsoid with semi-axes long > deep > short along x, z and y.
-
-    Its curvature lines are its intersections with confocal quadrics: the roots m in [deep^2, long^2] and n in
-    [short^2, deep^2] of x^2 / (long^2 - m) + z^2 / (deep^2 - m) + y^2 / (short^2 - m) = 1 are constant on
-    them. They are m = long^2 - (long^2 - deep^2) cos^2 s and n = deep^2 - (deep^2 - short^2) sin^2 t, so
-    there is no choice where a line passes a plane of symmetry. The four umbilics, where no
-    direction is principal, are at multiples of pi of both.
-    """
+    """The front of an ellipsoid with semi-axes long > deep > short along x, z and y."""
+    # Curvature lines are intersections with confocal quadrics. The roots m in [deep^2, long^2] and n in
+    # [short^2, deep^2] of x^2 / (long^2 - m) + z^2 / (deep^2 - m) + y^2 / (short^2 - m) = 1 are constant on
+    # them: m = long^2 - (long^2 - deep^2) cos^2 s and n = deep^2 - (deep^2 - short^2) sin^2 t.
     k = (long**2 - deep**2) / (long**2 - short**2)
 
     def wide(t: Floats) -> Floats:
@@ -278,8 +265,7 @@ def _towards_viewer(first: Floats, second: Floats) -> Floats:
     (ax, ay, az), (bx, by, bz) = first.T, second.T
     normal = _vectors(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
     x, y, z = normal.T
-    unit: Floats = normal * (np.where(z < 0, -1.0, 1.0) / length(length(x, y), z))[:, None]
-    return unit
+    return normal * (np.where(z < 0, -1.0, 1.0) / length(length(x, y), z))[:, None]
 
 
 def _frame(surface: CurvaturePatch, size: int) -> Frame:
@@ -294,15 +280,13 @@ def _parameters(surface: CurvaturePatch, frame: Frame) -> tuple[Floats, Floats, 
     wanted = np.stack([frame.x + (column + 0.5) * frame.pixel, -frame.y - (row + 0.5) * frame.pixel], axis=-1)
     s, t = _invert(surface, wanted)
     miss = length(*(surface.point(s, t)[:, :2] - wanted).T)
-    on_patch = (miss < 1e-9) & _within(s, surface.s_range) & _within(t, surface.t_range)
+    on_patch = miss < 1e-9
+    for value, ends in ((s, surface.s_range), (t, surface.t_range)):
+        on_patch &= (value >= ends[0] - 1e-9) & (value <= ends[1] + 1e-9)
     if not on_patch.any():
         raise InputError("no pixel centre lies on the surface; choose a larger size")
     mask = largest_part(on_patch.reshape(frame.shape))  # tips may touch the rest at corners only
     return s[mask.ravel()], t[mask.ravel()], mask
-
-
-def _within(value: Floats, ends: tuple[float, float]) -> Bools:
-    return (value >= ends[0] - 1e-9) & (value <= ends[1] + 1e-9)
 
 
 def _invert(surface: CurvaturePatch, wanted: Floats) -> tuple[Floats, Floats]:
@@ -319,47 +303,43 @@ def _invert(surface: CurvaturePatch, wanted: Floats) -> tuple[Floats, Floats]:
         area = ax * by - ay * bx
         # Away from the patch the projection may fold; such pixels only have to stay finite.
         area = np.where(np.abs(area) < 1e-3, np.copysign(1e-3, area), area)
-        s = _kept_near(s + (by * error[:, 0] - bx * error[:, 1]) / area, surface.s_range)
-        t = _kept_near(t + (ax * error[:, 1] - ay * error[:, 0]) / area, surface.t_range)
+        s, t = (
+            s + (by * error[:, 0] - bx * error[:, 1]) / area,
+            t + (ax * error[:, 1] - ay * error[:, 0]) / area,
+        )
+        s, t = (
+            np.clip(value, ends[0] - 0.5, ends[1] + 0.5)
+            for value, ends in ((s, surface.s_range), (t, surface.t_range))
+        )
     return s, t
 
 
-def _kept_near(value: Floats, ends: tuple[float, float]) -> Floats:
-    return np.clip(value, ends[0] - 0.5, ends[1] + 0.5)
-
-
 def _strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
-    """Weight [height, width] of drawn lines; and which pixels (n,) have a line of family u.
-
-    The spacing of the lines is bisected by ratio; the best share seen wins.
-    """
+    """Weight [height, width] of drawn lines; and which pixels (n,) have a line of family u."""
     near, far = 1.0, float(max(frame.shape))
-    best: tuple[float, Floats, Bools] | None = None
-    for _ in range(_BISECTIONS):
+    found = []
+    for _ in range(_BISECTIONS):  # of the spacing, by ratio
         middle = float(np.sqrt(near * far))
-        weight, on_u = _drawn(surface, frame, mask, spacing=middle)
+        u_lines, v_lines = _lines(surface, frame, middle)
+        both = cover_by_segments(np.concatenate([u_lines, v_lines]), frame)
+        weight = np.where(mask, both.weight, 0.0)
         share = float((weight >= LEAST_WEIGHT).sum() / mask.sum())
         near, far = (middle, far) if share > surface.share else (near, middle)
-        if best is None or abs(share - surface.share) < best[0]:
-            best = abs(share - surface.share), weight, on_u
-    assert best is not None
-    return best[1], best[2]
-
-
-def _drawn(surface: CurvaturePatch, frame: Frame, mask: Bools, *, spacing: float) -> tuple[Floats, Bools]:
-    """Weight and family, as in _strokes, of lines `spacing` pixels apart, at least one per family."""
-    u_lines, v_lines = _lines(surface, frame, spacing)
-    of_u, of_v = cover_by_segments(u_lines, frame), cover_by_segments(v_lines, frame)
-    both = cover_by_segments(np.concatenate([u_lines, v_lines]), frame)
-    return np.where(mask, both.weight, 0.0), (of_u.amount >= of_v.amount)[mask]
+        found.append((abs(share - surface.share), weight, u_lines, v_lines))
+    _, weight, u_lines, v_lines = min(found, key=lambda each: each[0])
+    of_u, of_v = (cover_by_segments(lines, frame).amount for lines in (u_lines, v_lines))
+    return weight, (of_u >= of_v)[mask]
 
 
 def _lines(surface: CurvaturePatch, frame: Frame, spacing: float) -> tuple[Floats, Floats]:
-    """Segments (m, 2, 2), y down, of lines t = const (family u) and s = const (family v)."""
+    """Segments (m, 2, 2), y down, of at least one line t = const (family u) and s = const (family v)."""
     middle_s, middle_t = np.mean(surface.s_range), np.mean(surface.t_range)
     along_s, along_t = np.linspace(*surface.s_range, _SAMPLES), np.linspace(*surface.t_range, _SAMPLES)
-    wide = _length(surface, along_s, np.full(_SAMPLES, middle_t)) / frame.pixel
-    high = _length(surface, np.full(_SAMPLES, middle_s), along_t) / frame.pixel
+    middle_lines = ((along_s, np.full(_SAMPLES, middle_t)), (np.full(_SAMPLES, middle_s), along_t))
+    wide, high = (
+        float(length(*np.diff(surface.point(*line)[:, :2], axis=0).T).sum()) / frame.pixel
+        for line in middle_lines
+    )
     at_t, at_s = _spread(surface.t_range, high / spacing), _spread(surface.s_range, wide / spacing)
     u = _polylines(surface, *np.broadcast_arrays(along_s[None], at_t[:, None]))
     v = _polylines(surface, *np.broadcast_arrays(at_s[:, None], along_t[None]))
@@ -369,12 +349,7 @@ def _lines(surface: CurvaturePatch, frame: Frame, spacing: float) -> tuple[Float
 def _spread(ends: tuple[float, float], count: float) -> Floats:
     """Middles of about `count` equal parts of an interval."""
     number = max(1, round(count))
-    middles: Floats = ends[0] + (np.arange(number) + 0.5) * (ends[1] - ends[0]) / number
-    return middles
-
-
-def _length(surface: CurvaturePatch, s: Floats, t: Floats) -> float:
-    return float(length(*np.diff(surface.point(s, t)[:, :2], axis=0).T).sum())
+    return ends[0] + (np.arange(number) + 0.5) * (ends[1] - ends[0]) / number
 
 
 def _polylines(surface: CurvaturePatch, s: Floats, t: Floats) -> Floats:

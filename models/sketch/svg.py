@@ -1,13 +1,10 @@
 """Reader of SVG drawings: the outlines of everything that is painted, as cubic Beziers.
 
-svgelements parses path data, transforms, lengths and colours, tinycss2 parses style sheets. This module walks
-through the document: style sheets at any place, `use` of symbols and invisible parts determine which strokes
-there are. Each element is parsed once, for any number of uses, and the work is bounded by the limits of
-`input_limits`. The bytes first pass defusedxml, which refuses entities. Files outside the drawing are never
-loaded: pictures and `use` of other files are ignored. So are clip paths, masks, dashes and text.
-
-Strokes are the path of every shape with a visible `stroke`, and the outline of a shape that is only filled:
-drawing programs export strokes as filled outlines. White (paper) counts as invisible.
+svgelements parses path data, transforms, lengths and colours, tinycss2 parses style sheets. Each element is
+parsed once, for any number of uses, and the work is bounded by the limits of `input_limits`. The bytes first
+pass defusedxml, which refuses entities. Pictures and `use` of other files are never loaded. Clip paths,
+masks, dashes and text are ignored. Shapes that are only filled count as strokes, because drawing programs
+export strokes as filled outlines; white (paper) counts as invisible.
 """
 
 from __future__ import annotations
@@ -33,7 +30,7 @@ from ..input_limits import (
     MAX_USE_DEPTH,
     MAX_USES,
 )
-from ..instance.elementary import turned
+from ..instance.angles import turned
 from ..instance.grid import Floats
 from .choice import Chooser, colour_label
 from .colour import is_paper, is_red
@@ -51,10 +48,7 @@ _START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "co
 
 @dataclass(frozen=True)
 class _Place:
-    """An element to visit: its inherited style, its transform, and its depth in `use`.
-
-    chosen: whether it, or an element around it, has a chosen label.
-    """
+    """An element to visit. chosen: whether it, or an element around it, has a chosen label."""
 
     element: Element
     style: Mapping[str, str]
@@ -64,24 +58,20 @@ class _Place:
 
 
 def read_svg(data: bytes, chooser: Chooser | None = None) -> Curves:
-    """Read the strokes of an SVG drawing in the units of its viewBox.
+    """Read the strokes of an SVG drawing in the units of its viewBox. Raises InputError.
 
-    chooser: matches the labels of curvature lines; None: colours decide. Raises InputError for malformed or
-    unsafe XML, damaged path data, too many elements, an empty drawing, and for missing labels.
+    chooser: matches the labels of curvature lines; None: colours decide.
     """
     root = _parsed(data)
     if _tag(root) != "svg":
-        raise InputError(
-            f"its root element is <{root.tag.split('}')[-1][:30]}>, not <svg>; expected an SVG drawing"
-        )
+        tag = root.tag.split("}")[-1][:30]
+        raise InputError(f"its root element is <{tag}>, not <svg>; expected an SVG drawing")
     canvas = _canvas(root)
     texts = ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
     walk = _Walk(style_sheet(texts), canvas, chooser)
     shapes = list(walk.shapes(root))
     if not sum(len(points) for _, points, _ in shapes):
-        raise InputError(
-            "draws no stroke: no visible path, line or shape was found; export the drawing with its strokes"
-        )
+        raise InputError("draws no stroke: it has no visible path, line or shape; export it again")
     paints, outlines, taken = zip(*shapes, strict=True)
     red, points = is_red(np.array(paints)), np.concatenate(outlines)
     shape = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(outline) for outline in outlines])
@@ -101,9 +91,7 @@ def _parsed(data: bytes) -> Element:
     try:
         root: Element = fromstring(data, forbid_dtd=False, forbid_entities=True, forbid_external=True)
     except DefusedXmlException as error:
-        raise InputError(
-            "declares XML entities, which are not read for safety; save it as plain SVG"
-        ) from error
+        raise InputError("declares XML entities, which are unsafe; save it as plain SVG") from error
     except (ParseError, ValueError, LookupError, RecursionError) as error:
         raise InputError(f"is not well-formed XML: {error}; save the drawing again") from error
     return root
@@ -116,19 +104,16 @@ class _Walk:
     sheet: StyleSheet
     canvas: tuple[float, float, float, float] | None
     chooser: Chooser | None
-    own: dict[Element, tuple[Mapping[str, str], Any]] = field(default_factory=dict)
+    own: dict[Element, tuple[Mapping[str, str], Any, bool]] = field(default_factory=dict)
     outlines: dict[Element, Floats] = field(default_factory=dict)
-    taken: dict[Element, bool] = field(default_factory=dict)
+
     visited: int = 0
     used: int = 0
     characters: int = 0
     curves: int = 0
 
     def shapes(self, root: Element) -> Iterator[tuple[tuple[float, float, float], Floats, bool]]:
-        """Every visible shape in drawing order: colour, control points in the root's units, and choice.
-
-        The choice is True where a label of the shape is chosen.
-        """
+        """Every visible shape in drawing order: colour, control points in the root's units, if chosen."""
         from svgelements import Matrix
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
@@ -136,44 +121,40 @@ class _Walk:
         while stack:
             place = self._styled(stack.pop())
             tag, element = _tag(place.element), place.element
-            self._count()
+            self.visited += 1
+            if self.visited > MAX_ELEMENTS:
+                raise InputError(f"draws more than {MAX_ELEMENTS} elements; simplify the drawing")
             if place.style.get("display") == "none" or _number(place.style.get("opacity")) == 0:
                 continue
-            if tag in SHAPES and _painted(place.style):
+            if tag in SHAPES:
                 paint = _paint(place.style)
-                painted = self.chooser is not None and self.chooser.takes([colour_label(paint)])
-                yield paint, self._placed(place), painted or place.chosen
+                if not (place.style["visibility"] in ("hidden", "collapse") or is_paper(np.array(paint))):
+                    painted = self.chooser is not None and self.chooser.takes([colour_label(paint)])
+                    yield paint, self._placed(place), painted or place.chosen
             elif tag in _CONTAINERS:
                 inner = _view(place, element) if element is not root else place.matrix
                 stack += [replace(place, element=child, matrix=inner) for child in reversed(element)]
             elif tag == "use":
                 stack += self._used(place, named)
 
-    def _count(self) -> None:
-        self.visited += 1
-        if self.visited > MAX_ELEMENTS:
-            raise InputError(f"draws more than {MAX_ELEMENTS} elements; simplify the drawing")
-
     def _styled(self, place: _Place) -> _Place:
         """The place with the element's own style and transform applied."""
-        if place.element not in self.own:
-            self._read(place.element)
-            style = _own_style(place.element, self.sheet)
-            self.own[place.element] = style, _transform(place.element, style)
-        own, transform = self.own[place.element]
+        element = place.element
+        if element not in self.own:
+            self.characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
+            if self.characters > MAX_DATA:
+                raise InputError(
+                    f"has more than {MAX_DATA} characters of paths, styles and transforms; "
+                    "simplify the drawing"
+                )
+            style = _own_style(element, self.sheet)
+            taken = self.chooser is not None and self.chooser.takes(_labels(element))
+            self.own[element] = style, _transform(element, style), taken
+        own, transform, taken = self.own[element]
         inherited = {key: place.style[key] for key in PAINT if key in place.style}
         style = inherited | {key: value for key, value in own.items() if value != "inherit"}
         matrix = place.matrix if transform is None else transform * place.matrix
-        chosen = self._chosen(place.element) or place.chosen
-        return _Place(place.element, style, matrix, place.uses, chosen)
-
-    def _chosen(self, element: Element) -> bool:
-        """Whether an element itself has a chosen label; all of its labels are recorded."""
-        if self.chooser is None:
-            return False
-        if element not in self.taken:
-            self.taken[element] = self.chooser.takes(_labels(element))
-        return self.taken[element]
+        return _Place(element, style, matrix, place.uses, taken or place.chosen)
 
     def _used(self, place: _Place, named: Mapping[str, Element]) -> list[_Place]:
         """The elements that a `use` refers to; none when it points into another file or at itself."""
@@ -188,10 +169,7 @@ class _Walk:
         if target is None or link in place.uses:
             return []
         if len(place.uses) == MAX_USE_DEPTH:
-            raise InputError(
-                f"has <use> elements nested more than {MAX_USE_DEPTH} deep; "
-                "expand them in the drawing program"
-            )
+            raise InputError(f"has <use> elements nested more than {MAX_USE_DEPTH} deep; expand them")
         moved = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
         uses = (*place.uses, link)
         used = replace(place, matrix=moved, uses=uses)
@@ -203,7 +181,12 @@ class _Walk:
     def _placed(self, place: _Place) -> Floats:
         """Control points (k, 4, 2) of a shape in the units of the root."""
         if place.element not in self.outlines:
-            self.outlines[place.element] = self._outline(place.element)
+            page = self.canvas[2:] if self.canvas else (100.0, 100.0)
+            try:
+                found = outline(_tag(place.element), place.element.attrib, page)
+            except InputError as error:
+                raise InputError(f"{_named(place.element)}: {error}") from error
+            self.outlines[place.element] = found
         points, m = self.outlines[place.element], place.matrix
         self.curves += len(points)
         if self.curves > MAX_CURVES:
@@ -215,22 +198,7 @@ class _Walk:
             raise InputError(
                 f"{_named(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"
             )
-        drawn: Floats = placed[(placed != placed[:, :1]).any(axis=(1, 2))]
-        return drawn
-
-    def _read(self, element: Element) -> None:
-        self.characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
-        if self.characters > MAX_DATA:
-            raise InputError(
-                f"has more than {MAX_DATA} characters of paths, styles and transforms; simplify the drawing"
-            )
-
-    def _outline(self, element: Element) -> Floats:
-        _, _, width, height = self.canvas or (0.0, 0.0, 100.0, 100.0)
-        try:
-            return outline(_tag(element), element.attrib, (width, height))
-        except InputError as error:
-            raise InputError(f"{_named(element)}: {error}") from error
+        return np.asarray(placed[(placed != placed[:, :1]).any(axis=(1, 2))])
 
 
 def _labels(element: Element) -> Iterator[str]:
@@ -260,8 +228,7 @@ def _transform(element: Element, style: Mapping[str, str]) -> Any:
         return None
     if len(text) > MAX_TRANSFORM:
         raise InputError(
-            f"{_named(element)}: its transform has more than {MAX_TRANSFORM} characters; "
-            "export the drawing again"
+            f"{_named(element)}: its transform has more than {MAX_TRANSFORM} characters; simplify it"
         )
     try:
         return Matrix(text)
@@ -286,21 +253,13 @@ def _view(place: _Place, element: Element) -> Any:
     return Matrix.translate(-x, -y) * Matrix.scale(scale) * centre * corner
 
 
-def _painted(style: Mapping[str, str]) -> bool:
-    """Whether a shape is visible: its stroke or fill is neither none, transparent, nor white like paper."""
-    return style["visibility"] not in ("hidden", "collapse") and not bool(
-        is_paper(np.array([_paint(style)]))[0]
-    )
-
-
 def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
     """Red, green, blue in [0, 1] of the stroke, else of the fill; white without either."""
     for kind in ("stroke", "fill"):
         colour = style[kind]
         colour = style["color"] if colour.lower() == "currentcolor" else colour
-        seen = _number(style.get(f"{kind}-opacity")) != 0 and not (
-            kind == "stroke" and _number(style.get("stroke-width")) == 0
-        )
+        numbers = ("stroke-opacity", "stroke-width") if kind == "stroke" else ("fill-opacity",)
+        seen = all(_number(style.get(name)) != 0 for name in numbers)
         if seen and colour.lower() not in ("none", "transparent"):
             return _rgb(colour)
     return 1.0, 1.0, 1.0
@@ -315,10 +274,8 @@ def _rgb(colour: str) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     try:
         parsed = Color(colour)
-        alpha = parsed.alpha / 255
-        red, green, blue = (
-            1 - alpha * (1 - channel / 255) for channel in (parsed.red, parsed.green, parsed.blue)
-        )
+        alpha, channels = parsed.alpha / 255, (parsed.red, parsed.green, parsed.blue)
+        red, green, blue = (1 - alpha * (1 - channel / 255) for channel in channels)
     except (ValueError, TypeError):
         return 0.0, 0.0, 0.0
     return red, green, blue

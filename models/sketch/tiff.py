@@ -13,10 +13,7 @@ import sys
 
 
 def unpacked(data: bytes) -> bytes:
-    """The first picture of a compressed TIFF as an upright TIFF without compression.
-
-    Raises ValueError with the decoder's message if decoding fails.
-    """
+    """The first picture of a compressed TIFF, upright and without compression. Raises ValueError."""
     command = [sys.executable, "-P", __file__]
     done = subprocess.run(command, input=data, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
     if done.returncode:

@@ -1,9 +1,8 @@
 """The curve of a sketch that each stroke pixel belongs to; not part of the instance.
 
 In a vector sketch a curve is an unbroken run of a path (SVG), a cluster of strokes (.scap), or a stroke
-(.curves), together with shorter ones that redraw it: they share more than half of their stroke pixels with
-it. Pictures do not record curves. For them, and without a sketch, a curve is a chain of stroke pixels that
-continue in each other's direction. A chain ends at a corner, and may end at a crossing.
+(.curves), together with shorter ones that redraw it. Without a vector sketch it is a chain of stroke pixels
+that continue in each other's direction. A chain ends at a corner, and may end at a crossing.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError, naming
-from ..instance.angles import line_difference
-from ..instance.elementary import arctangent
+from ..instance.angles import arctangent, line_difference
 from ..instance.grid import Ints
 from ..instance.instance import Instance
 from .choice import AS_DRAWN, Choice
@@ -27,28 +25,19 @@ from .curves import Curves
 from .read import LEAST_WEIGHT, bytes_of, curves_in, segments_of
 from .samples import SAMPLES, sample_svg
 
-REACH: Final = 2
-"""Rows and columns from a pixel of a chain to the next, which bridges crossings without a direction."""
-ASIDE: Final = np.radians(27.0)
-"""Greatest angle between a chain's direction and the way to its next pixel.
-
-A little more than atan(1/2): of the 16 ways within REACH one is as near as that to every direction.
-"""
-TURN: Final = np.radians(15.0)
-"""Greatest turn of a chain from a pixel to the next, as on a circle four pixels in radius."""
-REDRAWN: Final = 0.5
-"""Least share of its stroke pixels at which a curve only redraws another one."""
-SEVERAL: Final = -1
-"""The number of a stroke pixel on several curves."""
+REACH: Final = 2  # rows and columns from a pixel of a chain to the next, across crossings without a direction
+ASIDE: Final = np.radians(27.0)  # greatest angle to the next pixel of a chain; atan(1/2) is less
+TURN: Final = np.radians(15.0)  # greatest turn of a chain per pixel, as on a circle of four pixels in radius
+REDRAWN: Final = 0.5  # least share of its stroke pixels at which a curve only redraws another one
+SEVERAL: Final = -1  # the number of a stroke pixel on several curves
 _NONE: Final = -2
 
 
 def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choice = AS_DRAWN) -> Ints:
     """The number of the only curve of each stroke pixel, int (s,), SEVERAL where more curves pass through it.
 
-    sketch: the file that the instance was read from, or the name of a sample; None: not available. Pictures,
-    computed samples and instance files count as not available. choice: with which the sketch was read. Raises
-    InputError for an unreadable sketch, and for a sketch without a curve at a stroke of the instance.
+    sketch: the file that the instance was read from, or the name of a sample. None, pictures, computed
+    samples and instance files record no curves. Raises InputError for another sketch.
     """
     found = None if sketch is None else _drawn(sketch, choice)
     if found is None:
@@ -72,15 +61,12 @@ def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choi
 
 
 def has_curves(sketch: str | Path | None, choice: Choice = AS_DRAWN) -> bool:
-    """Whether a sketch is available and records its curves; otherwise chains are taken as curves."""
+    """Whether a sketch records its curves; otherwise chains are taken as curves."""
     return sketch is not None and _drawn(sketch, choice) is not None
 
 
 def _only(owner: Indices, stroke: Indices, count: int) -> Ints:
-    """The number of the only curve through each of `count` stroke pixels (s,), SEVERAL, or _NONE.
-
-    owner, stroke: (k,), a curve and a stroke pixel on it, each pair once.
-    """
+    """The only curve (s,) at each stroke pixel, SEVERAL, or _NONE, from pairs of curve and stroke pixel."""
     names, curve = np.unique(owner, return_inverse=True)
     through = csr_array((np.ones(len(curve)), (curve, stroke)), shape=(len(names), count))
     single = csr_array(
@@ -95,10 +81,7 @@ def _only(owner: Indices, stroke: Indices, count: int) -> Ints:
 
 
 def _redrawn(through: csr_array) -> Indices:
-    """The curve (c,) that each curve counts as: a longer one that it redraws, or itself.
-
-    through: 1 where a curve passes through a stroke pixel, (c, s).
-    """
+    """The curve (c,) that each curve redraws, or itself. through: 1 at its stroke pixels, (c, s)."""
     at_stroke = through.T.tocsr()
     length = np.diff(through.indptr)
     stands_for = np.full(len(length), -1)
@@ -113,11 +96,7 @@ def _redrawn(through: csr_array) -> Indices:
 
 
 def chains(instance: Instance) -> Ints:
-    """The number of the chain that each stroke pixel belongs to, int (s,), numbered from 0.
-
-    Two stroke pixels at most REACH apart are linked when their directions differ by at most TURN from each
-    other and by at most ASIDE from the line between them.
-    """
+    """The number of the chain that each stroke pixel belongs to, int (s,), numbered from 0."""
     theta, count = instance.theta, len(instance.theta)
     number = np.full(np.add(instance.mask.shape, 2 * REACH), -1, dtype=np.int32)
     row, column = instance.stroke_pixels.T + REACH
@@ -133,8 +112,7 @@ def chains(instance: Instance) -> Ints:
         ends.append(np.stack([one[linked], other[one][linked]]))
     first, second = np.concatenate(ends, axis=1)
     links = csr_array((np.ones(len(first)), (first, second)), shape=(count, count))
-    numbers: Ints = connected_components(links, directed=False)[1].astype(np.int32)
-    return numbers
+    return np.asarray(connected_components(links, directed=False)[1].astype(np.int32))
 
 
 def _drawn(sketch: str | Path, choice: Choice) -> Curves | None:

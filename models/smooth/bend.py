@@ -1,9 +1,8 @@
 """The bend field: lines of one family change little along the lines of the other family.
 
 Iarussi, Bommes, Bousseau: BendFields: Regularized Curvature Fields from Rough Concept Sketches (ACM
-Transactions on Graphics 34, 2015). The smoothness energy of docs/mathematics.md, 5, penalises every turn of a
-line. Curvature lines do turn along themselves, as the surface bends; their direction changes little from one
-of them to the next.
+Transactions on Graphics 34, 2015). Curvature lines turn along themselves, as the surface bends; their
+direction changes little from one to the next.
 """
 
 from __future__ import annotations
@@ -24,15 +23,9 @@ from .systems import factored, one_thread
 
 _Places = NDArray[np.intp]
 
-HARMONIC: Final = 0.05
-"""Weight of plain smoothness next to bend for strokes that tremble by `TREMBLE` or more.
-
-A greater weight smooths rough strokes further, and deviates from too many of them.
-"""
-TREMBLE: Final = np.radians(1.2)
-"""Approximate deviation of lines from strokes at 48 pixels with 3 degrees of noise on each stroke pixel."""
-HOLD: Final = 0.25
-"""Factor of the stroke weights: under the default ones, 3 degrees of noise show in the field from 0.3 on."""
+HARMONIC: Final = 0.05  # weight of plain smoothness for strokes that tremble by `TREMBLE` or more
+TREMBLE: Final = np.radians(1.2)  # about what 3 degrees of noise on strokes cause at 48 pixels
+HOLD: Final = 0.25  # factor of the stroke weights; from 0.3 on, 3 degrees of noise show
 
 _LEAST_HARMONIC: Final = 0.01  # smallest deviation from clean strokes
 _SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size
@@ -92,19 +85,14 @@ def bend_field(
 
 
 def tremble(field: CrossField) -> float:
-    """Deviation of single strokes from the lines of a field, in radians; 0 without strokes.
-
-    The standard deviation of a normal error with the same median, so that a few contradictory strokes
-    do not count.
-    """
+    """Standard deviation of a normal error with the median deviation of strokes from a field, in radians."""
     deviation = field.stroke_deviation
     return _SIGMA * float(np.median(deviation)) if len(deviation) else 0.0
 
 
 def _bent(start: CrossField, harmonic: float, hold: float, over: Over) -> CrossField:
-    """Bend field for a given weight of plain smoothness, after at least one round."""
     bend = _Bend.of(start, harmonic, hold)
-    x = np.concatenate(_lines(start))
+    x = np.concatenate([start.u_angle, start.v_angle])
     energy = bend.energy(x)
     for _ in range(_ROUNDS):
         moved = bend.round(x)
@@ -118,12 +106,11 @@ def _bent(start: CrossField, harmonic: float, hold: float, over: Over) -> CrossF
 
 @dataclass(frozen=True, eq=False)
 class _Bend:
-    """The energy of line angles x = (u, v), shape (2n,), as squares: bend, and linear ones.
+    """The energy of line angles x = (u, v), shape (2n,), as squares: bend, and linear ones (rows x - goal).
 
-    difference x - offset are the differences of pairs, (2m,), to the right and upwards: row e for the line u
-    of the first pixel of pair e, row m + e for its v. Bend has a square for each quadrant (pixel, line, a
-    horizontal and a vertical neighbour): across (q,) is the place in x of the pixel's other line, sideways
-    and upward (q,) are the rows of the two differences. The linear squares are rows x - goal.
+    difference x - offset are the differences of pairs, (2m,): row e for u of the first pixel of pair e, row
+    m + e for its v. Bend has a square for each quadrant (pixel, line, a horizontal and a vertical neighbour):
+    across (q,) is the place in x of the pixel's other line, sideways and upward (q,) are rows of differences.
     """
 
     difference: Any
@@ -170,16 +157,8 @@ class _Bend:
         return sparse.csr_array((parts, places), shape=(len(every), len(self.offset)))
 
 
-def _lines(field: CrossField) -> tuple[Floats, Floats]:
-    """The angles of u and v, shape (n,) each."""
-    return field.u_angle, field.v_angle
-
-
 def _differences(field: CrossField) -> tuple[Any, Floats]:
-    """Matrix (2m, 2n) and offset (2m,) of the differences of line angles that the jumps compare.
-
-    They are -(A + B) and -(A - B) of (4): an odd jump compares u with v, and a step of the label is pi/2.
-    """
+    """Matrix (2m, 2n) and offset (2m,) of the differences, -(A + B) and -(A - B), that the jumps compare."""
     grid, size, pairs = field.instance.grid, field.instance.grid.size, len(field.p)
     odd = field.p & 1
     first = np.concatenate([grid.first, grid.first + size])
@@ -204,10 +183,7 @@ def _quadrants(field: CrossField) -> tuple[_Places, _Places, _Places]:
 
 
 def _rows_of(field: CrossField, chosen: NDArray[np.bool_]) -> tuple[_Places, _Places]:
-    """The rows of differences that begin and that end at each line, (2n,) each; -1 where there is none.
-
-    For the chosen pairs, all vertical or all horizontal.
-    """
+    """Rows of differences of the chosen pairs that begin and that end at each line, (2n,) each, or -1."""
     grid, size, pairs = field.instance.grid, field.instance.grid.size, len(field.p)
     at = np.nonzero(chosen)[0]
     begin, end = np.full((2, 2 * size), -1)
@@ -222,7 +198,7 @@ def _strokes(field: CrossField, hold: float) -> tuple[Ints, Floats, Floats]:
     """The nearer line to each stroke, as a place in x, the stroke's nearest angle, and its weight; (s,)."""
     instance = field.instance
     at = instance.stroke_index
-    lines = np.stack([line[at] for line in _lines(field)])
+    lines = np.stack([field.u_angle[at], field.v_angle[at]])
     off = wrap(instance.theta - lines, -HALF, np.pi)
     carrying = np.argmin(np.round(np.abs(off), 9), axis=0)
     angle = (lines + off)[carrying, np.arange(len(at))]

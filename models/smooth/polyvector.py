@@ -1,8 +1,8 @@
-"""The PolyVector field: crosses of any angle from one linear system, without labels or jumps.
+"""The PolyVector field and the power field: crosses from one linear system, without labels or jumps.
 
 Diamanti, Vaxman, Panozzo, Sorkine-Hornung: Designing N-PolyVector Fields with Complex Polynomials (Computer
-Graphics Forum 33, 2014). A cross is the pair of roots exp(2 i u), exp(2 i v) of z^2 + X1 z + X0. The
-coefficients do not depend on the order of the lines or on the number of turns of an angle.
+Graphics Forum 33, 2014). A cross is the pair of roots exp(2 i u), exp(2 i v) of z^2 + X1 z + X0. The power
+field smooths exp(4 i theta), with right angles everywhere (Knoppel et al., ACM Trans. Graph. 32, 2013).
 """
 
 from __future__ import annotations
@@ -17,16 +17,12 @@ from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps, label_of
 from ..instance.grid import Floats
 from ..instance.instance import HALF, Instance
-from .systems import factored, locally, one_thread, smoothness
+from .systems import factored, locally, one_thread, smoothness, stroke_weight
 
 _Complex = NDArray[np.complex128]
 
-HOLDS: Final = (0.1, 1.0, 100.0)
-"""Factors of the stroke weights worth trying: loose, as in the energy, hard."""
-
-_HARDEST: Final = 1e4
-"""Greatest weight of a stroke, which dominates the 2 of a pair; `PULL` still counts in 16 digits."""
-
+HOLDS: Final = (0.1, 1.0, 100.0)  # factors of the stroke weights worth trying: loose, as in the energy, hard
+_HARDEST: Final = 1e4  # weight of a stroke, far above the 2 of a pair; `PULL` still counts in 16 digits
 _DECIMALS: Final = 9  # of line angles in quarter turns: rounding errors must not decide jumps
 
 
@@ -100,3 +96,33 @@ def roots(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
     x0 = np.where((x0 == 0) & (x1 == 0), -1.0, x0)
     apart = np.sqrt(x1**2 - 4 * x0)
     return np.angle(apart - x1) / 2, np.angle(-apart - x1) / 2
+
+
+@one_thread()
+def power_field(instance: Instance) -> CrossField:
+    """Field of orthogonal crosses from the harmonic extension of exp(4 i theta), with the best jumps.
+
+    The complex numbers z minimise the sum of 2 abs(z_i - z_j)^2 over pairs and of w abs(z - exp(4 i theta))^2
+    over strokes. Then alpha = arg(z) / 4 and beta = 0; parts without a stroke get alpha = 0. Labels are moved
+    into the windows of the instance (docs/mathematics.md, 10).
+
+    Parameters
+    ----------
+    instance
+        The instance.
+
+    Returns
+    -------
+    CrossField
+        The field.
+
+    """
+    grid = instance.grid
+    strokes, theta = instance.stroke_terms, instance.theta
+    goal = np.stack(
+        [strokes.at_pixels(strokes.weight * f(4 * theta), grid.size) for f in (np.cos, np.sin)], axis=-1
+    )
+    z = factored(smoothness(instance) + sparse.diags_array(stroke_weight(instance)))(goal)
+    alpha, beta = np.arctan2(z[:, 1], z[:, 0]) / 4, np.zeros(grid.size)
+    start = relabelled(instance, alpha, beta, free_jumps(grid, alpha, beta)[0])
+    return start.with_best_jumps()

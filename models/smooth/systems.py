@@ -18,11 +18,12 @@ from ..instance.instance import Instance
 
 Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
 
-PULL: Final = 1e-9
-"""Pull towards the present values: parts without strokes, or w_beta = 0, make a system singular."""
+PULL: Final = 1e-9  # pull to the present values, where strokes or w_beta are missing and a system is singular
 
 _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution would follow rounding
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual
+_LOCK: Final = threading.Lock()
+_HELD: Final[list[Any]] = []  # the limit of BLAS, once for each context that is open
 
 
 def stroke_weight(instance: Instance) -> Floats:
@@ -70,10 +71,7 @@ def factored(matrix: Any) -> Solve:
 
 
 def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.ndarray[Any, Any]:
-    """The x with Ax = right to a relative residual, A Hermitian, by diagonally scaled conjugate gradients.
-
-    Step k of the method reaches k pixels far; components that are smooth over longer distances stay near 0.
-    """
+    """The x with Ax = right to a relative residual, A Hermitian, by diagonally scaled conjugate gradients."""
     inverse = 1 / (matrix.diagonal().real + PULL)
     scaled = LinearOperator(matrix.shape, matvec=lambda v: inverse * v, dtype=matrix.dtype)
     with one_thread():
@@ -85,58 +83,31 @@ def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.nd
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Context, and decorator, that limits BLAS to one thread.
-
-    The dense blocks of sparse factors are tiny, and so are products of two vectors. Threads would cost many
-    times the work, most of all when other processes are busy. With one thread, sums do not depend on the
-    number of threads.
+    """Context, and decorator, that limits BLAS to one thread: faster on tiny blocks, with constant sums.
 
     Contexts may be nested, and several threads may be inside at once. The number of threads of BLAS is a
-    setting of the whole process: it returns to its old value when the last context ends. A BLAS that
-    threadpoolctl does not control, such as Accelerate on macOS, keeps its threads.
+    setting of the whole process: it returns to its old value when the last context ends.
     """
-    _LIMIT.enter()
+    with _LOCK:
+        if _HELD:
+            _HELD.append(_HELD[0])
+        else:
+            with _any_thread_may_set():
+                _HELD.append(_libraries().limit(limits=1, user_api="blas"))
     try:
         yield
     finally:
-        _LIMIT.leave()
-
-
-class _SharedLimit:
-    """Limit of BLAS to one thread, held while any thread is inside."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._inside = 0
-        self._held: Any = None
-
-    def enter(self) -> None:
-        """Set the limit, if no other thread is inside."""
-        with self._lock:
-            if not self._inside:
+        with _LOCK:
+            held = _HELD.pop()
+            if not _HELD:
                 with _any_thread_may_set():
-                    self._held = _libraries().limit(limits=1, user_api="blas")
-            self._inside += 1
-
-    def leave(self) -> None:
-        """Restore the old setting, if no other thread is inside."""
-        with self._lock:
-            self._inside -= 1
-            if not self._inside:
-                with _any_thread_may_set():
-                    self._held.restore_original_limits()
-
-
-_LIMIT: Final = _SharedLimit()
+                    held.restore_original_limits()
 
 
 @contextmanager
 def _any_thread_may_set() -> Iterator[None]:
-    """Context in which threadpoolctl lets this thread set the number of threads of OpenBLAS.
-
-    Since version 3.8 it ignores all threads except the first that set the number, and another thread may be
-    the last to leave `one_thread`.
-    """
+    """Context in which threadpoolctl lets this thread set the number of threads of OpenBLAS."""
+    # Since version 3.8 it ignores all threads but the first, and another may be the last to leave.
     release = getattr(OpenBLASController, "clear_controlling_thread", None)
     if release is None:
         yield

@@ -1,4 +1,4 @@
-"""The energy that a surface over crosses minimises, with its slope and curvature for a descent."""
+"""The energy that a surface over crosses minimises, with its slope and curvature, and the descent."""
 
 from __future__ import annotations
 
@@ -11,22 +11,24 @@ import numpy as np
 from scipy import sparse
 
 from ..instance.grid import Floats
-from .crosses import Crosses
-from .stencils import Stencils, scaled
+from ..processes.deadline import Over
+from ..smooth.systems import factored
+from .stencils import Crosses, Stencils, scaled
 
-CONJUGACY: Final = 0.1
-"""Weight of conjugacy: from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree."""
-FORGIVEN: Final = 0.007
-"""Cosine of the angle in space, ideally a right one, from which a cross counts less and less."""
+CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree
+FORGIVEN: Final = 0.007  # cosine of the angle in space from which a cross counts less and less
+_ROUNDS: Final = 60  # of the descent by Levenberg and Marquardt; 5 to 25 are usual
+_TRIALS: Final = 12  # increases of the damping in a round
+_FALL: Final = 2e-4  # least share of the energy that a round has to remove before another one
+_DAMPING: Final = 1e-2
+_LEAST: Final = 1e-9
+_UP: Final = 5.0
+_DOWN: Final = 8.0
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of a surface's energy besides the equations of its crosses.
-
-    even: differences of the normals of neighbours, times the number of pixels. facing: deviation of every
-    normal from the viewer. forgiven: as FORGIVEN; infinity for plain squares.
-    """
+    """Weights of a surface's energy besides the equations of its crosses, as in `Equations`."""
 
     even: float
     facing: float
@@ -72,11 +74,8 @@ class Equations:
 
     @cached_property
     def conjugacy(self) -> Any:
-        """The matrix (2b, N) of u . d_v g, then of v . d_u g, at the centres of blocks.
-
-        All derivatives there are central ones. At the border, where a surface is steep, one-sided derivatives
-        at pixels would cause larger errors than the crosses do.
-        """
+        """The matrix (2b, N) of u . d_v g, then of v . d_u g, at the centres of blocks."""
+        # Derivatives there are central: at a steep border, one-sided ones would cause large errors.
         blocks = self.stencils.blocks
         count = blocks.shape[1]
         at = (np.tile(np.arange(count), 4), blocks.ravel())
@@ -106,33 +105,25 @@ class Equations:
         """The cosines r (n,) of the angles in space between both lines."""
         u, v = self._lines
         a, b = (along @ z for along in self._along)
-        cosine: Floats = (np.sum(u * v, axis=1) + a * b) / np.sqrt((1 + a * a) * (1 + b * b))
-        return cosine
+        return np.asarray((np.sum(u * v, axis=1) + a * b) / np.sqrt((1 + a * a) * (1 + b * b)))
 
     def energy(self, z: Floats) -> float:
         """The energy of heights."""
         linear, _ = self._squares
+        cosine, scale = self.right_angles(z), self.weights.forgiven
+        plain = np.isinf(scale)
+        loss = np.sum(cosine**2) if plain else scale**2 * np.sum(np.log1p((cosine / scale) ** 2))
         normals = normals_of(self.stencils, z)
         uneven = sum(normal @ (self.stencils.unevenness @ normal) for normal in normals)
         return float(
-            self._loss(self.right_angles(z))
+            loss
             + np.sum((linear.matrix @ z - linear.goal) ** 2)
             + self.weights.even * normals.shape[1] * uneven
             - 2 * self.weights.facing * np.sum(np.log(normals[2]))
         )
 
-    def _loss(self, cosine: Floats) -> float:
-        scale = self.weights.forgiven
-        if np.isinf(scale):
-            return float(np.sum(cosine**2))
-        return float(scale**2 * np.sum(np.log1p((cosine / scale) ** 2)))
-
     def model(self, z: Floats) -> tuple[Floats, Any]:
-        """Half the slope (N,) of the energy at z, and half a curvature (N, N) that is nowhere negative.
-
-        The curvature is the one of Gauss and Newton; for `facing`, the curvature of |g|^2 with weights as at
-        z.
-        """
+        """Half the slope (N,) of the energy at z, and half its curvature (N, N) by Gauss and Newton."""
         linear, squares = self._squares
         down, angles = self._of_angles(z)
         even, bend = self._of_normals(z)
@@ -171,8 +162,7 @@ class Equations:
 def normals_of(stencils: Stencils, z: Floats) -> Floats:
     """The unit normals of the pixels, with their parts x, y and z one below the other: shape (3, n)."""
     x, y = (slope @ z for slope in stencils.slopes)
-    normals: Floats = np.stack([-x, -y, np.ones_like(x)]) / np.sqrt(1 + x * x + y * y)
-    return normals
+    return np.asarray(np.stack([-x, -y, np.ones_like(x)]) / np.sqrt(1 + x * x + y * y))
 
 
 def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
@@ -190,6 +180,29 @@ def _in_blocks(values: Floats, row: Any, column: Any, size: int) -> Any:
         for axis, each in enumerate((row, column))
     ]
     return sparse.csr_array((values.ravel(), tuple(places)), shape=(2 * size, 2 * size))
+
+
+def descended(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
+    """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
+    energy, damping = equations.energy(z), _DAMPING
+    for _ in range(_ROUNDS):
+        if over():
+            break
+        slope, curvature = equations.model(z)
+        diagonal = sparse.diags_array(curvature.diagonal())
+        for _ in range(_TRIALS):
+            tried = z - factored(curvature + damping * diagonal)(slope)
+            reached = equations.energy(tried)
+            if reached < energy:
+                break
+            damping *= _UP
+        else:
+            break
+        fallen, z, energy = energy - reached, tried, reached
+        damping = max(damping / _DOWN, _LEAST)
+        if fallen <= _FALL * (energy + fallen):
+            break
+    return energy, z
 
 
 def _along(matrices: tuple[Any, Any], line: Floats) -> Any:

@@ -10,13 +10,12 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import InputError
-from ..instance.grid import Bools, Floats
+from ..instance.grid import Floats
 from ..instance.instance import HALF, Instance
 from .equations import Rows
-from .levels import Level
+from .stencils import Level
 
-WEIGHT: Final = 0.1
-"""Weight of each pixel of the disc about a hint: the normals of its neighbours differ a little."""
+WEIGHT: Final = 0.1  # weight of each pixel of the disc about a hint, whose normals differ a little
 _DISC: Final = 0.05  # radius in parts of the root of the number of pixels
 
 
@@ -43,8 +42,7 @@ class Hint:
     @property
     def slopes(self) -> Floats:
         """The slopes (dz/dx, dz/dy) of a surface with this normal."""
-        rise: Floats = -np.tan(self.slant) * np.array([np.cos(self.tilt), np.sin(self.tilt)])
-        return rise
+        return np.asarray(-np.tan(self.slant) * np.array([np.cos(self.tilt), np.sin(self.tilt)]))
 
 
 def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
@@ -68,27 +66,13 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
             raise InputError(f"{place} has the tilt {hint.tilt}, not a direction; give a finite angle")
 
 
-@dataclass(frozen=True, eq=False)
-class Disc:
-    """The pixels of a level about a hint, a mask (n,), and the slopes required there."""
-
-    level: Level
-    pixels: Bools
-    slopes: Floats
-
-    @classmethod
-    def of(cls, hint: Hint, level: Level) -> Disc:
-        """The disc of a hint; one pixel at least."""
-        grid, (top, left) = level.grid, level.corner
-        away = np.hypot(
-            grid.rows - ((hint.row - top) >> level.halved),
-            grid.columns - ((hint.column - left) >> level.halved),
-        )
-        return cls(level, away <= max(1.0, _DISC * np.sqrt(grid.size)), hint.slopes)
-
-    @property
-    def rows(self) -> Rows:
-        """The squares that require the slopes."""
-        chosen = [slope[self.pixels] for slope in self.level.stencils.slopes]
-        weight = np.sqrt(WEIGHT)
-        return Rows(weight * sparse.vstack(chosen), weight * np.repeat(self.slopes, int(self.pixels.sum())))
+def rows_of(hint: Hint, level: Level) -> Rows:
+    """The squares that require the slopes of a hint on a disc of pixels of a level, at least one."""
+    grid, (top, left) = level.grid, level.corner
+    away = np.hypot(
+        grid.rows - ((hint.row - top) >> level.halved), grid.columns - ((hint.column - left) >> level.halved)
+    )
+    disc = away <= max(1.0, _DISC * np.sqrt(grid.size))
+    weight = np.sqrt(WEIGHT)
+    matrix = sparse.vstack([slope[disc] for slope in level.stencils.slopes])
+    return Rows(weight * matrix, weight * np.repeat(hint.slopes, int(disc.sum())))

@@ -4,34 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import Final
 
 import numpy as np
 from scipy import ndimage
 
 from ..field.field import CrossField
-from ..instance.grid import Bools, Floats, Grid
+from ..instance.grid import Floats, Grid
 from ..processes.deadline import Over, Progress, Stop, silent, stop_function
 from ..smooth.systems import one_thread
-from .crosses import Crosses
-from .descent import descended
-from .equations import FORGIVEN, Equations, Weights, normals_of
-from .hints import Disc, Hint, check_hints
-from .levels import Level, levels_of
-from .stencils import Stencils
+from .equations import FORGIVEN, Equations, Weights, descended, normals_of
+from .hints import Hint, check_hints, rows_of
+from .stencils import Crosses, Level, Stencils, levels_of
 from .surface import Surface
 from .trust import confidence_of, doubts_of, firmness, freedom_of, off_right_angles
 
-FIRST: Final = Weights(even=1e-4, facing=1e-2)
-"""The first pass from a start: stiff, so that starts converge to the same surface."""
-WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)
-"""Found on cylinder, torus, vase and spheroid of docs/surface.md, exact and from strokes."""
-
-CLEARLY: Final = 0.8
-"""Ratio of energies below which the plane's surface is preferred to the dome's: bodies bulge more often."""
-
-TELLING: Final = np.radians(10)
-"""Least slant of a hint that distinguishes z from -z: with less slant, both sides fit it nearly alike."""
+FIRST: Final = Weights(even=1e-4, facing=1e-2)  # stiff, so that starts converge to the same surface
+WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)  # found on surfaces of docs/surface.md
+CLEARLY: Final = 0.8  # ratio of energies below which a plane's surface is preferred to the dome's
+TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z from -z
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
 
 
@@ -87,24 +79,23 @@ def surface(
     found = []
     for number in range(1, parts + 1):
         progress("surface" if parts == 1 else f"surface, part {number} of {parts}")
-        level = _part(field, part_of == number)
+        mask = part_of == number
+        window = ndimage.find_objects(mask.astype(np.int8))[0]
+        stencils, crosses = Stencils(Grid(mask[window])), Crosses.of(field).at(mask[instance.mask])
+        level = Level(stencils, crosses, (window[0].start, window[1].start))
         own = [hint for hint in given if part_of[hint.row, hint.column] == number]
         z = _solved(level, own, cut, flip=flip)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
         found.append((level.grid.size, level, z, own))
-    _, level, z, own = max(found, key=lambda each: each[0])
-    firm = firmness(level, z, [Disc.of(hint, level).rows for hint in own])
-    return _judged(field, heights, firm, hinted=_decide_side(own), cut=cut.off)
-
-
-def _judged(field: CrossField, heights: Floats, firm: float, *, hinted: bool, cut: bool) -> Surface:
-    """The surface of heights, with its doubts and freedom."""
+    _, level, z, own = max(found, key=itemgetter(0))
+    firm = firmness(level, z, [rows_of(hint, level) for hint in own])
     off = off_right_angles(field, heights)
-    found = Surface(field, heights, confidence_of(field, off), (), freedom_of(firm, hinted=hinted), firm)
-    slant = np.arccos(np.minimum(found.normals[:, 2], 1.0))
-    late = ("time was over before it had settled",) if cut else ()
-    return replace(found, doubts=(*doubts_of(field, off, slant), *late))
+    freedom = freedom_of(firm, hinted=_decide_side(own))
+    lifted = Surface(field, heights, confidence_of(field, off), (), freedom, firm)
+    slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
+    late = ("time was over before it had settled",) if cut.off else ()
+    return replace(lifted, doubts=(*doubts_of(field, off, slant), *late))
 
 
 @dataclass
@@ -120,26 +111,16 @@ class TimeLimit:
         return self.off
 
 
-def _part(field: CrossField, mask: Bools) -> Level:
-    """The finest level of a part of the mask, cut out."""
-    window = ndimage.find_objects(mask.astype(np.int8))[0]
-    crosses = Crosses.of(field).at(mask[field.instance.mask])
-    return Level(Stencils(Grid(mask[window])), crosses, (window[0].start, window[1].start))
-
-
 def _solved(part: Level, hints: Sequence[Hint], over: Over, *, flip: bool) -> Floats:
     """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
     coarse, *finer = levels_of(part)
     dome, *planes = ([*_from_start(coarse, z, hints, over, flip=flip)] for z in coarse.starts)
-    _, z = min([*dome, *((energy / CLEARLY, z) for found in planes for energy, z in found)], key=_energy)
+    found = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
+    _, z = min(found, key=itemgetter(0))
     for level in finer:
         z = _settled(level, level.refined(coarse, z), hints, over)[1]
         coarse = level
     return z if hints else _oriented(part, z, flip=flip)
-
-
-def _energy(found: tuple[float, Floats]) -> float:
-    return found[0]
 
 
 def _from_start(
@@ -159,7 +140,7 @@ def _decide_side(hints: Sequence[Hint]) -> bool:
 
 def _settled(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> tuple[float, Floats]:
     """The energy and heights reached from z by descent, with the hints."""
-    extra = [Disc.of(hint, level).rows for hint in hints]
+    extra = [rows_of(hint, level) for hint in hints]
     return descended(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, over)
 
 

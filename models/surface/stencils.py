@@ -1,23 +1,29 @@
-"""Sparse matrices from heights at the corners of pixels to slopes and to changes of slopes."""
+"""Sparse matrices from heights at corners of pixels to slopes, crosses without order, and coarser grids."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
+from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Grid, Ints
+from ..smooth.polyvector import roots
+
+SMALL: Final = 500  # most pixels of the coarsest level, where all starts are tried
+_DOME: Final = 0.7  # height of a dome, relative to a half sphere
+_PLANE: Final = 0.5  # slope of a plane
 
 
 @dataclass(frozen=True, eq=False)
 class Stencils:
-    """The matrices of a mask. Heights are a vector (N,) over the corners of its pixels, in pixels.
+    """The matrices of a mask with n pixels, N corners numbered row by row, and b blocks of 2 x 2 pixels.
 
-    N corners are numbered row by row, n pixels as in `grid`; blocks are 2 x 2 pixels of the mask. x runs to
-    the right, y up.
+    Heights are a vector (N,), in pixels; x runs to the right, y up.
     """
 
     grid: Grid
@@ -49,8 +55,7 @@ class Stencils:
     def blocks(self) -> Ints:
         """Numbers of the pixels of each block, shape (4, b): upper left and right, lower left and right."""
         pixels = np.stack(around(self.grid.number))
-        found: Ints = pixels[:, (pixels >= 0).all(axis=0)]
-        return found
+        return pixels[:, (pixels >= 0).all(axis=0)]
 
     @cached_property
     def changes(self) -> tuple[Any, Any]:
@@ -73,6 +78,35 @@ class Stencils:
         return _sums(corners, self.count, *weights)
 
 
+@dataclass(frozen=True, eq=False)
+class Crosses:
+    """Two lines at each of n places: product and total of their numbers exp(2 i angle), complex (n,)."""
+
+    product: NDArray[np.complex128]
+    total: NDArray[np.complex128]
+
+    @classmethod
+    def of(cls, field: CrossField) -> Crosses:
+        """The crosses of a field, from u at alpha + beta and v at alpha + pi/2 - beta."""
+        return cls(-np.exp(4j * field.alpha), 2j * np.sin(2 * field.beta) * np.exp(2j * field.alpha))
+
+    def averaged(self, mean: Any) -> Crosses:
+        """The means by a matrix (k, n) whose rows add up to 1."""
+        return Crosses(mean @ self.product, mean @ self.total)
+
+    def at(self, places: Bools) -> Crosses:
+        """The crosses at some places, a mask (n,)."""
+        return Crosses(self.product[places], self.total[places])
+
+    @property
+    def lines(self) -> tuple[Floats, Floats]:
+        """Unit vectors (x, y) of both lines, shape (n, 2) each."""
+        first, second = (
+            np.stack([np.cos(angle), np.sin(angle)], axis=1) for angle in roots(self.product, -self.total)
+        )
+        return first, second
+
+
 def around(corners: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:
     """Views of a picture of points: upper left and right, lower left and right of each 2 x 2 of them."""
     ends = (slice(None, -1), slice(1, None))
@@ -89,3 +123,60 @@ def _sums(places: Ints, size: int, *weights: float) -> Any:
     count = places.shape[1]
     at = (np.tile(np.arange(count), len(weights)), places.ravel())
     return sparse.csr_array((np.repeat(np.array(weights), count), at), shape=(count, size))
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A mask and its crosses, with pixels of 2^`halved` of the pixels of the field.
+
+    corner: row and column, in pixels of the field, of the upper left corner of the mask's picture.
+    """
+
+    stencils: Stencils
+    crosses: Crosses
+    corner: tuple[int, int] = (0, 0)
+    halved: int = 0
+
+    @property
+    def grid(self) -> Grid:
+        """Its pixels."""
+        return self.stencils.grid
+
+    def coarser(self) -> Level:
+        """The level of pixels twice as large: one for each nonempty 2 x 2, with its mean cross."""
+        grid = self.grid
+        even = np.pad(grid.mask, [(0, size % 2) for size in grid.mask.shape])
+        larger = Grid(np.any([even[down::2, right::2] for down in (0, 1) for right in (0, 1)], axis=0))
+        at = larger.number[grid.rows // 2, grid.columns // 2]
+        share = 1 / np.bincount(at, minlength=larger.size)[at]
+        mean = sparse.csr_array((share, (at, np.arange(grid.size))), shape=(larger.size, grid.size))
+        return Level(Stencils(larger), self.crosses.averaged(mean), self.corner, self.halved + 1)
+
+    def refined(self, coarse: Level, heights: Floats) -> Floats:
+        """The heights (N,) interpolated from the coarser level, which was made from this one."""
+        picture = np.zeros(coarse.stencils.used.shape)
+        picture[coarse.stencils.used] = heights
+        row, column = np.nonzero(self.stencils.used)
+        ends = [picture[r, c] for r in (row // 2, (row + 1) // 2) for c in (column // 2, (column + 1) // 2)]
+        return np.asarray(2 * np.mean(ends, axis=0))
+
+    @property
+    def starts(self) -> list[Floats]:
+        """Initial heights: a dome over the mask, and planes that rise to the right and upwards."""
+        from scipy import ndimage
+
+        used = self.stencils.used
+        row, column = np.nonzero(used)
+        inside = ndimage.distance_transform_edt(np.pad(self.grid.mask, 1))
+        depth = np.min(around(inside), axis=0)[used]
+        radius = depth.max() + 1
+        dome = _DOME * np.sqrt(depth * (2 * radius - depth))
+        return [dome, _PLANE * (column - column.mean()), -_PLANE * (row - row.mean())]
+
+
+def levels_of(level: Level) -> list[Level]:
+    """The level and coarser ones, the coarsest first."""
+    found = [level]
+    while found[0].grid.size > SMALL:
+        found.insert(0, found[0].coarser())
+    return found

@@ -1,7 +1,4 @@
-"""A surface over the mask of an instance: heights at the corners of its pixels.
-
-x runs to the right, y up, z towards the viewer; all three are in pixels.
-"""
+"""A surface over the mask of an instance: heights at the corners of its pixels, in pixels."""
 
 from __future__ import annotations
 
@@ -72,8 +69,7 @@ class Surface(Pictured):
     def normals(self) -> Floats:
         """Unit normals towards the viewer at the pixels' centres, shape (n, 3)."""
         normal = np.column_stack([-self.gradient, np.ones(len(self.gradient))])
-        unit: Floats = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-        return unit
+        return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
     def flipped(self) -> Surface:
         """The same surface turned inside out, z to -z: the crosses are the same."""

@@ -11,21 +11,14 @@ from scipy import linalg
 from ..field.field import CrossField
 from ..instance.grid import Floats
 from ..smooth.systems import factored
-from .crosses import Crosses
 from .equations import Equations, Rows, Weights, changes_of_normals
-from .levels import Level
-from .stencils import Stencils, around, scaled
+from .stencils import Crosses, Level, Stencils, around, scaled
 
-OFF: Final = np.radians(10)
-"""Lines whose angle in space deviates more than this from a right angle do not fit."""
-UNFIT: Final = 0.25
-"""Share of misfit crosses from which a surface is doubted; docs/surface.md has the figures."""
-SPOTS: Final = 4
-"""Singular spots that a surface may show: an ellipsoid has four umbilics."""
-FLAT: Final = np.radians(10)
-"""Mean slant below which a surface is called flat."""
-LOOSE: Final = 0.01
-"""Firmness below which the crosses do not determine the surface: see `firmness`."""
+OFF: Final = np.radians(10)  # lines whose angle in space deviates more from a right angle do not fit
+UNFIT: Final = 0.25  # share of misfit crosses from which a surface is doubted (docs/surface.md)
+SPOTS: Final = 4  # singular spots that a surface may show: an ellipsoid has four umbilics
+FLAT: Final = np.radians(10)  # mean slant below which a surface is called flat
+LOOSE: Final = 0.01  # firmness below which the crosses do not determine the surface: see `firmness`
 
 _PLAIN: Final = Weights(even=0.0, facing=0.0)
 _VECTORS: Final = 4
@@ -38,8 +31,7 @@ def off_right_angles(field: CrossField, heights: Floats) -> Floats:
     """Deviation from a right angle between each cross's lines on the surface, in [0, pi/2] radians; (n,)."""
     stencils = Stencils(field.instance.grid)
     cosine = Equations(stencils, Crosses.of(field), _PLAIN).right_angles(heights[stencils.used])
-    off: Floats = np.arcsin(np.minimum(np.abs(cosine), 1.0))
-    return off
+    return np.arcsin(np.minimum(np.abs(cosine), 1.0))
 
 
 def confidence_of(field: CrossField, off: Floats) -> Floats:
@@ -54,20 +46,14 @@ def confidence_of(field: CrossField, off: Floats) -> Floats:
 def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
     """Sentences with reasons not to trust a surface. slant: of its normals, radians (n,)."""
     unfit, spots = float(np.mean(off > OFF)), len(field.singularities.index)
-    found = []
-    if unfit > UNFIT:
-        found.append(
-            f"{unfit:.0%} of the crosses are more than {np.degrees(OFF):g} degrees off right angles on it: "
-            "no one surface has all these curvature lines, as where hidden lines are drawn"
-        )
-    if spots > SPOTS:
-        found.append(f"the crosses turn round {spots} singular spots, more than a smooth surface shows")
-    if slant.mean() < FLAT:
-        found.append(
-            f"it is nearly flat, {np.degrees(slant.mean()):.1f} degrees on average: "
-            "lines that cross at right angles everywhere do not determine a shape"
-        )
-    return tuple(found)
+    found = {
+        f"{unfit:.0%} of the crosses are more than {np.degrees(OFF):g} degrees off right angles on it: "
+        "no one surface has all these curvature lines, as where hidden lines are drawn": unfit > UNFIT,
+        f"the crosses turn round {spots} singular spots, more than a smooth surface shows": spots > SPOTS,
+        f"it is nearly flat, {np.degrees(slant.mean()):.1f} degrees on average: "
+        "lines that cross at right angles everywhere do not determine a shape": slant.mean() < FLAT,
+    }
+    return tuple(doubt for doubt, holds in found.items() if holds)
 
 
 def freedom_of(firm: float, *, hinted: bool) -> tuple[str, ...]:
@@ -85,13 +71,11 @@ def freedom_of(firm: float, *, hinted: bool) -> tuple[str, ...]:
 def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:
     """Least change of the equations when the normals turn: radians per radian, both rms.
 
-    The root of the least eigenvalue of the curvature of right angles, conjugacy and hints at heights z,
-    relative to the curvature of the normals; by inverse iteration. It is 0 along a family of surfaces with
-    the same crosses, and for masks that are too small.
+    It is 0 along a family of surfaces with the same crosses, and for masks that are too small.
     """
-    count = level.stencils.count
     if level.grid.size < 2 * _VECTORS:
         return 0.0
+    # The least eigenvalue of the curvature relative to that of the normals, by inverse iteration.
     twist = level.stencils.twist
     _, curvature = Equations(level.stencils, level.crosses, _PLAIN, extra).model(z)
     curvature = curvature + _TWIST * (twist.T @ twist)
@@ -99,7 +83,7 @@ def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:
     turns = [scaled(slopes[0], part[0]) + scaled(slopes[1], part[1]) for part in change]
     turning = sum(turn.T @ turn for turn in turns)
     solve = factored(curvature + _PULL * turning)
-    vectors = np.random.default_rng(0).standard_normal((count, _VECTORS))
+    vectors = np.random.default_rng(0).standard_normal((level.stencils.count, _VECTORS))
     least = np.zeros(_VECTORS)
     for _ in range(_ROUNDS):
         vectors = solve(turning @ vectors)

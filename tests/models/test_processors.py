@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from crossfield.models.instance.elementary import arctangent, cosine, sine
+from crossfield.models.instance.angles import arctangent, cosine, sine
 from processors import PROCESSORS
 
 HASHES = """

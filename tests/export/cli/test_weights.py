@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InstanceError
-from crossfield.models.instance.instance import MOST_WEIGHT
-from crossfield.models.instance.weights import STROKE_WEIGHT
+from crossfield.models.instance.instance import MOST_WEIGHT, STROKE_WEIGHT
 from crossfield.models.sketch.samples import sample_svg
 
 GIVEN = ["--stroke-weight", "10", "--skew-weight", "1e-4"]

@@ -4,13 +4,12 @@ import re
 
 import numpy as np
 import pytest
-from crossfield.export.pictures.cubics import fitted
 from crossfield.export.pictures.draw import draw
-from crossfield.export.pictures.layers import Place, trimmed
+from crossfield.export.pictures.layers import Place, fitted, trimmed
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import sample
-from crossfield.models.smooth.power_field import power_field
+from crossfield.models.smooth.polyvector import power_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from layered import NUMBER, SVG, layers_of, lines_in, numbers

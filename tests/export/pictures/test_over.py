@@ -17,7 +17,7 @@ from crossfield.models.sketch.curves import bounding_box
 from crossfield.models.sketch.pen_strokes import read_curves
 from crossfield.models.sketch.read import read_sketch
 from crossfield.models.sketch.samples import sample
-from crossfield.models.smooth.power_field import power_field
+from crossfield.models.smooth.polyvector import power_field
 from defusedxml import ElementTree
 from layered import SVG, layers_of, lines_in, numbers
 from PIL import Image, ImageDraw
@@ -167,7 +167,7 @@ def test_another_drawing_and_another_kind_are_refused(tmp_path):
     far = BOXES.replace("<g ", '<g transform="translate(900 900)" ')
     with pytest.raises(InputError, match="lies elsewhere") as caught:
         draw(field, tmp_path / "over.svg", underlay=svg(tmp_path / "far.svg", far))
-    assert "give the one that its instance was read from" in str(caught.value)
+    assert "give the drawing that its instance was read from" in str(caught.value)
     with pytest.raises(InputError, match="use kind layers"):
         draw(field, tmp_path / "over.png", kind="crosses", underlay=tmp_path / "a.svg")
     with pytest.raises(InputError, match="lies elsewhere"):  # before anything is searched for

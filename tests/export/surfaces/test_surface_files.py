@@ -7,8 +7,7 @@ import crossfield as cf
 import matplotlib as mpl
 import numpy as np
 import pytest
-from crossfield.export.surfaces.files import FILES, surface_facts, write_surface
-from crossfield.export.surfaces.mesh import to_obj
+from crossfield.export.surfaces.files import FILES, surface_facts, to_obj, write_surface
 from crossfield.models.errors import InputError, OutputError
 from hypothesis import given
 from hypothesis import strategies as st
@@ -173,7 +172,7 @@ def test_surfaces_are_drawn_in_their_own_kinds(tmp_path):
     assert surface._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(InputError, match="choose one of shaded"):
         cf.draw(surface, tmp_path / "b.png", kind="crosses")
-    with pytest.raises(InputError, match="is one of a surface"):
+    with pytest.raises(InputError, match="show a surface"):
         cf.draw(surface.field, tmp_path / "b.png", kind="shaded")
     with pytest.raises(InputError, match="no kind of picture 'wings'; choose one of shaded"):
         cf.draw(surface, tmp_path / "b.png", kind="wings")

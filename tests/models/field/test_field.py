@@ -6,6 +6,7 @@ from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import DEGENERATE, CrossField, relabelled
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from exhaustive import random_instance
 from hypothesis import given
 from hypothesis import strategies as st
 from loops import for_each
@@ -33,15 +34,6 @@ def pixels(mask, theta, gauge="strokes", skew_coefficient=1e-6):
         gauge=gauge,
         skew_coefficient=skew_coefficient,
     )
-
-
-def random_instance(seed, gauge="strokes"):
-    rng = np.random.default_rng(seed)
-    mask = rng.random(rng.integers(1, 6, 2)) < 0.8
-    mask[0, 0] = True
-    at = np.argwhere(mask)
-    at = at[np.sort(rng.permutation(len(at))[: 1 + rng.integers(5)])]
-    return Instance("random", mask, at, rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at)), gauge=gauge)
 
 
 def random_field(instance, seed):
@@ -154,14 +146,6 @@ def test_cross_error_names_the_shape_that_it_needs():
         CrossField.from_lines(field.instance, field.u, field.v)
 
 
-def test_vectors_and_angles_of_lines_are_the_same_lines():
-    field = CrossField(pixels([[1, 1, 1]], {(0, 0): 0}), [0, 0.3, 1], [0.1, -0.2, 0], [0, 0])
-    for vectors, angle in ((field.u, field.u_angle), (field.v, field.v_angle)):
-        assert np.stack([np.cos(angle), np.sin(angle)], axis=-1) == pytest.approx(vectors, abs=1e-15)
-    again = CrossField.from_lines(field.instance, field.u_angle, field.v_angle)
-    assert again.cross_error(field.u_angle, field.v_angle) == pytest.approx(np.zeros(3), abs=1e-12)
-
-
 @pytest.mark.parametrize("index", [0.25, -0.25])
 def test_quarter_singularity_of_four_pixels(index):
     # The middle of the quad is the origin; the crosses turn by index * 360 degrees on the way round.
@@ -224,7 +208,7 @@ def test_pixel_energies_sum_up_to_the_smooth_energy(seed):
 
 @given(SEEDS, st.sampled_from(["strokes", "box"]))
 def test_best_jumps_beat_every_jump_in_the_bounds(seed, gauge):
-    instance = random_instance(seed, gauge)
+    instance = random_instance(seed, gauge=gauge)
     field, grid = random_field(instance, seed), instance.grid
     every = np.arange(-8, 9)[:, None]
     a = field.alpha[grid.first] - field.alpha[grid.second] + HALF * every
@@ -255,7 +239,7 @@ def test_energies_do_not_depend_on_the_labels(seed, norm):
 
 @given(SEEDS)
 def test_relabelling_into_the_box_keeps_strokes_that_fit(seed):
-    instance = random_instance(seed, "box")
+    instance = random_instance(seed, gauge="box")
     field, at, grid = random_field(instance, seed), instance.stroke_index, instance.grid
     alpha, beta = field.alpha.copy(), field.beta.copy()
     alpha[at] = np.clip(instance.target, 0, HALF)
@@ -274,7 +258,7 @@ def test_relabelling_into_the_box_keeps_strokes_that_fit(seed):
 
 @given(SEEDS, st.sampled_from(["strokes", "box"]))
 def test_relabelled_is_inside_every_bound(seed, gauge):
-    instance = random_instance(seed, gauge)
+    instance = random_instance(seed, gauge=gauge)
     rng = np.random.default_rng(seed)
     size, pairs = instance.grid.size, len(instance.grid.first)
     field = relabelled(

@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.array_archive import pack_arrays
-from crossfield.models.errors import CrossfieldError, InputError, InstanceError, OutputError
+from crossfield.models.errors import CrossfieldError, InputError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.file import read_field, write_field
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.sketch.samples import sample
-from crossfield.models.smooth.power_field import power_field
+from crossfield.models.smooth.polyvector import power_field
+from damage import change, full_instance, refused, same_instance, without
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -23,24 +24,11 @@ from loops import for_each
 # The file is written anew in every example, so sharing the folder is harmless.
 settings.register_profile("files", suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 files = settings.get_profile("files")
-MASK = np.array([[1, 1, 0, 1], [1, 1, 0, 0], [0, 1, 1, 0]], dtype=bool)
 
 
 @pytest.fixture
 def instance():
-    return Instance(
-        name="sample",
-        mask=MASK,
-        stroke_pixels=[[0, 0], [1, 1], [2, 2]],
-        theta=[0.1, 1 / 3, 2.9],
-        w=[1.0, 0.1, 2 / 3],
-        stroke_coefficient=0.5,
-        skew_coefficient=1e-7,
-        gauge="box",
-        source='a "quoted" sketch.svg, Größe',
-        pixel_size=2.5,
-        origin=(-1.25, 1e-3),
-    )
+    return full_instance()
 
 
 @pytest.fixture
@@ -55,30 +43,9 @@ def random_field(instance, seed):
     return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
 
-def same_instance(one, other):
-    return one.sha256 == other.sha256 and (one.mask == other.mask).all() and (one.theta == other.theta).all()
-
-
 def same_field(one, other):
     angles = (one.alpha == other.alpha).all() and (one.beta == other.beta).all()
     return angles and (one.p == other.p).all() and same_instance(one.instance, other.instance)
-
-
-def refused(read, path, message, error=InstanceError):
-    with pytest.raises(error) as caught:
-        read(path)
-    text = str(caught.value)
-    assert text.startswith(str(path))
-    assert message in text
-    assert "\n" not in text
-
-
-def change(key, value):
-    return lambda document: document | {key: value}
-
-
-def without(key):
-    return lambda document: {k: v for k, v in document.items() if k != key}
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])
@@ -124,11 +91,6 @@ def test_unknown_ending_is_refused_before_anything_is_written(field, tmp_path):
 
 def test_missing_file_is_named(tmp_path):
     refused(read_field, tmp_path / "none.npz", "cannot be read: no such file", InputError)
-
-
-def test_folder_that_is_not_there_is_named(field, tmp_path):
-    with pytest.raises(OutputError, match="cannot be written"):
-        write_field(field, tmp_path / "none" / "field.npz")
 
 
 def pixel(number, column, value):
@@ -248,69 +210,18 @@ def test_mesh_covers_the_mask_in_sketch_coordinates_with_y_up(field, tmp_path):
     assert set(triangles.ravel()) == set(range(len(vertices)))
 
 
-@given(seed=st.integers(0, 2**32 - 1))
-@settings(files)
-def test_mesh_is_a_manifold_on_any_mask(tmp_path, seed):
-    rng = np.random.default_rng(seed)
-    mask = rng.random(rng.integers(1, 6, 2)) < 0.6
-    mask[0, 0] = True
-    field = random_field(Instance("random", mask, [[0, 0]], [0.0], [1.0]), seed)
-    _, vertices, triangles = read_rawfield(write_field(field, tmp_path / "field.rawfield"))
-    edges = [(t[k], t[(k + 1) % 3]) for t in triangles.tolist() for k in range(3)]
-    assert len(set(edges)) == len(edges)
-    # Round every vertex the triangles form one fan: as many triangles, linked by shared edges, as there are.
-    for vertex in range(len(vertices)):
-        fan = [set(t) - {vertex} for t in triangles.tolist() if vertex in t]
-        reached = fan.pop()
-        while linked := [rim for rim in fan if rim & reached]:
-            reached |= linked[0]
-            fan.remove(linked[0])
-        assert not fan
-    # Neighbours share an edge: inner edges are the diagonals and one for every pair.
-    inner = sum((b, a) in set(edges) for a, b in edges) // 2
-    assert inner == field.instance.grid.size + len(field.instance.grid.first)
-
-
-def turns_round(vertex, triangles, angles):
-    """Four times the index of an inner vertex, by the least rotation from each face to the next; else 0."""
-    fan = {}
-    for face in np.nonzero((triangles == vertex).any(axis=1))[0]:
-        _, before, after = np.roll(triangles[face], -int(np.argmax(triangles[face] == vertex)))
-        fan[before] = (after, face)
-    if not fan or set(fan) != {following for following, _ in fan.values()}:
-        return 0
-    total, at = 0.0, next(iter(fan))
-    for _ in fan:
-        following, face = fan[at]
-        other = fan[following][1]
-        turns = [
-            ((np.roll(angles[other], -k) - angles[face] + np.pi) % (2 * np.pi) - np.pi).mean()
-            for k in range(4)
-        ]
-        total += min(turns, key=abs)
-        at = following
-    return round(4 * total / (2 * np.pi))
-
-
 @pytest.mark.parametrize("name", ["singular", "ring", "bottle"])
-def test_singularities_are_the_vertices_round_which_the_raw_field_turns(tmp_path, name):
-    """Recomputed from the mesh and its vectors alone; of a power field, whose lines are at right angles."""
+def test_singularities_are_the_vertices_round_which_the_crosses_turn(tmp_path, name):
     field = power_field(sample(name, 16))
-    vectors, vertices, triangles = read_rawfield(write_field(field, tmp_path / "field.rawfield"))
-    angles = np.arctan2(vectors[..., 1], vectors[..., 0])
-    turning = {v: turn for v in range(len(vertices)) if (turn := turns_round(v, triangles, angles))}
+    _, vertices, _ = read_rawfield(write_field(field, tmp_path / "field.rawfield"))
     head, *rows = (tmp_path / "field.sings").read_text().splitlines()
+    vertex, index = np.array([row.split() for row in rows], dtype=int).reshape(-1, 2).T
+    found, (x, y), size = field.singularities, field.instance.origin, field.instance.pixel_size
+    places = np.column_stack([x + size * (found.column + 1), -(y + size * (found.row + 1)), 4 * found.index])
     assert head == f"4 {len(rows)}"
-    assert {int(row.split()[0]): int(row.split()[1]) for row in rows} == turning
-    assert len(turning) == len(field.singularities.index)
-    assert turning or name != "singular"
-
-
-def test_rawfield_is_the_same_twice(field, tmp_path):
-    for name in ("one", "two"):
-        write_field(field, tmp_path / f"{name}.rawfield")
-    for suffix in (".rawfield", ".obj", ".sings"):
-        assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
+    stated = np.column_stack([vertices[vertex, :2], index])
+    assert sorted(map(tuple, stated.round(6).tolist())) == sorted(map(tuple, places.round(6).tolist()))
+    assert rows or name != "singular"
 
 
 # Whatever the bytes

@@ -1,7 +1,6 @@
 """Grid: numbering, neighbour pairs and quads against small grids written out by hand."""
 
 import numpy as np
-import pytest
 from crossfield.models.instance.grid import Grid
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,43 +29,10 @@ def test_two_by_two():
     assert grid.quads.tolist() == [[2, 3, 0, 1]]
 
 
-def test_three_by_three_with_a_hole():
-    grid = Grid(RING)
-    assert grid.number.tolist() == [[0, 1, 2], [3, -1, 4], [5, 6, 7]]
-    assert pairs(grid) == [
-        (0, 1, False),
-        (1, 2, False),
-        (3, 0, True),
-        (4, 2, True),
-        (5, 3, True),
-        (5, 6, False),
-        (6, 7, False),
-        (7, 4, True),
-    ]
-    assert grid.quads.shape == (0, 4)
-    upper, right = grid.pair_number
-    assert upper.tolist() == [[-1, -1, -1], [2, -1, 3], [4, -1, 7]]
-    assert right.tolist() == [[0, 1, -1], [-1, -1, -1], [5, 6, -1]]
-
-
 def test_three_by_three_without_a_hole_has_four_quads_row_by_row():
     grid = Grid(np.ones((3, 3), bool))
     corner = grid.first[grid.quads[:, 0]]
     assert corner.tolist() == [3, 4, 6, 7]
-
-
-def test_one_pixel_has_neither_pairs_nor_quads():
-    grid = Grid(np.array([[False, True]]))
-    assert grid.size == 1
-    assert len(grid.first) == len(grid.second) == len(grid.upward) == len(grid.quads) == 0
-    assert grid.number.tolist() == [[-1, 0]]
-
-
-@pytest.mark.parametrize("height,width", [(1, 5), (4, 1), (3, 7)])
-def test_counts_of_a_full_grid(height, width):
-    grid = Grid(np.ones((height, width), bool))
-    assert len(grid.first) == 2 * height * width - height - width
-    assert len(grid.quads) == (height - 1) * (width - 1)
 
 
 def test_pixels_that_meet_in_a_corner_are_two_parts():

@@ -10,7 +10,7 @@ from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.search.pinned import pinned
 from crossfield.models.sketch.samples import sample, samples
-from crossfield.models.smooth.power_field import power_field
+from crossfield.models.smooth.polyvector import power_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each

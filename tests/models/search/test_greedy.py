@@ -13,7 +13,7 @@ from crossfield.models.search.nearest_stroke import nearest_strokes
 from crossfield.models.search.search import search_patches
 from crossfield.models.search.starts import first_field
 from crossfield.models.sketch.samples import sample
-from crossfield.models.smooth.power_field import power_field
+from crossfield.models.smooth.polyvector import power_field
 from exhaustive import assert_feasible, exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st

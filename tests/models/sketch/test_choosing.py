@@ -5,7 +5,6 @@ import json
 
 import crossfield as cf
 import numpy as np
-import places
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InputError
@@ -147,14 +146,6 @@ def test_clusters_of_scap_are_chosen_and_are_the_curves_that_are_hidden(tmp_path
         cf.read_sketch(file, curvature=["class=flow"])
 
 
-def test_evaluation_takes_the_curves_that_were_chosen(tmp_path):
-    file = tmp_path / "a.svg"
-    file.write_bytes(lines('class="flow"'))
-    chosen = cf.read_sketch(file, size=40, curvature=["class=flow"])
-    found = curves_of(chosen, file, Choice(curvature=("class=flow",)))
-    assert set(found) - {-1} == {1, 2}
-
-
 # --- silhouettes --------------------------------------------------------------------------------------------
 
 
@@ -260,15 +251,6 @@ def test_labels_are_compared_as_they_are_written():
     assert label_of(" class = Flow ") == "class=Flow"
     assert label_of("id=a=b") == "id=a=b"
     assert label_of("color=RED") == label_of("colour=#f00") == "colour=#ff0000"
-
-
-@pytest.mark.skipif(
-    not (places.SHARED / "sketches").is_dir(), reason="the developers' sketches are not beside the checkout"
-)
-def test_a_cluster_of_a_shared_sketch_can_be_chosen():
-    file = places.SHARED / "sketches" / "strokestrip_mouse7c_SA_cluster.scap"
-    chosen = cf.read_sketch(file, size=32, curvature=["cluster=1", "cluster=2", "cluster=4"])
-    assert len(chosen.theta) < len(cf.read_sketch(file, size=32).theta)
 
 
 def test_commands_read_what_python_reads(tmp_path, capsys):

@@ -4,7 +4,6 @@ import contextlib
 
 import crossfield as cf
 import numpy as np
-import places
 import pytest
 from crossfield.models import input_limits
 from crossfield.models.errors import CrossfieldError, InputError
@@ -17,8 +16,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
 from PIL import Image
-
-SHARED = places.SHARED / "sketches"
 
 
 def content(strokes):
@@ -156,16 +153,6 @@ def test_all_strokes_in_space_make_a_page_or_a_typed_error(strokes):
     width, height = curves.canvas[2:]
     assert max(width, height) == 1080
     assert min(width, height) >= 80
-
-
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the developers' sketches are not beside the checkout")
-@for_each("name", ["cassie_hat", "cassie_computer-mouse"])
-def test_the_view_of_a_file_is_the_drawing_that_others_made_of_it(name):
-    seen = cf.read_sketch(SHARED / f"{name}.curves", size=32, view="30,25")
-    drawn = cf.read_sketch(SHARED / f"{name}_az30_el25.svg", size=32)
-    assert np.array_equal(seen.mask, drawn.mask)
-    both = np.intersect1d(seen.stroke_index, drawn.stroke_index)
-    assert len(both) > 0.98 * len(drawn.theta)
 
 
 @settings(max_examples=60, deadline=None)

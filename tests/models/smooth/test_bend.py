@@ -1,4 +1,4 @@
-"""The bend field: exact on constant crosses, near the truth on surfaces, and it moves with the sketch."""
+"""The bend field and its start: exact on constant crosses, near the truth on surfaces."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.instance import HALF, QUARTER
-from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, _lines, bend_field, tremble
+from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, bend_field, tremble
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
 from exhaustive import random_instance, sketch
 from hypothesis import given, settings
@@ -90,6 +90,9 @@ def test_the_field_moves_with_the_sketch(name):
         def there(field, mask=other.mask):
             return [turn(move(field.image(line)))[mask] for line in lines(field)]
 
+        plain = polyvector_field(other, hold=max(HOLDS))
+        assert plain.cross_error(*there(start)) == pytest.approx(0, abs=1e-6)
+        assert plain.energy().total == pytest.approx(start.energy().total, rel=1e-6)
         moved = bend_field(cf.CrossField.from_lines(other, *there(start)))
         assert moved.cross_error(*there(bend_field(start))) == pytest.approx(0, abs=1e-6)
 
@@ -116,12 +119,14 @@ def test_any_weights_will_do(seed, gauge, skew_coefficient, stroke_coefficient):
         skew_coefficient=skew_coefficient,
         stroke_coefficient=stroke_coefficient,
     )
-    field = bend_field(polyvector_field(instance))
-    assert (field.alpha >= instance.alpha_lower).all()
-    assert (field.alpha <= instance.alpha_upper).all()
-    assert (np.abs(field.beta) <= QUARTER).all()
-    assert (field.p >= instance.p_min).all()
-    assert (field.p <= instance.p_max).all()
+    start = polyvector_field(instance)
+    for field in (start, bend_field(start)):
+        assert (field.alpha >= instance.alpha_lower).all()
+        assert (field.alpha <= instance.alpha_upper).all()
+        assert (np.abs(field.beta) <= QUARTER).all()
+        assert (field.p >= instance.p_min).all()
+        assert (field.p <= instance.p_max).all()
+        assert 0 <= field.energy().total < np.inf
 
 
 @for_each(
@@ -185,7 +190,9 @@ def test_rounds_end_when_the_time_is_over():
         calls.clear()
         found = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: over(rounds))
         assert len(calls) == rounds + 1
-        energies.append(_Bend.of(start, HARMONIC, HOLD).energy(np.concatenate(_lines(found))))
+        energies.append(
+            _Bend.of(start, HARMONIC, HOLD).energy(np.concatenate([found.u_angle, found.v_angle]))
+        )
     assert energies == sorted(energies, reverse=True)
     whole = bend_field(start)
     assert np.array_equal(bend_field(start, stop=lambda: False).alpha, whole.alpha)
