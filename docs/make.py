@@ -345,10 +345,10 @@ def samples_in_short() -> str:
     """Numbers of samples by kind, and the content of the pictures."""
     known = [entry.kind for entry in SAMPLES.values()].count("analytic")
     return (
-        f"There are {len(SAMPLES)} samples: "
+        f"This page shows the {len(SAMPLES)} built-in samples: "
         f"{len(SAMPLES) - known} sketches and {known} computed surfaces whose true crosses are known. "
-        "Each can be named where a command takes a sketch, as in `crossfield run mouse -o out`. "
-        "The pictures show fields that a search of 10 rounds finds on grids of 48 pixels."
+        "Commands accept the name of a sample in place of a sketch, as in `crossfield run mouse -o out`. "
+        "The pictures show the results of a search with 10 rounds on grids of 48 pixels."
     )
 
 
@@ -388,7 +388,7 @@ def architecture() -> None:
     import rooms
 
     (DOCS / "architecture.svg").write_text(rooms.picture(DOCS.parent))
-    columns = ("folder", "what lives there", "uses, beside the top of `models/`")
+    columns = ("folder", "contents", "uses, in addition to the top of `models/`")
     replace_between(DOCS / "architecture.md", "folders", markdown(columns, rooms.table(DOCS.parent)))
 
 

@@ -66,7 +66,7 @@ def targets(root: Path, folder: str, node: ast.ImportFrom) -> set[str]:
 
 
 def table(root: Path) -> list[list[str]]:
-    """Rows in the order from the ground up: folder, description, imports."""
+    """Rows, lowest folder first: folder, description, imports."""
     return [
         [
             f"`{folder}/`",
@@ -133,7 +133,7 @@ def picture(root: Path) -> str:
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
             f'height="{height}" role="img">'
         ),
-        "<title>The folders of crossfield and the way of data through them</title>",
+        "<title>The folders of crossfield and the data between them</title>",
         f"<style>{STYLE}</style>",
         TIP,
         f'<rect width="{WIDTH}" height="{height}" fill="#ffffff"/>',
