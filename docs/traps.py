@@ -9,14 +9,11 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final
-
-from crossfield.export.programs.protocol import RefusedError
+from typing import Any, Final
 
 Answer = float | str
 REFUSED: Final = "refused"
@@ -43,34 +40,43 @@ def lp(
     return Trap(rule, what, "model.lp", text, meant, good)
 
 
-COST: Final = " x obj 1\n x c 1\n"
-
-
 def mps(rule: str, what: str, meant: Answer, *, good: bool = False, **sections: str) -> Trap:
     """An MPS with the row c, one column x of cost 1 unless another section is given."""
-    parts = {"HEAD": "", "ROWS": " G c\n", "COLUMNS": COST, "RHS": " RHS1 c 1\n", "BOUNDS": "", "TAIL": ""}
-    text = "NAME model FREE\n{HEAD}ROWS\n N obj\n{ROWS}COLUMNS\n{COLUMNS}RHS\n{RHS}{BOUNDS}{TAIL}ENDATA\n"
-    return Trap(rule, what, "model.mps", text.format(**parts | sections), meant, good)
+    parts = {
+        "HEAD": "",
+        "ROWS": " G c\n",
+        "COLUMNS": COST,
+        "RHS": " RHS1 c 1\n",
+        "BOUNDS": "",
+        "TAIL": "",
+    } | sections
+    bounds = f"BOUNDS\n{parts['BOUNDS']}" if parts["BOUNDS"] else ""
+    text = (
+        f"NAME model FREE\n{parts['HEAD']}ROWS\n N obj\n{parts['ROWS']}COLUMNS\n{parts['COLUMNS']}"
+        f"RHS\n{parts['RHS']}{bounds}{parts['TAIL']}ENDATA\n"
+    )
+    return Trap(rule, what, "model.mps", text, meant, good)
 
 
+COST: Final = " x obj 1\n x c 1\n"
 WHOLE: Final = " M1 'MARKER' 'INTORG'\n x obj -1\n x c 1\n M2 'MARKER' 'INTEND'\n"
 UP_TO_5: Final = {"ROWS": " L c\n", "RHS": " RHS1 c 5\n"}
 FIXED: Final = {
-    "COLUMNS": " x c 1\n y c 1\n", "RHS": " RHS1 c 0\n", "BOUNDS": "BOUNDS\n FX BND1 x 1\n FX BND1 y 1\n",
+    "COLUMNS": " x c 1\n y c 1\n", "RHS": " RHS1 c 0\n", "BOUNDS": " FX BND1 x 1\n FX BND1 y 1\n",
 }  # fmt: skip
 """x = y = 1, so that the objective is the sum of what was read of Q."""
 ONE_TRIANGLE: Final = " x x 2\n x y 1\n y y 2\n"
 
 TRAPS: Final = (
-    lp("W2", "the constant as cost of a fixed column", "x + 7 ONE", "x >= 1", 8.0,
+    lp("W2", "constant as the cost of a fixed column", "x + 7 ONE", "x >= 1", 8.0,
        rest="Bounds\n 1 <= ONE <= 1\n", good=True),
     lp("L1", "`x + 7`", "x + 7", "x >= 1", 8.0),
     lp("L2", "`7 + x`", "7 + x", "x >= 1", 8.0),
-    lp("L3", "`x + 5 <= 10`, greatest x", "- x", "x + 5 <= 10", -5.0),
-    lp("L4", "`x <= 10 + z`, z up to 1, greatest x", "- x", "x <= 10 + z", -11.0,
+    lp("L3", "`x + 5 <= 10`, maximise x", "- x", "x + 5 <= 10", -5.0),
+    lp("L4", "`x <= 10 + z`, z <= 1, maximise x", "- x", "x <= 10 + z", -11.0,
        rest="Bounds\n 0 <= z <= 1\n"),
-    lp("L5", "`Integers`, x up to 3.5, greatest x", "- x", "x <= 3.5", -3.0, rest="Integers\n x\n"),
-    lp("L6", "bounds after `Generals`, x up to 2.5", "- x", "x <= 9", -2.0,
+    lp("L5", "`Integers`, maximise x, x <= 3.5", "- x", "x <= 3.5", -3.0, rest="Integers\n x\n"),
+    lp("L6", "bounds after `Generals`, maximise x, x <= 2.5", "- x", "x <= 9", -2.0,
        rest="Generals\n x\nBounds\n 0 <= x <= 2.5\n"),
     lp("L9", "`[ x^2 ]` at x = 2", "[ x^2 ]", "x >= 2", 4.0),
     lp("L13", "`-1 <= x <= 5`", "x", "-1 <= x <= 5", 0.0),
@@ -82,41 +88,35 @@ TRAPS: Final = (
     lp("L22", "`-infinity <= x`", "x", "x >= -4", -4.0, rest="Bounds\n -infinity <= x <= 5\n"),
     lp("L34", "`[ x ^2 ] / 2` at x = 2", "[ x ^2 ] / 2", "x >= 2", 2.0, good=True),
     lp("L34", "`[ x ^ 2 ] / 2` at x = 2", "[ x ^ 2 ] / 2", "x >= 2", 2.0),
-    mps("M1", "an integer without bounds, greatest x", -1.0, COLUMNS=WHOLE, **UP_TO_5),
-    mps("M2", "an integer with `LO 0` alone, up to 5", -5.0, COLUMNS=WHOLE,
-        BOUNDS="BOUNDS\n LO BND1 x 0\n", **UP_TO_5),
-    mps("M3", "`UP -3` alone, x from -9", -9.0, RHS=" RHS1 c -9\n", BOUNDS="BOUNDS\n UP BND1 x -3\n"),
+    mps("M1", "an integer without bounds, maximise x", -1.0, COLUMNS=WHOLE, **UP_TO_5),
+    mps("M2", "an integer with `LO 0` alone, maximise x, x <= 5", -5.0, COLUMNS=WHOLE,
+        BOUNDS=" LO BND1 x 0\n", **UP_TO_5),
+    mps("M3", "`UP -3` alone, x >= -9", -9.0, RHS=" RHS1 c -9\n", BOUNDS=" UP BND1 x -3\n"),
     mps("M4", "right side 7 of the objective, at x = 1", -6.0, RHS=" RHS1 c 1\n RHS1 obj 7\n"),
-    mps("M5", "`OBJSENSE MAX`, x up to 5", 5.0, HEAD="OBJSENSE MAX\n", **UP_TO_5),
-    mps("M5", "`OBJSENSE MAXIMIZE`, x up to 5", 5.0, HEAD="OBJSENSE MAXIMIZE\n", **UP_TO_5),
+    mps("M5", "`OBJSENSE MAX`, x <= 5", 5.0, HEAD="OBJSENSE MAX\n", **UP_TO_5),
+    mps("M5", "`OBJSENSE MAXIMIZE`, x <= 5", 5.0, HEAD="OBJSENSE MAXIMIZE\n", **UP_TO_5),
     mps("M6", "`OBJSENSE` and `MAX` in two lines", 5.0, HEAD="OBJSENSE\n    MAX\n", **UP_TO_5),
     mps("M7", "cost 1 and cost 3, at x = 1", REFUSED, COLUMNS=f"{COST} x obj 3\n"),
-    mps("M8", "the set of right sides is called like the row", 1.0, RHS=" c c 1\n"),
+    mps("M8", "the set of right sides is named like the row", 1.0, RHS=" c c 1\n"),
     mps("M9", "no set name", REFUSED, RHS=" c 1\n"),
     mps("M13", "QUADOBJ, one triangle", 3.0, TAIL=f"QUADOBJ\n{ONE_TRIANGLE}", good=True, **FIXED),
     mps("M13", "QUADOBJ, both triangles", REFUSED, TAIL=f"QUADOBJ\n{ONE_TRIANGLE} y x 1\n", **FIXED),
     mps("M14", "QMATRIX, one triangle", REFUSED, TAIL=f"QMATRIX\n{ONE_TRIANGLE}", **FIXED),
     mps("M15", "QSECTION", 3.0, TAIL=f"QSECTION obj\n{ONE_TRIANGLE}", **FIXED),
-    mps("M25", "`BV`, then `UP 5`, greatest x", REFUSED, COLUMNS=" x obj -1\n x c 1\n",
-        BOUNDS="BOUNDS\n BV BND1 x\n UP BND1 x 5\n", **UP_TO_5),
+    mps("M25", "`BV`, then `UP 5`, maximise x", REFUSED, COLUMNS=" x obj -1\n x c 1\n",
+        BOUNDS=" BV BND1 x\n UP BND1 x 5\n", **UP_TO_5),
 )  # fmt: skip
 """`meant` is a human reader's interpretation of the file; `refused` for files without a clear meaning."""
 
 
-@contextmanager
-def reading(*errors: type[Exception]) -> Iterator[None]:
-    """Raise RefusedError in place of these errors of a program that reads a file."""
-    try:
-        yield
-    except errors as error:
-        raise RefusedError(str(error)) from error
-
-
 def highs(path: Path) -> Answer:
     """HiGHS's optimum."""
-    from crossfield.export.programs.highs import loaded
+    import highspy
 
-    model = loaded(path)
+    model: Any = highspy.Highs()
+    model.setOptionValue("output_flag", "false")
+    if model.readModel(str(path)) == highspy.HighsStatus.kError:
+        return REFUSED
     model.run()
     status = model.modelStatusToString(model.getModelStatus())
     return float(model.getInfo().objective_function_value) if status == "Optimal" else status.lower()
@@ -126,9 +126,13 @@ def gurobi(path: Path) -> Answer:
     """Gurobi's optimum."""
     import gurobipy
 
-    with gurobipy.Env(params={"OutputFlag": 0}) as environment:
-        with reading(gurobipy.GurobiError):
+    with gurobipy.Env(empty=True) as environment:
+        environment.setParam("OutputFlag", 0)
+        environment.start()
+        try:
             model = gurobipy.read(str(path), environment)
+        except gurobipy.GurobiError:
+            return REFUSED
         model.optimize()
         return float(model.ObjVal) if model.Status == gurobipy.GRB.OPTIMAL else "infeasible"
 
@@ -138,10 +142,17 @@ def cplex(path: Path) -> Answer:
     import cplex
 
     model = cplex.Cplex()
-    for stream in ("log", "error", "warning", "results"):
-        getattr(model, f"set_{stream}_stream")(None)
-    with reading(cplex.exceptions.CplexError):
+    for silence in (
+        model.set_log_stream,
+        model.set_error_stream,
+        model.set_warning_stream,
+        model.set_results_stream,
+    ):
+        silence(None)
+    try:
         model.read(str(path))
+    except cplex.exceptions.CplexError:
+        return REFUSED
     model.solve()
     found = model.solution
     return float(found.get_objective_value()) if "optimal" in found.get_status_string() else "infeasible"
@@ -153,8 +164,10 @@ def xpress(path: Path) -> Answer:
 
     model = xpress.problem()
     model.controls.outputlog = 0
-    with reading(xpress.SolverError):
+    try:
         model.readProb(str(path))
+    except xpress.SolverError:
+        return REFUSED
     model.optimize()
     found = model.attributes
     return float(found.objval) if found.solstatus == xpress.SolStatus.OPTIMAL else "infeasible"
@@ -166,35 +179,37 @@ def scip(path: Path) -> Answer:
 
     model = Model()
     model.hideOutput()
-    with reading(OSError):
+    try:
         model.readProblem(str(path))
+    except OSError:
+        return REFUSED
     model.optimize()
     return float(model.getObjVal()) if model.getStatus() == "optimal" else str(model.getStatus())
 
 
 def glpk(path: Path) -> Answer:
     """GLPK's optimum."""
+    report = path.with_suffix(".txt")
     kind = "--lp" if path.suffix == ".lp" else "--freemps"
-    text = report("glpsol", kind, str(path), "-o")
+    executed("glpsol", kind, str(path), "-o", str(report))
+    text = report.read_text() if report.exists() else ""
     found = re.search(r"Objective:.*= *(\S+)", text)
-    if found is None:
-        raise RefusedError("GLPK reports no objective")
-    return float(found[1]) if "OPTIMAL" in text else "infeasible"
+    return REFUSED if found is None else float(found[1]) if "OPTIMAL" in text else "infeasible"
 
 
 def cbc(path: Path) -> Answer:
     """CBC's optimum."""
-    text = report("cbc", str(path), "solve", "solution")
+    report = path.with_suffix(".txt")
+    executed("cbc", str(path), "solve", "solution", str(report))
+    text = report.read_text() if report.exists() else ""
     found = re.match(r"Optimal - objective value (\S+)", text)
-    return float(found[1]) if found else "infeasible"
+    return REFUSED if not text else float(found[1]) if found else "infeasible"
 
 
-def report(*words: str) -> str:
-    """Text of the report of a program, whose path is its last argument. Raises RefusedError without one."""
-    with tempfile.TemporaryDirectory() as folder, reading(FileNotFoundError):
-        path = Path(folder) / "report.txt"
-        subprocess.run([*words, str(path)], capture_output=True, check=False, timeout=SECONDS)
-        return path.read_text()
+def executed(*words: str) -> None:
+    """Run a program without its output."""
+    command = [shutil.which(words[0]) or words[0], *words[1:]]
+    subprocess.run(command, capture_output=True, check=False, timeout=SECONDS)
 
 
 PROGRAMS: Final[dict[str, tuple[str, Callable[[Path], Answer]]]] = {
@@ -214,26 +229,19 @@ def answer(title: str, trap: Trap) -> Answer:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / trap.name
         path.write_text(trap.text)
-        try:
-            return PROGRAMS[title][1](path)
-        except RefusedError:
-            return REFUSED
+        return PROGRAMS[title][1](path)
 
 
 def shown(value: Answer, trap: Trap) -> str:
     """A cell: bold where the program neither refuses nor finds the intended optimum."""
-    text = cell(value)
-    return text if value in {REFUSED, trap.meant} else f"**{text}**"
+    text = f"{value:g}" if isinstance(value, float) else value
+    wrong = value not in {REFUSED, trap.meant}
+    return f"**{text}**" if wrong else text
 
 
 def meaning(trap: Trap) -> str:
     """The intended optimum, as a cell."""
-    return cell(trap.meant).replace(REFUSED, "unclear")
-
-
-def cell(value: Answer) -> str:
-    """An answer as text."""
-    return f"{value:g}" if isinstance(value, float) else value
+    return f"{trap.meant:g}" if isinstance(trap.meant, float) else trap.meant.replace(REFUSED, "unclear")
 
 
 def table() -> tuple[tuple[str, ...], list[list[str]]]:

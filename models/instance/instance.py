@@ -30,7 +30,7 @@ MOST_WEIGHT: Final = 1e6  # greatest weight of a term of the energy
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
 """Instance names that instance libraries allow: at most 32 lower-case letters, digits and `_`."""
 REFERENCE: Final = 24  # pixels of the longer side of the grid on which weights are coefficients
-STROKE_WEIGHT: Final = 20.0  # see docs/weights.md
+STROKE_WEIGHT: Final = 20.0  # see docs/evidence.md
 SKEW_WEIGHT: Final = 1e-6
 # On a finer grid the smoothness keeps its value, strokes have more pixels, and areas the square of that.
 _POWERS: Final = {"stroke": 1, "skew": 2}

@@ -21,7 +21,7 @@ def rooms():
 
 @pytest.fixture(scope="module")
 def listed():
-    """The rows of the page's table: folder -> (description, imports), from the ground up."""
+    """The rows of the page's table: folder -> (description, imports), lowest folder first."""
     page = (ROOT / "docs" / "architecture.md").read_text()
     rows = re.findall(r"^\| `([a-z/]+)/` \| (.+?) \| (.+) \|$", page, re.MULTILINE)
     return {folder: (text, re.findall(r"`([a-z/]+)`", used)) for folder, text, used in rows}

@@ -1,5 +1,5 @@
-"""The spellings that our writers use are read alike by every program;
-docs/format-rules.md tells of the others.
+"""Every program reads the spellings of our writers alike;
+docs/format-rules.md lists the others.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def traps():
         return import_module("traps")
 
 
-def test_the_page_tells_of_every_trap(traps):
+def test_the_page_lists_every_trap(traps):
     page = (ROOT / "docs" / "format-rules.md").read_text()
     rows = re.findall(
         r"^\| ([LMW]\d+) \| (.+?) \| ([\w-]+) \|", page.partition("<!-- traps:")[2], re.MULTILINE
