@@ -158,7 +158,7 @@ def test_paths_that_pages_and_comments_name_are_there():
 
 
 def test_modules_that_comments_name_without_a_folder_are_there():
-    """Words like `worker.py`; a user may have a file numpy.py by mistake."""
+    """Words like `control.py`; a user may have a file numpy.py by mistake."""
     there = {path.name for path in modules()} | {"numpy.py"}
     named = {
         (place(path), name)

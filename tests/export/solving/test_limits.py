@@ -107,7 +107,8 @@ def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
 
 def limits(seconds):
     """Limits of a certified proof whose clock stands still."""
-    return WorkLimits(Deadline.after(seconds, lambda: 0.0), lambda: False, lambda: False, 0.0, certified=True)
+    whole = Deadline.after(seconds, lambda: 0.0)
+    return WorkLimits(whole, lambda: False, 0.0, certified=True, work=math.inf)
 
 
 def test_a_proof_keeps_time_for_its_certificate():
