@@ -127,7 +127,7 @@ def picture(root: Path) -> str:
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" '
     parts = [
         f'{head}height="{HEIGHT}" role="img">',
-        "<title>The folders of crossfield and the way of data through them</title>",
+        "<title>The folders of crossfield and the flow of data through them</title>",
         f"<style>{STYLE}</style>",
         TIP,
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
