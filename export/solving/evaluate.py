@@ -134,7 +134,7 @@ def evaluate(
     progress
         Receives lines of text.
     stop
-        A function or an event that says whether to stop, as Ctrl-C does.
+        A function that returns whether to stop, or an event, as Ctrl-C does.
     curvature, view
         The options with which the sketch was read.
 

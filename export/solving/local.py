@@ -77,7 +77,7 @@ def solve(
     start
         A field whose complete point is the incumbent or starting point.
     stop
-        A function or an event that says whether to stop. The best point so far is then returned.
+        A function that returns whether to stop, or an event. The best point so far is then returned.
 
     Returns
     -------

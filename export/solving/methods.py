@@ -131,7 +131,7 @@ class Request:
         return Deadline.after(self.limits.time_limit, self.clock)
 
     def over(self) -> Over:
-        """Return what says whether the time limit, counted from now, or the caller ends the work."""
+        """Return a function that states whether the time limit, from now on, or the caller ends the work."""
         deadline = self.deadline()
         return lambda: deadline.passed() or self.stop()
 
@@ -142,7 +142,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to a field. find: the fields that it finds, one by one, because a later one may fail.
+    """A method. find: yields its fields one by one, because a later one may fail.
 
     The last one is its answer. timed: whether it runs up to the time limit, or ends when it is done.
     """
@@ -186,7 +186,7 @@ def _bend(request: Request) -> Iterator[Candidate]:
 
 
 def _steps(request: Request, deadline: Deadline) -> Over:
-    """Return what says before a step whether the deadline would pass in it, or the caller ends the work."""
+    """Return a function that states before a step whether the deadline or the caller ends the work."""
     late = deadline.steps()
     return lambda: late() or request.stop()
 
@@ -206,7 +206,7 @@ def _search(request: Request) -> Iterator[Candidate]:
 
 
 def _searched(method: str, found: Search, begin: float, **counts: int) -> Candidate:
-    """The candidate from a search that began at a time of the performance counter."""
+    """The candidate of a search that began at a time of the performance counter."""
     seconds, interrupted = time.perf_counter() - begin, found.ended == "interrupted"
     return Candidate(method, found.field, seconds, interrupted=interrupted, counts=tuple(counts.items()))
 

@@ -28,7 +28,7 @@ class Proven:
 
     @classmethod
     def by(cls, proof: Proof | None, path: Path, deadline: Deadline, stop: Over = never) -> Proven | None:
-        """Return what a proof proves, with its certificate at `path`; None if that is nothing.
+        """Return the result of a proof, with its certificate at `path`; None without a result.
 
         Errors are those of `certified`.
         """

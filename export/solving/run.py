@@ -201,35 +201,35 @@ def run(
     progress: Progress = silent,
     stop: Stop | None = None,
 ) -> Report:
-    """Do everything: files for solvers, every field that can be found here, pictures, and a report.
+    """Write solver files, compute fields by every method, draw pictures, and write a report.
 
-    The field that is kept is the bend field: it is nearer to curves that were hidden from it than fields of
-    less energy (docs/evidence.md). Afterwards the folder contains
+    The field of the method `bend` is kept, because it has the smallest error at hidden curves
+    (docs/evidence.md). Afterwards the folder contains
 
     - DIR/models: every formulation in every format, starting points, manifests, the instance
-    - DIR/solve: what the local solvers read and wrote
-    - DIR/field.npz, .json, .rawfield with .obj and .sings: the field that is kept
+    - DIR/solve: input and output of the local solvers
+    - DIR/field.npz, .json, .rawfield with .obj and .sings: the kept field
     - DIR/overview.png and other pictures of it; overlay.svg, .png: the same on the drawing
-    - DIR/shaded.png: the surface over it, where that can be trusted; report.json says why not
+    - DIR/shaded.png: its surface, if it can be trusted; otherwise report.json has the reasons
     - DIR/lowest.npz: the field of minimum 2-norm energy
-    - DIR/mask.png: the pixels that are solved for, as read_sketch takes them; not for an instance from a file
-    - DIR/certificate.npz: the certificate of the bound that is proven, with the field of the method `prove`
+    - DIR/mask.png: the mask, as `read_sketch` accepts it; not for an instance from a file
+    - DIR/certificate.npz: the certificate of the proven bound, with the field of the method `prove`
     - DIR/index.html: a page that shows all of these
-    - DIR/report.json: written last. Where it is, the run is complete, or it says what interrupted the run
+    - DIR/report.json: written last, so its presence means that the run has ended
 
-    A method that fails is noted in the report; the fields that were found stand. Ctrl-C ends the present
-    method with its best field and the run with it: no further method is tried and nothing is drawn. Before
-    the solver files are written, Ctrl-C raises KeyboardInterrupt.
+    The report names methods that failed and what interrupted the run. Ctrl-C ends the current method with its
+    best field; then no further method is tried and nothing is drawn. Before the solver files are written,
+    Ctrl-C raises KeyboardInterrupt.
 
     Parameters
     ----------
     instance
         The instance.
     folder
-        The folder to write to; it is made where it does not exist.
+        The folder to write to; created if it does not exist.
     limits
-        Limits of each method that searches; `Limits()` by default. The first line of `progress` says what
-        they amount to.
+        Limits of each method that searches; `Limits()` by default. The first line of `progress` states the
+        total.
     options
         Options as for `formulate`.
     dialects, jobs
@@ -239,7 +239,7 @@ def run(
     progress
         Receives lines of text.
     stop
-        A function or an event that says whether to stop, as Ctrl-C does. The solver files are always
+        A function that returns whether to stop, or an event, as Ctrl-C does. The solver files are always
         written.
 
     Returns

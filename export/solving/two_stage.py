@@ -125,8 +125,8 @@ def two_stage(
     start
         The first incumbent. None: the first field.
     stop
-        A function or an event that says whether to stop. The second stage then starts with the best point of
-        the first.
+        A function that returns whether to stop, or an event. The second stage then starts with the best
+        point of the first.
     options
         Options of `milp-mccormick`: facet, stroke_norm, beta_norm.
 

@@ -98,12 +98,12 @@ class Canonical:
 
     @cached_property
     def row_lower(self) -> Floats:
-        """Left sides of all rows, constants moved there, -inf where there is none, shape (rows,)."""
+        """Left sides of all rows, constants moved there, -inf without one, shape (rows,)."""
         return self._sides[0]
 
     @cached_property
     def row_upper(self) -> Floats:
-        """Right sides of all rows, inf where there is none, shape (rows,)."""
+        """Right sides of all rows, inf without one, shape (rows,)."""
         return self._sides[1]
 
     @cached_property

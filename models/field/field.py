@@ -143,8 +143,7 @@ class CrossField(Pictured):
         Raises
         ------
         InputError
-            For another shape, as that of the vectors `u` and `v`, and for values that are no angles: not
-            finite, or beyond 1e6.
+            For another shape, such as vectors, and for values that are not finite or exceed 1e6.
 
         """
         alpha, beta = label_of(_angles(instance, u_angle, "u_angle"), _angles(instance, v_angle, "v_angle"))

@@ -38,7 +38,7 @@ class ProblemArrays:
     a
         A, the linear terms of all rows, shape (m, n).
     row_lower, row_upper
-        Sides of the rows, shape (m,); -inf and inf where there is none. Constants of rows are on these sides.
+        Sides of the rows, shape (m,); -inf and inf without a side. Constants of rows are on these sides.
     row_products, row_factors
         Products of the rows: row, first and second column, shape (k, 3), and their factors, shape (k,).
         `row_q` returns the matrix of one row.
@@ -49,9 +49,8 @@ class ProblemArrays:
     column_names, row_names
         Names as in the files, shapes (n,) and (m,), or None when they were not asked for.
     nonlinear
-        Tags of the terms of the objective and of the rows that are no polynomials of degree 2 or less. None
-        of their coefficients is in the arrays, and their rows have the sides -inf and inf: the arrays are
-        then only a part of the problem.
+        Tags of the terms of the objective and of the rows that are not polynomials of degree 2 or less. The
+        arrays do not contain their coefficients, and their rows have the sides -inf and inf.
     family_rows
         Rows of each family by its tag.
 
@@ -180,7 +179,7 @@ def row_terms(
 
 
 def row_sides(families: Iterable[PlacedFamily]) -> tuple[Floats, Floats]:
-    """Left and right sides of all rows, constants moved there; -inf and inf where there is none."""
+    """Left and right sides of all rows, constants moved there; -inf and inf without a side."""
     lower, upper = [np.zeros(0)], [np.zeros(0)]
     for family in families:
         sense, nothing = family.family.sense, np.full(family.count, np.inf)

@@ -91,8 +91,8 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
     path
         The file to write.
     stop
-        A function or an event that says whether to stop. The certificate then has only the levels that were
-        checked before.
+        A function that returns whether to stop, or an event. The certificate then has only the levels
+        that were checked before.
 
     Returns
     -------

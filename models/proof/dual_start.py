@@ -40,9 +40,9 @@ def search(
 ) -> Search:
     """Search for a field of low 2-norm energy, from the greedy field on.
 
-    The result is no higher than `start` or, unless time cuts that off, than the first field. On grids of 65
-    to 1000 pixels, or that many at lower resolution, it is also no higher than what a short proof finds. That
-    needs 5 s or more, or 60 s where compiled code is not in the cache yet.
+    The result has at most the energy of `start` and, if time allows, of the first field. If the grid, or one
+    of its coarser versions, has 65 to 1000 pixels, the search also starts from the field of a short proof.
+    This takes 5 s or more, or 60 s while compiled code is not in the cache yet.
 
     Without a time limit the same instance, seed and rounds give the same field on the same kind of processor,
     for any number of jobs and threads. Ctrl-C ends the search with the best field so far.
@@ -67,7 +67,7 @@ def search(
     progress
         Receives a line of text after every round.
     stop
-        A function or an event that says whether to stop. The best field so far is then returned.
+        A function that returns whether to stop, or an event. The best field so far is then returned.
 
     Returns
     -------

@@ -37,7 +37,7 @@ def prove(
 
     The bound holds for both gauges. Under `box` it is the bound of `strokes`, and seldom tight. Without a
     time limit the same arguments give the same proof, for any number of threads. Ctrl-C ends the proof with
-    what it has.
+    its best field and bound.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def prove(
     progress
         Receives a line of text every few passes.
     stop
-        A function or an event that says whether to stop. The proof so far is then returned.
+        A function that returns whether to stop, or an event. The proof so far is then returned.
 
     Returns
     -------

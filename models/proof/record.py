@@ -64,7 +64,7 @@ class LevelRecord(Lattice):
 
 @dataclass(frozen=True, eq=False)
 class Proof(Claim):
-    """The best field that was found, and what is proven of it.
+    """The best field found, and the proven bound.
 
     Parameters
     ----------

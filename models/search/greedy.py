@@ -54,7 +54,7 @@ def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop 
     progress
         Receives a line of text after every batch: the number of jumps that are decided.
     stop
-        A function or an event that says whether to stop. All remaining jumps are then decided at once.
+        A function that returns whether to stop, or an event. All remaining jumps are then decided at once.
 
     Returns
     -------

@@ -44,7 +44,7 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
     field
         The field to begin with.
     stop
-        A function or an event that says whether to stop. The best field so far is then returned.
+        A function that returns whether to stop, or an event. The best field so far is then returned.
 
     Returns
     -------

@@ -14,7 +14,7 @@ costs one update of G. Angles outside the patch stay as they are; the energy is 
 Updates lose digits. Where the parities of all jumps fit together and every stroke has the same sign of beta,
 (alpha + c, beta -+ c) costs w_beta alone. Then H has an eigenvalue of about w_beta, and a jump that ends this
 state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is computed
-from its definition (`PatchEnergy`). If the updates give another energy, G is computed anew.
+from its definition (`PatchEnergy`). If the updates give another energy, G is computed again.
 Gains that no energy can have are discarded too.
 """
 

@@ -37,7 +37,7 @@ _FALL: Final = 1e-4  # least share of the energy that a round has to remove befo
 def bend_field(
     start: CrossField, *, harmonic: float | None = None, hold: float = HOLD, stop: Stop | None = None
 ) -> CrossField:
-    """Field of little bend to which the lines of `start` lead, with the best jumps.
+    """Field of little bend near the lines of `start`, with the best jumps.
 
     With line angles u, v in radians the energy is the sum of
 
@@ -46,13 +46,13 @@ def bend_field(
     - `hold` w_strokes w (line - theta)^2 over strokes, and
     - w_beta beta^2 over pixels (docs/mathematics.md, 10).
 
-    The jumps of `start` say which lines of neighbours belong together, and the nearer line of `start` carries
-    a stroke; both stay. So the start decides where singularities are. The method `bend` starts from the
-    PolyVector field with the hardest hold.
+    The jumps of `start` match the lines of neighbours, and the nearer line of `start` follows a stroke; both
+    are fixed. The start therefore determines the singularities. The method `bend` starts from the PolyVector
+    field with the hardest hold.
 
-    Each round keeps the unit vectors and minimises over the angles: one sparse system. The energy is then
-    computed anew. Rounds end when it has hardly fallen, after 20 rounds at the latest; a round in which it
-    rises is left out. Labels are then moved into the windows of the instance, as by `CrossField.from_lines`.
+    Each round fixes the unit vectors and minimises over the angles: one sparse system. Rounds end when the
+    energy hardly decreases, and after 20 rounds at the latest; a round that increases it is discarded. Labels
+    are then moved into the windows of the instance, as by `CrossField.from_lines`.
     Deterministic unless `stop` ends it.
 
     Parameters

@@ -56,8 +56,8 @@ def surface(
     flip
         Whether to turn all other parts inside out.
     stop
-        A function or an event that says whether to stop. The best heights so far are then returned, and a
-        doubt says so.
+        A function that returns whether to stop, or an event. The best heights so far are then returned with
+        a doubt.
     progress
         Receives a line of text when a part begins.
 
