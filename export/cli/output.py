@@ -152,8 +152,9 @@ def show_table(
 
 
 _LEGEND: Final = """\
-  off: mean angle from a stroke to the nearer line; <45°: pixels whose lines are
-  less than 45 degrees apart; sing.: singularities; s: seconds"""
+  start: the field from which methods begin; off: mean angle from a stroke to
+  the nearer line; <45°: pixels whose lines are less than 45 degrees apart;
+  sing.: singularities; s: seconds"""
 
 
 def show_report(report: Report, folder: Path) -> None:
