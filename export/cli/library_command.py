@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .help_texts import Command
-from .options import Folder, Json, Processes, Quiet, Seconds
-from .output import print_json, print_line, print_notice, progress, show_table
+from .option_groups import with_option_groups
+from .options import Folder, PrintOptions, Processes, Quiet, Seconds
+from .output import print_line, print_notice, progress, show_table
 
 if TYPE_CHECKING:
     from ..library.contributions.submit import Submission
@@ -21,7 +22,11 @@ library = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-command = partial(library.command, cls=Command)
+
+def command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Decorator that adds a function as a command of this name."""
+    return lambda function: library.command(name, cls=Command)(with_option_groups(function))
+
 
 Library = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield library build` wrote.")]
 
@@ -43,13 +48,12 @@ def build_command(
         bool,
         typer.Option("--search", help="Search for points and proofs even where the specification has them."),
     ] = False,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    printing: PrintOptions,
 ) -> None:
     """Build a library: every instance that the specification asks for, in its formulations and formats.
 
     Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file with all
-    facts about it. Whole files in the folder are kept, so that a build that was stopped continues.
+    facts about it. Complete files in the folder are kept, so an interrupted build continues.
     A size that is too small for a sketch is skipped with a message.
     """
     from dataclasses import replace
@@ -57,16 +61,14 @@ def build_command(
     from ..library.building.build import build, unmatched
     from ..library.plan.spec import default_spec, read_spec
 
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         show("reading the specification")
         wanted = default_spec() if spec == "default" else read_spec(spec)
         wanted = replace(wanted, points=None) if search else wanted
         built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
-    if as_json:
-        print_json(built.document)
-    elif not quiet:
-        left_out = f", {len(built.skipped)} instances skipped" if built.skipped else ""
-        print_line(f"{output}: {len(built.document['entries'])} entries{left_out}")
+    left_out = f", {len(built.skipped)} instances skipped" if built.skipped else ""
+    line = f"{output}: {len(built.document['entries'])} entries{left_out}"
+    printing.show(built.document, lambda: print_line(line))
     for name, reason in built.skipped.items():
         print_notice(f"{name} is skipped: {reason}")
     if stale := sorted({record.entry for record in unmatched(built)}):
@@ -101,13 +103,12 @@ def solve_command(
     machine: Annotated[
         str | None, typer.Option("--machine", metavar="TEXT", help="Processor and memory.")
     ] = None,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    printing: PrintOptions,
 ) -> None:
     """Run the installed solvers on a library and add bounds, times and better points to its ledger.json."""
     from ..library.contributions.solve import solve_library
 
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         records = solve_library(
             folder,
             solvers=solver,
@@ -117,14 +118,10 @@ def solve_command(
             machine=machine,
             progress=show,
         )
-    if as_json:
-        print_json(records)
-    elif not quiet:
-        failed = sum(record["status"] == "no point" for record in records)
-        print_line(
-            f"{folder / 'ledger.json'}: {len(records)} new records"
-            + (f", {failed} of them of runs that found no point" if failed else "")
-        )
+    failed = sum(record["status"] == "no point" for record in records)
+    without = f", {failed} of runs that found no point" if failed else ""
+    line = f"{folder / 'ledger.json'}: {len(records)} new records{without}"
+    printing.show(records, lambda: print_line(line))
 
 
 @command("verify")
@@ -132,8 +129,7 @@ def verify_command(
     folder: Library,
     *,
     jobs: Processes = 1,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    printing: PrintOptions,
 ) -> None:
     """Check a library: make every entry again and compare it, with its points, files and checksums.
 
@@ -143,12 +139,10 @@ def verify_command(
 
     from ..library.checking.check_library import verify_library
 
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         findings = verify_library(folder, jobs=jobs, progress=show)
-    if as_json:
-        print_json([asdict(finding) for finding in findings])
-    elif not quiet and not findings:
-        print_line(f"{folder}: no defects found")
+    result = f"defects: {len(findings)}" if findings else "no defects found"
+    printing.show([asdict(finding) for finding in findings], lambda: print_line(f"{folder}: {result}"))
     for finding in findings:
         print_notice(str(finding))
     if findings:
@@ -163,8 +157,7 @@ def release_command(
     ],
     *,
     jobs: Processes = 1,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    printing: PrintOptions,
 ) -> None:
     """Verify a library and write it as one archive for publication, with its checksum beside it.
 
@@ -173,12 +166,10 @@ def release_command(
     """
     from ..library.checking.release import release_library
 
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         frozen = release_library(folder, output, jobs=jobs, progress=show)
-    if as_json:
-        print_json({"file": str(frozen.file), "sha256": frozen.sha256, "files": frozen.files})
-    elif not quiet:
-        print_line(f"{frozen.file}: {frozen.files} files, SHA-256 {frozen.sha256}")
+    facts = {"file": str(frozen.file), "sha256": frozen.sha256, "files": frozen.files}
+    printing.show(facts, lambda: print_line("{file}: {files} files, SHA-256 {sha256}".format_map(facts)))
 
 
 @command("submit")
@@ -217,8 +208,7 @@ def submit_command(
     ] = None,
     by: Annotated[str | None, typer.Option("--by", metavar="TEXT", help="Name of the submitter.")] = None,
     date: Annotated[str | None, typer.Option("--date", metavar="YYYY-MM-DD", help="Day of the run.")] = None,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    printing: PrintOptions,
 ) -> None:
     """Check files against a library, keep what improves it, and rebuild what depends on them once.
 
@@ -232,12 +222,12 @@ def submit_command(
     from ..library.contributions.submit import submit
 
     facts = RunFacts(solver, version, status, bound, seconds, threads, time_limit, machine, by, date)  # type: ignore[arg-type]
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         found = submit(folder, files or [], entry=entry, facts=facts, progress=show)
-    if as_json:
-        print_json([_submitted(each) for each in found])
-    elif not quiet:
-        show_table(str(folder), ("file", "result", "entry", "now"), list(map(_row, found)))
+    columns = ("file", "result", "entry", "now")
+    printing.show(
+        list(map(_submitted, found)), lambda: show_table(str(folder), columns, list(map(_row, found)))
+    )
     refused = [each for each in found if each.error is not None]
     for each in refused:
         print_notice(str(each.error))
