@@ -119,7 +119,7 @@ def solve_command(
             progress=show,
         )
     failed = sum(record["status"] == "no point" for record in records)
-    without = f", {failed} of runs that found no point" if failed else ""
+    without = f", {failed} from runs without a point" if failed else ""
     line = f"{folder / 'ledger.json'}: {len(records)} new records{without}"
     printing.show(records, lambda: print_line(line))
 

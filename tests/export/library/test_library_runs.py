@@ -378,7 +378,7 @@ def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others
     """Writing a model takes longer than a nanosecond, which the command line does not accept as a limit."""
     solve_command(lib, solver=["highs"], time_limit=1e-9)
     said = capfd.readouterr().out
-    assert said == f"{lib / 'ledger.json'}: 4 new records, 4 of them of runs that found no point\n"
+    assert said == f"{lib / 'ledger.json'}: 4 new records, 4 from runs without a point\n"
     records = read_ledger(lib).records
     assert {each.entry for each in records} == {MILP, OTHER, QP, QP.replace("s1", "s2")}
     assert {(each.status, each.seconds, each.trace) for each in records} == {("no point", None, ())}
