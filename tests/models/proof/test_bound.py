@@ -129,13 +129,14 @@ def test_threads_change_no_bit():
 
 
 @pytest.mark.slow
-def test_the_bound_of_mouse_is_that_of_the_prototype():
+def test_the_bound_of_mouse_is_above_that_of_the_prototype():
     instance = cf.sample("mouse", 24, stroke_weight=1.0, skew_weight=1e-6)
     field = cf.search(instance, rounds=8, jobs=2).field
     assert field.energy().total == pytest.approx(5.014402, abs=1e-6)
     with crew(2) as hands:
         dual = Dual(Lattice.whole(field, 32), hands)
-        assert dual.ascend(60, never) == pytest.approx(4.81, abs=0.01)  # a gap of 4.0 %
+        # The prototype, with a deduction of h^2/2 on strokes of white pixels, had 4.81, a gap of 4.0 %.
+        assert dual.ascend(60, never) == pytest.approx(4.857, abs=0.01)
 
 
 def holds(lattice, cross):
