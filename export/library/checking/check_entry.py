@@ -1,14 +1,14 @@
-"""Checks of an entry against its problem, formulated again from the instance, and of its runs.
+"""Checks of an entry and of its runs.
 
-The entry is made again from what it was made of, and compared with what is in the library, model files
-unpacked; the best known point is read by the readers of solution files and evaluated, and, by the checker
-that ships with every library, against the .mps and the instance without any rounding.
+The entry is made again and compared with the library. Its best known point is read from its files and
+evaluated, and checked exactly against the .mps and the instance by the checker that every library contains.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,15 +18,13 @@ from ...formats.registry import generator
 from ...solutions.logs.registry import parse_log
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
-from ...writing.curvature import probtype
 from ..building.entry_task import Entry
 from ..documents.check_point import BadInputError, check
 from ..documents.documents import problem_of
-from ..documents.statistics import counts, curvature, ranges, sizes
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record
 from ..ledger.points import complete_point
-from ..ledger.standing import MAKERS, is_proven, relative_gap
+from ..ledger.standing import MAKERS
 from .finding import FEASIBLE, Finding, close, of_error
 from .made_again import entry_findings
 
@@ -36,10 +34,7 @@ _AGAIN: Final = "restore it, or submit the run again"
 def verify_entry(
     folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry | None
 ) -> Iterator[Finding]:
-    """Yield findings about an entry whose sidecar obeys its schema and whose files are those listed.
-
-    task: its inputs; None if they are damaged or missing, which is reported elsewhere.
-    """
+    """Yield findings about an entry with a valid sidecar and all its files; task: None for damaged inputs."""
     name = f"{sidecar['name']}.json"
     try:
         problem = problem_of(folder, sidecar)
@@ -47,40 +42,16 @@ def verify_entry(
         yield of_error(error, Path(error.file or name).name)
         return
     if sidecar["generator"] != generator():
-        made = f"was made by {sidecar['generator']}, so that {generator()} cannot make it again to compare it"
+        made = f"was made by {sidecar['generator']}, so {generator()} cannot make it again to compare it"
         yield Finding(name, made, f"verify with {sidecar['generator']}")
-        task = None
-    yield from _facts(name, sidecar, problem) if task is None else _again(folder, sidecar, task)
-    if sidecar["best"] is not None:
-        yield from _points(folder, sidecar, problem)
-        yield from _exactly(folder, sidecar)
-        yield from _unused(sidecar, problem, ledger)
-    yield from _bounds(name, sidecar)
-
-
-def _again(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
-    """Differences from the rebuilt entry, or the reason why it cannot be rebuilt."""
-    try:
-        yield from entry_findings(folder, sidecar, task)
-    except CrossfieldError as error:
-        yield of_error(error, Path(error.file or f"{task.name}.json").name)
-
-
-def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
-    """Wrong facts about the problem in the sidecar."""
-    instance = problem.instance
-    facts: dict[str, Any] = {
-        "class": problem.problem_class,
-        "convex": problem.convex,
-        "probtype": probtype(problem),
-        "counts": counts(problem),
-        "curvature": curvature(problem),
-        "ranges": ranges(problem),
-        "instance": sidecar["instance"] | sizes(instance) | {"sha256": instance.sha256},
-    }
-    for key, value in facts.items():
-        if sidecar[key] != value:
-            yield Finding(name, f"states another {key} than its problem has")
+    elif task is not None:
+        try:
+            yield from entry_findings(folder, sidecar, task)
+        except CrossfieldError as error:
+            yield of_error(error, Path(error.file or name).name)
+    yield from _points(folder, sidecar, problem)
+    yield from _exactly(folder, sidecar)
+    yield from _kept(sidecar["name"], problem, ledger)
 
 
 def _points(folder: Path, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
@@ -149,49 +120,14 @@ def _exactly(folder: Path, sidecar: dict[str, Any]) -> Iterator[Finding]:
             )
 
 
-def _unused(sidecar: dict[str, Any], problem: Problem, ledger: Ledger) -> Iterator[Finding]:
-    """A field of the ledger that is better than the best known point, because a build was stopped."""
-    record = ledger.with_point(sidecar["name"])
-    if record is None or record.problem_sha256 != problem.sha256:
+def _kept(entry: str, problem: Problem, ledger: Ledger) -> Iterator[Finding]:
+    """A false objective of the field that the ledger keeps for an entry."""
+    record = ledger.with_point(entry)
+    if record is None or record.primal is None or record.problem_sha256 != problem.sha256:
         return
-    try:
-        objective = problem.objective_value(complete_point(problem, ledger.field(record)))
-    except CrossfieldError:
-        return  # reported with the ledger
-    if record.primal is not None and not close(objective, record.primal):
-        yield Finding(
-            LEDGER,
-            f"states another objective of {record.point} than it has",
-            "restore it, or submit the point again",
-        )
-    stated = sidecar["best"]["objective"]
-    if objective < stated and not close(objective, stated):
-        yield Finding(
-            f"{sidecar['name']}.json", f"states a worse point than {record.point}, which the ledger has"
-        )
-
-
-def _bounds(name: str, sidecar: dict[str, Any]) -> Iterator[Finding]:
-    """Contradictions between bounds, status, gap and the best known point."""
-    bounds = [each["bound"] for each in sidecar["bounds"] if each["bound"] is not None]
-    bound = max(bounds, default=None)
-    if sidecar["bound"] != bound:
-        yield Finding(name, f"states the bound {sidecar['bound']}, but the best of its bounds is {bound}")
-    if sidecar["best"] is None:
-        return
-    objective = sidecar["best"]["objective"]
-    if bound is not None and bound > objective:
-        yield Finding(name, f"has a dual bound {bound!r} above the objective {objective!r} of its point")
-    gap = None if bound is None else relative_gap(objective, bound)
-    if (sidecar["status"], sidecar["gap"]) != (_status(sidecar, objective), gap):
-        yield Finding(name, "states another status or gap than follows from its bounds and its point")
-
-
-def _status(sidecar: dict[str, Any], objective: float) -> str:
-    """The status that follows from a sidecar's bounds; a closed gap is solved or claimed."""
-    if sidecar["bound"] is None or not is_proven(objective, sidecar["bound"]):
-        return "best known"
-    return "optimal" if "solved" in sidecar else "claimed"
+    with suppress(CrossfieldError):  # reported with the ledger
+        if not close(problem.objective_value(complete_point(problem, ledger.field(record))), record.primal):
+            yield Finding(LEDGER, f"states another objective of {record.point} than it has", _AGAIN)
 
 
 def run_findings(ledger: Ledger, record: Record) -> Iterator[Finding]:

@@ -5,11 +5,11 @@ Everything is recomputed: problems are formulated again from their instances (`v
 
 from __future__ import annotations
 
+import json
 import re
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,7 +24,6 @@ from ..building.entry_task import Entry
 from ..building.executor import executor
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
 from ..building.inputs import Inputs
-from ..documents.citation import cited
 from ..documents.documents import (
     INDEX,
     Library,
@@ -143,16 +142,9 @@ class _Verification:
 
     def _index(self, library: Library) -> Iterator[Finding]:
         """Findings about the index, and missing texts and checkers."""
-        document = library.document
-        names = document["entries"]
-        if document["generator"] == generator():
-            yield from self._release(library)
-        if sorted(document["sha256"]) != sorted(names):
+        names = library.document["entries"]
+        if sorted(library.document["sha256"]) != sorted(names):
             yield Finding(INDEX, "lists other entries than it has checksums for")
-        for name in names:
-            path = self.folder / f"{name}.json"
-            if path.name in self.present and sha256_of(path) != document["sha256"].get(name):
-                yield Finding(path.name, f"has another SHA-256 than {INDEX} states")
         try:
             spec = library.spec
             plans = plan(spec)
@@ -167,12 +159,6 @@ class _Verification:
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
 
-    def _release(self, library: Library) -> Iterator[Finding]:
-        """A release that does not follow from the specification."""
-        with suppress(CrossfieldError):  # reported with the specification
-            if library.document.get("release") != cited(library.spec):
-                yield Finding(INDEX, "states another release than follows from the specification")
-
     def _skipped(self, library: Library, plans: tuple[InstancePlan, ...]) -> Iterator[Finding]:
         """Skipped instances that can be made, or that have another reason."""
         recipes = {each.recipe.name: each.recipe for each in plans}
@@ -186,7 +172,7 @@ class _Verification:
                     yield Finding(INDEX, f"states another reason for leaving {name} out than there is")
 
     def _entries(self, library: Library) -> Iterator[Finding]:
-        """Findings about ledger, instances and entries, and about texts if there are none before."""
+        """Findings about ledger, instances and entries, and about texts if all entries are sound."""
         try:
             ledger = read_ledger(self.folder)
         except CrossfieldError as error:
@@ -224,13 +210,13 @@ class _Verification:
         return None
 
     def _texts(self, library: Library, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
-        """Texts, drawings, checkers and library.solu that differ from those made of sound sidecars."""
-        if library.document["generator"] != generator():
-            return
+        """General files that differ from those made of sound sidecars."""
         try:
-            made = general(library.spec, sidecars, library.skipped)
+            made = general(self.folder, library.spec, sidecars, library.skipped)
         except CrossfieldError:
             return  # reported with the index
+        if json.loads(made.pop(INDEX)) != library.document:
+            yield Finding(INDEX, "is not what follows from the specification and the sidecars")
         for name in sorted(made):
             if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
                 yield Finding(name, "is not what follows from the specification and the sidecars")

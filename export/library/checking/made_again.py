@@ -22,8 +22,7 @@ from ..ledger.certificates import METHOD
 from ..ledger.points import Provenance, ours
 from .finding import Finding, close
 
-_FROM_EACH_OTHER: Final = {"best", "bound", "gap", "files"}
-"""Keys of a sidecar that are compared elsewhere: with points, with each other, file by file."""
+_APART: Final = {"best", "files"}  # keys of a sidecar that are compared part by part
 
 
 def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
@@ -32,7 +31,7 @@ def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterat
     made = json.loads(files[name])
     yield from _models(folder, sidecar, files)
     for key in dict.fromkeys((*made, *sidecar)):
-        if key not in _FROM_EACH_OTHER and not same(sidecar.get(key), made.get(key)):
+        if key not in _APART and not same(sidecar.get(key), made.get(key)):
             yield Finding(name, f"states another {key} than follows from its instance and the ledger")
     if _described(sidecar["files"]) != _described(made["files"]):
         yield Finding(name, "states other files, or other things of them, than are made of its problem")

@@ -220,13 +220,14 @@ SEALED = {
         QP,
         "a number that is not finite",
     ),
-    "a bound beyond all numbers": (edit(QP, **bound_of(10**400)), QP, "no entry can have"),
+    "a bound beyond all numbers": (edit(QP, **bound_of(10**400)), QP, "another bounds"),
     "another option": (edit(MILP, options__facet="printed"), f"{STEM}.instance.json", "is not the instance"),
     "another objective": (
         edit(MIQP, best__objective=lambda value: value + 1e-7),
         f"{STEM}_miqp.sol",
         "has objective",
     ),
+    "an entry without a point": (edit(MILP, best=None), MILP, "$.best"),
     "another energy": (
         edit(MIQP, best__energy_2norm=lambda value: value + 1e-7),
         f"{STEM}_miqp.sol",
@@ -244,9 +245,9 @@ SEALED = {
         f"{STEM}_milp.nl.sol",
         "not a solution file of a known kind",
     ),
-    "a bound above a point": (edit(MIQP, **bound_of(1e3)), MIQP, "above the objective"),
-    "a status that does not follow": (edit(MIQP, **bound_of(-1.0)), MIQP, "another status or gap"),
-    "a bound that is none of the bounds": (edit(QP, bound=-5.0), QP, "the best of its bounds"),
+    "a bound above a point": (edit(MIQP, **bound_of(1e3)), MIQP, "another bounds"),
+    "a status that does not follow": (edit(MIQP, **bound_of(-1.0)), MIQP, "another status"),
+    "a bound that is none of the bounds": (edit(QP, bound=-5.0), QP, "another bound "),
     "a fact in library.solu": (
         text("library.solu", b"= " + MILP[:-5].encode(), b"= " + MIQP[:-5].encode()),
         "library.solu",

@@ -164,7 +164,9 @@ def test_another_origin_makes_an_instance_again_and_a_forged_one_is_found(mixed,
     index = json.loads((folder / "library.json").read_text())
     index["release"]["authors"] = ["M. Allory"]
     (folder / "library.json").write_text(json.dumps(index))
-    assert "states another release" in " ".join(str(each) for each in verify_library(folder))
+    assert "library.json: is not what follows from the specification" in " ".join(
+        str(each) for each in verify_library(folder)
+    )
 
 
 def test_an_invalid_origin_or_release_is_refused(tmp_path):
