@@ -36,11 +36,7 @@ _LISTED: Final = 4  # entries named in a message
 
 
 def kinds_of(path: Path) -> set[Kind]:
-    """Return the kinds of a file by its content, and of a .rawfield by its suffix.
-
-    A file may be a solution and a log at once, as those of BARON are. The set is empty for a file of no known
-    kind. Raises InputError for a file that cannot be read.
-    """
+    """Return the kinds of a file: none for an unknown kind, and two for BARON's, a solution and a log."""
     data = read_bytes(path)
     if path.suffix.lower() == ".rawfield":
         return {"field"}
@@ -83,10 +79,6 @@ class Entries:
         self.library = library
         self._problems: dict[str, Problem] = {}
 
-    def sidecar(self, name: str) -> dict[str, Any]:
-        """Return the sidecar of an entry. Raises InputError for a name that the library does not have."""
-        return self.library.entry(name)
-
     def problem(self, sidecar: dict[str, Any]) -> Problem:
         """Return the problem of an entry. Raises as `problem_of`."""
         name = sidecar["name"]
@@ -94,16 +86,10 @@ class Entries:
             self._problems[name] = problem_of(self.library, sidecar)
         return self._problems[name]
 
-    def on(self, instance_sha256: str) -> list[dict[str, Any]]:
-        """Return the sidecars of the entries of an instance."""
-        return [each for each in self.library.entries if each["instance"]["sha256"] == instance_sha256]
-
     def by_file_name(self, path: Path) -> str:
-        """Return the longest name of an entry that the file's name begins with; empty if there is none."""
-        known = (
-            name for name in self.library.document["entries"] if re.match(rf"{name}([._-]|$)", path.name)
-        )
-        return max(known, key=len, default="")
+        """Return the longest name of an entry with which the file's name begins; empty if there is none."""
+        names = self.library.document["entries"]
+        return max((each for each in names if re.match(rf"{each}([._-]|$)", path.name)), key=len, default="")
 
     def by_stamp(self, stamps: Iterable[str]) -> str:
         """Return the only entry whose problem has one of the stamps; empty if there is none."""
@@ -121,19 +107,14 @@ class Entries:
     def of_log(self, log: RunLog, path: Path) -> str:
         """Return the entry of a log by its stamps, the names in it or the file's name; empty if unknown."""
         named = self.named_in(log.text)
-        return (
-            self.by_stamp(log.stamps) or (named.pop() if len(named) == 1 else "") or self.by_file_name(path)
-        )
+        only = named.pop() if len(named) == 1 else ""
+        return self.by_stamp(log.stamps) or only or self.by_file_name(path)
 
     def of_solution(self, raw: RawSolution, path: Path) -> str:
-        """Return the entry of a solution by its stamp, its file's name or its columns.
-
-        Raises SolutionError unless exactly one entry fits.
-        """
-        by_stamp = self.by_stamp([raw.stamp]) if raw.stamp else ""
-        return by_stamp or self.by_file_name(path) or self._by_columns(raw, path)
-
-    def _by_columns(self, raw: RawSolution, path: Path) -> str:
+        """Return the entry of a solution by stamp, file name or columns. Raises SolutionError if unclear."""
+        name = (self.by_stamp([raw.stamp]) if raw.stamp else "") or self.by_file_name(path)
+        if name:
+            return name
         fitting = [each["name"] for each in self.library.entries if self._fits(raw, path, each)]
         if len(fitting) == 1:
             return str(fitting[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -15,7 +16,7 @@ from .run_record import LogFile, RunFacts
 
 @dataclass(frozen=True)
 class Source:
-    """A submitted file, or the solution and the log of one run. error: if the file cannot be read."""
+    """A submitted file, or the solution and the log of one run. listed: not only found in a folder."""
 
     kind: Kind | Literal["bound", ""]
     path: Path | None = None
@@ -35,10 +36,7 @@ class Source:
 
 
 def sources_of(files: Sequence[str | Path], facts: RunFacts) -> list[Source]:
-    """Return files by kind, solutions with their logs.
-
-    Raises InputError for a bound or status with several files, and for no file and no bound.
-    """
+    """Return files by kind, solutions with their logs. Raises InputError for facts that do not fit them."""
     found = [_source(path, listed) for path, listed in _expanded(files)]
     logs = {each.path.with_suffix(""): each for each in found if each.kind == "log" and each.path}
     paired = []
@@ -76,22 +74,13 @@ def _source(path: Path, listed: bool) -> Source:
         kinds = kinds_of(path)
     except CrossfieldError as error:
         return Source("", path, error=error)
-    if kinds == {"solution", "log"}:
-        return _both(path)
-    return Source(next(iter(kinds), ""), path, listed=listed)
-
-
-def _both(path: Path) -> Source:
-    """The file as the log of a run, as its solution, or as both, depending on its content."""
-    try:
-        LogFile.read(path)
-        has_log = True
-    except CrossfieldError:
-        has_log = False
-    try:
+    if kinds != {"solution", "log"}:
+        return Source(next(iter(kinds), ""), path, listed=listed)
+    has_log = has_point = False
+    with suppress(CrossfieldError):
+        has_log = bool(LogFile.read(path))
+    with suppress(CrossfieldError):
         has_point = read_raw(path).has_point
-    except CrossfieldError:
-        has_point = False
     if has_log and not has_point:
         return Source("log", path)
     return Source("solution", path, path if has_log else None)
