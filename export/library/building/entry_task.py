@@ -1,8 +1,4 @@
-"""The task of each entry: model files in every format, the best known point, and the sidecar.
-
-Like the task of an instance it is a function from values to the bytes of files; the sidecar comes last, so
-that an entry whose sidecar stands and fits is done.
-"""
+"""The task of each entry: model files in every format, the best known point, and the sidecar last."""
 
 from __future__ import annotations
 
@@ -29,10 +25,9 @@ from ...writing.records import number
 from ..documents.citation import REFERENCES
 from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
 from ..documents.statistics import counts, curvature, density, ranges, tangent_bound
-from ..ledger.certificates import METHOD
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record
-from ..ledger.points import Best, Known, Provenance, best_point, complete_point, ours
+from ..ledger.points import METHOD, Best, Known, Provenance, best_point, complete_point, ours
 from ..ledger.standing import (
     best_of_each,
     contradicts,
@@ -53,10 +48,9 @@ _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for
 
 @dataclass(frozen=True)
 class Entry:
-    """The task of an entry: its recipe and the facts about its instance.
+    """The task of an entry: its recipe, and the document and files of its instance.
 
-    records and submitted: what the ledger has of all entries of the instance, records and kept fields;
-    relatives: names of the entries that may be related.
+    records, submitted: of all entries of the instance in the ledger; relatives: entries that may be related.
     """
 
     recipe: EntryRecipe
@@ -91,12 +85,9 @@ def make_entry(task: Entry) -> Files:
         best = best_point(problem, list(known.values()))
         records = _records(task, best, instance)
         bounds = _bounds(task, best, records)
-        facts = standing(best.objective, bounds, records, task.name)
-        status = facts["status"]
-        listed += _points(task, best, Path(made), proven=status == "optimal")
-        found = _gap(best, bounds, status) | {"runs": runs_of(records, task.name, best.objective)}
-        found |= {"density": density(instance), "difficulty": _grade(task, best, bounds, status)}
-        document = _sidecar(task, best, listed, refused) | found | facts | _context(task, problem)
+        results = _results(task, best, records, bounds)
+        listed += _points(task, best, Path(made), proven=results["status"] == "optimal")
+        document = _sidecar(task, best, listed, refused) | results | _context(task, problem)
         files = {each["name"]: (Path(made) / each["name"]).read_bytes() for each in listed}
         return files | {f"{task.name}.json": as_bytes(document)}
 
@@ -142,7 +133,7 @@ def _models(
 
 
 def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict[str, Any]]:
-    """Facts of the best point's files written to the folder: MIPLIB's kind, and AMPL's for a .nl."""
+    """Facts of the files of the best point in the folder: in MIPLIB's format, and in AMPL's for a .nl."""
     path = folder / f"{task.name}.sol"
     path.write_bytes(b"".join(_miplib(best)))
     listed = [_listed(path, "miplib", ["columns as in the .mps and .lp; those at 0 are left out"])]
@@ -157,7 +148,7 @@ def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict
 
 
 def _miplib(best: Best) -> Iterator[bytes]:
-    """The lines of a .sol file as MIPLIB has them, in the columns of LP and MPS."""
+    """The lines of a .sol file in MIPLIB's format, with the columns of LP and MPS."""
     held = start_of(best.problem, best.known.field).problem
     start = Start(held, complete_point(held, best.known.field))
     yield f"=obj= {number(start.objective)}\n".encode()
@@ -197,7 +188,7 @@ def _within(stated: dict[str, Any], best: Best, entry: str) -> float:
 
 
 def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
-    """The records about this problem or another one with the same optimum."""
+    """The records about this problem and those with the same optimum."""
     shas = {task.name: best.problem.sha256}
     for name, formulation in siblings(task.recipe, task.relatives).items():
         shas[name] = _formulated(instance, formulation, "hull", best.known.field.p).sha256
@@ -216,21 +207,23 @@ def _computed(method: str, bound: float) -> dict[str, Any]:
     return found | {"seconds": None, "threads": None, "via": None}
 
 
-def _gap(best: Best, bounds: list[dict[str, Any]], status: str) -> dict[str, Any]:
-    """The dual bounds, the greatest one, and the gap to the best point."""
+def _results(task: Entry, best: Best, records: list[Record], bounds: list[dict[str, Any]]) -> dict[str, Any]:
+    """Dual bounds, status, gap, runs and grade of the entry."""
+    facts = standing(best.objective, bounds, records, task.name)
     bound = max((each["bound"] for each in bounds), default=None)
     gap = None if bound is None else relative_gap(best.objective, bound)
-    return {"bounds": bounds, "bound": bound, "status": status, "gap": gap}
-
-
-def _grade(task: Entry, best: Best, bounds: list[dict[str, Any]], status: str) -> str:
-    """The grade of the entry, from its own runs and the tangent at its point."""
-    runs = [
-        each for each in task.records if (each.entry, each.problem_sha256) == (task.name, best.problem.sha256)
-    ]
-    shown = [each["bound"] for each in bounds if each["solver"] == ours(_TANGENT).solver]
-    tangent = any(is_proven(best.objective, bound) for bound in shown)
-    return difficulty(status, runs, tangent=tangent)
+    tangents = [each["bound"] for each in bounds if each["solver"] == ours(_TANGENT).solver]
+    tangent = any(is_proven(best.objective, each) for each in tangents)
+    runs = [each for each in records if each.entry == task.name]
+    return {
+        "bounds": bounds,
+        "bound": bound,
+        "status": facts["status"],
+        "gap": gap,
+        "runs": runs_of(records, task.name, best.objective),
+        "density": density(best.problem.instance),
+        "difficulty": difficulty(facts["status"], runs, tangent=tangent),
+    } | facts
 
 
 def _sidecar(

@@ -40,8 +40,11 @@ def write_index(folder: Path, spec: Spec, plans: Sequence[InstancePlan], skipped
     written = general(folder, spec, sidecars, skipped)
     for name, data in written.items():
         write_bytes(folder / name, data)
-    beside = read_ledger(folder).files
-    present = {*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *beside}
+    abouts = [about_file(each.recipe.name) for each in plans]
+    documents = sidecars + [read_about(folder / name) for name in abouts]
+    listed = {file["name"] for each in documents for file in each["files"]}
+    present = {*written, LEDGER, *abouts, *listed, *read_ledger(folder).files}
+    present |= {f"{each['name']}.json" for each in sidecars}
     _remove_stale(folder, present)
     sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(present))
     write_bytes(folder / SUMS, sums.encode())
@@ -62,7 +65,6 @@ def general(
 
 
 def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    """The context of the templates."""
     rungs = [_rung(name, [each for each in sidecars if each["rung"] == name]) for name in RUNGS]
     written = {file["format"] for each in sidecars for file in each["files"]}
     return {
@@ -117,22 +119,6 @@ def _index(folder: Path, spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str
         "entries": names,
         "sha256": {name: sha256_of(folder / f"{name}.json") for name in names},
     }
-
-
-def _of_instances(folder: Path, plans: Sequence[InstancePlan]) -> list[str]:
-    found = []
-    for each in plans:
-        name = about_file(each.recipe.name)
-        found += [name, *(file["name"] for file in read_about(folder / name)["files"])]
-    return found
-
-
-def _of_entries(sidecars: list[dict[str, Any]]) -> list[str]:
-    return [
-        name
-        for each in sidecars
-        for name in (f"{each['name']}.json", *(file["name"] for file in each["files"]))
-    ]
 
 
 def _remove_stale(folder: Path, present: set[str]) -> None:

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ....models.storage import read_bytes
-from ..ledger.certificates import METHOD
 from ..ledger.given import Points, nothing
 from ..ledger.ledger import Ledger, Record
-from ..ledger.points import Provenance, ours
+from ..ledger.points import METHOD, Provenance, ours
 from ..plan.recipe import InstancePlan
 from .entry_task import Entry
 from .instance_task import Evidence, Preparation, Submitted
@@ -35,13 +34,10 @@ class Inputs:
         """Yield the tasks of its entries. Raises as `preparation`, and InputError for a missing file."""
         files = {facts["name"]: read_bytes(folder / facts["name"]) for facts in about["files"]}
         relatives, submitted = tuple(self._relatives[_relation(each)]), self._submitted(each)
-        records = self._records(each)
+        names = {entry.name for entry in each.entries}
+        records = tuple(record for record in self.ledger.records if record.entry in names)
         for recipe in each.entries:
             yield Entry(recipe, about, files, records, submitted, relatives)
-
-    def _records(self, each: InstancePlan) -> tuple[Record, ...]:
-        names = {entry.name for entry in each.entries}
-        return tuple(record for record in self.ledger.records if record.entry in names)
 
     def _submitted(self, each: InstancePlan) -> tuple[Submitted, ...]:
         """The fields that the ledger keeps for the entries of an instance."""
@@ -55,7 +51,7 @@ class Inputs:
 
     def _certificate(self, instance: str) -> Evidence | None:
         """The certificate that the ledger keeps for an instance."""
-        kept = self.ledger.certificate(instance)
+        kept = next((each for each in self.ledger.certificates if each.instance == instance), None)
         if kept is None:
             return None
         data = self.ledger.content(kept.file, kept.sha256)

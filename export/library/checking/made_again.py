@@ -18,8 +18,7 @@ from ....models.storage import read_bytes
 from ...formats.registry import FORMATS
 from ..building.entry_task import Entry, make_entry
 from ..building.instance_task import Files, Preparation, source_of, stated_of
-from ..ledger.certificates import METHOD
-from ..ledger.points import Provenance, ours
+from ..ledger.points import METHOD, Provenance, ours
 from .finding import Finding, close
 
 _APART: Final = {"best", "files"}  # keys of a sidecar that are compared part by part
