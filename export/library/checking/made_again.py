@@ -1,8 +1,4 @@
-"""Comparison of a library with its documents rebuilt from their sources.
-
-Only search results are taken from the library: the fields of each instance, and the records of the ledger.
-Everything else follows from these.
-"""
+"""Comparison of a library with its documents rebuilt from its specification, fields and ledger."""
 
 from __future__ import annotations
 
@@ -10,6 +6,7 @@ import gzip
 import json
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -71,11 +68,10 @@ def _models(folder: Path, sidecar: dict[str, Any], made: Files) -> Iterator[Find
 
 
 def _content(data: bytes, name: str) -> bytes | None:
-    """Bytes of a file, unpacked; None when it is damaged."""
-    try:
+    """Bytes of a file, unpacked; None if it is damaged."""
+    with suppress(OSError, EOFError, zlib.error):
         return gzip.decompress(data) if name.endswith(".gz") else data
-    except (OSError, EOFError, zlib.error):
-        return None
+    return None
 
 
 def _described(files: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -85,9 +81,8 @@ def _described(files: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _known(task: Entry) -> set[Provenance]:
     """The provenances of the known fields of an entry's instance."""
-    return {Provenance.of(facts) for facts in task.about["fields"].values()} | {
-        each.provenance for each in task.submitted
-    }
+    known = {Provenance.of(facts) for facts in task.about["fields"].values()}
+    return known | {each.provenance for each in task.submitted}
 
 
 def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Preparation) -> Iterator[Finding]:
@@ -107,18 +102,13 @@ def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Prep
     for key, value in expected.items():
         if not same(about.get(key), value):
             yield Finding(name, f"states another {key} than follows from the specification")
+    if "given" in about:
+        return
     known = {each.provenance for each in task.submitted}
     known |= {task.evidence.provenance} if task.evidence else set()
+    known |= set(map(ours, ("greedy", "search", "two stages", METHOD)))
     for role, facts in about["fields"].items():
         found = Provenance.of(facts)
-        if "given" not in about and found not in known and not _is_of_a_build(found):
+        by_highs = (found.solver, found.seconds, found.by) == ("HiGHS", None, None)  # of any version
+        if found not in known and not by_highs:
             yield Finding(name, f"names a finder of its field {role} whom the ledger does not know")
-
-
-def _is_of_a_build(found: Provenance) -> bool:
-    """Whether a build finds such a field itself, with any version of HiGHS."""
-    by_highs = (found.solver, found.seconds, found.by) == ("HiGHS", None, None)
-    return by_highs or found in map(ours, _METHODS)
-
-
-_METHODS: Final = ("greedy", "search", "two stages", METHOD)

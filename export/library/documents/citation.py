@@ -1,7 +1,6 @@
-"""Citation and licences of a library.
+"""Citation and licences of a library, as its specification states them for each sketch.
 
-Licences are those that the specification states, sketch by sketch. The paper is cited by its title alone,
-because nothing else about it is certain.
+The paper is cited by its title alone, because nothing else about it is certain.
 """
 
 from __future__ import annotations
@@ -32,7 +31,6 @@ LICENCES: Final = {
     },
     "MIT": ("MIT licence", "https://opensource.org/license/mit"),
 }
-"""Full name and address of known licences."""
 
 PAPER: Final = (
     "Extrapolating curvature lines in rough concept sketches using mixed-integer nonlinear optimization"
@@ -55,7 +53,6 @@ REFERENCES: Final = (
         "the problem"
     ),
 )
-"""References of every entry."""
 
 _SPECIAL: Final = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
 _SPECIAL_OF_TEX: Final = _SPECIAL | {letter: f"\\{letter}" for letter in "&%$#_{}"}
@@ -80,7 +77,7 @@ def bibtex(spec: Spec) -> str:
         }
     return "\n\n".join(
         (
-            _entry("misc", _key(spec), fields),
+            _entry("misc", "_".join([slug(spec.title, "_"), *([fields["year"]] if release else [])]), fields),
             _entry("misc", "extrapolating_curvature_lines", {"title": f"{{{PAPER}}}"}),
             _entry("article", "bendfields", BENDFIELDS | {"title": f"{{{BENDFIELDS['title']}}}"}),
         )
@@ -89,11 +86,6 @@ def bibtex(spec: Spec) -> str:
 
 def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
     return f"@{kind}{{{key},\n" + "".join(f"  {name} = {{{text}}},\n" for name, text in fields.items()) + "}"
-
-
-def _key(spec: Spec) -> str:
-    year = spec.release.date[:4] if spec.release else ""
-    return "_".join(filter(None, (slug(spec.title, "_"), year)))
 
 
 def slug(text: str, between: str = "-") -> str:

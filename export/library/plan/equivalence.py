@@ -52,13 +52,17 @@ def not_equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str
         if declared.minimises != mine
     ]
     if "facet" in FORMULATIONS[recipe.formulation].settable:
-        found.append(_other_facet(recipe, names))
+        facet = "hull" if recipe.facet == "printed" else "printed"
+        found.append(_relation(recipe, recipe.formulation, names, _FACETS[facet], facet))
     return found + _other_gauge(recipe, names)
 
 
-def _relation(recipe: EntryRecipe, formulation: str, names: Collection[str], why: str) -> dict[str, Any]:
-    name = entry_name(recipe.instance, formulation, "hull")
-    return {"formulation": formulation, "entry": name if name in names else None, "why": why}
+def _relation(
+    recipe: EntryRecipe, formulation: str, names: Collection[str], why: str, facet: str = ""
+) -> dict[str, Any]:
+    name = entry_name(recipe.instance, formulation, facet or "hull")
+    shown = f"{formulation} (facet {facet})" if facet else formulation
+    return {"formulation": shown, "entry": name if name in names else None, "why": why}
 
 
 def _difference(recipe: EntryRecipe, other: str) -> str:
@@ -68,13 +72,6 @@ def _difference(recipe: EntryRecipe, other: str) -> str:
     if mine == AT_JUMPS and theirs == TWO_NORM:
         return "its jumps are free: its optimum is a lower bound of this one"
     return f"it minimises {theirs}, this one {mine}: points transfer, optima differ"
-
-
-def _other_facet(recipe: EntryRecipe, names: Collection[str]) -> dict[str, Any]:
-    facet = "hull" if recipe.facet == "printed" else "printed"
-    name = entry_name(recipe.instance, recipe.formulation, facet)
-    shown = f"{recipe.formulation} (facet {facet})"
-    return {"formulation": shown, "entry": name if name in names else None, "why": _FACETS[facet]}
 
 
 def _other_gauge(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:

@@ -1,45 +1,14 @@
-"""The specification of a library: which sketches, sizes, gauges, seeds, formulations and formats.
+"""The specification of a library, read from TOML: sketches, sizes, gauges, seeds, formulations and formats.
 
-Read from TOML and checked.
-
-    format = "crossfield-library-spec"
-    version = 1
-    title = "..."                      one line
-    formulations = ["..."]             all by default
-    gauges = ["strokes"], facets = ["hull"]    may also stand in a rung, which then has its own
-    ledger = "ledger.json"             what solvers found before, with its fields beside it; may be left out
-    points = "points"                  fields and certificates by `crossfield library points`; may be left out
-
-    [release]                          what is cited; may be left out
-    version = "1.0", date = "2026-11-22", authors = ["A. Name"]
-
-    [rungs.tiny]                       tiny, small, medium or large
-    sizes = [4]                        pixels on the longer side
-    formats = ["nl", "mps"]            all by default
-    compress = false                   .gz
-    prove = true                       certificates of 2-norm optima; by default on tiny and small
-
-    [[sketches]]
-    name = "bend"                      lower case and digits, part of every name
-    sample = "cylinder_bend"           or file = "drawing.svg" (with mask = "mask.png" if need be),
-                                       or random = "full" | "ragged"
-    seeds = [1, 2]                     of a random one
-    rungs = ["tiny"]                   all by default
-    sizes = { tiny = [10] }            other ones than the rung has, for a drawing that needs them
-    author = "A. Name"                 of the drawing; with license and source, told where they are stated
-    license = "CC-BY-4.0"              best as SPDX has it
-    source = "..."                     where it is from
-    added = "2026-11-22"               when it came into the library; also of a rung: the later day counts
-
-Files are found from the folder of the specification. The form is library-spec.schema.json beside this module;
-this module checks names in tables, and combinations of keys.
+docs/library.md describes its keys, and library-spec.schema.json in this folder its form. This module checks
+names in tables, and combinations of keys. Files are relative to the folder of the specification.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
@@ -60,9 +29,7 @@ from ...formats.registry import FORMATS
 FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
 RUNGS: Final = ("tiny", "small", "medium", "large")
-"""The ladder: every solver in seconds; optimum proven; gap open; reading and presolve."""
-PROVEN: Final = ("tiny", "small")
-"""Rungs whose 2-norm optima are proven by default: most proofs take a second there."""
+PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by default: most take a second
 Kind = Literal["sample", "file", "random"]
 DEFAULT: Final = Path(__file__).with_name("default.toml")
 
@@ -85,9 +52,6 @@ class Origin:
         return {key: value for key, value in asdict(self).items() if value}
 
 
-NOTHING_STATED: Final = Origin()
-
-
 @dataclass(frozen=True)
 class Release:
     """A citable release of a library. date: as 2026-11-22; authors: names as they are cited."""
@@ -103,7 +67,7 @@ class Release:
 
     def document(self) -> dict[str, Any]:
         """Return the release as a table of a specification."""
-        return {"version": self.version, "date": self.date, "authors": list(self.authors)}
+        return asdict(self) | {"authors": list(self.authors)}
 
 
 def day(text: str, place: str) -> str:
@@ -129,24 +93,17 @@ class Rung:
 
     def document(self) -> dict[str, Any]:
         """Return the rung as a table of a specification."""
-        return {
-            "sizes": list(self.sizes),
-            "formats": list(self.formats),
-            "compress": self.compress,
-            "gauges": list(self.gauges),
-            "facets": list(self.facets),
-            "prove": self.prove,
-            **({"added": self.added} if self.added else {}),
-        }
+        named = asdict(self).items()
+        stated = {key: list(value) if isinstance(value, tuple) else value for key, value in named}
+        return {key: value for key, value in stated.items() if key != "name" and value != ""}
 
 
 @dataclass(frozen=True)
 class Sketch:
     """Source of instances: a sample, a file with its mask, or random strokes of some seeds.
 
-    name: short, part of every name. sizes: by rung, where they are not the rung's. what: the sample, the
-    file's own name, or the shape of a random mask. drawing, mask: as they are published, with the suffixes of
-    their files.
+    what: the sample, the file's own name, or the shape of a random mask. sizes: by rung, if they differ from
+    the rung's. drawing, mask: published bytes.
     """
 
     name: str
@@ -154,13 +111,13 @@ class Sketch:
     what: str
     title: str
     rungs: tuple[str, ...]
+    origin: Origin
     sizes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     seeds: tuple[int | None, ...] = (None,)
     drawing: bytes = b""
     suffix: str = ""
     mask: bytes = b""
     mask_suffix: str = ""
-    origin: Origin = NOTHING_STATED
     added: str = ""
 
     def sizes_on(self, rung: Rung) -> tuple[int, ...]:
@@ -172,15 +129,8 @@ class Sketch:
         """Files of the library that hold the drawing and its mask, by name."""
         if self.kind == "sample" and SAMPLES[self.what].kind == "sketch":
             return {f"cf_{self.name}.sketch.svg": sample_svg(self.what).encode()}
-        return {
-            name: data for name, data in ((self._copy(), self.drawing), (self._mask(), self.mask)) if data
-        }
-
-    def _copy(self) -> str:
-        return f"cf_{self.name}.sketch{self.suffix}"
-
-    def _mask(self) -> str:
-        return f"cf_{self.name}.mask{self.mask_suffix}"
+        drawing, mask = f"cf_{self.name}.sketch{self.suffix}", f"cf_{self.name}.mask{self.mask_suffix}"
+        return {name: data for name, data in ((drawing, self.drawing), (mask, self.mask)) if data}
 
     def document(self) -> dict[str, Any]:
         """Return the sketch as a table of a specification, with its file names in a library."""
@@ -191,17 +141,13 @@ class Sketch:
             return head | {"sample": self.what}
         if self.kind == "random":
             return head | {"random": self.what, "seeds": list(self.seeds)}
-        masked = {"mask": self._mask()} if self.mask else {}
-        return head | {"file": self._copy(), "file_name": self.what} | masked
+        drawing, *mask = self.files
+        return head | {"file": drawing, "file_name": self.what} | ({"mask": mask[0]} if mask else {})
 
 
 @dataclass(frozen=True)
 class Spec:
-    """A checked specification.
-
-    ledger: file of a ledger that the build uses, or None; points: a folder of fields and
-    certificates that replace searches, or None.
-    """
+    """A checked specification. ledger: its file; points: a folder of results that replace searches."""
 
     title: str
     formulations: tuple[str, ...]
@@ -242,7 +188,7 @@ def read_spec(path: str | Path) -> Spec:
 
 
 def spec_of(document: dict[str, Any], path: Path) -> Spec:
-    """Return the specification of a document with files beside `path`. Raises InputError, naming `path`."""
+    """Return the specification of a document with files next to `path`. Raises InputError."""
     with naming(path):
         _check_form(document)
         return _spec(document, path.parent)
@@ -251,9 +197,7 @@ def spec_of(document: dict[str, Any], path: Path) -> Spec:
 def _check_form(document: dict[str, Any]) -> None:
     for key, value in (("format", FORMAT), ("version", VERSION)):
         if document.get(key) != value or isinstance(document[key], bool):
-            raise InputError(
-                f"{key}: must be {value!r}; this is no specification of a library, or another version"
-            )
+            raise InputError(f"{key}: must be {value!r}; give a specification of a library of this version")
     try:
         error = schema_error(document, "library-spec", __package__)
     except ValueError as large:  # of a whole number of more digits than Python writes
@@ -311,7 +255,11 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         "gauges": _words(document, "gauges", GAUGES, ("strokes",)),
         "facets": _words(document, "facets", FACETS, ("hull",)),
     }
-    formulations = _formulations(document)
+    known = (*FORMULATIONS, *short_names())
+    named = _words(document, "formulations", known, tuple(FORMULATIONS))
+    formulations = tuple(declaration_of(name).name for name in named)
+    if (name := _twice(formulations)) is not None:
+        raise InputError(f"formulations: {name[1]!r} is listed twice; list it once")
     rungs = tuple(
         _rung(name, document["rungs"][name], defaults) for name in RUNGS if name in document["rungs"]
     )
@@ -319,7 +267,10 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         _sketch(table, f"sketches[{number}].", folder, rungs)
         for number, table in enumerate(document["sketches"])
     )
-    _check_names([sketch.name for sketch in sketches])
+    if (name := _twice([sketch.name for sketch in sketches])) is not None:
+        raise InputError(
+            f"sketches[{name[0]}].name: {name[1]!r} is the name of two sketches; give each its own"
+        )
     ledger = folder / document["ledger"] if "ledger" in document else None
     if ledger is not None and not ledger.is_file():
         raise InputError(f"ledger: there is no file {ledger.name}; leave the key out, or give a ledger.json")
@@ -330,23 +281,9 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
     return Spec(document["title"], formulations, rungs, sketches, ledger, points, release)
 
 
-def _formulations(document: dict[str, Any]) -> tuple[str, ...]:
-    """The formulations of a specification, which may use short names."""
-    known = (*FORMULATIONS, *short_names())
-    named = _words(document, "formulations", known, tuple(FORMULATIONS))
-    found = [declaration_of(name).name for name in named]
-    for number, name in enumerate(found):
-        if name in found[:number]:
-            raise InputError(f"formulations: {name!r} is listed twice; list it once")
-    return tuple(found)
-
-
-def _check_names(names: list[str]) -> None:
-    for number, name in enumerate(names):
-        if name in names[:number]:
-            raise InputError(
-                f"sketches[{number}].name: {name!r} is the name of two sketches; give each its own"
-            )
+def _twice(names: Sequence[str]) -> tuple[int, str] | None:
+    """Place and name of the first repetition."""
+    return next(((at, name) for at, name in enumerate(names) if name in names[:at]), None)
 
 
 def _words(

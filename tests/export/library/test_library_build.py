@@ -28,8 +28,7 @@ from crossfield.export.library.documents.statistics import tangent_bound
 from crossfield.export.library.ledger import points as known_points
 from crossfield.export.library.ledger.given import read_points, write_points
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
-from crossfield.export.library.ledger.points import complete_point, field_of
-from crossfield.export.library.ledger.points import better_in_1norm
+from crossfield.export.library.ledger.points import better_in_1norm, complete_point, field_of
 from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec
