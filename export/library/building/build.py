@@ -20,10 +20,9 @@ from ..ledger.given import Points, nothing, points_of, read_points
 from ..ledger.ledger import Ledger, Record, merged, read_ledger, write_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.spec import Spec
-from .entry_task import make_entry
+from .entry_task import Inputs, make_entry
 from .executor import Tasks, ahead, executor
 from .index import write_index
-from .inputs import Inputs
 from .instance_task import Files, prepared
 
 

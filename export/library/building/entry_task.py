@@ -1,11 +1,14 @@
-"""The task of each entry: model files in every format, the best known point, and the sidecar last."""
+"""The task of each entry: model files in every format, the best known point, and the sidecar last.
+
+`Inputs` collects the inputs of these tasks, for building and verifying alike.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,7 @@ from ....models.formulations.problem import Problem, formulate
 from ....models.instance.file import read_instance
 from ....models.instance.grid import Ints
 from ....models.instance.instance import Instance
+from ....models.storage import read_bytes
 from ...bundle.starts import Start, start_of
 from ...formats.nl import Layout
 from ...formats.registry import generator, write
@@ -25,8 +29,9 @@ from ...writing.records import number
 from ..documents.citation import REFERENCES
 from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
 from ..documents.statistics import counts, curvature, density, ranges, tangent_bound
+from ..ledger.given import Points, nothing
 from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import Record
+from ..ledger.ledger import Ledger, Record
 from ..ledger.points import METHOD, Best, Known, Provenance, best_point, complete_point, ours
 from ..ledger.standing import (
     best_of_each,
@@ -39,8 +44,8 @@ from ..ledger.standing import (
     standing,
 )
 from ..plan.equivalence import equivalent, not_equivalent, notes_of, siblings, transformations
-from ..plan.recipe import EntryRecipe, digest
-from .instance_task import Files, Submitted
+from ..plan.recipe import EntryRecipe, InstancePlan, digest
+from .instance_task import Evidence, Files, Preparation, Submitted
 
 _TANGENT = "tangent at the point"
 _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for sure
@@ -266,3 +271,50 @@ def _context(task: Entry, problem: Problem) -> dict[str, Any]:
         "references": list(REFERENCES),
         "recipe_sha256": task.sha256,
     }
+
+
+class Inputs:
+    """Tasks of a library with these plans, this ledger and given points."""
+
+    def __init__(self, ledger: Ledger, plans: Iterable[InstancePlan], points: Points = nothing) -> None:
+        self.ledger, self.plans, self.points = ledger, tuple(plans), points
+        self._relatives: dict[str, list[str]] = {}
+        for each in self.plans:
+            self._relatives.setdefault(_relation(each), []).extend(entry.name for entry in each.entries)
+
+    def preparation(self, each: InstancePlan) -> Preparation:
+        """Return the task of an instance. Raises InputError, InstanceError for a damaged file."""
+        name = each.recipe.name
+        return Preparation(each.recipe, self._submitted(each), self.points(name), self._certificate(name))
+
+    def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
+        """Yield the tasks of its entries. Raises as `preparation`, and InputError for a missing file."""
+        files = {facts["name"]: read_bytes(folder / facts["name"]) for facts in about["files"]}
+        relatives, submitted = tuple(self._relatives[_relation(each)]), self._submitted(each)
+        names = {entry.name for entry in each.entries}
+        records = tuple(record for record in self.ledger.records if record.entry in names)
+        for recipe in each.entries:
+            yield Entry(recipe, about, files, records, submitted, relatives)
+
+    def _submitted(self, each: InstancePlan) -> tuple[Submitted, ...]:
+        """The fields that the ledger keeps for the entries of an instance."""
+        records = (self.ledger.with_point(entry.name) for entry in each.entries)
+        return tuple(self._submission(record) for record in records if record is not None)
+
+    def _submission(self, record: Record) -> Submitted:
+        self.ledger.field(record)  # an error here names the file
+        provenance = Provenance(record.solver, record.version, record.seconds, record.by)
+        return Submitted(self.ledger.content(str(record.point), record.point_sha256), provenance)
+
+    def _certificate(self, instance: str) -> Evidence | None:
+        """The certificate that the ledger keeps for an instance."""
+        kept = next((each for each in self.ledger.certificates if each.instance == instance), None)
+        if kept is None:
+            return None
+        data = self.ledger.content(kept.file, kept.sha256)
+        return Evidence(kept.file, data, kept.instance_sha256, replace(ours(METHOD), by=kept.by))
+
+
+def _relation(each: InstancePlan) -> str:
+    """The name without the gauge, which instances with related entries share."""
+    return each.recipe.name.removesuffix("_box")

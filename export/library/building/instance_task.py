@@ -92,16 +92,11 @@ _Found = tuple[Known, list[Known], Certified | None]
 
 
 def prepared(task: Preparation) -> Files | NoStrokeError:
-    """Return the files of an instance, or the error that its size does not suit its sketch."""
+    """Return the files of an instance, its document last, or the error that its size is too small."""
     try:
-        return prepare(task)
+        instance = instance_from(task.recipe)
     except NoStrokeError as error:
         return error
-
-
-def prepare(task: Preparation) -> Files:
-    """Return the files of an instance: itself, its fields, and last its document. Raises InputError."""
-    instance = instance_from(task.recipe)
     given = task.given if task.given and task.given.instance == instance.sha256 else None
     evidence, sent = task.evidence, None
     if evidence and evidence.instance_sha256 == instance.sha256:

@@ -17,10 +17,9 @@ from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, sha256_of
 from ...formats.registry import generator
-from ..building.entry_task import Entry
+from ..building.entry_task import Entry, Inputs
 from ..building.executor import executor
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
-from ..building.inputs import Inputs
 from ..documents.documents import (
     INDEX,
     Library,

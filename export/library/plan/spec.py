@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 from ....models.errors import InputError, naming, shortened
 from ....models.formulations.catalogue import FORMULATIONS, declaration_of, short_names
@@ -71,9 +71,9 @@ class Release:
 
 
 def day(text: str, place: str) -> str:
-    """Return the day as YYYY-MM-DD. Raises InputError for an invalid one."""
+    """Return a day as YYYY-MM-DD, and no text as it is. Raises InputError for an invalid day."""
     try:
-        return date.fromisoformat(text).isoformat()
+        return date.fromisoformat(text).isoformat() if text else ""
     except ValueError as error:
         raise InputError(f"{place}: {text!r} is no day; write one as 2026-11-22") from error
 
@@ -241,7 +241,7 @@ def _of_value(error: Any) -> str:
         case "enum":
             words = f"there is no {value!r}; choose from {', '.join(schema['enum'])}"
         case "oneOf":
-            words = f"needs exactly one of {', '.join(_SOURCES)}"
+            words = f"needs exactly one of {', '.join(get_args(Kind))}"
         case "pattern":
             words = f"{value!r} is not allowed; write {schema['description']}"
         case _:
@@ -273,10 +273,10 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         )
     ledger = folder / document["ledger"] if "ledger" in document else None
     if ledger is not None and not ledger.is_file():
-        raise InputError(f"ledger: there is no file {ledger.name}; leave the key out, or give a ledger.json")
+        raise InputError(f"ledger: there is no file {ledger.name}; omit the key, or give a ledger.json")
     points = folder / document["points"] if "points" in document else None
     if points is not None and not points.exists():
-        raise InputError(f"points: there is no {points.name}; leave the key out, or give a library's points")
+        raise InputError(f"points: there is no {points.name}; omit the key, or give the points of a library")
     release = Release.of(document["release"]) if "release" in document else None
     return Spec(document["title"], formulations, rungs, sketches, ledger, points, release)
 
@@ -305,12 +305,8 @@ def _rung(name: str, table: dict[str, Any], defaults: dict[str, tuple[str, ...]]
     known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
     words = {key: _words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
     compress, prove = table.get("compress", False), table.get("prove", name in PROVEN)
-    added = _added(table, f"rungs.{name}.")
+    added = day(table.get("added", ""), f"rungs.{name}.added")
     return Rung(name, _whole(table["sizes"]), compress=compress, prove=prove, added=added, **words)
-
-
-def _added(table: dict[str, Any], place: str) -> str:
-    return day(table["added"], f"{place}added") if "added" in table else ""
 
 
 def _whole(numbers: list[float]) -> tuple[int, ...]:
@@ -321,16 +317,28 @@ def _whole(numbers: list[float]) -> tuple[int, ...]:
 def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
     name, names = table["name"], tuple(rung.name for rung in rungs)
     wanted = _words(table, "rungs", names, names, place)
-    kind = next(kind for kind in _SOURCES if kind in table)
-    what: dict[str, Any] = _SOURCES[kind](table, place, folder)
+    sizes = table.get("sizes", {})
+    if unknown := [rung for rung in sizes if rung not in wanted]:
+        raise InputError(f"{place}sizes.{unknown[0]}: is unknown; the keys here are {', '.join(wanted)}")
+    kind = next(kind for kind in get_args(Kind) if kind in table)
+    word = table[kind]
+    if kind == "file":
+        what = _file(table, place, folder)
+    elif kind == "random":
+        shape = "full square" if word == "full" else "ragged part of a square"
+        title = f"random strokes on a {shape}"
+        what = {"what": word, "title": title, "seeds": _whole(table["seeds"])}
+    else:
+        _check_known(word, SAMPLES, f"{place}sample", "sample ")
+        what = {"what": word, "title": SAMPLES[word].description}
     sketch = Sketch(
         name,
         kind,
         title=table.get("title", what.pop("title")),
         rungs=wanted,
-        sizes=_sizes(table, place, wanted),
+        sizes=tuple((rung, _whole(sizes[rung])) for rung in wanted if rung in sizes),
         origin=Origin.of(table),
-        added=_added(table, place),
+        added=day(table.get("added", ""), f"{place}added"),
         **what,
     )
     every = [size for rung in rungs if rung.name in wanted for size in sketch.sizes_on(rung)]
@@ -341,28 +349,6 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
                 "because names carry the size alone"
             )
     return sketch
-
-
-def _sizes(
-    table: dict[str, Any], place: str, rungs: tuple[str, ...]
-) -> tuple[tuple[str, tuple[int, ...]], ...]:
-    given = table.get("sizes", {})
-    for rung in given:
-        if rung not in rungs:
-            raise InputError(f"{place}sizes.{rung}: is unknown; the keys here are {', '.join(rungs)}")
-    return tuple((rung, _whole(given[rung])) for rung in rungs if rung in given)
-
-
-def _sample(table: dict[str, Any], place: str, _folder: Path) -> dict[str, Any]:
-    what = table["sample"]
-    _check_known(what, SAMPLES, f"{place}sample", "sample ")
-    return {"what": what, "title": SAMPLES[what].description}
-
-
-def _random(table: dict[str, Any], _place: str, _folder: Path) -> dict[str, Any]:
-    what = table["random"]
-    title = f"random strokes on a {'full square' if what == 'full' else 'ragged part of a square'}"
-    return {"what": what, "title": title, "seeds": _whole(table["seeds"])}
 
 
 def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
@@ -382,13 +368,6 @@ def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
         "mask": masked,
         "mask_suffix": suffix_of_picture(masked) if masked else "",
     }
-
-
-_SOURCES: Final[dict[Kind, Callable[[dict[str, Any], str, Path], dict[str, Any]]]] = {
-    "sample": _sample,
-    "file": _file,
-    "random": _random,
-}
 
 
 def _content(path: Path, place: str) -> bytes:

@@ -29,8 +29,8 @@ from ...pictures.draw import counted
 from ...pictures.web import field_picture, instance_picture, thumbnail
 from ..building.index import SOLU, SUMS
 from ..documents.documents import Library, about_file, read_about, read_library
-from ..documents.mathematics import model
 from ..plan.spec import RUNGS
+from .mathematics import model
 from .study import study
 
 ASSETS: Final = ("site.css", "site.js", "icon.svg")  # copied from the templates
