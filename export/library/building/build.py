@@ -16,7 +16,7 @@ from ....models.processes.deadline import Progress, silent
 from ....models.storage import make_folder, write_bytes
 from ..documents.documents import Library, about_file, are_whole, read_about, read_library, read_sidecar
 from ..documents.lock import locked
-from ..ledger.given import Points, nothing, points_of, read_points
+from ..ledger.given import NO_POINTS, Points, points_of, read_points
 from ..ledger.ledger import Ledger, Record, merged, read_ledger, write_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.spec import Spec
@@ -45,7 +45,7 @@ def build(
     make_folder(folder)
     try:
         with locked(folder, "a build of the library", progress):
-            points = read_points(spec.points) if spec.points else nothing
+            points = read_points(spec.points) if spec.points else NO_POINTS
             return _built(spec, plans, folder, points, jobs=jobs, scheduler=scheduler, progress=progress)
     except BaseException:
         if is_new:
@@ -79,7 +79,7 @@ def _built(
     kept = [each for each in plans if each.recipe.name not in work.skipped]
     if not kept:
         name, reason = next(iter(work.skipped.items()))
-        raise InputError(f"nothing is left on any grid that it asks for; {name}: {reason}")
+        raise InputError(f"every grid is too coarse for its sketch; {name}: {reason}")
     write_ledger(ledger)
     progress("index and checksums")
     write_index(folder, spec, kept, dict(sorted(work.skipped.items())))
@@ -127,7 +127,7 @@ class _Build:
             if isinstance(files, NoStrokeError):
                 self.total -= len(each.entries)
                 self.skipped[task.name] = str(files).removeprefix(f"{task.name}: ")
-                self.progress(f"left out: {files}")
+                self.progress(f"skipped: {files}")
                 return
             self._write(files)
             about = read_about(self.folder / about_file(task.name))

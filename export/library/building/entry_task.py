@@ -29,7 +29,7 @@ from ...writing.records import number
 from ..documents.citation import REFERENCES
 from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
 from ..documents.statistics import counts, curvature, density, ranges, tangent_bound
-from ..ledger.given import Points, nothing
+from ..ledger.given import NO_POINTS, Points
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record
 from ..ledger.points import METHOD, Best, Known, Provenance, best_point, complete_point, ours
@@ -80,20 +80,18 @@ class Entry:
 
 def make_entry(task: Entry) -> Files:
     """Return the files of an entry, the sidecar last."""
-    with (
-        tempfile.TemporaryDirectory(prefix="crossfield-") as given,
-        tempfile.TemporaryDirectory(prefix="crossfield-") as made,
-    ):
-        instance, known = _read(task, Path(given))
+    with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
+        made = Path(temporary)
+        instance, known = _read(task, made)
         problem = _formulated(instance, task.recipe.formulation, task.recipe.facet, known["baseline"].field.p)
-        listed, refused = _models(problem, task.recipe, Path(made))
+        listed, refused = _models(problem, task.recipe, made)
         best = best_point(problem, list(known.values()))
         records = _records(task, best, instance)
         bounds = _bounds(task, best, records)
         results = _results(task, best, records, bounds)
-        listed += _points(task, best, Path(made), proven=results["status"] == "optimal")
+        listed += _points(task, best, made, proven=results["status"] == "optimal")
         document = _sidecar(task, best, listed, refused) | results | _context(task, problem)
-        files = {each["name"]: (Path(made) / each["name"]).read_bytes() for each in listed}
+        files = {each["name"]: (made / each["name"]).read_bytes() for each in listed}
         return files | {f"{task.name}.json": as_bytes(document)}
 
 
@@ -101,9 +99,10 @@ def _read(task: Entry, folder: Path) -> tuple[Instance, dict[str, Known]]:
     """The instance and its known fields by role."""
     for name, data in task.files.items():
         (folder / name).write_bytes(data)
-    known = {}
-    for role, facts in task.about["fields"].items():
-        known[role] = Known(read_field(folder / facts["file"]), Provenance.of(facts))
+    known = {
+        role: Known(read_field(folder / facts["file"]), Provenance.of(facts))
+        for role, facts in task.about["fields"].items()
+    }
     instance = read_instance(folder / task.about["instance"]["file"])
     for place, each in enumerate(task.submitted):
         submitted = each.known()
@@ -167,29 +166,31 @@ def _listed(path: Path, dialect: str, notes: list[str]) -> dict[str, Any]:
 
 
 def _bounds(task: Entry, best: Best, records: list[Record]) -> list[dict[str, Any]]:
-    """The best dual bound of each solver for this optimum, and the bounds of tangent and certificate."""
-    having = [each for each in records if each.bound is not None]
-    found = [_bound(record, task.name) for record in best_of_each(having, task.name)]
-    tangent = tangent_bound(best.problem, best.point)
+    """The best dual bound of each solver for this optimum, and the bounds of tangent and certificate.
+
+    A bound is at most the best objective. Raises InputError if the point contradicts it.
+    """
+    found, name = [], task.name
+    stated = ("solver", "version", "bound", "status", "seconds", "threads")
+    for record in best_of_each((each for each in records if each.bound is not None), name):
+        via = None if record.entry == name else record.entry
+        found.append({key: getattr(record, key) for key in stated} | {"via": via})
+    tangent, certificate = tangent_bound(best.problem, best.point), task.about.get("certificate")
     if tangent is not None:
         found.append(_computed(_TANGENT, tangent))
-    certificate = task.about.get("certificate")
     if certificate is not None and FORMULATIONS[task.recipe.formulation].minimises == TWO_NORM:
         found.append(_computed(METHOD, certificate["bound"]) | {"certificate": certificate["file"]})
-    return [each | {"bound": _within(each, best, task.name)} for each in found]
-
-
-def _within(stated: dict[str, Any], best: Best, entry: str) -> float:
-    """The bound, at most the best objective. Raises InputError if the point contradicts it."""
-    bound, computed = float(stated["bound"]), stated["status"] == "computed"
-    if contradicts(bound, best.objective):
-        raise InputError(
-            f"has the bound {bound!r} of {stated['via'] or entry} by {stated['solver']}, "
-            f"but {entry} has a feasible point of {best.objective!r}; "
-            f"that bound is wrong, {'build again without it' if computed else 'take its record out'}",
-            file=stated.get("certificate", LEDGER),
-        )
-    return cut(bound, best.objective)
+    for each in found:
+        bound = float(each["bound"])
+        if contradicts(bound, best.objective):
+            remedy = "build again without it" if each["status"] == "computed" else "take its record out"
+            raise InputError(
+                f"has the bound {bound!r} of {each['via'] or name} by {each['solver']}, "
+                f"but {name} has a feasible point of {best.objective!r}; that bound is wrong, {remedy}",
+                file=each.get("certificate", LEDGER),
+            )
+        each["bound"] = cut(bound, best.objective)
+    return found
 
 
 def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
@@ -198,12 +199,6 @@ def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
     for name, formulation in siblings(task.recipe, task.relatives).items():
         shas[name] = _formulated(instance, formulation, "hull", best.known.field.p).sha256
     return [each for each in task.records if shas.get(each.entry) == each.problem_sha256]
-
-
-def _bound(record: Record, entry: str) -> dict[str, Any]:
-    stated = ("solver", "version", "bound", "status", "seconds", "threads")
-    via = None if record.entry == entry else record.entry
-    return {key: getattr(record, key) for key in stated} | {"via": via}
 
 
 def _computed(method: str, bound: float) -> dict[str, Any]:
@@ -276,7 +271,7 @@ def _context(task: Entry, problem: Problem) -> dict[str, Any]:
 class Inputs:
     """Tasks of a library with these plans, this ledger and given points."""
 
-    def __init__(self, ledger: Ledger, plans: Iterable[InstancePlan], points: Points = nothing) -> None:
+    def __init__(self, ledger: Ledger, plans: Iterable[InstancePlan], points: Points = NO_POINTS) -> None:
         self.ledger, self.plans, self.points = ledger, tuple(plans), points
         self._relatives: dict[str, list[str]] = {}
         for each in self.plans:

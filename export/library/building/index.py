@@ -15,7 +15,7 @@ from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, generator
 from ...writing.records import number
 from ..documents import check_point
-from ..documents.citation import PAPER, REFERENCES, Terms, cited
+from ..documents.citation import PAPER, REFERENCES, cited, terms
 from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, about_file, as_bytes, read_about, read_sidecar
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
@@ -71,7 +71,7 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
         "spec": spec,
         "generator": generator(),
         "release": cited(spec),
-        "terms": Terms(spec.sketches),
+        "terms": terms(spec.sketches),
         "references": REFERENCES,
         "paper": PAPER,
         "rungs": [rung for rung in rungs if rung["entries"]],

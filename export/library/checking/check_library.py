@@ -51,7 +51,7 @@ _SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
 
 
 def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> list[Finding]:
-    """Return the findings about a library in a folder, which is locked meanwhile; none if it is sound.
+    """Return the findings about a library in a folder, which is locked during the work.
 
     Raises InputError without a library, OutputError if another process holds the lock for too long.
     """
@@ -161,10 +161,10 @@ class _Verification:
             try:
                 if name in recipes:
                     instance_from(recipes[name])
-                yield Finding(INDEX, f"leaves out {name}, which can be made or is not asked for")
+                yield Finding(INDEX, f"skips {name}, which can be made or is not asked for")
             except CrossfieldError as error:
                 if str(error) != f"{name}: {stated}":
-                    yield Finding(INDEX, f"states another reason for leaving {name} out than there is")
+                    yield Finding(INDEX, f"states another reason for skipping {name} than there is")
 
     def _entries(self, library: Library) -> Iterator[Finding]:
         """Findings about ledger, instances and entries, and about texts if all entries are sound."""

@@ -30,10 +30,10 @@ def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterat
         if key not in _APART and not same(sidecar.get(key), made.get(key)):
             yield Finding(name, f"states another {key} than follows from its instance and the ledger")
     if _described(sidecar["files"]) != _described(made["files"]):
-        yield Finding(name, "states other files, or other things of them, than are made of its problem")
+        yield Finding(name, "states other files, or other facts about them, than its problem has")
     for key in ("point", "nl_point"):
         if sidecar["best"][key] != made["best"][key]:
-            yield Finding(name, f"names another {key} than is made of its problem")
+            yield Finding(name, f"names another {key} than its problem has")
     if not close(sidecar["best"]["objective"], made["best"]["objective"]):
         yield Finding(name, "does not state the best of the known points")
     if Provenance.of(sidecar["best"]) not in _known(task):

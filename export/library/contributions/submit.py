@@ -163,7 +163,7 @@ class _Session:
                 raise SolutionError(f"holds no point ({raw.status})", file=source.path)
             return (name if not raw.stamp else "") or self.entries.of_solution(raw, source.path)
         if not name:
-            raise InputError("does not show the entry of the run; name the entry", file=source.log)
+            raise InputError("the entry of the run is unknown; name the entry", file=source.log)
         return name
 
     def _kept(
@@ -361,7 +361,7 @@ class _Session:
         return self.certified.get(instance, stated)
 
     def _ledger(self, source: Source) -> Iterator[Submission]:
-        """Check the runs, points and certificates of another ledger, whose files lie beside it."""
+        """Check the runs, points and certificates of another ledger with their files."""
         assert source.path is not None
         other = read_ledger(source.path.parent, source.path.name)
         found = 0

@@ -61,7 +61,7 @@ class Library:
 
 
 def folder_of(path: str | Path) -> Path:
-    """Return the path of a folder. Raises InputError for a file, such as a release, and for nothing."""
+    """Return the path of a folder. Raises InputError for a file, such as a release, or a missing folder."""
     if Path(path).is_file():
         raise InputError("is a file; unpack it, as with `tar -xzf`, and give the folder", file=path)
     if not Path(path).is_dir():

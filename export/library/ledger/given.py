@@ -59,10 +59,7 @@ class Given:
 
 
 Points = Callable[[str], Given | None]  # results by the name of an instance
-
-
-def nothing(_instance: str) -> None:
-    """Return None: a lookup without results."""
+NO_POINTS: Final[Points] = dict[str, Given]().get
 
 
 def read_points(path: str | Path) -> Points:

@@ -29,7 +29,7 @@ FILE: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
 Evidence = Literal["log", "word"]
 """Evidence of a submitted bound: a log that the library keeps, or only the statement of its submitter."""
-_LATER: Final = ("machine", "date", "evidence", "log", "log_sha256", "trace")  # left out where there is none
+_LATER: Final = ("machine", "date", "evidence", "log", "log_sha256", "trace")  # absent if empty
 _LONGEST: Final = 200  # characters of a text
 _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 

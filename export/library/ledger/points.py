@@ -32,7 +32,7 @@ _ROUNDS: Final = 8
 _NODES: Final = {"tiny": 1000, "small": 20}  # of the branch and bound in the 1-norm, by rung
 _LP_UP_TO: Final = 1000  # pixels up to which the angles are fitted in the 1-norm
 _MOST_WORK: Final = 20_000_000  # labels, counted at each rounding, after which a proof ends: some minutes
-_MOST_BYTES: Final = 2_000_000  # a larger certificate is of a proof with a gap, and is left out
+_MOST_BYTES: Final = 2_000_000  # a larger certificate has a gap, and is omitted
 
 
 @dataclass(frozen=True)

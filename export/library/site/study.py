@@ -88,7 +88,7 @@ def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
         patterns.get("hessian"),
         blocks(patterns["hessian"]) if "hessian" in patterns else None,
         _presolved(library.folder, entry),
-        ways(entry, problem),
+        list(ways(entry, problem)),
         _plot(entry, pictures),
     )
 
@@ -186,7 +186,7 @@ def _nonlinear(family: PlacedFamily) -> set[sp.Symbol]:
 def _pairs(problem: Problem) -> Iterator[Places]:
     """Columns whose mixed second derivative is not zero everywhere, arrays (k, 2).
 
-    Terms of the objective that cancel are left out.
+    Terms of the objective that cancel are omitted.
     """
     for degree in range(2, _HIGHEST + 1):
         index, _ = problem.merged_objective(degree)
