@@ -43,7 +43,7 @@ from ..ledger.standing import (
     runs_of,
     standing,
 )
-from ..plan.equivalence import equivalent, not_equivalent, notes_of, siblings, transformations
+from ..plan.equivalence import equivalent, not_equivalent, notes_of
 from ..plan.recipe import EntryRecipe, InstancePlan, digest
 from .instance_task import Evidence, Files, Preparation, Submitted
 
@@ -196,8 +196,10 @@ def _bounds(task: Entry, best: Best, records: list[Record]) -> list[dict[str, An
 def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
     """The records about this problem and those with the same optimum."""
     shas = {task.name: best.problem.sha256}
-    for name, formulation in siblings(task.recipe, task.relatives).items():
-        shas[name] = _formulated(instance, formulation, "hull", best.known.field.p).sha256
+    for each in equivalent(task.recipe, task.relatives):
+        if each["entry"] is not None:
+            other = _formulated(instance, each["formulation"], "hull", best.known.field.p)
+            shas[each["entry"]] = other.sha256
     return [each for each in task.records if shas.get(each.entry) == each.problem_sha256]
 
 
@@ -258,8 +260,9 @@ def _sidecar(
 
 
 def _context(task: Entry, problem: Problem) -> dict[str, Any]:
+    formats = task.recipe.formats
     return {
-        "transformations": transformations(problem, task.recipe.formats),
+        "transformations": [f".{name}: {note}" for name in formats for note in notes_of(problem, name)],
         "equivalent": equivalent(task.recipe, task.relatives),
         "not_equivalent": not_equivalent(task.recipe, task.relatives),
         "licence": task.about.get("origin", {}).get("license"),

@@ -36,9 +36,8 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.sources import instance_from
-from .check_entry import run_findings, verify_entry
+from .check_entry import instance_findings, run_findings, verify_entry
 from .finding import BUILD, Finding, close, of_error
-from .made_again import instance_findings
 
 FETCH: Final = "fetch it again, or build the library again"
 REMOVE: Final = "remove it"

@@ -34,9 +34,8 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
 from ..ledger.standing import best_of_each, contradicts
-from .matching import Entries
+from .matching import Entries, Source, sources_of
 from .run_record import LogFile, RunFacts, run_record
-from .sources import Source, sources_of
 
 Outcome = Literal["accepted", "not better", "refused", "skipped"]
 

@@ -20,12 +20,6 @@ _FACETS: Final = {
 }
 
 
-def siblings(recipe: EntryRecipe, names: Collection[str]) -> dict[str, str]:
-    """Return the other entries of the library with the same optimum, and their formulations."""
-    found = equivalent(recipe, names)
-    return {each["entry"]: each["formulation"] for each in found if each["entry"] is not None}
-
-
 def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
     """Return the formulations with the same optimum, and the reasons. names: entries of the library."""
     if recipe.facet == "printed":
@@ -88,11 +82,6 @@ def _other_gauge(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, 
     )
     shown = f"{recipe.formulation} (gauge {'strokes' if box else 'box'})"
     return [{"formulation": shown, "entry": name, "why": f"the other gauge: {windows}; optima differ"}]
-
-
-def transformations(problem: Problem, formats: Collection[str]) -> list[str]:
-    """Return sentences about changes in the files: products lifted, the column ONE, bounds."""
-    return [f".{name}: {note}" for name in formats for note in notes_of(problem, name)]
 
 
 def notes_of(problem: Problem, name: str) -> list[str]:
