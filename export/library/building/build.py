@@ -1,8 +1,7 @@
 """Build of a library: missing files are written, and complete ones are kept.
 
-Two kinds of tasks: an instance with its fields, then each of its entries. Their results are bytes, written
-here and nowhere else, each file beside and renamed, and the file that marks completion last. So a build that
-was stopped continues, whatever stopped it.
+There are two kinds of tasks: an instance with its fields, then each of its entries. Only this module writes
+their files, the file that marks completion last. So an interrupted build continues.
 """
 
 from __future__ import annotations
@@ -17,14 +16,13 @@ from ....models.processes.deadline import Progress, silent
 from ....models.storage import make_folder, write_bytes
 from ..documents.documents import Library, about_file, are_whole, read_about, read_library, read_sidecar
 from ..documents.lock import locked
-from ..ledger.given import Points, nothing, points_of, read_points
+from ..ledger.given import NO_POINTS, Points, points_of, read_points
 from ..ledger.ledger import Ledger, Record, merged, read_ledger, write_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.spec import Spec
-from .entry_task import Entry, make_entry
+from .entry_task import Inputs, make_entry
 from .executor import Tasks, ahead, executor
 from .index import write_index
-from .inputs import Inputs
 from .instance_task import Files, prepared
 
 
@@ -38,18 +36,16 @@ def build(
 ) -> Library:
     """Build the library of a specification in a folder and return it.
 
-    jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead.
-    progress: called with a line for each entry that is made. The same specification and ledger give the same
-    bytes with any number of processes. With points in the specification they do so on every processor.
-    Without points they do so where every search takes the same branches. Raises InputError, OutputError,
-    BuildError.
+    scheduler: address of a dask scheduler whose workers replace the processes; progress: called with a line
+    per entry. The same specification gives the same bytes with any number of processes, and with points on
+    every processor. Raises InputError, OutputError, BuildError.
     """
     plans = plan(spec)
     folder, is_new = Path(folder), not Path(folder).exists()
     make_folder(folder)
     try:
         with locked(folder, "a build of the library", progress):
-            points = read_points(spec.points) if spec.points else nothing
+            points = read_points(spec.points) if spec.points else NO_POINTS
             return _built(spec, plans, folder, points, jobs=jobs, scheduler=scheduler, progress=progress)
     except BaseException:
         if is_new:
@@ -69,20 +65,21 @@ def _built(
     progress: Progress,
 ) -> Library:
     """Build it under the lock of the caller; the ledger is written last, so a refused build has none."""
-    _sweep(folder)
-    ledger = _ledger(spec, plans, folder)
+    for path in folder.glob(".*.part"):  # of a build that was killed
+        path.unlink(missing_ok=True)
+    entries = [entry.name for each in plans for entry in each.entries]
+    other = Ledger(folder) if spec.ledger is None else read_ledger(spec.ledger.parent, spec.ledger.name)
+    ledger = merged(folder, other, entries, [each.recipe.name for each in plans])
     with executor(jobs, scheduler) as chosen:
         tasks = Tasks(chosen, ahead(jobs, scheduler))
         work = _Build(folder, Inputs(ledger, plans, points), tasks, progress)
-        for each in sorted(
-            plans, key=lambda each: -each.recipe.size
-        ):  # the last one goes first: small ones, whose faults show at once
-            work.begin(each)
+        for each in sorted(plans, key=lambda each: -each.recipe.size):
+            work.begin(each)  # the last task runs first: small ones, whose faults show at once
         tasks.run()
     kept = [each for each in plans if each.recipe.name not in work.skipped]
     if not kept:
         name, reason = next(iter(work.skipped.items()))
-        raise InputError(f"nothing is left on any grid that it asks for; {name}: {reason}")
+        raise InputError(f"every grid is too coarse for its sketch; {name}: {reason}")
     write_ledger(ledger)
     progress("index and checksums")
     write_index(folder, spec, kept, dict(sorted(work.skipped.items())))
@@ -99,8 +96,7 @@ def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -
 def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
     """Bring a library up to date as `rebuild` does, under the lock of the caller."""
     spec = read_library(folder).spec
-    points = points_of(folder)
-    return _built(spec, plan(spec), folder, points, jobs=jobs, scheduler=None, progress=progress)
+    return _built(spec, plan(spec), folder, points_of(folder), jobs=jobs, scheduler=None, progress=progress)
 
 
 def unmatched(library: Library) -> list[Record]:
@@ -111,38 +107,27 @@ def unmatched(library: Library) -> list[Record]:
     return [each for each in records if problems.get(each.entry, each.problem_sha256) != each.problem_sha256]
 
 
-def _sweep(folder: Path) -> None:
-    """Remove temporary files of a build that was killed."""
-    for path in folder.glob(".*.part"):
-        path.unlink(missing_ok=True)
-
-
-def _ledger(spec: Spec, plans: Sequence[InstancePlan], folder: Path) -> Ledger:
-    entries = [entry.name for each in plans for entry in each.entries]
-    given = Ledger(folder) if spec.ledger is None else read_ledger(spec.ledger.parent, spec.ledger.name)
-    return merged(folder, given, entries, [each.recipe.name for each in plans])
-
-
 class _Build:
     """A build in progress: its tasks and the number of finished entries."""
 
     def __init__(self, folder: Path, inputs: Inputs, tasks: Tasks, progress: Progress) -> None:
         self.folder, self.inputs, self.tasks, self.progress = folder, inputs, tasks, progress
         self.total, self.done = sum(len(each.entries) for each in self.inputs.plans), 0
-        self.skipped: dict[str, str] = {}
-        """Instances whose size is too small for their sketch, and the reasons."""
+        self.skipped: dict[str, str] = {}  # instances too small for their sketch, and the reasons
 
     def begin(self, each: InstancePlan) -> None:
         """Schedule an instance unless it is complete, and then its entries."""
         task = self.inputs.preparation(each)
-        about = self._whole(task.name, task.sha256)
+        about = self._whole(about_file(task.name), task.sha256, read_about)
         if about is not None:
             self._entries(each, about)
             return
 
         def finish(files: Files | NoStrokeError) -> None:
             if isinstance(files, NoStrokeError):
-                self._skip(each, files)
+                self.total -= len(each.entries)
+                self.skipped[task.name] = str(files).removeprefix(f"{task.name}: ")
+                self.progress(f"skipped: {files}")
                 return
             self._write(files)
             about = read_about(self.folder / about_file(task.name))
@@ -152,24 +137,17 @@ class _Build:
 
         self.tasks.add(prepared, task, finish)
 
-    def _skip(self, each: InstancePlan, error: NoStrokeError) -> None:
-        """Skip an instance and its entries."""
-        name = each.recipe.name
-        self.total -= len(each.entries)
-        self.skipped[name] = str(error).removeprefix(f"{name}: ")
-        self.progress(f"left out: {error}")
-
-    def _whole(self, instance: str, sha256: str) -> dict[str, Any] | None:
-        """The document of an instance if it was made from the same recipe and its files are complete."""
+    def _whole(self, name: str, sha256: str, read: Callable[[Path], dict[str, Any]]) -> dict[str, Any] | None:
+        """A document if it was made from the same recipe and its files are complete."""
         try:
-            about = read_about(self.folder / about_file(instance))
+            found = read(self.folder / name)
         except CrossfieldError:
             return None
-        return about if about["recipe_sha256"] == sha256 and are_whole(self.folder, about["files"]) else None
+        return found if found["recipe_sha256"] == sha256 and are_whole(self.folder, found["files"]) else None
 
     def _entries(self, each: InstancePlan, about: dict[str, Any]) -> None:
         for task in reversed(list(self.inputs.entries(each, about, self.folder))):
-            if self._is_done(task):
+            if self._whole(f"{task.name}.json", task.sha256, read_sidecar):
                 self.done += 1
             else:
                 self.tasks.add(make_entry, task, self._finish(task.name))
@@ -181,13 +159,6 @@ class _Build:
             self.progress(f"{self.done} of {self.total} entries: {name}")
 
         return finish
-
-    def _is_done(self, task: Entry) -> bool:
-        try:
-            sidecar = read_sidecar(self.folder / f"{task.name}.json")
-        except CrossfieldError:
-            return False
-        return sidecar["recipe_sha256"] == task.sha256 and are_whole(self.folder, sidecar["files"])
 
     def _write(self, files: Files) -> None:
         for name, data in files.items():

@@ -1,15 +1,14 @@
-"""The task of each entry: model files in every format, the best known point, and the sidecar.
+"""The task of each entry: model files in every format, the best known point, and the sidecar last.
 
-Like the task of an instance it is a function from values to the bytes of files; the sidecar comes last, so
-that an entry whose sidecar stands and fits is done.
+`Inputs` collects the inputs of these tasks, for building and verifying alike.
 """
 
 from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from ....models.formulations.problem import Problem, formulate
 from ....models.instance.file import read_instance
 from ....models.instance.grid import Ints
 from ....models.instance.instance import Instance
+from ....models.storage import read_bytes
 from ...bundle.starts import Start, start_of
 from ...formats.nl import Layout
 from ...formats.registry import generator, write
@@ -29,10 +29,10 @@ from ...writing.records import number
 from ..documents.citation import REFERENCES
 from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
 from ..documents.statistics import counts, curvature, density, ranges, tangent_bound
-from ..ledger.certificates import METHOD
+from ..ledger.given import NO_POINTS, Points
 from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import Record
-from ..ledger.points import Best, Known, Provenance, best_point, complete_point, ours
+from ..ledger.ledger import Ledger, Record
+from ..ledger.points import METHOD, Best, Known, Provenance, best_point, complete_point, ours
 from ..ledger.standing import (
     best_of_each,
     contradicts,
@@ -43,9 +43,9 @@ from ..ledger.standing import (
     runs_of,
     standing,
 )
-from ..plan.equivalence import equivalent, not_equivalent, notes_of, siblings, transformations
-from ..plan.recipe import EntryRecipe, digest
-from .instance_task import Files, Submitted
+from ..plan.equivalence import equivalent, not_equivalent, notes_of
+from ..plan.recipe import EntryRecipe, InstancePlan, digest
+from .instance_task import Evidence, Files, Preparation, Submitted
 
 _TANGENT = "tangent at the point"
 _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for sure
@@ -53,10 +53,9 @@ _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for
 
 @dataclass(frozen=True)
 class Entry:
-    """The task of an entry: its recipe and the facts about its instance.
+    """The task of an entry: its recipe, and the document and files of its instance.
 
-    records and submitted: what the ledger has of all entries of the instance, records and kept fields;
-    relatives: names of the entries that may be related.
+    records, submitted: of all entries of the instance in the ledger; relatives: entries that may be related.
     """
 
     recipe: EntryRecipe
@@ -81,23 +80,18 @@ class Entry:
 
 def make_entry(task: Entry) -> Files:
     """Return the files of an entry, the sidecar last."""
-    with (
-        tempfile.TemporaryDirectory(prefix="crossfield-") as given,
-        tempfile.TemporaryDirectory(prefix="crossfield-") as made,
-    ):
-        instance, known = _read(task, Path(given))
+    with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
+        made = Path(temporary)
+        instance, known = _read(task, made)
         problem = _formulated(instance, task.recipe.formulation, task.recipe.facet, known["baseline"].field.p)
-        listed, refused = _models(problem, task.recipe, Path(made))
+        listed, refused = _models(problem, task.recipe, made)
         best = best_point(problem, list(known.values()))
         records = _records(task, best, instance)
         bounds = _bounds(task, best, records)
-        facts = standing(best.objective, bounds, records, task.name)
-        status = facts["status"]
-        listed += _points(task, best, Path(made), proven=status == "optimal")
-        found = _gap(best, bounds, status) | {"runs": runs_of(records, task.name, best.objective)}
-        found |= {"density": density(instance), "difficulty": _grade(task, best, bounds, status)}
-        document = _sidecar(task, best, listed, refused) | found | facts | _context(task, problem)
-        files = {each["name"]: (Path(made) / each["name"]).read_bytes() for each in listed}
+        results = _results(task, best, records, bounds)
+        listed += _points(task, best, made, proven=results["status"] == "optimal")
+        document = _sidecar(task, best, listed, refused) | results | _context(task, problem)
+        files = {each["name"]: (made / each["name"]).read_bytes() for each in listed}
         return files | {f"{task.name}.json": as_bytes(document)}
 
 
@@ -105,9 +99,10 @@ def _read(task: Entry, folder: Path) -> tuple[Instance, dict[str, Known]]:
     """The instance and its known fields by role."""
     for name, data in task.files.items():
         (folder / name).write_bytes(data)
-    known = {}
-    for role, facts in task.about["fields"].items():
-        known[role] = Known(read_field(folder / facts["file"]), Provenance.of(facts))
+    known = {
+        role: Known(read_field(folder / facts["file"]), Provenance.of(facts))
+        for role, facts in task.about["fields"].items()
+    }
     instance = read_instance(folder / task.about["instance"]["file"])
     for place, each in enumerate(task.submitted):
         submitted = each.known()
@@ -142,7 +137,7 @@ def _models(
 
 
 def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict[str, Any]]:
-    """Facts of the best point's files written to the folder: MIPLIB's kind, and AMPL's for a .nl."""
+    """Facts of the files of the best point in the folder: in MIPLIB's format, and in AMPL's for a .nl."""
     path = folder / f"{task.name}.sol"
     path.write_bytes(b"".join(_miplib(best)))
     listed = [_listed(path, "miplib", ["columns as in the .mps and .lp; those at 0 are left out"])]
@@ -157,7 +152,7 @@ def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict
 
 
 def _miplib(best: Best) -> Iterator[bytes]:
-    """The lines of a .sol file as MIPLIB has them, in the columns of LP and MPS."""
+    """The lines of a .sol file in MIPLIB's format, with the columns of LP and MPS."""
     held = start_of(best.problem, best.known.field).problem
     start = Start(held, complete_point(held, best.known.field))
     yield f"=obj= {number(start.objective)}\n".encode()
@@ -171,43 +166,41 @@ def _listed(path: Path, dialect: str, notes: list[str]) -> dict[str, Any]:
 
 
 def _bounds(task: Entry, best: Best, records: list[Record]) -> list[dict[str, Any]]:
-    """The best dual bound of each solver for this optimum, and the bounds of tangent and certificate."""
-    having = [each for each in records if each.bound is not None]
-    found = [_bound(record, task.name) for record in best_of_each(having, task.name)]
-    tangent = tangent_bound(best.problem, best.point)
+    """The best dual bound of each solver for this optimum, and the bounds of tangent and certificate.
+
+    A bound is at most the best objective. Raises InputError if the point contradicts it.
+    """
+    found, name = [], task.name
+    stated = ("solver", "version", "bound", "status", "seconds", "threads")
+    for record in best_of_each((each for each in records if each.bound is not None), name):
+        via = None if record.entry == name else record.entry
+        found.append({key: getattr(record, key) for key in stated} | {"via": via})
+    tangent, certificate = tangent_bound(best.problem, best.point), task.about.get("certificate")
     if tangent is not None:
         found.append(_computed(_TANGENT, tangent))
-    certificate = task.about.get("certificate")
     if certificate is not None and FORMULATIONS[task.recipe.formulation].minimises == TWO_NORM:
         found.append(_computed(METHOD, certificate["bound"]) | {"certificate": certificate["file"]})
-    return [each | {"bound": _within(each, best, task.name)} for each in found]
-
-
-def _within(stated: dict[str, Any], best: Best, entry: str) -> float:
-    """The bound, at most the best objective. Raises InputError if the point contradicts it."""
-    bound, computed = float(stated["bound"]), stated["status"] == "computed"
-    if contradicts(bound, best.objective):
-        raise InputError(
-            f"has the bound {bound!r} of {stated['via'] or entry} by {stated['solver']}, "
-            f"but {entry} has a feasible point of {best.objective!r}; "
-            f"that bound is wrong, {'build again without it' if computed else 'take its record out'}",
-            file=stated.get("certificate", LEDGER),
-        )
-    return cut(bound, best.objective)
+    for each in found:
+        bound = float(each["bound"])
+        if contradicts(bound, best.objective):
+            remedy = "build again without it" if each["status"] == "computed" else "take its record out"
+            raise InputError(
+                f"has the bound {bound!r} of {each['via'] or name} by {each['solver']}, "
+                f"but {name} has a feasible point of {best.objective!r}; that bound is wrong, {remedy}",
+                file=each.get("certificate", LEDGER),
+            )
+        each["bound"] = cut(bound, best.objective)
+    return found
 
 
 def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
-    """The records about this problem or another one with the same optimum."""
+    """The records about this problem and those with the same optimum."""
     shas = {task.name: best.problem.sha256}
-    for name, formulation in siblings(task.recipe, task.relatives).items():
-        shas[name] = _formulated(instance, formulation, "hull", best.known.field.p).sha256
+    for each in equivalent(task.recipe, task.relatives):
+        if each["entry"] is not None:
+            other = _formulated(instance, each["formulation"], "hull", best.known.field.p)
+            shas[each["entry"]] = other.sha256
     return [each for each in task.records if shas.get(each.entry) == each.problem_sha256]
-
-
-def _bound(record: Record, entry: str) -> dict[str, Any]:
-    stated = ("solver", "version", "bound", "status", "seconds", "threads")
-    via = None if record.entry == entry else record.entry
-    return {key: getattr(record, key) for key in stated} | {"via": via}
 
 
 def _computed(method: str, bound: float) -> dict[str, Any]:
@@ -216,21 +209,23 @@ def _computed(method: str, bound: float) -> dict[str, Any]:
     return found | {"seconds": None, "threads": None, "via": None}
 
 
-def _gap(best: Best, bounds: list[dict[str, Any]], status: str) -> dict[str, Any]:
-    """The dual bounds, the greatest one, and the gap to the best point."""
+def _results(task: Entry, best: Best, records: list[Record], bounds: list[dict[str, Any]]) -> dict[str, Any]:
+    """Dual bounds, status, gap, runs and grade of the entry."""
+    facts = standing(best.objective, bounds, records, task.name)
     bound = max((each["bound"] for each in bounds), default=None)
     gap = None if bound is None else relative_gap(best.objective, bound)
-    return {"bounds": bounds, "bound": bound, "status": status, "gap": gap}
-
-
-def _grade(task: Entry, best: Best, bounds: list[dict[str, Any]], status: str) -> str:
-    """The grade of the entry, from its own runs and the tangent at its point."""
-    runs = [
-        each for each in task.records if (each.entry, each.problem_sha256) == (task.name, best.problem.sha256)
-    ]
-    shown = [each["bound"] for each in bounds if each["solver"] == ours(_TANGENT).solver]
-    tangent = any(is_proven(best.objective, bound) for bound in shown)
-    return difficulty(status, runs, tangent=tangent)
+    tangents = [each["bound"] for each in bounds if each["solver"] == ours(_TANGENT).solver]
+    tangent = any(is_proven(best.objective, each) for each in tangents)
+    runs = [each for each in records if each.entry == task.name]
+    return {
+        "bounds": bounds,
+        "bound": bound,
+        "status": facts["status"],
+        "gap": gap,
+        "runs": runs_of(records, task.name, best.objective),
+        "density": density(best.problem.instance),
+        "difficulty": difficulty(facts["status"], runs, tangent=tangent),
+    } | facts
 
 
 def _sidecar(
@@ -265,11 +260,59 @@ def _sidecar(
 
 
 def _context(task: Entry, problem: Problem) -> dict[str, Any]:
+    formats = task.recipe.formats
     return {
-        "transformations": transformations(problem, task.recipe.formats),
+        "transformations": [f".{name}: {note}" for name in formats for note in notes_of(problem, name)],
         "equivalent": equivalent(task.recipe, task.relatives),
         "not_equivalent": not_equivalent(task.recipe, task.relatives),
         "licence": task.about.get("origin", {}).get("license"),
         "references": list(REFERENCES),
         "recipe_sha256": task.sha256,
     }
+
+
+class Inputs:
+    """Tasks of a library with these plans, this ledger and given points."""
+
+    def __init__(self, ledger: Ledger, plans: Iterable[InstancePlan], points: Points = NO_POINTS) -> None:
+        self.ledger, self.plans, self.points = ledger, tuple(plans), points
+        self._relatives: dict[str, list[str]] = {}
+        for each in self.plans:
+            self._relatives.setdefault(_relation(each), []).extend(entry.name for entry in each.entries)
+
+    def preparation(self, each: InstancePlan) -> Preparation:
+        """Return the task of an instance. Raises InputError, InstanceError for a damaged file."""
+        name = each.recipe.name
+        return Preparation(each.recipe, self._submitted(each), self.points(name), self._certificate(name))
+
+    def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
+        """Yield the tasks of its entries. Raises as `preparation`, and InputError for a missing file."""
+        files = {facts["name"]: read_bytes(folder / facts["name"]) for facts in about["files"]}
+        relatives, submitted = tuple(self._relatives[_relation(each)]), self._submitted(each)
+        names = {entry.name for entry in each.entries}
+        records = tuple(record for record in self.ledger.records if record.entry in names)
+        for recipe in each.entries:
+            yield Entry(recipe, about, files, records, submitted, relatives)
+
+    def _submitted(self, each: InstancePlan) -> tuple[Submitted, ...]:
+        """The fields that the ledger keeps for the entries of an instance."""
+        records = (self.ledger.with_point(entry.name) for entry in each.entries)
+        return tuple(self._submission(record) for record in records if record is not None)
+
+    def _submission(self, record: Record) -> Submitted:
+        self.ledger.field(record)  # an error here names the file
+        provenance = Provenance(record.solver, record.version, record.seconds, record.by)
+        return Submitted(self.ledger.content(str(record.point), record.point_sha256), provenance)
+
+    def _certificate(self, instance: str) -> Evidence | None:
+        """The certificate that the ledger keeps for an instance."""
+        kept = next((each for each in self.ledger.certificates if each.instance == instance), None)
+        if kept is None:
+            return None
+        data = self.ledger.content(kept.file, kept.sha256)
+        return Evidence(kept.file, data, kept.instance_sha256, replace(ours(METHOD), by=kept.by))
+
+
+def _relation(each: InstancePlan) -> str:
+    """The name without the gauge, which instances with related entries share."""
+    return each.recipe.name.removesuffix("_box")

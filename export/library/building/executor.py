@@ -1,7 +1,7 @@
 """Executors of tasks: this process, processes of this machine, or the workers of a dask scheduler.
 
-All three are executors of `concurrent.futures`. A task is a function from values to values that writes
-nothing. If a worker dies during a task, another one repeats it, and its result is used once.
+A task is a function from values to values that writes no files. If a dask worker dies during a task, another
+one repeats it.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from ....models.processes.side_by_side import workers
 
 T = TypeVar("T")
 
-_AHEAD: Final = 64
-"""Tasks that are handed out to a cluster at once: enough for its workers, few enough to keep memory flat."""
+_AHEAD: Final = 64  # tasks submitted to a cluster at once: enough for its workers, at constant memory
 _TRIES: Final = 3  # of a task whose dask worker died
 _PATIENCE: Final = "10s"  # to reach a scheduler
 
@@ -63,7 +62,7 @@ def _cluster(address: str) -> Iterator[Executor]:
         yield client.get_executor(pure=False, retries=_TRIES)
     except distributed.KilledWorker as error:
         raise BuildError(
-            "a task ended several workers, for want of memory most likely; see their logs and build again, "
+            "a task ended several workers, probably for lack of memory; see their logs and build again, "
             "complete files are kept"
         ) from error
     except (CancelledError, distributed.comm.core.CommClosedError) as error:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,7 +15,7 @@ from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, generator
 from ...writing.records import number
 from ..documents import check_point
-from ..documents.citation import PAPER, REFERENCES, Terms, cited
+from ..documents.citation import PAPER, REFERENCES, cited, terms
 from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, about_file, as_bytes, read_about, read_sidecar
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
@@ -32,46 +31,47 @@ TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md")
 _OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
 
 
-def write_index(
-    folder: Path, spec: Spec, plans: Iterable[InstancePlan], skipped: Mapping[str, str] | None = None
-) -> None:
-    """Write the files about the library as a whole and remove those of entries that left it.
+def write_index(folder: Path, spec: Spec, plans: Sequence[InstancePlan], skipped: Mapping[str, str]) -> None:
+    """Write the files about the library as a whole and remove the files of entries that left it.
 
     skipped: names of instances that the specification asks for and that are not in the plans, and why.
     """
-    plans = tuple(plans)
     sidecars = [read_sidecar(folder / f"{entry.name}.json") for each in plans for entry in each.entries]
-    index = _index(folder, spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
-    written = general(spec, sidecars, skipped or {}) | {INDEX: as_bytes(index)}
+    written = general(folder, spec, sidecars, skipped)
     for name, data in written.items():
         write_bytes(folder / name, data)
-    beside = read_ledger(folder).files
-    present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *beside]
-    _remove_stale(folder, set(present))
-    sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(set(present)))
+    abouts = [about_file(each.recipe.name) for each in plans]
+    documents = sidecars + [read_about(folder / name) for name in abouts]
+    listed = {file["name"] for each in documents for file in each["files"]}
+    present = {*written, LEDGER, *abouts, *listed, *read_ledger(folder).files}
+    present |= {f"{each['name']}.json" for each in sidecars}
+    _remove_stale(folder, present)
+    sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(present))
     write_bytes(folder / SUMS, sums.encode())
 
 
-def general(spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, str]) -> dict[str, bytes]:
-    """Return the files about the library as a whole: texts, drawings, checkers and library.solu."""
+def general(
+    folder: Path, spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, str]
+) -> dict[str, bytes]:
+    """Return the files about the library as a whole, the index last. folder: holds the sidecars."""
     context = _context(spec, sidecars) | {"skipped": skipped}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
     checkers = {CHECKER: read_bytes(Path(check_point.__file__))}
     if context["certified"]:
         checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
-    return texts | drawings | checkers | {SOLU: _optima(sidecars)}
+    index = _index(folder, spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
+    return texts | drawings | checkers | {SOLU: _optima(sidecars), INDEX: as_bytes(index)}
 
 
 def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    """The context of the templates."""
     rungs = [_rung(name, [each for each in sidecars if each["rung"] == name]) for name in RUNGS]
     written = {file["format"] for each in sidecars for file in each["files"]}
     return {
         "spec": spec,
         "generator": generator(),
         "release": cited(spec),
-        "terms": Terms(spec.sketches),
+        "terms": terms(spec.sketches),
         "references": REFERENCES,
         "paper": PAPER,
         "rungs": [rung for rung in rungs if rung["entries"]],
@@ -121,22 +121,6 @@ def _index(folder: Path, spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str
     }
 
 
-def _of_instances(folder: Path, plans: tuple[InstancePlan, ...]) -> list[str]:
-    found = []
-    for each in plans:
-        name = about_file(each.recipe.name)
-        found += [name, *(file["name"] for file in read_about(folder / name)["files"])]
-    return found
-
-
-def _of_entries(sidecars: list[dict[str, Any]]) -> list[str]:
-    return [
-        name
-        for each in sidecars
-        for name in (f"{each['name']}.json", *(file["name"] for file in each["files"]))
-    ]
-
-
 def _remove_stale(folder: Path, present: set[str]) -> None:
     """Remove files that an earlier build listed and this one lacks; other files stay."""
     sums = folder / SUMS
@@ -145,7 +129,5 @@ def _remove_stale(folder: Path, present: set[str]) -> None:
     for line in read_bytes(sums).decode("ascii", "replace").splitlines():
         expected, _, name = line.partition("  ")
         path = folder / name
-        if name in present or not _OURS.fullmatch(name) or not path.is_file():
-            continue
-        if hashlib.sha256(path.read_bytes()).hexdigest() == expected:
+        if name not in present and _OURS.fullmatch(name) and path.is_file() and sha256_of(path) == expected:
             path.unlink()

@@ -1,7 +1,6 @@
-"""The first task of each instance: files of the instance and of its known fields.
+"""The task of each instance: files of the instance and of its known fields.
 
-A task is a function from values to the bytes of files, so that it runs in any process on any machine. The
-caller writes the files.
+A task is a function from values to the bytes of files, which the caller writes. It runs in any process.
 """
 
 from __future__ import annotations
@@ -15,26 +14,27 @@ from ....models.field.field import CrossField
 from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import to_json
 from ....models.instance.instance import Instance
+from ....models.search.greedy import greedy_field
 from ....models.search.pinned import pinned
 from ...formats.registry import generator
 from ..documents.documents import ABOUT_FORMAT, VERSION, about_file, as_bytes
 from ..documents.statistics import sizes
-from ..ledger.certificates import Certified, certified, certified_by
 from ..ledger.given import Given
 from ..ledger.points import (
+    Certified,
     Known,
     Provenance,
-    baseline_field,
+    better_in_1norm,
+    certified,
+    certified_by,
     least_energy,
     ours,
     searched_field,
 )
-from ..ledger.search_1norm import better_in_1norm
 from ..plan.recipe import InstanceRecipe, digest
 from ..plan.sources import RAGGED_SHARE, STROKE_SHARE, instance_from, kind_of
 
-Files = dict[str, bytes]
-"""Files by name, in the order in which they are to be written."""
+Files = dict[str, bytes]  # by name, in the order of writing
 
 ROLES: Final = {"baseline": ".baseline.field.json", "least_1": ".l1.field.json", "least_2": ".field.json"}
 """Roles of fields and the suffixes of their files; equal fields share the last file."""
@@ -54,20 +54,12 @@ class Submitted:
 
 @dataclass(frozen=True)
 class Evidence:
-    """The certificate of a ledger.
-
-    file, data: name and bytes of its file; instance_sha256: the instance that it is on; provenance: who
-    submitted it.
-    """
+    """The certificate of a ledger: name and bytes of its file, its instance and its submitter."""
 
     file: str
     data: bytes
     instance_sha256: str
     provenance: Provenance
-
-    def certified(self, instance: Instance) -> Certified:
-        """Return the verdict of a certificate. Raises InputError unless the checker accepts it."""
-        return certified_by(self.data, self.file, instance, self.provenance)
 
 
 @dataclass(frozen=True)
@@ -95,31 +87,36 @@ class Preparation:
         return digest([generator(), self.recipe.document(), submitted, *given, *proof])
 
 
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """Search result for an instance: the baseline, fields of low energy, and a certificate."""
-
-    baseline: Known
-    low: list[Known]
-    certificate: Certified | None
+_Found = tuple[Known, list[Known], Certified | None]
+"""The baseline, fields of low energy, and a certificate."""
 
 
 def prepared(task: Preparation) -> Files | NoStrokeError:
-    """Return the files of an instance, or the error that its size does not suit its sketch."""
+    """Return the files of an instance, its document last, or the error that its size is too small."""
     try:
-        return prepare(task)
+        instance = instance_from(task.recipe)
     except NoStrokeError as error:
         return error
-
-
-def prepare(task: Preparation) -> Files:
-    """Return the files of an instance: itself, its fields, and last its document. Raises InputError."""
-    instance = instance_from(task.recipe)
     given = task.given if task.given and task.given.instance == instance.sha256 else None
-    evidence = task.evidence
-    sent = evidence.certified(instance) if evidence and evidence.instance_sha256 == instance.sha256 else None
-    found = _given(given, instance, task.recipe) if given else _searched(instance, task.recipe, sent)
-    chosen = _chosen(instance, task, found, sent)
+    evidence, sent = task.evidence, None
+    if evidence and evidence.instance_sha256 == instance.sha256:
+        sent = certified_by(evidence.data, evidence.file, instance, evidence.provenance)
+    baseline, low, proven = (
+        _given(given, instance, task.recipe) if given else _searched(instance, task.recipe, sent)
+    )
+    submitted = [each.known() for each in task.submitted]
+    every = [
+        baseline,
+        *low,
+        *(each for each in submitted if each.field.instance.sha256 == instance.sha256),
+        *([sent.known] if sent else []),  # last, so that an equal field that was submitted earlier stays
+    ]
+    # The ledger does not decide on the baseline, whose jumps are the data of `qp-fixed`.
+    chosen = {
+        "baseline": baseline,
+        "least_1": least_energy(every, 1),
+        "least_2": least_energy(every, 2),
+    }
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
     for role in reversed(ROLES):
@@ -130,7 +127,12 @@ def prepare(task: Preparation) -> Files:
             files[name] = field_to_json(known.field)
         energies = {f"energy_{norm}norm": known.field.energy(norm).total for norm in (2, 1)}
         fields[role] = {"file": name, **asdict(known.provenance), **energies}
-    certificate = _certificate(found.certificate, sent, files)
+    certificates = [each for each in (sent, proven) if each is not None]
+    certificate = {}
+    if certificates:
+        best = max(certificates, key=lambda each: each.facts["bound"])
+        files[best.file] = best.data
+        certificate = {"certificate": {"file": best.file, **best.facts}}
     about = _about(instance, task, {role: fields[role] for role in ROLES}, files) | certificate
     return files | {about_file(task.name): as_bytes(about)}
 
@@ -143,38 +145,13 @@ def _searched(instance: Instance, recipe: InstanceRecipe, sent: Certified | None
     found = better_in_1norm(searched.field, recipe.rung)
     staged = [Known(pinned(each.field), ours("two stages")) for each in found]
     low = [searched, *([proven.known] if proven else []), *found, *staged]
-    return _Found(baseline_field(instance), low, proven)
+    return Known(pinned(greedy_field(instance)), ours("greedy")), low, proven
 
 
 def _given(given: Given, instance: Instance, recipe: InstanceRecipe) -> _Found:
     """The given points, without any search; a certificate is checked."""
     low = [given.field("least_2"), given.field("least_1")]
-    return _Found(given.field("baseline"), low, given.certificate(instance) if recipe.prove else None)
-
-
-def _certificate(found: Certified | None, sent: Certified | None, files: Files) -> dict[str, Any]:
-    """Facts of the certificate with the greatest bound, if there is one, whose file is added to the files."""
-    known = [each for each in (sent, found) if each is not None]
-    if not known:
-        return {}
-    best = max(known, key=lambda each: each.facts["bound"])
-    files[best.file] = best.data
-    return {"certificate": {"file": best.file, **best.facts}}
-
-
-def _chosen(instance: Instance, task: Preparation, found: _Found, sent: Certified | None) -> dict[str, Known]:
-    """The field of each role; the ledger does not decide on the baseline, for `qp-fixed`.
-
-    The field of a submitted certificate comes last, so that an equal one that was submitted before it stays.
-    """
-    submitted = [each.known() for each in task.submitted]
-    known = [
-        found.baseline,
-        *found.low,
-        *(each for each in submitted if each.field.instance.sha256 == instance.sha256),
-        *([sent.known] if sent else []),
-    ]
-    return {"baseline": found.baseline, "least_1": least_energy(known, 1), "least_2": least_energy(known, 2)}
+    return given.field("baseline"), low, given.certificate(instance) if recipe.prove else None
 
 
 def _same(first: CrossField, second: CrossField) -> bool:

@@ -1,45 +1,46 @@
-"""Checks of an entry against its problem, formulated again from the instance, and of its runs.
+"""Checks of an entry and of its runs.
 
-The entry is made again from what it was made of, and compared with what is in the library, model files
-unpacked; the best known point is read by the readers of solution files and evaluated, and, by the checker
-that ships with every library, against the .mps and the instance without any rounding.
+The entry is made again and compared with the library. Its best known point is read from its files and
+evaluated, and checked exactly against the .mps and the instance by the checker that every library contains.
 """
 
 from __future__ import annotations
 
+import gzip
+import json
 import os
+import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError
 from ....models.formulations.problem import Problem
-from ...formats.registry import generator
+from ....models.instance.file import read_instance
+from ....models.storage import read_bytes
+from ...formats.registry import FORMATS, generator
 from ...solutions.logs.registry import parse_log
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
-from ...writing.curvature import probtype
-from ..building.entry_task import Entry
+from ..building.entry_task import Entry, make_entry
+from ..building.instance_task import Files, Preparation, source_of, stated_of
 from ..documents.check_point import BadInputError, check
 from ..documents.documents import problem_of
-from ..documents.statistics import counts, curvature, ranges, sizes
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record
-from ..ledger.points import complete_point
-from ..ledger.standing import MAKERS, is_proven, relative_gap
+from ..ledger.points import METHOD, Provenance, complete_point, ours
+from ..ledger.standing import MAKERS
 from .finding import FEASIBLE, Finding, close, of_error
-from .made_again import entry_findings
 
+_APART: Final = {"best", "files"}  # keys of a sidecar that are compared part by part
 _AGAIN: Final = "restore it, or submit the run again"
 
 
 def verify_entry(
     folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry | None
 ) -> Iterator[Finding]:
-    """Yield findings about an entry whose sidecar obeys its schema and whose files are those listed.
-
-    task: its inputs; None if they are damaged or missing, which is reported elsewhere.
-    """
+    """Yield findings about an entry with a valid sidecar and all its files; task: None for damaged inputs."""
     name = f"{sidecar['name']}.json"
     try:
         problem = problem_of(folder, sidecar)
@@ -47,40 +48,16 @@ def verify_entry(
         yield of_error(error, Path(error.file or name).name)
         return
     if sidecar["generator"] != generator():
-        made = f"was made by {sidecar['generator']}, so that {generator()} cannot make it again to compare it"
+        made = f"was made by {sidecar['generator']}, so {generator()} cannot make it again to compare it"
         yield Finding(name, made, f"verify with {sidecar['generator']}")
-        task = None
-    yield from _facts(name, sidecar, problem) if task is None else _again(folder, sidecar, task)
-    if sidecar["best"] is not None:
-        yield from _points(folder, sidecar, problem)
-        yield from _exactly(folder, sidecar)
-        yield from _unused(sidecar, problem, ledger)
-    yield from _bounds(name, sidecar)
-
-
-def _again(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
-    """Differences from the rebuilt entry, or the reason why it cannot be rebuilt."""
-    try:
-        yield from entry_findings(folder, sidecar, task)
-    except CrossfieldError as error:
-        yield of_error(error, Path(error.file or f"{task.name}.json").name)
-
-
-def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
-    """Wrong facts about the problem in the sidecar."""
-    instance = problem.instance
-    facts: dict[str, Any] = {
-        "class": problem.problem_class,
-        "convex": problem.convex,
-        "probtype": probtype(problem),
-        "counts": counts(problem),
-        "curvature": curvature(problem),
-        "ranges": ranges(problem),
-        "instance": sidecar["instance"] | sizes(instance) | {"sha256": instance.sha256},
-    }
-    for key, value in facts.items():
-        if sidecar[key] != value:
-            yield Finding(name, f"states another {key} than its problem has")
+    elif task is not None:
+        try:
+            yield from entry_findings(folder, sidecar, task)
+        except CrossfieldError as error:
+            yield of_error(error, Path(error.file or name).name)
+    yield from _points(folder, sidecar, problem)
+    yield from _exactly(folder, sidecar)
+    yield from _kept(sidecar["name"], problem, ledger)
 
 
 def _points(folder: Path, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
@@ -149,49 +126,14 @@ def _exactly(folder: Path, sidecar: dict[str, Any]) -> Iterator[Finding]:
             )
 
 
-def _unused(sidecar: dict[str, Any], problem: Problem, ledger: Ledger) -> Iterator[Finding]:
-    """A field of the ledger that is better than the best known point, because a build was stopped."""
-    record = ledger.with_point(sidecar["name"])
-    if record is None or record.problem_sha256 != problem.sha256:
+def _kept(entry: str, problem: Problem, ledger: Ledger) -> Iterator[Finding]:
+    """A false objective of the field that the ledger keeps for an entry."""
+    record = ledger.with_point(entry)
+    if record is None or record.primal is None or record.problem_sha256 != problem.sha256:
         return
-    try:
-        objective = problem.objective_value(complete_point(problem, ledger.field(record)))
-    except CrossfieldError:
-        return  # reported with the ledger
-    if record.primal is not None and not close(objective, record.primal):
-        yield Finding(
-            LEDGER,
-            f"states another objective of {record.point} than it has",
-            "restore it, or submit the point again",
-        )
-    stated = sidecar["best"]["objective"]
-    if objective < stated and not close(objective, stated):
-        yield Finding(
-            f"{sidecar['name']}.json", f"states a worse point than {record.point}, which the ledger has"
-        )
-
-
-def _bounds(name: str, sidecar: dict[str, Any]) -> Iterator[Finding]:
-    """Contradictions between bounds, status, gap and the best known point."""
-    bounds = [each["bound"] for each in sidecar["bounds"] if each["bound"] is not None]
-    bound = max(bounds, default=None)
-    if sidecar["bound"] != bound:
-        yield Finding(name, f"states the bound {sidecar['bound']}, but the best of its bounds is {bound}")
-    if sidecar["best"] is None:
-        return
-    objective = sidecar["best"]["objective"]
-    if bound is not None and bound > objective:
-        yield Finding(name, f"has a dual bound {bound!r} above the objective {objective!r} of its point")
-    gap = None if bound is None else relative_gap(objective, bound)
-    if (sidecar["status"], sidecar["gap"]) != (_status(sidecar, objective), gap):
-        yield Finding(name, "states another status or gap than follows from its bounds and its point")
-
-
-def _status(sidecar: dict[str, Any], objective: float) -> str:
-    """The status that follows from a sidecar's bounds; a closed gap is solved or claimed."""
-    if sidecar["bound"] is None or not is_proven(objective, sidecar["bound"]):
-        return "best known"
-    return "optimal" if "solved" in sidecar else "claimed"
+    with suppress(CrossfieldError):  # reported with the ledger
+        if not close(problem.objective_value(complete_point(problem, ledger.field(record))), record.primal):
+            yield Finding(LEDGER, f"states another objective of {record.point} than it has", _AGAIN)
 
 
 def run_findings(ledger: Ledger, record: Record) -> Iterator[Finding]:
@@ -219,3 +161,96 @@ def run_findings(ledger: Ledger, record: Record) -> Iterator[Finding]:
         yield Finding(
             LEDGER, f"states that the run of {record.log} proved an optimum, and it did not", _AGAIN
         )
+
+
+def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
+    """Yield differences between an entry's files and those that its task makes. Raises CrossfieldError."""
+    files, name = make_entry(task), f"{task.name}.json"
+    made = json.loads(files[name])
+    yield from _models(folder, sidecar, files)
+    for key in dict.fromkeys((*made, *sidecar)):
+        if key not in _APART and not same(sidecar.get(key), made.get(key)):
+            yield Finding(name, f"states another {key} than follows from its instance and the ledger")
+    if _described(sidecar["files"]) != _described(made["files"]):
+        yield Finding(name, "states other files, or other facts about them, than its problem has")
+    for key in ("point", "nl_point"):
+        if sidecar["best"][key] != made["best"][key]:
+            yield Finding(name, f"names another {key} than its problem has")
+    if not close(sidecar["best"]["objective"], made["best"]["objective"]):
+        yield Finding(name, "does not state the best of the known points")
+    if Provenance.of(sidecar["best"]) not in _known(task):
+        yield Finding(name, "names a finder of its point who found none of the known fields")
+
+
+def same(stated: Any, made: Any) -> bool:
+    """Whether two values of JSON are the same, numbers up to rounding."""
+    if isinstance(made, dict):
+        return (
+            isinstance(stated, dict)
+            and stated.keys() == made.keys()
+            and all(same(stated[key], made[key]) for key in made)
+        )
+    if isinstance(made, list):
+        return isinstance(stated, list) and len(stated) == len(made) and all(map(same, stated, made))
+    if isinstance(made, float) and isinstance(stated, int | float) and not isinstance(stated, bool):
+        return close(stated, made)
+    return type(stated) is type(made) and bool(stated == made)
+
+
+def _models(folder: Path, sidecar: dict[str, Any], made: Files) -> Iterator[Finding]:
+    """Model files that differ from those written of the problem today."""
+    for file in sidecar["files"]:
+        name = file["name"]
+        if file["format"] not in FORMATS:
+            continue
+        if name not in made:
+            yield Finding(name, f"differs from the .{file['format']} of this problem")
+        elif _content(made[name], name) != _content(read_bytes(folder / name), name):
+            yield Finding(name, "does not hold the problem that its sidecar describes")
+
+
+def _content(data: bytes, name: str) -> bytes | None:
+    """Bytes of a file, unpacked; None if it is damaged."""
+    with suppress(OSError, EOFError, zlib.error):
+        return gzip.decompress(data) if name.endswith(".gz") else data
+    return None
+
+
+def _described(files: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The descriptions of files without size and checksum."""
+    return [{key: file[key] for key in file if key not in {"bytes", "sha256"}} for file in files]
+
+
+def _known(task: Entry) -> set[Provenance]:
+    """The provenances of the known fields of an entry's instance."""
+    known = {Provenance.of(facts) for facts in task.about["fields"].values()}
+    return known | {each.provenance for each in task.submitted}
+
+
+def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Preparation) -> Iterator[Finding]:
+    """Yield statements about an instance that do not follow from its recipe, except fields."""
+    recipe = task.recipe
+    instance = read_instance(folder / about["instance"]["file"])
+    expected = {
+        "name": task.name,
+        "family": recipe.sketch.name,
+        "title": recipe.sketch.title,
+        "rung": recipe.rung,
+        "source": source_of(instance, recipe),
+        "recipe_sha256": task.sha256,
+        **dict.fromkeys(("origin", "added")),
+        **stated_of(recipe),
+    }
+    for key, value in expected.items():
+        if not same(about.get(key), value):
+            yield Finding(name, f"states another {key} than follows from the specification")
+    if "given" in about:
+        return
+    known = {each.provenance for each in task.submitted}
+    known |= {task.evidence.provenance} if task.evidence else set()
+    known |= set(map(ours, ("greedy", "search", "two stages", METHOD)))
+    for role, facts in about["fields"].items():
+        found = Provenance.of(facts)
+        by_highs = (found.solver, found.seconds, found.by) == ("HiGHS", None, None)  # of any version
+        if found not in known and not by_highs:
+            yield Finding(name, f"names a finder of its field {role} whom the ledger does not know")

@@ -1,10 +1,8 @@
-"""Checks of a library as a whole: files, checksums, schemas, and every entry by its sidecar.
-
-Everything is recomputed: problems are formulated again from their instances (`verify_entry`).
-"""
+"""Checks of a library as a whole: files, checksums, schemas, instances, and every entry (`verify_entry`)."""
 
 from __future__ import annotations
 
+import json
 import re
 from collections import deque
 from collections.abc import Iterator
@@ -14,17 +12,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
-from ....models.field.field import CrossField
 from ....models.field.file import read_field
 from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, sha256_of
 from ...formats.registry import generator
-from ..building.entry_task import Entry
+from ..building.entry_task import Entry, Inputs
 from ..building.executor import executor
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
-from ..building.inputs import Inputs
-from ..documents.citation import cited
 from ..documents.documents import (
     INDEX,
     Library,
@@ -41,25 +36,22 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.sources import instance_from
-from .check_entry import run_findings, verify_entry
+from .check_entry import instance_findings, run_findings, verify_entry
 from .finding import BUILD, Finding, close, of_error
-from .made_again import instance_findings
 
 FETCH: Final = "fetch it again, or build the library again"
 REMOVE: Final = "remove it"
-PLAIN: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-"""Names of files that a library may hold."""
+PLAIN: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")  # names of files in a library
 
 Checked = tuple[dict[str, Any] | None, list[Finding]]
 
-_AHEAD: Final = 16  # entries a process that are handed out at once: the first one may be the slowest
+_AHEAD: Final = 16  # entries per process that are submitted at once: the first one may be the slowest
 _SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
 
 
 def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> list[Finding]:
-    """Return the findings about a library in a folder; an empty list if it is sound.
+    """Return the findings about a library in a folder, which is locked during the work.
 
-    jobs: processes; progress: called with a line per step. The folder is locked during the work.
     Raises InputError without a library, OutputError if another process holds the lock for too long.
     """
     place = folder_of(folder)
@@ -118,7 +110,8 @@ class _Verification:
         if SUMS not in self.present:
             yield Finding(SUMS, "is missing", FETCH)
             return
-        for number, line in enumerate(_text(self.folder / SUMS).splitlines(), 1):
+        sums = read_bytes(self.folder / SUMS).decode("utf-8", "replace")
+        for number, line in enumerate(sums.splitlines(), 1):
             parts = _SUM.fullmatch(line)
             if parts is None:
                 yield Finding(SUMS, f"line {number} is no checksum and name", FETCH)
@@ -143,16 +136,9 @@ class _Verification:
 
     def _index(self, library: Library) -> Iterator[Finding]:
         """Findings about the index, and missing texts and checkers."""
-        document = library.document
-        names = document["entries"]
-        if document["generator"] == generator():
-            yield from self._release(library)
-        if sorted(document["sha256"]) != sorted(names):
+        names = library.document["entries"]
+        if sorted(library.document["sha256"]) != sorted(names):
             yield Finding(INDEX, "lists other entries than it has checksums for")
-        for name in names:
-            path = self.folder / f"{name}.json"
-            if path.name in self.present and sha256_of(path) != document["sha256"].get(name):
-                yield Finding(path.name, f"has another SHA-256 than {INDEX} states")
         try:
             spec = library.spec
             plans = plan(spec)
@@ -167,12 +153,6 @@ class _Verification:
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
 
-    def _release(self, library: Library) -> Iterator[Finding]:
-        """A release that does not follow from the specification."""
-        with suppress(CrossfieldError):  # reported with the specification
-            if library.document.get("release") != cited(library.spec):
-                yield Finding(INDEX, "states another release than follows from the specification")
-
     def _skipped(self, library: Library, plans: tuple[InstancePlan, ...]) -> Iterator[Finding]:
         """Skipped instances that can be made, or that have another reason."""
         recipes = {each.recipe.name: each.recipe for each in plans}
@@ -180,13 +160,13 @@ class _Verification:
             try:
                 if name in recipes:
                     instance_from(recipes[name])
-                yield Finding(INDEX, f"leaves out {name}, which can be made or is not asked for")
+                yield Finding(INDEX, f"skips {name}, which can be made or is not asked for")
             except CrossfieldError as error:
                 if str(error) != f"{name}: {stated}":
-                    yield Finding(INDEX, f"states another reason for leaving {name} out than there is")
+                    yield Finding(INDEX, f"states another reason for skipping {name} than there is")
 
     def _entries(self, library: Library) -> Iterator[Finding]:
-        """Findings about ledger, instances and entries, and about texts if there are none before."""
+        """Findings about ledger, instances and entries, and about texts if all entries are sound."""
         try:
             ledger = read_ledger(self.folder)
         except CrossfieldError as error:
@@ -212,25 +192,21 @@ class _Verification:
 
     def _task(self, name: str, inputs: Inputs) -> Entry | None:
         """The inputs of an entry; None if they are damaged or missing, which is reported elsewhere."""
-        for each in inputs.plans:
-            if name in {entry.name for entry in each.entries}:
-                try:
-                    about = read_about(self.folder / about_file(each.recipe.name))
-                    return next(
-                        task for task in inputs.entries(each, about, self.folder) if task.name == name
-                    )
-                except CrossfieldError:
-                    return None
+        plans = (each for each in inputs.plans for entry in each.entries if entry.name == name)
+        with suppress(CrossfieldError, StopIteration):
+            each = next(plans)
+            about = read_about(self.folder / about_file(each.recipe.name))
+            return next(task for task in inputs.entries(each, about, self.folder) if task.name == name)
         return None
 
     def _texts(self, library: Library, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
-        """Texts, drawings, checkers and library.solu that differ from those made of sound sidecars."""
-        if library.document["generator"] != generator():
-            return
+        """General files that differ from those made of sound sidecars."""
         try:
-            made = general(library.spec, sidecars, library.skipped)
+            made = general(self.folder, library.spec, sidecars, library.skipped)
         except CrossfieldError:
             return  # reported with the index
+        if json.loads(made.pop(INDEX)) != library.document:
+            yield Finding(INDEX, "is not what follows from the specification and the sidecars")
         for name in sorted(made):
             if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
                 yield Finding(name, "is not what follows from the specification and the sidecars")
@@ -238,37 +214,33 @@ class _Verification:
     def _each(self, names: list[str], ledger: Ledger, inputs: Inputs) -> Iterator[Checked]:
         """The sidecar of each entry in order, None if it is damaged, and the findings."""
         most = 1 if self.jobs == 1 else _AHEAD * self.jobs
-        under_way: deque[tuple[Checked, Future[list[Finding]] | None]] = deque()
+        under_way: deque[tuple[dict[str, Any] | None, list[Finding], Future[list[Finding]] | None]] = deque()
         with executor(self.jobs, None) as chosen:
             for number, name in enumerate(names, 1):
                 self.progress(f"{number} of {len(names)}: {name}")
                 sidecar, wrong = self._sidecar(name)
                 future = None
-                if sidecar is not None and self._has_all(name, sidecar, wrong):
+                if sidecar is not None and not wrong:
                     task = self._task(name, inputs)
                     future = chosen.submit(_verified, self.folder, sidecar, ledger, task)
-                under_way.append(((sidecar, wrong), future))
+                under_way.append((sidecar, wrong, future))
                 if len(under_way) >= most:
                     yield _ended(*under_way.popleft())
             while under_way:
                 yield _ended(*under_way.popleft())
 
     def _sidecar(self, name: str) -> Checked:
-        """The sidecar of an entry, and the findings about it alone."""
+        """The sidecar of an entry, and the findings about its name and files."""
         self.known.add(f"{name}.json")
         try:
             sidecar = read_sidecar(self.folder / f"{name}.json")
         except CrossfieldError as error:
             return None, [of_error(error, f"{name}.json")]
         self.known |= {file["name"] for file in sidecar["files"]}
-        of = sidecar["name"]
-        return sidecar, [] if of == name else [Finding(f"{name}.json", f"states that it is of {of}")]
-
-    def _has_all(self, name: str, sidecar: dict[str, Any], wrong: list[Finding]) -> bool:
-        """Whether all files of an entry are there as listed; adds findings about the others."""
-        lost = list(self._listed(f"{name}.json", sidecar["files"]))
-        wrong += lost
-        return not lost
+        wrong = list(self._listed(f"{name}.json", sidecar["files"]))
+        if sidecar["name"] != name:
+            wrong.append(Finding(f"{name}.json", f"states that it is about {sidecar['name']}"))
+        return sidecar, wrong
 
     def _listed(self, by: str, files: list[dict[str, Any]]) -> Iterator[Finding]:
         """Listed files that are missing or have another size or checksum."""
@@ -333,25 +305,25 @@ class _Verification:
     def _recipe(self, name: str, about: dict[str, Any], inputs: Inputs) -> Iterator[Finding]:
         """Statements about an instance that do not follow from its recipe."""
         planned = [each for each in inputs.plans if about_file(each.recipe.name) == name]
-        if about["generator"] != generator() or not planned:
-            return
-        try:
-            yield from instance_findings(self.folder, name, about, inputs.preparation(planned[0]))
-        except CrossfieldError as error:
-            yield of_error(error, Path(error.file or name).name)
+        if about["generator"] == generator() and planned:
+            try:
+                yield from instance_findings(self.folder, name, about, inputs.preparation(planned[0]))
+            except CrossfieldError as error:
+                yield of_error(error, Path(error.file or name).name)
 
     def _fields(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
         """Fields on other instances or of other energies, and least fields that are not least."""
-        fields = about["fields"]
+        fields, listed = about["fields"], {each["name"] for each in about["files"]}
         for role, facts in fields.items():
+            name_of_field = facts["file"]
             try:
-                field = self._field(facts["file"], about)
+                field = read_field(self.folder / name_of_field) if name_of_field in listed else None
             except CrossfieldError as error:
-                yield of_error(error, facts["file"])
+                yield of_error(error, name_of_field)
                 continue
             stated = (facts["energy_2norm"], facts["energy_1norm"])
-            if field is None:
-                yield Finding(facts["file"], f"is not a field of {about['name']}")
+            if field is None or field.instance.sha256 != about["instance"]["sha256"]:
+                yield Finding(name_of_field, f"is not a field of {about['name']}")
             elif not all(map(close, stated, (field.energy(2).total, field.energy(1).total))):
                 yield Finding(name, f"states other energies of its field {role} than it has")
         for role, energy in (("least_2", "energy_2norm"), ("least_1", "energy_1norm")):
@@ -381,29 +353,18 @@ class _Verification:
         ):
             yield Finding(name, "states another status, bound or energy of its certificate than it shows")
 
-    def _field(self, name: str, about: dict[str, Any]) -> CrossField | None:
-        """The field in a file, None if it does not belong to the instance."""
-        if name not in {each["name"] for each in about["files"]}:
-            return None
-        field = read_field(self.folder / name)
-        return field if field.instance.sha256 == about["instance"]["sha256"] else None
-
 
 def _verified(folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry | None) -> list[Finding]:
-    """Findings about an entry, even if its sidecar holds nonsense."""
+    """Findings about an entry, even if its sidecar has impossible values."""
     found: list[Finding] = []
     try:
         found.extend(verify_entry(folder, sidecar, ledger, task))
-    except (ArithmeticError, LookupError, ValueError):  # obeys the schema, and is nonsense all the same
+    except (ArithmeticError, LookupError, ValueError):  # values that the schema allows
         found.append(Finding(f"{sidecar['name']}.json", "holds values that no entry can have"))
     return found
 
 
-def _ended(known: Checked, future: Future[list[Finding]] | None) -> Checked:
-    """The sidecar with the findings of the process, after it has ended."""
-    sidecar, wrong = known
+def _ended(
+    sidecar: dict[str, Any] | None, wrong: list[Finding], future: Future[list[Finding]] | None
+) -> Checked:
     return sidecar, [*wrong, *(future.result() if future else [])]
-
-
-def _text(path: Path) -> str:
-    return read_bytes(path).decode("utf-8", "replace")

@@ -1,7 +1,6 @@
-"""Release of a library as one verified archive, with its checksum beside it.
+"""Release of a library as one verified archive, with its checksum in a second file.
 
-The same library gives the same bytes at any time: order, times, owners and modes are fixed. Only another
-zlib may compress differently.
+Order, times, owners and modes are fixed: the same library gives the same bytes, except under another zlib.
 """
 
 from __future__ import annotations
@@ -38,20 +37,13 @@ class Frozen:
     sha256: str
     files: int
 
-    @property
-    def sum_file(self) -> Path:
-        """The file beside it that `sha256sum --check` reads."""
-        return self.file.with_name(f"{self.file.name}.sha256")
-
 
 def release_library(
     folder: str | Path, output: str | Path, *, jobs: int = 1, progress: Progress = silent
 ) -> Frozen:
-    """Write the release of a library as a .tar.gz, with its checksum in a second file.
+    """Verify a library and write its release as a .tar.gz, with its checksum in a second file.
 
-    jobs: processes that verify it first. The library is locked during the work. Raises InputError for another
-    suffix, for a library that states no version and day, and for one that does not verify; OutputError where
-    nothing can be written.
+    Raises InputError for another suffix, without a version, and for a defective library; OutputError.
     """
     folder, output = Path(folder), Path(output)
     if not output.name.lower().endswith(_SUFFIX):
@@ -60,36 +52,32 @@ def release_library(
         raise OutputError("lies inside the library, whose files are its own; choose another", file=output)
     with unchanged(folder, "a release of the library", progress):
         top = _top(read_library(folder))
-        _check(folder, jobs, progress)
+        found = list(findings_in(folder, jobs=jobs, progress=progress))
+        if found:
+            more = f" ({len(found) - 1} more)" if found[1:] else ""
+            raise InputError(
+                f"does not verify, so it is not released: {found[0]}{more}; see `crossfield library verify`",
+                file=folder,
+            )
         names = [SUMS, *(line[66:] for line in read_bytes(folder / SUMS).decode().splitlines())]
         progress(f"{len(names)} files")
         make_folder(output.parent)
         with replacing(output) as stream:
             _pack(stream, ((f"{top}/{name}", read_bytes(folder / name)) for name in sorted(names)))
     frozen = Frozen(output, sha256_of(output), len(names))
-    write_bytes(frozen.sum_file, f"{frozen.sha256}  {output.name}\n".encode())
+    write_bytes(output.with_name(f"{output.name}.sha256"), f"{frozen.sha256}  {output.name}\n".encode())
     return frozen
 
 
 def _top(library: Library) -> str:
     """Name of the folder in the archive: title and version."""
-    stated = library.document.get("release", {})
+    stated = library.document["release"]
     if "version" not in stated:
         raise InputError(
             "states no version and no day; write [release] into its specification and build it again",
             file=library.folder,
         )
     return f"{slug(stated['title'])[:_LONGEST]}-{slug(stated['version'])[:_LONGEST]}"
-
-
-def _check(folder: Path, jobs: int, progress: Progress) -> None:
-    found = list(findings_in(folder, jobs=jobs, progress=progress))
-    if found:
-        more = f" ({len(found) - 1} more)" if found[1:] else ""
-        raise InputError(
-            f"does not verify, so it is not released: {found[0]}{more}; see `crossfield library verify`",
-            file=folder,
-        )
 
 
 def _pack(stream: IO[bytes], members: Iterable[tuple[str, bytes]]) -> None:

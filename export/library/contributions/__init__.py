@@ -1,4 +1,1 @@
-"""New bounds and better points.
-
-Runs of local solvers on the entries, and files that others submit: checked, compared, kept in the ledger.
-"""
+"""New bounds and better points."""

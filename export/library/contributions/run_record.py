@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -24,11 +25,7 @@ _ADDED: Final = 2  # columns that a program adds: for a constant, for an objecti
 
 @dataclass(frozen=True)
 class RunFacts:
-    """Facts that a submitter states about a run; None for what its log states or is unknown.
-
-    solver, version: program; status: result; bound: dual bound; seconds: duration; threads: number of
-    threads; time_limit: in seconds; machine: processor and memory; by: submitter; date: as YYYY-MM-DD.
-    """
+    """Facts that a submitter states about a run, named as in a record; None if not stated."""
 
     solver: str | None = None
     version: str | None = None
@@ -44,7 +41,7 @@ class RunFacts:
 
 @dataclass(frozen=True)
 class LogFile:
-    """The log of a run: its path, its content, and what the reader finds in it."""
+    """The log of a run: its path, its bytes, and the facts in it."""
 
     path: Path
     content: bytes
@@ -57,22 +54,18 @@ class LogFile:
 
     @classmethod
     def of(cls, path: Path, content: bytes) -> LogFile:
-        """Read the content of a log. path: named in errors. Raises SolutionError."""
+        """Read the bytes of a log at a path. Raises SolutionError."""
         with naming(path):
             return cls(path, content, parse_log(content))
 
     def check_entry(self, entry: str, problem: Problem, named: set[str]) -> None:
-        """Raise SolutionError if the log is of another problem. named: entries that it names."""
+        """Raise SolutionError if the log is about another problem. named: entries that it names."""
         others = sorted(named - {entry}) if entry not in named else []
         if self.log.stamps - {problem.stamp}:
             others = others or [f"a problem {min(self.log.stamps - {problem.stamp})}"]
         if others:
             raise SolutionError(f"is a log of {others[0]}, not of {entry}", file=self.path)
-        if (
-            self.log.columns is not None
-            and "GAMS" not in self.log.text
-            and not _is_of_size(self.log, problem)
-        ):
+        if "GAMS" not in self.log.text and not _has_size(self.log, problem):
             raise SolutionError(
                 f"is a log of a model of {self.log.columns} columns and {self.log.rows} rows, "
                 f"and {entry} has other numbers",
@@ -80,9 +73,10 @@ class LogFile:
             )
 
 
-def _is_of_size(log: RunLog, problem: Problem) -> bool:
-    """Whether a model of that size may be the problem in one of the formats."""
-    assert log.columns is not None
+def _has_size(log: RunLog, problem: Problem) -> bool:
+    """Whether a log states no size, or the size of the problem in one of the formats."""
+    if log.columns is None:
+        return True
     for each in FORMATS.values():
         try:
             held = carried(problem, each)
@@ -102,17 +96,16 @@ def run_record(
     objective: float | None,
     known: float,
 ) -> Record:
-    """Return the record of a run; stated facts take the place of those in the log.
+    """Return the record of a run; stated facts replace those in the log.
 
-    objective: of the run's point, None without a point; known: the least objective of any feasible point of
-    the entry. Raises InputError for facts that the log denies or that a ledger cannot hold, and SolutionError
-    for a bound above a feasible point or above the bound of the log.
+    objective: of the run's point; known: the least one of the entry's feasible points. Raises InputError for
+    facts that the log denies or a ledger cannot hold, SolutionError for a bound that a point or log refutes.
     """
     read = log.log if log else RunLog("")
     best = known if objective is None else min(known, objective)
     bound, evidence = _bound(facts, read, best, entry)
     if bound is None and objective is None:
-        raise InputError("there is nothing to keep; give a bound, a log that states one, or a solution file")
+        raise InputError("there is nothing to keep; give a bound, a log with a bound, or a solution file")
     digest = hashlib.sha256(log.content).hexdigest() if log else None
     record = Record(
         entry,
@@ -133,24 +126,12 @@ def run_record(
         log_sha256=digest,
         trace=read.trace,
     )
-    _check(record, facts, log)
+    # First without the values of the log, so that an error names the log only for a value in it.
+    measured = {name: getattr(facts, name) for name in ("seconds", "threads", "time_limit")}
+    replace(record, version=facts.version or UNKNOWN, trace=(), **measured).check()
+    with naming(log.path) if log else nullcontext():
+        record.check()
     return record
-
-
-def _check(record: Record, facts: RunFacts, log: LogFile | None) -> None:
-    """Raise InputError unless a ledger can hold the record, naming the log if the value is from there."""
-    stated = replace(
-        record,
-        version=facts.version or UNKNOWN,
-        seconds=facts.seconds,
-        threads=facts.threads,
-        time_limit=facts.time_limit,
-        trace=(),
-    )
-    stated.check()
-    if log is not None:
-        with naming(log.path):
-            record.check()
 
 
 def _bound(facts: RunFacts, log: RunLog, best: float, entry: str) -> tuple[float | None, Evidence | None]:
@@ -166,7 +147,7 @@ def _bound(facts: RunFacts, log: RunLog, best: float, entry: str) -> tuple[float
     if contradicts(bound, best):
         raise SolutionError(
             f"the bound {bound!r} lies above {best!r}, the objective of a feasible point of {entry}; "
-            "it is none, let the solver use tighter tolerances"
+            "run the solver with tighter tolerances"
         )
     return bound, evidence
 

@@ -1,6 +1,6 @@
 """Runs of the installed solvers on the entries of a library, for its ledger.
 
-Each run uses one thread. HiGHS, Ipopt and Bonmin start from the best known point, the others without a
+Each run uses one thread. HiGHS, Ipopt and Bonmin start from the best known point, other solvers without a
 start. Runs that the ledger has are not repeated.
 """
 
@@ -47,8 +47,7 @@ from ..ledger.points import complete_point, field_of
 from ..ledger.standing import contradicts
 from ..plan.spec import RUNGS
 
-GAP: Final = 1e-7
-"""Relative gap of a search: less than what counts as proven, for some points are a little infeasible."""
+GAP: Final = 1e-7  # relative gap of a search, smaller than the gap of a proof: points may be infeasible
 
 
 def solve_library(
@@ -63,21 +62,17 @@ def solve_library(
 ) -> list[dict[str, Any]]:
     """Run solvers, add the records to the ledger, bring the library up to date and return the records.
 
-    solvers: names of the table of solvers, those that are installed by default, each on the entries that it
-    takes. time_limit: seconds of a run; up_to: last rung; by: who runs it; machine: on what. An entry that is
-    too large for the free edition of a program is passed over. Raises InputError for an unknown name,
-    MissingSolverError for a solver that is asked for and not installed.
+    solvers: by default all that are installed; time_limit: seconds of a run; up_to: last rung. An entry that
+    is too large for the free edition of a program is skipped. Raises InputError for an unknown name,
+    MissingSolverError for a named solver that is not installed.
     """
     chosen = _chosen(solvers)
     (last,) = _known([up_to or RUNGS[-1]], RUNGS, "rung")
     check_text("by", by)
     check_text("machine", machine)
     library, found = read_library(folder), []
-    with (
-        tempfile.TemporaryDirectory(prefix="crossfield-") as temporary,
-        Solvers() as at_work,
-    ):
-        work = _Solving(library, at_work, Path(temporary), time_limit)
+    with Solvers() as at_work:
+        work = _Solving(library, at_work, time_limit)
         runs = list(work.runs(chosen, RUNGS[: RUNGS.index(last) + 1]))
         for number, (document, solver) in enumerate(runs):
             progress(f"{number + 1} of {len(runs)} runs: {solver} on {document['name']}")
@@ -96,11 +91,7 @@ def solve_library(
 
 
 def drop_refuted(library: Library) -> None:
-    """Remove bounds that lie above a feasible point from measured records of the ledger.
-
-    A later run may find a point that refutes a bound within a solver's tolerances. Submitted bounds stay. The
-    caller holds the lock.
-    """
+    """Remove measured bounds that a point found later refutes. The caller holds the lock."""
     ledger, dropped = read_ledger(library.folder), {}
     for document in library.entries:
         measured = [
@@ -143,10 +134,10 @@ def _known(names: Sequence[str], table: Any, kind: str) -> list[str]:
 
 
 class _Solving:
-    """Runs on a library with a time limit each, and a folder for their files."""
+    """Runs on a library with a time limit each."""
 
-    def __init__(self, library: Library, solvers: Solvers, folder: Path, limit: float) -> None:
-        self.library, self.solvers, self.folder, self.limit = library, solvers, folder, limit
+    def __init__(self, library: Library, solvers: Solvers, limit: float) -> None:
+        self.library, self.solvers, self.limit = library, solvers, limit
 
     def runs(self, solvers: list[str], rungs: Sequence[str]) -> Iterator[tuple[dict[str, Any], str]]:
         """Yield sidecar and solver of each missing run that the solver supports."""
@@ -157,7 +148,8 @@ class _Solving:
             problem = problem_of(self.library, document)
             have = ledger.of(document["name"], problem.sha256)
             for solver in solvers:
-                if _takes(problem, solver) and not any(self._covers(each, solver) for each in have):
+                takes = format_for(problem, solver).answer == "yes"
+                if takes and not any(self._covers(each, solver) for each in have):
                     yield document, solver
 
     def _covers(self, record: Record, solver: str) -> bool:
@@ -167,10 +159,9 @@ class _Solving:
         return record.status == "optimal" or (record.time_limit or 0.0) >= self.limit
 
     def run(self, document: dict[str, Any], solver: str) -> tuple[Record, CrossField | None]:
-        """Return the record of a run, and its field if that is better than the best known point.
+        """Return the record of a run, without a point if it fails, and its field if that is the best one.
 
-        A solver that fails or is not started gives a record without a point. Raises UnsupportedBySolverError
-        for a problem that is too large.
+        Raises UnsupportedBySolverError for a problem that is too large.
         """
         problem = problem_of(self.library, document)
         record = Record(
@@ -203,13 +194,12 @@ class _Solving:
     def _solve(
         self, document: dict[str, Any], problem: Problem, solver: str
     ) -> tuple[Solution, tuple[tuple[float | None, ...], ...]]:
-        """The solution of a solver, and bounds and objectives over time if its log states them.
-
-        Raises SolverError when no time was left to start the solver.
-        """
-        entry, limits = SOLVERS[solver], Limits(self.limit, GAP, 1)
-        start = _start(self.library, document, problem) if entry.bundled else None
-        with tempfile.TemporaryDirectory(dir=self.folder) as folder:
+        """The solution of a solver and the trace in its log. Raises SolverError if no time was left."""
+        limits, start = Limits(self.limit, GAP, 1), None
+        if SOLVERS[solver].bundled:
+            known = read_solution(self.library.folder / document["best"]["point"], problem)
+            start = None if known.point is None else field_of(known.problem, known.point)
+        with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
             found = self.solvers.solve(problem, solver, folder=folder, limits=limits, start=start)
             log = next(Path(folder).glob("*.log"), None)
             if log is None and not found.interrupted:
@@ -217,16 +207,6 @@ class _Solving:
             with suppress(CrossfieldError):
                 return found, read_log(log).trace if log else ()
         return found, ()
-
-
-def _takes(problem: Problem, solver: str) -> bool:
-    return format_for(problem, solver).answer == "yes"
-
-
-def _start(library: Library, document: dict[str, Any], problem: Problem) -> CrossField | None:
-    """The field of the best known point."""
-    known = read_solution(library.folder / document["best"]["point"], problem)
-    return None if known.point is None else field_of(known.problem, known.point)
 
 
 def _run_status(problem: Problem, solver: str, found: Solution) -> RunStatus:
@@ -244,13 +224,8 @@ def _proves(problem: Problem, solver: str, found: Solution) -> bool:
 
 
 def _bound(problem: Problem, solver: str, found: Solution, known: float) -> float | None:
-    """The dual bound that the solver reports, unless a feasible point contradicts it.
-
-    Without one, a proven optimum less the allowed gap.
-    """
-    if found.bound is not None:
-        return None if contradicts(found.bound, known) else found.bound
-    if found.objective is None or not _proves(problem, solver, found):
-        return None
-    bound = found.objective - GAP * abs(found.objective)
-    return None if contradicts(bound, known) else bound
+    """The reported dual bound, or a proven optimum less the gap, unless a feasible point contradicts it."""
+    bound = found.bound
+    if bound is None and found.objective is not None and _proves(problem, solver, found):
+        bound = found.objective - GAP * abs(found.objective)
+    return None if bound is None or contradicts(bound, known) else bound

@@ -1,8 +1,8 @@
 """Submission of files to a library: solutions, fields, certificates, logs of runs and ledgers.
 
 Each file is checked completely, and every improvement is added to the ledger in memory. Then the ledger is
-written, and the rest of the library follows from it by one rebuild, which ends with SHA256SUMS. So the
-checksum of ledger.json shows a submission that was stopped, and the next one or a build completes it.
+written, and one rebuild updates the library, SHA256SUMS last. If a submission is interrupted, the checksum
+of ledger.json shows it, and the next submission or build completes it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from ....models.errors import CrossfieldError, InputError, SolutionError, naming
 from ....models.field.field import CrossField
 from ....models.field.file import field_of_json, read_field
 from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
-from ....models.formulations.problem import Problem, Violation
+from ....models.formulations.problem import Violation
+from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes
@@ -30,12 +31,11 @@ from ..checking.finding import FEASIBLE, is_better
 from ..documents.documents import Library, about_file, folder_of, read_about, read_library
 from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import Ledger, Record, SubmittedCertificate, read_ledger, write_ledger
+from ..ledger.ledger import Ledger, Record, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
 from ..ledger.standing import best_of_each, contradicts
-from .matching import Entries
+from .matching import Entries, Source, sources_of
 from .run_record import LogFile, RunFacts, run_record
-from .sources import Source, sources_of
 
 Outcome = Literal["accepted", "not better", "refused", "skipped"]
 
@@ -46,11 +46,9 @@ _NOTHING_STATED: Final = RunFacts()
 class Submission:
     """Result of submitting a file, or the solution and the log of one run.
 
-    files: empty for a bound without a file. kind: a word of `Kind` or `bound`; empty for an unknown kind.
-    outcome: `skipped` for a file of no known kind in a submitted folder. entries: those that
-    the file improves, or else those that it belongs to. objective, known: of the file's point and the least
-    one before, for the first entry. bound: dual bound. better_point: whether the point is now the best known
-    one. status: of the first entry afterwards. error: reason of a refusal.
+    kind: `Kind`, `bound`, or empty if unknown. outcome: `skipped` for unknown files in a submitted folder.
+    entries: those that the file improves, or else all that it fits. objective, known: of its point and of the
+    best point before, for the first entry; status: of that entry afterwards.
     """
 
     files: tuple[Path, ...]
@@ -73,38 +71,14 @@ def submit(
     facts: RunFacts = _NOTHING_STATED,
     progress: Progress = silent,
 ) -> list[Submission]:
-    """Check files against a library, keep what improves it, and bring it up to date once.
+    """Check files against a library, keep improvements, rebuild it once, and return a result per file or run.
 
-    Parameters
-    ----------
-    folder
-        Folder of the library.
-    files
-        Files and folders. A solution and a log whose names differ in the suffix alone are one run. With a
-        bound in `facts` there may be none.
-    entry
-        Name of the entry that all files belong to; by default each file shows its own.
-    facts
-        Facts about the runs.
-    progress
-        Called with a line per step.
-
-    Returns
-    -------
-    list of Submission
-        One result per file or run, in their order. A file that is refused changes nothing and does not stop
-        the others.
-
-    Raises
-    ------
-    InputError
-        For an archive, another version's library, an unknown entry, a bound or status with several files, and
-        for no file and no bound.
-    OutputError
-        If the library cannot be written.
-
+    files: files and folders; a solution and a log whose names differ only in the suffix are one run. entry:
+    the entry of all files; by default crossfield detects it from each file. A refused file changes nothing
+    and does not stop the others. Raises InputError for an archive, another version's library, an unknown
+    entry, and for facts that do not fit the files; OutputError.
     """
-    library = writable_library(folder)
+    library = _writable(folder)
     with locked(library.folder, "a submission", progress):
         library = _settled(library, progress)
         if entry is not None:
@@ -123,8 +97,8 @@ def submit(
         ]
 
 
-def writable_library(folder: str | Path) -> Library:
-    """Return the library in a folder. Raises InputError for an archive or a library of another version."""
+def _writable(folder: str | Path) -> Library:
+    """The library in a folder. Raises InputError for an archive or a library of another version."""
     library = read_library(folder_of(folder))
     if library.document["generator"] != generator():
         made = library.document["generator"]
@@ -133,7 +107,7 @@ def writable_library(folder: str | Path) -> Library:
 
 
 def _settled(library: Library, progress: Progress) -> Library:
-    """The library, after the rebuild that an earlier submission was stopped before."""
+    """The library, rebuilt if an earlier submission was interrupted before its rebuild."""
     digest = hashlib.sha256(read_bytes(library.folder / LEDGER)).hexdigest()
     sums = read_bytes(library.folder / SUMS).decode("utf-8", "replace").splitlines()
     return library if f"{digest}  {LEDGER}" in sums else rebuilt(library.folder, progress=progress)
@@ -160,8 +134,11 @@ class _Session:
         try:
             if source.error is not None:
                 raise source.error
+            if not source.kind and source.listed:
+                what = "is no solution, field, certificate, log or ledger; give one of these"
+                raise InputError(what, file=source.path)
             if not source.kind:
-                return [self._unknown(source)]
+                return [Submission(source.files, "", "skipped")]
             if source.kind == "ledger":
                 return list(self._ledger(source))
             check = {"field": self._field, "certificate": self._certificate}.get(source.kind, self._run)
@@ -170,21 +147,11 @@ class _Session:
             self.ledger = before
             return [Submission(source.files, source.kind, "refused", error=error)]
 
-    def _unknown(self, source: Source) -> Submission:
-        if source.listed:
-            raise InputError(
-                "is no solution, field, certificate, log or ledger; give one of these", file=source.path
-            )
-        return Submission(source.files, "", "skipped")
-
     def _run(self, source: Source) -> Submission:
         """Check the solution, the log and the stated bound of a run."""
         log = LogFile.read(source.log) if source.log else None
-        name = self.entry or self._name_of(source, log)
-        sidecar = self.entries.sidecar(name)
-        found = None
-        if source.path is not None:
-            found = self._point(source.path, sidecar)
+        sidecar = self.library.entry(self.entry or self._name_of(source, log))
+        found = None if source.path is None else self._point(source.path, sidecar)
         return self._kept(source, sidecar, self.facts, log, found)
 
     def _name_of(self, source: Source, log: LogFile | None) -> str:
@@ -195,9 +162,7 @@ class _Session:
                 raise SolutionError(f"holds no point ({raw.status})", file=source.path)
             return (name if not raw.stamp else "") or self.entries.of_solution(raw, source.path)
         if not name:
-            raise InputError(
-                "there is nothing that shows the entry of the run; name the entry", file=source.log
-            )
+            raise InputError("the entry of the run is unknown; name the entry", file=source.log)
         return name
 
     def _kept(
@@ -221,11 +186,10 @@ class _Session:
         is_best = is_run and record not in have and record in best_of_each([*have, record], name)
         if better or is_best:
             self._add(record, sidecar, found if better else None, log)
-        outcome: Outcome = "accepted" if better or is_best else "not better"
         return Submission(
             source.files,
             source.kind,
-            outcome,
+            "accepted" if better or is_best else "not better",
             (name,),
             objective=objective,
             known=None if objective is None else known,
@@ -266,20 +230,23 @@ class _Session:
             raise SolutionError(f"holds no point ({solution.status})", file=path)
         if solution.unknown:
             raise SolutionError(
-                f"{solution.unknown} of its names are not in {name}; it is a point of another entry, "
-                "name that entry",
+                f"{solution.unknown} of its names are not in {name}; name the entry of this point",
                 file=path,
             )
         # Every other column follows from angles and jumps, so a solver's tolerance there does not count.
         violation = problem.violation(complete_point(problem, solution.field))
-        _check_feasible(path, name, replace(violation, integrality=solution.violation.integrality))
         found = field_of(solution.problem, solution.point)
-        self._check_bound(path, sidecar, problem, found)
+        self._objective(path, sidecar, found, replace(violation, integrality=solution.violation.integrality))
         return found
 
-    def _check_bound(self, path: Path, sidecar: dict[str, Any], problem: Problem, found: CrossField) -> None:
-        """Raise SolutionError if a dual bound of the entry lies above the objective of a feasible field."""
-        objective = problem.objective_value(complete_point(problem, found))
+    def _objective(
+        self, path: Path, sidecar: dict[str, Any], found: CrossField, violation: Violation | None = None
+    ) -> float:
+        """The objective of a field. Raises SolutionError if it is not feasible or lies below a dual bound."""
+        problem = self.entries.problem(sidecar)
+        point = complete_point(problem, found)
+        _check_feasible(path, sidecar["name"], violation or problem.violation(point))
+        objective = problem.objective_value(point)
         bounds = [sidecar["bound"], self.bounds.get(sidecar["name"])]
         bound = max((each for each in bounds if each is not None), default=None)
         if bound is not None and contradicts(bound, objective):
@@ -289,28 +256,28 @@ class _Session:
                 f"that bound is wrong, take its record out of {LEDGER} first",
                 file=path,
             )
+        return float(objective)
 
     def _field(self, source: Source) -> Submission:
         """Check a field on every entry of its instance."""
         assert source.path is not None
         found = self._read_field(source.path)
-        sidecars = self._on(source.path, "field", found.instance.sha256, found.instance.summary)
-        improved, checked = [], []
-        for sidecar in sidecars:
-            problem = self.entries.problem(sidecar)
-            point = complete_point(problem, found)
-            _check_feasible(source.path, sidecar["name"], problem.violation(point))
-            self._check_bound(source.path, sidecar, problem, found)
-            known, objective = self.known(sidecar), problem.objective_value(point)
-            checked.append((sidecar, objective, known))
-            if is_better(objective, known):
-                improved.append((sidecar, objective, known))
-        for sidecar, objective, _ in _one_per_optimum(improved):
-            problem = self.entries.problem(sidecar)
-            record = run_record(
-                sidecar["name"], problem, self.facts, None, objective=objective, known=self.known(sidecar)
-            )
-            self._add(record, sidecar, found)
+        checked = []
+        for sidecar in self._on(source.path, "field", found.instance):
+            objective = self._objective(source.path, sidecar, found)
+            checked.append((sidecar, objective, self.known(sidecar)))
+        improved = [each for each in checked if is_better(each[1], each[2])]
+        optima = set()
+        for sidecar, objective, _ in improved:
+            # One record per optimum, because a field counts for all entries of its instance.
+            optimum = FORMULATIONS[sidecar["formulation"]].minimises, sidecar["options"]["facet"]
+            if optimum not in optima:
+                optima.add(optimum)
+                problem, known = self.entries.problem(sidecar), self.known(sidecar)
+                record = run_record(
+                    sidecar["name"], problem, self.facts, None, objective=objective, known=known
+                )
+                self._add(record, sidecar, found)
         chosen = improved or checked
         return Submission(
             source.files,
@@ -324,7 +291,7 @@ class _Session:
 
     def _read_field(self, path: Path) -> CrossField:
         name = self.entry or (self.entries.by_file_name(path) if path.suffix.lower() == ".rawfield" else "")
-        on = self.entries.problem(self.entries.sidecar(name)).instance if name else None
+        on = self.entries.problem(self.library.entry(name)).instance if name else None
         if path.suffix.lower() in (".rawfield", ".npz"):
             return read_field(path, on=on)
         with naming(path):
@@ -336,11 +303,16 @@ class _Session:
                 found.check_instance(on)
             return found
 
-    def _on(self, path: Path, kind: str, instance_sha256: str, summary: str) -> list[dict[str, Any]]:
+    def _on(self, path: Path, kind: str, instance: Instance) -> list[dict[str, Any]]:
         """The sidecars of an instance, or of the one entry that was named. Raises InputError without any."""
-        found = [each for each in self.entries.on(instance_sha256) if self.entry in (None, each["name"])]
+        found = [
+            each
+            for each in self.library.entries
+            if each["instance"]["sha256"] == instance.sha256 and self.entry in (None, each["name"])
+        ]
         if not found:
-            raise InputError(f"is a {kind} of an instance that is not in the library: {summary}", file=path)
+            what = f"is a {kind} of an instance that is not in the library: {instance.summary}"
+            raise InputError(what, file=path)
         return found
 
     def _certificate(self, source: Source) -> Submission:
@@ -350,7 +322,7 @@ class _Session:
         instance = found.field.instance
         sidecars = [
             each
-            for each in self._on(source.path, "certificate", instance.sha256, instance.summary)
+            for each in self._on(source.path, "certificate", instance)
             if FORMULATIONS[each["formulation"]].minimises == TWO_NORM
         ]
         if not sidecars:
@@ -358,18 +330,15 @@ class _Session:
                 f"proves a bound of the 2-norm, which no entry of {instance.name} minimises", file=source.path
             )
         names = tuple(each["name"] for each in sidecars)
-        problem = self.entries.problem(sidecars[0])
-        _check_feasible(source.path, names[0], problem.violation(complete_point(problem, found.field)))
+        self._objective(source.path, sidecars[0], found.field)
         stem = sidecars[0]["instance"]["file"].removesuffix(".instance.json")
-        known = self.known(sidecars[0])
-        before = self._certified_bound(stem)
+        known, before = self.known(sidecars[0]), self._certified_bound(stem)
         better_point = is_better(found.energy, known)
         improves = (
             before is None or is_better(-found.bound, -before) or (better_point and found.bound >= before)
         )
         if improves:
-            data = read_bytes(source.path)
-            self.ledger = self.ledger.certified(stem, instance.sha256, data, self.facts.by)
+            self.ledger = self.ledger.certified(stem, instance.sha256, read_bytes(source.path), self.facts.by)
             self.certified[stem] = found.bound
             self.fields.setdefault(instance.sha256, []).append(found.field)
             self._raise_bounds(names, found.bound)
@@ -386,13 +355,12 @@ class _Session:
 
     def _certified_bound(self, instance: str) -> float | None:
         """The bound of the certificate that the library has of an instance."""
-        if instance in self.certified:
-            return self.certified[instance]
         about = read_about(self.library.folder / about_file(instance))
-        return about["certificate"]["bound"] if "certificate" in about else None
+        stated: float | None = about.get("certificate", {}).get("bound")
+        return self.certified.get(instance, stated)
 
     def _ledger(self, source: Source) -> Iterator[Submission]:
-        """Check the runs, points and certificates of another ledger, whose files lie beside it."""
+        """Check the runs, points and certificates of another ledger with their files."""
         assert source.path is not None
         other = read_ledger(source.path.parent, source.path.name)
         found = 0
@@ -403,54 +371,34 @@ class _Session:
             try:
                 yield self._of_ledger(source, record, other)
             except CrossfieldError as error:
-                yield Submission(source.files, source.kind, "refused", (), error=error)
+                yield Submission(source.files, source.kind, "refused", error=error)
         for each in other.certificates:
-            if each not in self.ledger.certificates:
-                found += 1
-                yield from self.results(_certificate_of(other, each))
+            if each in self.ledger.certificates:
+                continue
+            found += 1
+            certificate = Source("certificate", other.folder / each.file)
+            try:
+                other.content(each.file, each.sha256)
+            except CrossfieldError as error:
+                certificate = replace(certificate, error=error)
+            yield from self.results(certificate)
         if not found:
             yield Submission(source.files, source.kind, "not better")
 
     def _of_ledger(self, source: Source, record: Record, other: Ledger) -> Submission:
         """Check a record of another ledger, whose bound counts as stated unless its log shows it."""
         assert source.path is not None
-        sidecar = self.entries.sidecar(record.entry)
+        sidecar = self.library.entry(record.entry)
         problem = self.entries.problem(sidecar)
         if record.problem_sha256 != problem.sha256:
-            raise InputError(f"has a record of another problem than that of {record.entry}", file=source.path)
+            raise InputError(f"has a record of {record.entry} about another problem", file=source.path)
         log = LogFile.of(other.folder / str(record.log), other.log(record)) if record.log else None
         found = other.field(record) if record.point else None
         if found is not None:
             found.check_instance(problem.instance)
-            path = other.folder / str(record.point)
-            _check_feasible(path, record.entry, problem.violation(complete_point(problem, found)))
-            self._check_bound(path, sidecar, problem, found)
+            self._objective(other.folder / str(record.point), sidecar, found)
         facts = RunFacts(**{name: getattr(record, name) for name in RunFacts.__dataclass_fields__})
         return self._kept(source, sidecar, facts, log, found)
-
-
-def _certificate_of(other: Ledger, certificate: SubmittedCertificate) -> Source:
-    """The file of a certificate in another ledger, with an error if the ledger names another one."""
-    path = other.folder / certificate.file
-    try:
-        other.content(certificate.file, certificate.sha256)
-    except CrossfieldError as error:
-        return Source("certificate", path, error=error)
-    return Source("certificate", path)
-
-
-Improved = tuple[dict[str, Any], float, float]
-"""The sidecar of an entry, the objective of a field there, and the least one before."""
-
-
-def _one_per_optimum(improved: Iterable[Improved]) -> list[Improved]:
-    """The first of the entries with the same optimum, for a field counts for all entries of its instance."""
-    chosen: dict[tuple[str, str], Improved] = {}
-    for each in improved:
-        sidecar = each[0]
-        optimum = FORMULATIONS[sidecar["formulation"]].minimises, sidecar["options"]["facet"]
-        chosen.setdefault(optimum, each)
-    return list(chosen.values())
 
 
 def _check_feasible(path: Path, entry: str, found: Violation) -> None:

@@ -1,14 +1,12 @@
-"""Citation and licences of a library.
+"""Citation and licences of a library, as its specification states them for each sketch.
 
-Licences are those that the specification states, sketch by sketch. The paper is cited by its title alone,
-because nothing else about it is certain.
+The paper is cited by its title alone, because nothing else about it is certain.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any, Final
 
 from ..plan.spec import Sketch, Spec
@@ -32,7 +30,6 @@ LICENCES: Final = {
     },
     "MIT": ("MIT licence", "https://opensource.org/license/mit"),
 }
-"""Full name and address of known licences."""
 
 PAPER: Final = (
     "Extrapolating curvature lines in rough concept sketches using mixed-integer nonlinear optimization"
@@ -55,10 +52,11 @@ REFERENCES: Final = (
         "the problem"
     ),
 )
-"""References of every entry."""
 
-_SPECIAL: Final = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-_SPECIAL_OF_TEX: Final = _SPECIAL | {letter: f"\\{letter}" for letter in "&%$#_{}"}
+_TEX: Final = str.maketrans(
+    {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    | {letter: f"\\{letter}" for letter in "&%$#_{}"}
+)
 
 
 def cited(spec: Spec) -> dict[str, Any]:
@@ -70,17 +68,17 @@ def cited(spec: Spec) -> dict[str, Any]:
 def bibtex(spec: Spec) -> str:
     """Return the BibTeX entries of the library, of the paper and of BendFields."""
     release = spec.release
-    fields = {"title": f"{{{_tex(spec.title)}}}"}
+    fields = {"title": f"{{{spec.title.translate(_TEX)}}}"}
     if release is not None:
         fields |= {
             "author": " and ".join(map(_author, release.authors)),
             "year": release.date[:4],
-            "version": _tex(release.version),
-            "note": f"Version {_tex(release.version)} of {release.date}",
+            "version": release.version.translate(_TEX),
+            "note": f"Version {release.version.translate(_TEX)} of {release.date}",
         }
     return "\n\n".join(
         (
-            _entry("misc", _key(spec), fields),
+            _entry("misc", "_".join([slug(spec.title, "_"), *([fields["year"]] if release else [])]), fields),
             _entry("misc", "extrapolating_curvature_lines", {"title": f"{{{PAPER}}}"}),
             _entry("article", "bendfields", BENDFIELDS | {"title": f"{{{BENDFIELDS['title']}}}"}),
         )
@@ -91,11 +89,6 @@ def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
     return f"@{kind}{{{key},\n" + "".join(f"  {name} = {{{text}}},\n" for name, text in fields.items()) + "}"
 
 
-def _key(spec: Spec) -> str:
-    year = spec.release.date[:4] if spec.release else ""
-    return "_".join(filter(None, (slug(spec.title, "_"), year)))
-
-
 def slug(text: str, between: str = "-") -> str:
     """Return letters, digits and points of a text in lower case, joined by a separator."""
     return re.sub(r"[^a-z0-9.]+", between, text.lower()).strip(between + ".") or "library"
@@ -103,45 +96,27 @@ def slug(text: str, between: str = "-") -> str:
 
 def _author(name: str) -> str:
     """An author; the name of a group is not taken apart."""
-    return f"{{{_tex(name)}}}" if name.startswith("The ") else _tex(name)
+    text = name.translate(_TEX)
+    return f"{{{text}}}" if name.startswith("The ") else text
 
 
-def _tex(text: str) -> str:
-    return "".join(_SPECIAL_OF_TEX.get(letter, letter) for letter in text)
+def terms(sketches: Sequence[Sketch]) -> dict[str, Any]:
+    """Return the licences of sketches for the texts of a library.
+
+    licence, name: the known licence of all sketches, or empty; known: identifier, name and address of each
+    known licence; lines: one per sketch with its origin.
+    """
+    stated = list(dict.fromkeys(each.origin.license for each in sketches))
+    known = [(each, *LICENCES[each]) for each in stated if each in LICENCES]
+    licence, name, _ = known[0] if len(stated) == len(known) == 1 else ("", "", "")
+    return {"licence": licence, "name": name, "known": known, "lines": list(map(_line, sketches))}
 
 
-@dataclass(frozen=True)
-class Terms:
-    """Licences in a library, for its texts."""
-
-    sketches: tuple[Sketch, ...]
-
-    @property
-    def licence(self) -> str:
-        """The known licence that all sketches share; empty without one."""
-        stated = {each.origin.license for each in self.sketches}
-        return next(iter(stated)) if len(stated) == 1 and stated <= {*LICENCES} else ""
-
-    @property
-    def name(self) -> str:
-        """The full name of the licence of all sketches."""
-        return LICENCES[self.licence][0]
-
-    @property
-    def known(self) -> list[tuple[str, str, str]]:
-        """Identifier, name and address of each licence that is stated and known."""
-        stated = dict.fromkeys(each.origin.license for each in self.sketches)
-        return [(each, *LICENCES[each]) for each in stated if each in LICENCES]
-
-    @property
-    def lines(self) -> Iterator[str]:
-        """One line per sketch with its stated origin."""
-        for sketch in self.sketches:
-            origin = sketch.origin
-            licence = origin.license or "no licence is stated; ask its author before you share it"
-            parts = (
-                licence,
-                origin.author and f"author: {origin.author}",
-                origin.source and f"source: {origin.source}",
-            )
-            yield f"{sketch.name}: {'; '.join(filter(None, parts))}"
+def _line(sketch: Sketch) -> str:
+    origin = sketch.origin
+    parts = (
+        origin.license or "no licence is stated; ask its author before you share it",
+        origin.author and f"author: {origin.author}",
+        origin.source and f"source: {origin.source}",
+    )
+    return f"{sketch.name}: {'; '.join(filter(None, parts))}"

@@ -1,7 +1,6 @@
 """JSON documents of a library: a sidecar per entry, a document per instance, and the index.
 
-Schemas: library-entry.schema.json, library-instance.schema.json and library-index.schema.json beside this
-module.
+Their schemas are the files library-*.schema.json in this folder.
 """
 
 from __future__ import annotations
@@ -20,8 +19,6 @@ from ....models.errors import InputError, InstanceError
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, formulate
 from ....models.instance.file import read_document, read_instance
-from ....models.instance.grid import Ints
-from ....models.instance.instance import Instance
 from ....models.storage import sha256_of
 from ..plan.spec import Spec, spec_of
 
@@ -41,7 +38,7 @@ class Library:
 
     @cached_property
     def entries(self) -> tuple[dict[str, Any], ...]:
-        """The sidecars of all entries. Raises InputError, InstanceError for a missing or damaged one."""
+        """The sidecars of all entries. Raises as `read_sidecar`."""
         return tuple(map(self.entry, self.document["entries"]))
 
     def entry(self, name: str) -> dict[str, Any]:
@@ -64,7 +61,7 @@ class Library:
 
 
 def folder_of(path: str | Path) -> Path:
-    """Return the path of a folder. Raises InputError for a file, such as a release, and for nothing."""
+    """Return the path of a folder. Raises InputError for a file, such as a release, or a missing folder."""
     if Path(path).is_file():
         raise InputError("is a file; unpack it, as with `tar -xzf`, and give the folder", file=path)
     if not Path(path).is_dir():
@@ -107,38 +104,28 @@ def as_bytes(document: dict[str, Any]) -> bytes:
 
 
 def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Problem:
-    """Return the problem of an entry, from its instance's file and its sidecar.
+    """Return the problem of an entry from its instance's file and its sidecar.
 
-    Raises InputError, InstanceError when the instance is missing, damaged, or another one than the sidecar
-    names.
+    Raises InputError, InstanceError if the instance is missing, damaged or another one.
     """
     folder = library.folder if isinstance(library, Library) else Path(library)
     path = folder / document["instance"]["file"]
-    problem = problem_from(
-        read_instance(path), document["formulation"], document["options"], document["jumps"]
-    )
+    instance, jumps = read_instance(path), None
+    if FORMULATIONS[document["formulation"]].fixed:
+        jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
+        listed = np.array(document["jumps"] or [], dtype=np.int64).reshape(-1, 2)
+        if (listed[:, 0] >= len(jumps)).any():
+            raise InstanceError(
+                "a jump of a pair is listed that the instance does not have; build the library again"
+            )
+        jumps[listed[:, 0]] = listed[:, 1]
+    problem = formulate(instance, document["formulation"], p=jumps, **document["options"])
     if problem.sha256 != document["problem_sha256"]:
         raise InstanceError(
             f"is not the instance that {document['name']}.json was made from; build the library again",
             file=path,
         )
     return problem
-
-
-def problem_from(
-    instance: Instance, formulation: str, options: dict[str, Any], listed: list[list[int]] | None
-) -> Problem:
-    """Return the problem of a formulation; listed: nonzero jumps as [pair, jump] if they are data."""
-    jumps: Ints | None = None
-    if FORMULATIONS[formulation].fixed:
-        jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
-        given = np.array(listed or [], dtype=np.int64).reshape(-1, 2)
-        if (given[:, 0] >= len(jumps)).any():
-            raise InstanceError(
-                "a jump of a pair is listed that the instance does not have; build the library again"
-            )
-        jumps[given[:, 0]] = given[:, 1]
-    return formulate(instance, formulation, p=jumps, **options)
 
 
 def listed_jumps(problem: Problem) -> list[list[int]] | None:

@@ -1,8 +1,7 @@
 """Lock on the folder of a library, which ends with the process that holds it.
 
-The lock is a file `.lock` in the folder that the system locks for its holder (filelock: flock, on Windows
-msvcrt), so that a crash leaves no lock behind. The file names its holder, who removes it. The next process
-takes over the file of one that crashed.
+The operating system locks the file `.lock` in the folder, so a crash leaves no lock behind. The file names
+its holder, who removes it. The next process takes over the file of a process that crashed.
 """
 
 from __future__ import annotations
@@ -20,17 +19,15 @@ from ....models.errors import OutputError, shortened
 from ....models.processes.deadline import Progress, silent
 
 FILE: Final = ".lock"
-PATIENCE: Final = 600.0
-"""Seconds that a process waits for another one to end."""
-_TICK: Final = 0.1  # seconds between two looks
+PATIENCE: Final = 600.0  # seconds that a process waits for another one to end
+_TICK: Final = 0.1  # seconds between two attempts
 
 
 @contextmanager
 def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[None]:
-    """Keep other processes from changing or verifying the library in a folder.
+    """Lock a library. Raises OutputError after PATIENCE seconds, or for a folder that cannot be written.
 
-    action: shown to processes that wait. Raises OutputError if another process does not end within PATIENCE
-    seconds, or if the folder cannot be written.
+    action: shown to processes that wait.
     """
     path = folder / FILE
     lock = FileLock(path, timeout=PATIENCE, poll_interval=_TICK)
@@ -63,13 +60,12 @@ def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[N
 
 @contextmanager
 def unchanged(folder: Path, action: str, progress: Progress = silent) -> Iterator[None]:
-    """Lock a folder for reading; one that cannot be written is read without a lock."""
+    """Lock a folder for reading, unless it cannot be written."""
     with locked(folder, action, progress) if os.access(folder, os.W_OK) else nullcontext():
         yield
 
 
 def _holder(path: Path) -> str:
-    """The holder of a lock in words."""
     try:
         holder = path.read_bytes()[:300].decode("utf-8", "replace")
     except OSError:

@@ -1,11 +1,8 @@
-"""Statistics of a problem: columns, rows and terms by kind, curvature, and ranges of coefficients.
-
-The list of counts is MINLPLib's. Nothing is read from files: all of it comes from the declaration bound to
-the instance.
-"""
+"""Statistics of a problem: columns, rows and terms by kind as in MINLPLib, curvature, and ranges."""
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any, Final
 
 import numpy as np
@@ -17,17 +14,13 @@ from ....models.instance.instance import Instance
 from ...writing.canonical import Canonical
 from ...writing.curvature import NEGLIGIBLE, of_objective, of_rows
 
-MOST_EIGEN: Final = 600
-"""Variables in the quadratic objective up to which eigenvalues are computed."""
+MOST_EIGEN: Final = 600  # variables in the quadratic objective up to which eigenvalues are computed
 
 
 def sizes(instance: Instance) -> dict[str, int]:
     """Return the numbers of pixels, stroke pixels and pairs."""
-    return {
-        "pixels": instance.grid.size,
-        "strokes": len(instance.theta),
-        "pairs": len(instance.grid.first),
-    }
+    grid = instance.grid
+    return {"pixels": grid.size, "strokes": len(instance.theta), "pairs": len(grid.first)}
 
 
 def density(instance: Instance) -> float:
@@ -56,28 +49,23 @@ def _columns(problem: Problem) -> dict[str, int]:
 
 
 def _rows(problem: Problem) -> dict[str, int]:
-    by_degree = {
-        degree: sum(f.count for f in problem.rows if _kind(f.degree) == degree) for degree in range(4)
-    }
+    kinds = ("linear", "quadratic", "polynomial", "general")
+    by_kind = Counter({f"{kind}_constraints": 0 for kind in kinds})
+    for family in problem.rows:
+        degree = family.degree  # 99 for other families than polynomials
+        kind = kinds[0 if degree <= 1 else 1 if degree == 2 else 2 if degree < 99 else 3]
+        by_kind[f"{kind}_constraints"] += family.count
     return {
         "constraints": problem.n_rows,
         "equalities": sum(f.count for f in problem.rows if f.family.sense == "=="),
-        "linear_constraints": by_degree[0],
-        "quadratic_constraints": by_degree[1],
-        "polynomial_constraints": by_degree[2],
-        "general_constraints": by_degree[3],
+        **by_kind,
         "nonzeros": sum(len(f.variables) * f.count for f in problem.rows),
         "nonlinear_nonzeros": sum(_nonlinear_variables(f) * f.count for f in problem.rows),
     }
 
 
-def _kind(degree: int) -> int:
-    """0 linear, 1 quadratic, 2 polynomial, 3 general."""
-    return 0 if degree <= 1 else 1 if degree == 2 else 2 if degree < 99 else 3
-
-
 def _nonlinear_variables(family: PlacedFamily) -> int:
-    """Columns that stand in nonlinear terms of each row of a family."""
+    """Columns in nonlinear terms of each row of a family."""
     if family.terms is None:
         return len(family.variables)
     return len({symbol for term in family.terms if term.degree > 1 for symbol in term.symbols})
@@ -108,7 +96,7 @@ def curvature(problem: Problem) -> dict[str, Any]:
 
 
 def _eigenvalue_signs(problem: Problem) -> dict[str, int] | None:
-    """Numbers of negative, zero, positive eigenvalues of a Hessian; None above MOST_EIGEN variables."""
+    """Numbers of eigenvalues of the Hessian by sign; None above MOST_EIGEN variables."""
     index, value = problem.merged_objective(2)
     used, place = np.unique(index, return_inverse=True)
     if len(used) > MOST_EIGEN:

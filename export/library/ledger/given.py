@@ -1,8 +1,7 @@
 """Given points of a specification: results for its instances, found once and kept.
 
-A folder or an archive holds the same files per instance as a library: INSTANCE.about.json, and the fields
-and the certificate that it lists. A build with them does not search, so that its bytes do not depend on the
-processor. Results for another instance than the built one do not count.
+A folder holds the same files per instance as a library: INSTANCE.about.json, and the fields and the
+certificate that it lists. A build with them does not search, so its bytes do not depend on the processor.
 """
 
 from __future__ import annotations
@@ -19,8 +18,7 @@ from ....models.instance.instance import Instance
 from ....models.storage import make_folder, read_bytes, write_bytes
 from ..documents.documents import about_file, are_whole, folder_of, read_about, read_library
 from ..plan.recipe import digest
-from .certificates import METHOD, Certified, certified_by
-from .points import Known, Provenance, ours
+from .points import METHOD, Certified, Known, Provenance, certified_by, ours
 
 ROLES: Final = ("baseline", "least_1", "least_2")
 _SAME: Final = 1e-9  # processors round energies differently
@@ -36,20 +34,16 @@ class Given:
 
     @property
     def instance(self) -> str:
-        """The SHA-256 of the instance that it is about."""
+        """The SHA-256 of the instance."""
         return str(self.about["instance"]["sha256"])
 
     def field(self, role: str) -> Known:
-        """Return the field of a role of ROLES. Raises InstanceError for a damaged one."""
+        """Return the field of a role in ROLES. Raises InstanceError for a damaged field."""
         facts = self.about["fields"][role]
         return Known(field_of_json(self.files[facts["file"]]), Provenance.of(facts))
 
     def certificate(self, instance: Instance) -> Certified | None:
-        """Return the certificate, checked, if there is one.
-
-        Raises InputError if the checker refuses it, if it is of another instance, or if the document states
-        another status, bound or energy.
-        """
+        """Return the certificate, checked. Raises InputError if it is invalid or contradicts the document."""
         facts = dict(self.about.get("certificate", {}))
         if not facts:
             return None
@@ -64,30 +58,24 @@ class Given:
         return replace(found, file=f"{self.about['name']}.certificate.npz", facts=facts)
 
 
-Points = Callable[[str], Given | None]
-"""Results for the instance of a name, None without any."""
-
-
-def nothing(_instance: str) -> None:
-    """Return no results for any instance."""
+Points = Callable[[str], Given | None]  # results by the name of an instance
+NO_POINTS: Final[Points] = dict[str, Given]().get
 
 
 def read_points(path: str | Path) -> Points:
     """Read the points in a folder. Raises InputError, InstanceError for a damaged file."""
-    folder = folder_of(path)
-    return dict(_named(folder, each) for each in sorted(folder.glob("*.about.json"))).get
-
-
-def _named(folder: Path, path: Path) -> tuple[str, Given]:
-    """The name of a document's instance and the results for it."""
-    about = read_about(path)
-    if path.name != about_file(about["name"]):
-        raise InputError(f"is about {about['name']}; its name must be {about_file(about['name'])}", file=path)
-    return about["name"], _given(folder, about)
+    folder, found = folder_of(path), {}
+    for each in sorted(folder.glob("*.about.json")):
+        about = read_about(each)
+        name = about_file(about["name"])
+        if each.name != name:
+            raise InputError(f"is about {about['name']}; its name must be {name}", file=each)
+        found[about["name"]] = _given(folder, about)
+    return found.get
 
 
 def points_of(folder: Path) -> Points:
-    """Return the points of a library that was built with given ones, which are at least as good."""
+    """Return the given points of a library as it holds them."""
 
     def of(instance: str) -> Given | None:
         try:
@@ -100,10 +88,7 @@ def points_of(folder: Path) -> Points:
 
 
 def write_points(library: str | Path, folder: str | Path) -> int:
-    """Write the points of a library to a folder and return the number of instances.
-
-    Raises InputError where there is no library or a file is damaged, InstanceError, OutputError.
-    """
+    """Write the points of a library to a folder and return the number of instances."""
     source = read_library(library).folder
     abouts = sorted(source.glob("*.about.json"))
     files = {each.name: read_bytes(each) for each in abouts}
@@ -116,21 +101,16 @@ def write_points(library: str | Path, folder: str | Path) -> int:
 
 
 def _given(folder: Path, about: dict[str, Any], sha256: str | None = None) -> Given:
-    """The results for an instance in a folder. Raises InputError for a missing or another file."""
+    """The results for an instance in a folder. Raises InputError for a missing or different file."""
+    remedy = "make the points again with `crossfield library points`"
     listed = [each for each in about["files"] if each["name"] != about["instance"]["file"]]
     if lost := [each["name"] for each in listed if not are_whole(folder, [each])]:
-        raise InputError(
-            f"{about_file(about['name'])} lists {lost[0]}, which is missing or another file; "
-            "make the points again with `crossfield library points`",
-            file=folder,
-        )
+        what = f"{about_file(about['name'])} lists {lost[0]}, which is missing or another file; {remedy}"
+        raise InputError(what, file=folder)
     named = [*about["fields"].values(), *([about["certificate"]] if "certificate" in about else [])]
     if unlisted := {each["file"] for each in named} - {each["name"] for each in listed}:
-        raise InputError(
-            f"{about_file(about['name'])} names {min(unlisted)} and does not list it; "
-            "make the points again with `crossfield library points`",
-            file=folder,
-        )
+        what = f"{about_file(about['name'])} names {min(unlisted)} and does not list it; {remedy}"
+        raise InputError(what, file=folder)
     facts = [about[key] for key in ("name", "fields")] + [about.get("certificate"), listed]
     files = {each["name"]: read_bytes(folder / each["name"]) for each in listed}
     return Given(about, files, sha256 or digest([about["instance"]["sha256"], *facts]))

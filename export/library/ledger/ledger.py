@@ -1,7 +1,7 @@
-"""The ledger: results of solvers, measured once and kept. It is an input of every build.
+"""The ledger: results of solvers, measured once and kept as an input of every build.
 
-ledger.json holds records; the field of a record that improved a point lies beside it as `ENTRY.field.json`. A
-record carries the SHA-256 of the problem it is about, and counts for that problem alone.
+ledger.json holds records; `ENTRY.field.json` in the same folder holds the field of a record that improved a
+point. A record carries the SHA-256 of its problem, and counts for that problem alone.
 """
 
 from __future__ import annotations
@@ -27,10 +27,9 @@ FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
 FILE: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
-"""Result of a run; `feasible` for a submitted point."""
 Evidence = Literal["log", "word"]
 """Evidence of a submitted bound: a log that the library keeps, or only the statement of its submitter."""
-_LATER: Final = ("machine", "date", "evidence", "log", "log_sha256", "trace")  # left out where there is none
+_LATER: Final = ("machine", "date", "evidence", "log", "log_sha256", "trace")  # absent if empty
 _LONGEST: Final = 200  # characters of a text
 _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 
@@ -39,11 +38,9 @@ _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 class Record:
     """One run of a solver on an entry, or one submitted point.
 
-    problem_sha256: of the entry's problem; primal: objective of its point, recomputed; bound: its dual bound;
-    seconds, threads and time_limit as measured; by: who ran it; point: the field's file beside the ledger,
-    with its SHA-256, or None. machine: what it ran on; date: as YYYY-MM-DD; evidence: None for a run that
-    `library solve` measured; log: the log's file beside the ledger, with its SHA-256; trace: seconds, dual
-    bound and best objective in the course of the run.
+    primal: recomputed objective of its point; bound: dual bound; by: who ran it; point, log: names of files;
+    date: as YYYY-MM-DD; evidence: None for a run that `library solve` measured; trace: seconds, dual bound
+    and best objective during the run.
     """
 
     entry: str
@@ -68,11 +65,11 @@ class Record:
 
     @property
     def rank(self) -> tuple[Any, ...]:
-        """Place in the ledger: by entry and solver, then by everything else."""
+        """Sort key in the ledger: entry and solver first."""
         return (self.entry, self.solver, self.version, json.dumps(asdict(self)))
 
     def check(self) -> None:
-        """Raise InputError, naming the value at fault, unless a ledger can hold the record."""
+        """Raise InputError that names the invalid value unless a ledger can hold the record."""
         for name in ("solver", "by", "machine"):
             check_text(name, getattr(self, name))
         if not _VERSION.fullmatch(self.version):
@@ -86,30 +83,20 @@ class Record:
             )
         if self.date is not None and not _is_date(self.date):
             raise InputError(f"date is {shortened(self.date)!r}; give a day as YYYY-MM-DD")
-        self._check_numbers()
+        for name in ("primal", "bound", "seconds", "threads", "time_limit"):
+            value = getattr(self, name)
+            least, sign = (-math.inf, "") if name in ("primal", "bound") else (0, " that is not negative")
+            if value is not None and not (least <= value and math.isfinite(value)):
+                raise InputError(f"{name.replace('_', ' ')} is {value}; give a finite number{sign}")
         error = schema_error(_as_json(self), "library-ledger", documents.__name__)
         if error is not None:
             place = error.json_path.removeprefix("$.records[0].")
             raise InputError(f"{place}: {shortened(error.message)}; a ledger cannot hold this record")
 
-    def _check_numbers(self) -> None:
-        for name in ("primal", "bound"):
-            value = getattr(self, name)
-            if value is not None and not math.isfinite(value):
-                raise InputError(f"{name} is {value}; give a finite number")
-        measured = {"seconds": self.seconds, "threads": self.threads, "time limit": self.time_limit}
-        for name, value in measured.items():
-            if value is not None and not 0 <= value < math.inf:
-                raise InputError(f"{name} is {value}; give a finite number that is not negative")
-
 
 @dataclass(frozen=True)
 class SubmittedCertificate:
-    """A certificate that was submitted.
-
-    instance, instance_sha256: name and SHA-256 of the instance; file, sha256: name and SHA-256 of the file
-    beside the ledger; by: who submitted it.
-    """
+    """A submitted certificate. instance: its name; sha256: of the file; by: who submitted it."""
 
     instance: str
     instance_sha256: str
@@ -120,10 +107,7 @@ class SubmittedCertificate:
 
 @dataclass(frozen=True)
 class Ledger:
-    """Records and certificates in order, and the folder that holds their files.
-
-    unwritten: content of files that are not in the folder yet, by name.
-    """
+    """Records and certificates in order, and their folder. unwritten: files that it lacks, by name."""
 
     folder: Path
     records: tuple[Record, ...] = ()
@@ -131,21 +115,16 @@ class Ledger:
     unwritten: Mapping[str, bytes] = field(default_factory=dict)
 
     def of(self, entry: str, problem_sha256: str) -> list[Record]:
-        """Return the records of an entry that are about this very problem."""
+        """Return the records of an entry about this problem."""
         return [each for each in self.records if (each.entry, each.problem_sha256) == (entry, problem_sha256)]
 
     def with_point(self, entry: str) -> Record | None:
-        """Return the record whose field is kept for an entry: the last one that has a field."""
-        found = [each for each in self.records if each.entry == entry and each.point is not None]
-        return found[-1] if found else None
-
-    def certificate(self, instance: str) -> SubmittedCertificate | None:
-        """Return the certificate of the instance of a name."""
-        return next((each for each in self.certificates if each.instance == instance), None)
+        """Return the record whose field is kept for an entry: the last one with a field."""
+        return next((each for each in reversed(self.records) if each.entry == entry and each.point), None)
 
     @property
     def files(self) -> list[str]:
-        """Names of all files that records and certificates refer to."""
+        """Names of all files of records and certificates."""
         names = [name for each in self.records for name in (each.point, each.log)]
         return [name for name in [*names, *(each.file for each in self.certificates)] if name is not None]
 
@@ -160,7 +139,7 @@ class Ledger:
         return data
 
     def field(self, record: Record) -> CrossField:
-        """Return the field of a record. Raises InputError, InstanceError for a missing or another file."""
+        """Return the field of a record. Raises as `content`."""
         data = self.content(str(record.point), record.point_sha256)
         with naming(self.folder / str(record.point)):
             return field_of_json(data)
@@ -172,11 +151,10 @@ class Ledger:
     def added(
         self, record: Record, field: CrossField | None = None, log: bytes | None = None
     ) -> tuple[Ledger, Record]:
-        """Return the ledger with one more record, and that record as the ledger has it.
+        """Return the ledger with one more record, and that record with its files.
 
-        field: replaces the kept field of the entry if it is better; the records that named the kept field
-        lose it. log: content of the file that the record names. Raises InputError for a record that a ledger
-        cannot hold.
+        field: replaces the kept field of the entry if it is better. log: content of the log that the record
+        names. Raises InputError for a record that a ledger cannot hold.
         """
         record.check()
         records, unwritten = list(self.records), dict(self.unwritten)
@@ -191,7 +169,7 @@ class Ledger:
         return replace(self, records=tuple(records), unwritten=unwritten), record
 
     def certified(self, instance: str, instance_sha256: str, data: bytes, by: str | None = None) -> Ledger:
-        """Return the ledger with the bytes of a certificate in place of the instance's earlier one."""
+        """Return the ledger with a certificate that replaces the earlier one of the instance."""
         check_text("by", by)
         sha256 = hashlib.sha256(data).hexdigest()
         name = f"{instance}.{sha256[:12]}.certificate.npz"
@@ -212,7 +190,7 @@ class Ledger:
 
 
 def check_text(name: str, text: str | None) -> None:
-    """Raise InputError, naming the value, unless a ledger can hold the text."""
+    """Raise InputError that names the text unless a ledger can hold it."""
     if text is not None and (not text.isprintable() or not 0 < len(text) <= _LONGEST):
         raise InputError(f"{name} must be one line of at most {_LONGEST} printable characters")
 
@@ -225,7 +203,7 @@ def _is_date(text: str) -> bool:
 
 
 def _as_json(record: Record) -> dict[str, Any]:
-    """A ledger of one record as a reader of its file sees it: with lists in place of tuples."""
+    """A ledger of one record as its file has it: with lists in place of tuples."""
     document: dict[str, Any] = json.loads(json.dumps(Ledger(Path(), (record,)).document()))
     return document
 
@@ -271,18 +249,14 @@ def write_ledger(ledger: Ledger) -> None:
 def add_record(
     folder: str | Path, record: Record, field: CrossField | None = None, log: bytes | None = None
 ) -> Record:
-    """Add a record to the ledger of a folder as `Ledger.added` does, and write that ledger.
-
-    The caller holds the lock of the library. Raises InputError, before anything is written, for a record
-    that a ledger cannot hold; OutputError.
-    """
+    """Add a record as `Ledger.added` to the ledger of a folder whose lock the caller holds, and write it."""
     ledger, record = read_ledger(folder).added(record, field, log)
     write_ledger(ledger)
     return record
 
 
 def _is_better(record: Record, kept: Record | None) -> bool:
-    """Whether a record's field is better than the kept one, which may have come meanwhile."""
+    """Whether a record's field is better than the kept one."""
     if kept is None or kept.problem_sha256 != record.problem_sha256 or kept.primal is None:
         return True
     return record.primal is None or record.primal < kept.primal
@@ -293,10 +267,9 @@ def _without_point(record: Record) -> Record:
 
 
 def merged(folder: Path, other: Ledger, entries: Iterable[str], instances: Iterable[str]) -> Ledger:
-    """Return the ledger of a folder with another's records and certificates; nothing is written.
+    """Return the ledger of a folder with another's records on these entries and instances.
 
-    entries, instances: names of those whose records and certificates are taken over. A field or certificate
-    that the folder has already stays.
+    A field or certificate that the folder has already stays; nothing is written.
     """
     ledger, wanted = read_ledger(folder), set(entries)
     have = {_without_point(record) for record in ledger.records}

@@ -1,32 +1,43 @@
-"""Known fields, and the complete points of every formulation that follow from them.
+"""Fields and certificates by a fixed amount of work, and the points of every formulation with a field.
 
-A point of any formulation comes from a field (angles and jumps): every other column then has its best value,
-without solver tolerances.
+A field (angles and jumps) gives a point of any formulation: every other column has its best value, without
+solver tolerances. Every build finds the same fields and certificates.
 """
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from ....models.errors import SolutionError
 from ....models.field.field import CrossField
-from ....models.formulations.problem import Problem
+from ....models.formulations.problem import Problem, formulate, with_integers_fixed
 from ....models.instance.grid import Floats
 from ....models.instance.instance import QUARTER, Instance
+from ....models.proof.certificate import Certificate, read_certificate, write_certificate
 from ....models.proof.dual_start import search
-from ....models.search.greedy import greedy_field
 from ....models.search.pinned import pinned
-from ...formats.registry import generator
+from ...bundle.starts import write_start
+from ...formats.registry import generator, write
+from ...solutions.solution import read_solution
 
+METHOD: Final = "prove"
 _ROUNDS: Final = 8
+_NODES: Final = {"tiny": 1000, "small": 20}  # of the branch and bound in the 1-norm, by rung
+_LP_UP_TO: Final = 1000  # pixels up to which the angles are fitted in the 1-norm
+_MOST_WORK: Final = 20_000_000  # labels, counted at each rounding, after which a proof ends: some minutes
+_MOST_BYTES: Final = 2_000_000  # a larger certificate has a gap, and is omitted
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """Origin of a field: solver and version, and for a submitted one seconds and submitter."""
+    """Origin of a field: solver and version; seconds and submitter of a submitted field."""
 
     solver: str
     version: str
@@ -53,14 +64,79 @@ def ours(method: str) -> Provenance:
     return Provenance(f"{name} ({method})", version)
 
 
-def baseline_field(instance: Instance) -> Known:
-    """Return the greedy field, whose jumps are the data of `qp-fixed` and therefore fixed."""
-    return Known(pinned(greedy_field(instance)), ours("greedy"))
-
-
 def searched_field(instance: Instance) -> Known:
-    """Return a field of low 2-norm energy, by a fixed amount of work."""
+    """Return a field of low 2-norm energy."""
     return Known(pinned(search(instance, rounds=_ROUNDS, jobs=1).field), ours("search"))
+
+
+def better_in_1norm(start: CrossField, rung: str) -> list[Known]:
+    """Return fields of lower 1-norm energy by HiGHS: best angles for the jumps, and on low rungs a search."""
+    if start.instance.grid.size > _LP_UP_TO:
+        return []
+    problem = formulate(start.instance, "milp-mccormick")  # whose objective is the 1-norm energy
+    fitted = _solved(with_integers_fixed(problem, start))
+    found = [fitted]
+    if rung in _NODES:
+        found.append(_solved(problem, mip_max_nodes=_NODES[rung], start=fitted or start))
+    return [Known(each, Provenance("HiGHS", version("highspy"))) for each in found if each is not None]
+
+
+def _solved(problem: Problem, start: CrossField | None = None, **options: int) -> CrossField | None:
+    """The field that HiGHS finds under options, or None."""
+    from ...programs.highs import loaded, set_options, solved, write_solution
+
+    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
+        model, first, answer = (Path(folder) / name for name in ("model.mps", "start.sol", "answer.sol"))
+        write(problem, model)
+        highs = loaded(model, threads=1, parallel="off", mip_rel_gap=1e-6, mip_abs_gap=1e-9)
+        set_options(highs, **options)
+        if start is not None:
+            write_start(problem, start, first, "highs")
+            highs.readSolution(str(first), 0)
+        write_solution(solved(highs, model), answer)
+        try:
+            found = read_solution(answer, problem)
+        except SolutionError:
+            return None
+    return None if found.point is None else field_of(problem, found.point)
+
+
+@dataclass(frozen=True, eq=False)
+class Certified:
+    """A checked certificate: its field, name and bytes of its file, and status, energy and bound."""
+
+    known: Known
+    file: str
+    data: bytes
+    facts: dict[str, Any]
+
+    @classmethod
+    def of(cls, found: Certificate, file: str, data: bytes, provenance: Provenance) -> Certified:
+        """Return it as the checker found it."""
+        facts = {"status": found.status, "energy": found.energy, "bound": found.bound}
+        return cls(Known(found.field, provenance), file, data, facts)
+
+
+def certified(start: CrossField, file: str) -> Certified | None:
+    """Prove the 2-norm optimum from a field; None if the certificate is large. file: name in a library."""
+    from ....models.proof.prove import prove  # loads compiled functions
+
+    found = prove(start.instance, start=start, work=_MOST_WORK, jobs=1)
+    field = pinned(found.field)
+    proof = replace(found, field=field, energy=field.energy().total)
+    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
+        path = Path(folder) / "a.certificate.npz"
+        claim = write_certificate(proof, path)
+        data = path.read_bytes()
+    return None if len(data) > _MOST_BYTES else Certified.of(claim, file, data, ours(METHOD))
+
+
+def certified_by(data: bytes, file: str, on: Instance, provenance: Provenance) -> Certified:
+    """Check the bytes of a certificate of an instance. Raises as `read_certificate`."""
+    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
+        path = Path(folder) / file
+        path.write_bytes(data)
+        return Certified.of(read_certificate(path, on=on), file, data, provenance)
 
 
 def least_energy(known: Sequence[Known], norm: int) -> Known:
@@ -69,12 +145,9 @@ def least_energy(known: Sequence[Known], norm: int) -> Known:
 
 
 def complete_point(problem: Problem, found: CrossField) -> Floats:
-    """Return the best point of a problem (columns,) with the angles and jumps of a field.
-
-    As `Problem.point`; with the facet as printed, z is free in an interval, and takes the value there that
-    makes t least.
-    """
+    """Return the best point of a problem (columns,) with the angles and jumps of a field."""
     point = problem.point(found)
+    # With the facet as printed, z is free in an interval, and takes the value there that makes t least.
     if problem.formulation.options.facet == "printed" and {"z", "t"} <= problem.blocks.keys():
         grid, odd = found.instance.grid, (found.p & 1).astype(np.float64)
         first, second = found.beta[grid.first], found.beta[grid.second]
@@ -87,7 +160,7 @@ def complete_point(problem: Problem, found: CrossField) -> Floats:
 
 
 def field_of(problem: Problem, point: Floats) -> CrossField:
-    """Return the field of a point (columns,), with angles and jumps clipped into their ranges."""
+    """Return the field of a point (columns,), with angles and jumps clipped to their ranges."""
     found, instance = problem.field(point), problem.instance
     return CrossField(
         instance,
@@ -107,7 +180,7 @@ class Best:
 
     @property
     def objective(self) -> float:
-        """The objective, recomputed from the declaration."""
+        """The recomputed objective."""
         return self.problem.objective_value(self.point)
 
     def facts(self) -> dict[str, Any]:

@@ -20,12 +20,6 @@ _FACETS: Final = {
 }
 
 
-def siblings(recipe: EntryRecipe, names: Collection[str]) -> dict[str, str]:
-    """Return the other entries of the library with the same optimum, and their formulations."""
-    found = equivalent(recipe, names)
-    return {each["entry"]: each["formulation"] for each in found if each["entry"] is not None}
-
-
 def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
     """Return the formulations with the same optimum, and the reasons. names: entries of the library."""
     if recipe.facet == "printed":
@@ -52,13 +46,17 @@ def not_equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str
         if declared.minimises != mine
     ]
     if "facet" in FORMULATIONS[recipe.formulation].settable:
-        found.append(_other_facet(recipe, names))
+        facet = "hull" if recipe.facet == "printed" else "printed"
+        found.append(_relation(recipe, recipe.formulation, names, _FACETS[facet], facet))
     return found + _other_gauge(recipe, names)
 
 
-def _relation(recipe: EntryRecipe, formulation: str, names: Collection[str], why: str) -> dict[str, Any]:
-    name = entry_name(recipe.instance, formulation, "hull")
-    return {"formulation": formulation, "entry": name if name in names else None, "why": why}
+def _relation(
+    recipe: EntryRecipe, formulation: str, names: Collection[str], why: str, facet: str = ""
+) -> dict[str, Any]:
+    name = entry_name(recipe.instance, formulation, facet or "hull")
+    shown = f"{formulation} (facet {facet})" if facet else formulation
+    return {"formulation": shown, "entry": name if name in names else None, "why": why}
 
 
 def _difference(recipe: EntryRecipe, other: str) -> str:
@@ -68,13 +66,6 @@ def _difference(recipe: EntryRecipe, other: str) -> str:
     if mine == AT_JUMPS and theirs == TWO_NORM:
         return "its jumps are free: its optimum is a lower bound of this one"
     return f"it minimises {theirs}, this one {mine}: points transfer, optima differ"
-
-
-def _other_facet(recipe: EntryRecipe, names: Collection[str]) -> dict[str, Any]:
-    facet = "hull" if recipe.facet == "printed" else "printed"
-    name = entry_name(recipe.instance, recipe.formulation, facet)
-    shown = f"{recipe.formulation} (facet {facet})"
-    return {"formulation": shown, "entry": name if name in names else None, "why": _FACETS[facet]}
 
 
 def _other_gauge(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
@@ -91,11 +82,6 @@ def _other_gauge(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, 
     )
     shown = f"{recipe.formulation} (gauge {'strokes' if box else 'box'})"
     return [{"formulation": shown, "entry": name, "why": f"the other gauge: {windows}; optima differ"}]
-
-
-def transformations(problem: Problem, formats: Collection[str]) -> list[str]:
-    """Return sentences about changes in the files: products lifted, the column ONE, bounds."""
-    return [f".{name}: {note}" for name in formats for note in notes_of(problem, name)]
 
 
 def notes_of(problem: Problem, name: str) -> list[str]:

@@ -15,17 +15,14 @@ from ....models.errors import InputError
 from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
 from .spec import Rung, Sketch, Spec
 
-LONGEST: Final = 32
-"""Characters of a name before its suffix."""
+LONGEST: Final = 32  # characters of a name before its suffix
 
 
 @dataclass(frozen=True)
 class InstanceRecipe:
-    """Recipe of an instance. sketch: with the drawing's bytes; seed: None unless the sketch is random.
+    """Recipe of an instance. seed: of random sketches; prove: whether to prove its 2-norm optimum.
 
-    prove: whether its 2-norm optimum is to be proven, where the rung says so and a formulation asks for it;
-    not under the gauge `box`, where bounds are weak. added: the day on which it came into the library, empty
-    where none is stated.
+    added: the day of its addition to the library; empty if not stated.
     """
 
     name: str
@@ -76,10 +73,7 @@ def entry_name(instance: str, formulation: str, facet: str) -> str:
 
 
 def plan(spec: Spec) -> tuple[InstancePlan, ...]:
-    """Return every instance of a specification with its entries, by sketch, size, seed and gauge.
-
-    Raises InputError for a name that is too long.
-    """
+    """Return every instance of a specification with its entries. Raises InputError for a long name."""
     two_norm = any(FORMULATIONS[name].minimises == TWO_NORM for name in spec.formulations)
     found = tuple(
         InstancePlan(recipe, _entries(recipe, rung, spec.formulations))
@@ -88,11 +82,10 @@ def plan(spec: Spec) -> tuple[InstancePlan, ...]:
         if rung.name in sketch.rungs
         for recipe in _instances(sketch, rung, prove=two_norm and rung.prove)
     )
-    for entry in (entry for each in found for entry in each.entries):
-        if len(entry.name) > LONGEST:
+    for name in (entry.name for each in found for entry in each.entries):
+        if len(name) > LONGEST:
             raise InputError(
-                f"the name {entry.name} has {len(entry.name)} characters; "
-                f"shorten the sketch's name until it has {LONGEST}"
+                f"the name {name} has {len(name)} characters; shorten the sketch's name to reach {LONGEST}"
             )
     return found
 
@@ -106,7 +99,7 @@ def _instances(sketch: Sketch, rung: Rung, *, prove: bool) -> list[InstanceRecip
             size,
             seed,
             gauge,
-            prove=prove and gauge == "strokes",
+            prove=prove and gauge == "strokes",  # bounds are weak under the gauge `box`
             added=max(sketch.added, rung.added),
         )
         for size in sketch.sizes_on(rung)

@@ -16,21 +16,15 @@ from ....models.sketch.read import LEAST_WEIGHT, instance_of
 from ....models.sketch.samples import SAMPLES, sample
 from .recipe import InstanceRecipe
 
-STROKE_SHARE: Final = 0.2
-"""Part of the pixels of a random instance that carry strokes."""
-RAGGED_SHARE: Final = 0.75
-"""Part of the square that a ragged mask is drawn from; its largest connected part is kept."""
+STROKE_SHARE: Final = 0.2  # of the pixels of a random instance
+RAGGED_SHARE: Final = 0.75  # of the square, for a ragged mask; its largest connected part is kept
 
 
 def instance_from(recipe: InstanceRecipe) -> Instance:
-    """Return the instance of a recipe, under the recipe's name.
-
-    Raises InputError that names it; a NoStrokeError when the size leaves nothing of the sketch.
-
-    Its weights are the coefficients of the paper, 1 and 1e-6, on every grid, so that published results apply.
-    """
+    """Return the instance of a recipe. Raises InputError; NoStrokeError if its size leaves no strokes."""
     make = {"sample": _of_sample, "file": _of_file, "random": random_instance}[recipe.sketch.kind]
     try:
+        # The coefficients of the paper, 1 and 1e-6, on every grid, so that published results apply.
         of_paper = {name: getattr(Instance, name) for name in ("stroke_coefficient", "skew_coefficient")}
         return replace(make(recipe), name=recipe.name, **of_paper)
     except NoStrokeError as error:
@@ -65,10 +59,10 @@ def _of_file(recipe: InstanceRecipe) -> Instance:
 
 
 def random_instance(recipe: InstanceRecipe) -> Instance:
-    """Return random strokes of a size and a seed, on a fifth of the pixels.
+    """Return random strokes of a size and a seed, by NumPy's PCG64.
 
-    Drawn with NumPy's PCG64 in this order: the mask when it is ragged, the order of the pixels (the first
-    fifth, at least one, are strokes), theta uniform in [0, pi), w uniform in [0.1, 1].
+    Drawn in this order: a ragged mask, the order of the pixels (the first fifth, at least one, are strokes),
+    theta uniform in [0, pi), w uniform in [0.1, 1].
     """
     rng = np.random.Generator(np.random.PCG64(recipe.seed))
     mask = np.ones((recipe.size, recipe.size), dtype=bool)

@@ -1,49 +1,18 @@
-"""The specification of a library: which sketches, sizes, gauges, seeds, formulations and formats.
+"""The specification of a library, read from TOML: sketches, sizes, gauges, seeds, formulations and formats.
 
-Read from TOML and checked.
-
-    format = "crossfield-library-spec"
-    version = 1
-    title = "..."                      one line
-    formulations = ["..."]             all by default
-    gauges = ["strokes"], facets = ["hull"]    may also stand in a rung, which then has its own
-    ledger = "ledger.json"             what solvers found before, with its fields beside it; may be left out
-    points = "points"                  fields and certificates by `crossfield library points`; may be left out
-
-    [release]                          what is cited; may be left out
-    version = "1.0", date = "2026-11-22", authors = ["A. Name"]
-
-    [rungs.tiny]                       tiny, small, medium or large
-    sizes = [4]                        pixels on the longer side
-    formats = ["nl", "mps"]            all by default
-    compress = false                   .gz
-    prove = true                       certificates of 2-norm optima; by default on tiny and small
-
-    [[sketches]]
-    name = "bend"                      lower case and digits, part of every name
-    sample = "cylinder_bend"           or file = "drawing.svg" (with mask = "mask.png" if need be),
-                                       or random = "full" | "ragged"
-    seeds = [1, 2]                     of a random one
-    rungs = ["tiny"]                   all by default
-    sizes = { tiny = [10] }            other ones than the rung has, for a drawing that needs them
-    author = "A. Name"                 of the drawing; with license and source, told where they are stated
-    license = "CC-BY-4.0"              best as SPDX has it
-    source = "..."                     where it is from
-    added = "2026-11-22"               when it came into the library; also of a rung: the later day counts
-
-Files are found from the folder of the specification. The form is library-spec.schema.json beside this module;
-this module checks names in tables, and combinations of keys.
+docs/library.md describes its keys, and library-spec.schema.json in this folder its form. This module checks
+names in tables, and combinations of keys. Files are relative to the folder of the specification.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Collection
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 from ....models.errors import InputError, naming, shortened
 from ....models.formulations.catalogue import FORMULATIONS, declaration_of, short_names
@@ -60,9 +29,7 @@ from ...formats.registry import FORMATS
 FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
 RUNGS: Final = ("tiny", "small", "medium", "large")
-"""The ladder: every solver in seconds; optimum proven; gap open; reading and presolve."""
-PROVEN: Final = ("tiny", "small")
-"""Rungs whose 2-norm optima are proven by default: most proofs take a second there."""
+PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by default: most take a second
 Kind = Literal["sample", "file", "random"]
 DEFAULT: Final = Path(__file__).with_name("default.toml")
 
@@ -85,9 +52,6 @@ class Origin:
         return {key: value for key, value in asdict(self).items() if value}
 
 
-NOTHING_STATED: Final = Origin()
-
-
 @dataclass(frozen=True)
 class Release:
     """A citable release of a library. date: as 2026-11-22; authors: names as they are cited."""
@@ -103,13 +67,13 @@ class Release:
 
     def document(self) -> dict[str, Any]:
         """Return the release as a table of a specification."""
-        return {"version": self.version, "date": self.date, "authors": list(self.authors)}
+        return asdict(self) | {"authors": list(self.authors)}
 
 
 def day(text: str, place: str) -> str:
-    """Return the day as YYYY-MM-DD. Raises InputError for an invalid one."""
+    """Return a day as YYYY-MM-DD, and no text as it is. Raises InputError for an invalid day."""
     try:
-        return date.fromisoformat(text).isoformat()
+        return date.fromisoformat(text).isoformat() if text else ""
     except ValueError as error:
         raise InputError(f"{place}: {text!r} is no day; write one as 2026-11-22") from error
 
@@ -129,24 +93,17 @@ class Rung:
 
     def document(self) -> dict[str, Any]:
         """Return the rung as a table of a specification."""
-        return {
-            "sizes": list(self.sizes),
-            "formats": list(self.formats),
-            "compress": self.compress,
-            "gauges": list(self.gauges),
-            "facets": list(self.facets),
-            "prove": self.prove,
-            **({"added": self.added} if self.added else {}),
-        }
+        named = asdict(self).items()
+        stated = {key: list(value) if isinstance(value, tuple) else value for key, value in named}
+        return {key: value for key, value in stated.items() if key != "name" and value != ""}
 
 
 @dataclass(frozen=True)
 class Sketch:
     """Source of instances: a sample, a file with its mask, or random strokes of some seeds.
 
-    name: short, part of every name. sizes: by rung, where they are not the rung's. what: the sample, the
-    file's own name, or the shape of a random mask. drawing, mask: as they are published, with the suffixes of
-    their files.
+    what: the sample, the file's own name, or the shape of a random mask. sizes: by rung, if they differ from
+    the rung's. drawing, mask: published bytes.
     """
 
     name: str
@@ -154,13 +111,13 @@ class Sketch:
     what: str
     title: str
     rungs: tuple[str, ...]
+    origin: Origin
     sizes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     seeds: tuple[int | None, ...] = (None,)
     drawing: bytes = b""
     suffix: str = ""
     mask: bytes = b""
     mask_suffix: str = ""
-    origin: Origin = NOTHING_STATED
     added: str = ""
 
     def sizes_on(self, rung: Rung) -> tuple[int, ...]:
@@ -172,15 +129,8 @@ class Sketch:
         """Files of the library that hold the drawing and its mask, by name."""
         if self.kind == "sample" and SAMPLES[self.what].kind == "sketch":
             return {f"cf_{self.name}.sketch.svg": sample_svg(self.what).encode()}
-        return {
-            name: data for name, data in ((self._copy(), self.drawing), (self._mask(), self.mask)) if data
-        }
-
-    def _copy(self) -> str:
-        return f"cf_{self.name}.sketch{self.suffix}"
-
-    def _mask(self) -> str:
-        return f"cf_{self.name}.mask{self.mask_suffix}"
+        drawing, mask = f"cf_{self.name}.sketch{self.suffix}", f"cf_{self.name}.mask{self.mask_suffix}"
+        return {name: data for name, data in ((drawing, self.drawing), (mask, self.mask)) if data}
 
     def document(self) -> dict[str, Any]:
         """Return the sketch as a table of a specification, with its file names in a library."""
@@ -191,17 +141,13 @@ class Sketch:
             return head | {"sample": self.what}
         if self.kind == "random":
             return head | {"random": self.what, "seeds": list(self.seeds)}
-        masked = {"mask": self._mask()} if self.mask else {}
-        return head | {"file": self._copy(), "file_name": self.what} | masked
+        drawing, *mask = self.files
+        return head | {"file": drawing, "file_name": self.what} | ({"mask": mask[0]} if mask else {})
 
 
 @dataclass(frozen=True)
 class Spec:
-    """A checked specification.
-
-    ledger: file of a ledger that the build uses, or None; points: a folder of fields and
-    certificates that replace searches, or None.
-    """
+    """A checked specification. ledger: its file; points: a folder of results that replace searches."""
 
     title: str
     formulations: tuple[str, ...]
@@ -242,7 +188,7 @@ def read_spec(path: str | Path) -> Spec:
 
 
 def spec_of(document: dict[str, Any], path: Path) -> Spec:
-    """Return the specification of a document with files beside `path`. Raises InputError, naming `path`."""
+    """Return the specification of a document with files next to `path`. Raises InputError."""
     with naming(path):
         _check_form(document)
         return _spec(document, path.parent)
@@ -251,9 +197,7 @@ def spec_of(document: dict[str, Any], path: Path) -> Spec:
 def _check_form(document: dict[str, Any]) -> None:
     for key, value in (("format", FORMAT), ("version", VERSION)):
         if document.get(key) != value or isinstance(document[key], bool):
-            raise InputError(
-                f"{key}: must be {value!r}; this is no specification of a library, or another version"
-            )
+            raise InputError(f"{key}: must be {value!r}; give a specification of a library of this version")
     try:
         error = schema_error(document, "library-spec", __package__)
     except ValueError as large:  # of a whole number of more digits than Python writes
@@ -297,7 +241,7 @@ def _of_value(error: Any) -> str:
         case "enum":
             words = f"there is no {value!r}; choose from {', '.join(schema['enum'])}"
         case "oneOf":
-            words = f"needs exactly one of {', '.join(_SOURCES)}"
+            words = f"needs exactly one of {', '.join(get_args(Kind))}"
         case "pattern":
             words = f"{value!r} is not allowed; write {schema['description']}"
         case _:
@@ -311,7 +255,11 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         "gauges": _words(document, "gauges", GAUGES, ("strokes",)),
         "facets": _words(document, "facets", FACETS, ("hull",)),
     }
-    formulations = _formulations(document)
+    known = (*FORMULATIONS, *short_names())
+    named = _words(document, "formulations", known, tuple(FORMULATIONS))
+    formulations = tuple(declaration_of(name).name for name in named)
+    if (name := _twice(formulations)) is not None:
+        raise InputError(f"formulations: {name[1]!r} is listed twice; list it once")
     rungs = tuple(
         _rung(name, document["rungs"][name], defaults) for name in RUNGS if name in document["rungs"]
     )
@@ -319,34 +267,23 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         _sketch(table, f"sketches[{number}].", folder, rungs)
         for number, table in enumerate(document["sketches"])
     )
-    _check_names([sketch.name for sketch in sketches])
+    if (name := _twice([sketch.name for sketch in sketches])) is not None:
+        raise InputError(
+            f"sketches[{name[0]}].name: {name[1]!r} is the name of two sketches; give each its own"
+        )
     ledger = folder / document["ledger"] if "ledger" in document else None
     if ledger is not None and not ledger.is_file():
-        raise InputError(f"ledger: there is no file {ledger.name}; leave the key out, or give a ledger.json")
+        raise InputError(f"ledger: there is no file {ledger.name}; omit the key, or give a ledger.json")
     points = folder / document["points"] if "points" in document else None
     if points is not None and not points.exists():
-        raise InputError(f"points: there is no {points.name}; leave the key out, or give a library's points")
+        raise InputError(f"points: there is no {points.name}; omit the key, or give the points of a library")
     release = Release.of(document["release"]) if "release" in document else None
     return Spec(document["title"], formulations, rungs, sketches, ledger, points, release)
 
 
-def _formulations(document: dict[str, Any]) -> tuple[str, ...]:
-    """The formulations of a specification, which may use short names."""
-    known = (*FORMULATIONS, *short_names())
-    named = _words(document, "formulations", known, tuple(FORMULATIONS))
-    found = [declaration_of(name).name for name in named]
-    for number, name in enumerate(found):
-        if name in found[:number]:
-            raise InputError(f"formulations: {name!r} is listed twice; list it once")
-    return tuple(found)
-
-
-def _check_names(names: list[str]) -> None:
-    for number, name in enumerate(names):
-        if name in names[:number]:
-            raise InputError(
-                f"sketches[{number}].name: {name!r} is the name of two sketches; give each its own"
-            )
+def _twice(names: Sequence[str]) -> tuple[int, str] | None:
+    """Place and name of the first repetition."""
+    return next(((at, name) for at, name in enumerate(names) if name in names[:at]), None)
 
 
 def _words(
@@ -368,12 +305,8 @@ def _rung(name: str, table: dict[str, Any], defaults: dict[str, tuple[str, ...]]
     known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
     words = {key: _words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
     compress, prove = table.get("compress", False), table.get("prove", name in PROVEN)
-    added = _added(table, f"rungs.{name}.")
+    added = day(table.get("added", ""), f"rungs.{name}.added")
     return Rung(name, _whole(table["sizes"]), compress=compress, prove=prove, added=added, **words)
-
-
-def _added(table: dict[str, Any], place: str) -> str:
-    return day(table["added"], f"{place}added") if "added" in table else ""
 
 
 def _whole(numbers: list[float]) -> tuple[int, ...]:
@@ -384,16 +317,28 @@ def _whole(numbers: list[float]) -> tuple[int, ...]:
 def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
     name, names = table["name"], tuple(rung.name for rung in rungs)
     wanted = _words(table, "rungs", names, names, place)
-    kind = next(kind for kind in _SOURCES if kind in table)
-    what: dict[str, Any] = _SOURCES[kind](table, place, folder)
+    sizes = table.get("sizes", {})
+    if unknown := [rung for rung in sizes if rung not in wanted]:
+        raise InputError(f"{place}sizes.{unknown[0]}: is unknown; the keys here are {', '.join(wanted)}")
+    kind = next(kind for kind in get_args(Kind) if kind in table)
+    word = table[kind]
+    if kind == "file":
+        what = _file(table, place, folder)
+    elif kind == "random":
+        shape = "full square" if word == "full" else "ragged part of a square"
+        title = f"random strokes on a {shape}"
+        what = {"what": word, "title": title, "seeds": _whole(table["seeds"])}
+    else:
+        _check_known(word, SAMPLES, f"{place}sample", "sample ")
+        what = {"what": word, "title": SAMPLES[word].description}
     sketch = Sketch(
         name,
         kind,
         title=table.get("title", what.pop("title")),
         rungs=wanted,
-        sizes=_sizes(table, place, wanted),
+        sizes=tuple((rung, _whole(sizes[rung])) for rung in wanted if rung in sizes),
         origin=Origin.of(table),
-        added=_added(table, place),
+        added=day(table.get("added", ""), f"{place}added"),
         **what,
     )
     every = [size for rung in rungs if rung.name in wanted for size in sketch.sizes_on(rung)]
@@ -404,28 +349,6 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
                 "because names carry the size alone"
             )
     return sketch
-
-
-def _sizes(
-    table: dict[str, Any], place: str, rungs: tuple[str, ...]
-) -> tuple[tuple[str, tuple[int, ...]], ...]:
-    given = table.get("sizes", {})
-    for rung in given:
-        if rung not in rungs:
-            raise InputError(f"{place}sizes.{rung}: is unknown; the keys here are {', '.join(rungs)}")
-    return tuple((rung, _whole(given[rung])) for rung in rungs if rung in given)
-
-
-def _sample(table: dict[str, Any], place: str, _folder: Path) -> dict[str, Any]:
-    what = table["sample"]
-    _check_known(what, SAMPLES, f"{place}sample", "sample ")
-    return {"what": what, "title": SAMPLES[what].description}
-
-
-def _random(table: dict[str, Any], _place: str, _folder: Path) -> dict[str, Any]:
-    what = table["random"]
-    title = f"random strokes on a {'full square' if what == 'full' else 'ragged part of a square'}"
-    return {"what": what, "title": title, "seeds": _whole(table["seeds"])}
 
 
 def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
@@ -445,13 +368,6 @@ def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
         "mask": masked,
         "mask_suffix": suffix_of_picture(masked) if masked else "",
     }
-
-
-_SOURCES: Final[dict[Kind, Callable[[dict[str, Any], str, Path], dict[str, Any]]]] = {
-    "sample": _sample,
-    "file": _file,
-    "random": _random,
-}
 
 
 def _content(path: Path, place: str) -> bytes:

@@ -1,5 +1,1 @@
-"""A library as static pages.
-
-A table of all entries, a page for each instance and entry, pictures and files. The layouts are
-templates/site.
-"""
+"""A library as static pages."""

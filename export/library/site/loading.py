@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem
 from ...solvers_table import takes
+
+_NO_NAMES: Final = (
+    "JuMP reads no names with .nl files: line i of the .col file names variable i. Without the option it"
+    " builds a legacy nonlinear block"
+)
 
 
 @dataclass(frozen=True)
@@ -19,10 +25,30 @@ class Way:
     note: str = ""
 
 
-def ways(entry: dict[str, Any], problem: Problem) -> list[Way]:
-    """Return the lines that load an entry in HiGHS, Gurobi, Pyomo, JuMP, GAMS and AMPL."""
-    made = [_highs(entry, problem), _gurobi(entry), _pyomo(entry), _jump(entry), _gams(entry), _ampl(entry)]
-    return [way for way in made if way is not None]
+def ways(entry: dict[str, Any], problem: Problem) -> Iterator[Way]:
+    """Yield the lines that load an entry in HiGHS, Gurobi, Pyomo, JuMP, GAMS and AMPL."""
+    model, support = _first(entry, "mps", "lp"), takes(problem, "highs")
+    if model and support.answer != "no":
+        text = f'import highspy\nhighs = highspy.Highs()\nhighs.readModel("{model}"); highs.run()'
+        yield Way("HiGHS, in Python", text, "pip install highspy brings no highs command.")
+    elif support.reason:
+        yield Way("HiGHS", "", support.reason)
+    if model:
+        text = f'import gurobipy\nmodel = gurobipy.read("{model}")\nmodel.optimize()'
+        yield Way("Gurobi, in Python", text)
+    yield _pyomo(entry)
+    if name := _first(entry, *(("mps", "lp", "nl") if entry["class"] in ("LP", "MILP") else ("nl",))):
+        nl = name.removesuffix(".gz").endswith(".nl")
+        options, note = ("; use_nlp_block = false", _NO_NAMES) if nl else ("", "")
+        yield Way("JuMP, in Julia", f'using JuMP\nmodel = read_from_file("{name}"{options})', note)
+    if name := _first(entry, "gms"):
+        command, (name,) = _unpacked(name)
+        yield Way("GAMS", f"{command}gams {name}")
+    files = [each["name"] for each in entry["files"] if each["format"] == "mod"]
+    if files:
+        command, names = _unpacked(*sorted(files, key=lambda name: ".dat" in name))
+        lines = " ".join(f"{'data' if '.dat' in name else 'model'} {name};" for name in names)
+        yield Way("AMPL", f"{lines} solve;", f"In a shell before: {command.strip()}" if command else "")
 
 
 def _first(entry: dict[str, Any], *formats: str) -> str:
@@ -36,22 +62,6 @@ def _unpacked(*names: str) -> tuple[str, tuple[str, ...]]:
     packed = [name for name in names if name.endswith(".gz")]
     command = f"gunzip -k {' '.join(packed)}\n" if packed else ""
     return command, tuple(name.removesuffix(".gz") for name in names)
-
-
-def _highs(entry: dict[str, Any], problem: Problem) -> Way | None:
-    name = _first(entry, "mps", "lp")
-    support = takes(problem, "highs")
-    if support.answer == "no" or not name:
-        return Way("HiGHS", "", support.reason) if support.reason else None
-    text = f'import highspy\nhighs = highspy.Highs()\nhighs.readModel("{name}"); highs.run()'
-    return Way("HiGHS, in Python", text, "pip install highspy brings no highs command.")
-
-
-def _gurobi(entry: dict[str, Any]) -> Way | None:
-    name = _first(entry, "mps", "lp")
-    if not name:
-        return None
-    return Way("Gurobi, in Python", f'import gurobipy\nmodel = gurobipy.read("{name}")\nmodel.optimize()')
 
 
 def _pyomo(entry: dict[str, Any]) -> Way:
@@ -80,36 +90,3 @@ def _settings(entry: dict[str, Any]) -> list[str]:
         for key, value in entry["options"].items()
         if key in declared.settable and value != getattr(declared.defaults, key)
     ]
-
-
-def _jump(entry: dict[str, Any]) -> Way | None:
-    linear = entry["class"] in ("LP", "MILP")
-    name = _first(entry, *(("mps", "lp", "nl") if linear else ("nl",)))
-    if not name:
-        return None
-    nl = name.removesuffix(".gz").endswith(".nl")
-    options, note = ("; use_nlp_block = false", _NO_NAMES) if nl else ("", "")
-    return Way("JuMP, in Julia", f'using JuMP\nmodel = read_from_file("{name}"{options})', note)
-
-
-_NO_NAMES: Final = (
-    "JuMP reads no names with .nl files: line i of the .col file names variable i. Without the option it"
-    " builds a legacy nonlinear block"
-)
-
-
-def _gams(entry: dict[str, Any]) -> Way | None:
-    name = _first(entry, "gms")
-    if not name:
-        return None
-    command, (name,) = _unpacked(name)
-    return Way("GAMS", f"{command}gams {name}")
-
-
-def _ampl(entry: dict[str, Any]) -> Way | None:
-    files = [each["name"] for each in entry["files"] if each["format"] == "mod"]
-    if not files:
-        return None
-    command, names = _unpacked(*sorted(files, key=lambda name: ".dat" in name))
-    lines = " ".join(f"{'data' if '.dat' in name else 'model'} {name};" for name in names)
-    return Way("AMPL", f"{lines} solve;", f"In a shell before: {command.strip()}" if command else "")

@@ -1,9 +1,7 @@
-"""A library as a static site: a table of entries, a page for each, pictures, and every file.
+"""A library as a static site: a table of entries, a page for each, pictures, and every file in files/.
 
-Layout: index.html, about.html, site.css, site.js, icon.svg, instance/NAME.html, entry/NAME.html, pictures/,
-files/ (the library itself). Links are relative, no other server is contacted, and only sorting and filtering
-need JavaScript. The templates are templates/site/*.html.j2; every text that
-comes from a file is escaped by them.
+Links are relative, pages contact no other server, and only sorting and filtering need JavaScript. The
+templates, templates/site/*.html.j2, escape every text from a file.
 """
 
 from __future__ import annotations
@@ -18,8 +16,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
-from jinja2 import Environment
-
 from .... import templates
 from ....models.errors import InputError, InstanceError, OutputError
 from ....models.field.file import read_field
@@ -33,12 +29,11 @@ from ...pictures.draw import counted
 from ...pictures.web import field_picture, instance_picture, thumbnail
 from ..building.index import SOLU, SUMS
 from ..documents.documents import Library, about_file, read_about, read_library
-from ..documents.mathematics import model
 from ..plan.spec import RUNGS
+from .mathematics import model
 from .study import study
 
-ASSETS: Final = ("site.css", "site.js", "icon.svg")
-"""Files of the templates that go into a site as they are."""
+ASSETS: Final = ("site.css", "site.js", "icon.svg")  # copied from the templates
 FOLDERS: Final = ("entry", "files", "instance", "pictures")
 PAGES: Final = ("index.html", "about.html")
 
@@ -49,7 +44,6 @@ _ROLES: Final = {
     "least_1": "field of least known 1-norm energy",
     "baseline": "baseline field, whose jumps are the data of qp-fixed",
 }
-"""Roles of fields in the document of an instance, in words."""
 
 
 @dataclass(frozen=True)
@@ -57,14 +51,10 @@ class Picture:
     """A displayed field. roles: keys of _ROLES; facts: provenance; singular: its singularities in words."""
 
     roles: tuple[str, ...]
+    caption: str
     facts: dict[str, Any]
     file: str
     singular: str
-
-    @property
-    def caption(self) -> str:
-        """Its roles in words."""
-        return "; ".join(_ROLES[role] for role in self.roles)
 
 
 @dataclass
@@ -83,7 +73,7 @@ class Shown:
         return str(self.about["name"])
 
     def picture_of(self, entry: dict[str, Any]) -> Picture:
-        """Return the field shown with an entry: the best in its norm, or that with its jumps."""
+        """Return the field shown with an entry: the best in its norm, or the field with its jumps."""
         meaning = FORMULATIONS[entry["formulation"]].minimises
         role = "baseline" if entry["jumps"] is not None else "least_1" if "1-norm" in meaning else "least_2"
         return next(each for each in self.pictures if role in each.roles)
@@ -92,8 +82,8 @@ class Shown:
 def write_site(folder: str | Path, output: str | Path, progress: Progress = silent) -> list[Path]:
     """Write the site of a library and return its pages; an earlier site in `output` is replaced.
 
-    Raises InputError, InstanceError when the library is missing, damaged, or differs from its checksums, and
-    OutputError when `output` cannot be written or holds something other than a site.
+    Raises InputError, InstanceError for a missing or damaged library, OutputError if `output` cannot be
+    written or holds something other than a site.
     """
     library = read_library(folder)
     if Path(output).resolve().is_relative_to(library.folder.resolve()):
@@ -127,14 +117,11 @@ def _instances(library: Library, names: Iterable[str]) -> list[Shown]:
     for name, entries in grouped.items():
         about = read_about(library.folder / about_file(name))
         drawings = sorted(each for each in names if each.startswith(f"cf_{entries[0]['family']}."))
-        found.append(Shown(about, entries, _label(entries[0]["source"]), drawings=drawings))
+        source = entries[0]["source"]
+        seed = "" if source["seed"] is None else f" s{source['seed']}"
+        label = f"{source['size']}{seed}{' box' if source['gauge'] == 'box' else ''}"
+        found.append(Shown(about, entries, label, drawings=drawings))
     return found
-
-
-def _label(source: dict[str, Any]) -> str:
-    """An instance among those of its sketch, as `8 s2 box`: pixels a side, seed, gauge."""
-    seed = [] if source["seed"] is None else [f"s{source['seed']}"]
-    return " ".join([str(source["size"]), *seed, *(["box"] if source["gauge"] == "box" else [])])
 
 
 def _sums(path: Path) -> dict[str, str]:
@@ -163,10 +150,7 @@ def _check_listed(library: Library, shown: list[Shown], sums: dict[str, str]) ->
 
 
 def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
-    """Make hard links to every file of the library in a folder, or copies if links are impossible.
-
-    Raises InputError for a symbolic link, and for a file that differs from its checksum.
-    """
+    """Link or copy every file of the library into a folder. Raises InputError for links and other files."""
     for name in (*sums, SUMS):
         if (folder / name).is_symlink():
             raise InputError(
@@ -197,27 +181,34 @@ def _draw(folder: Path, shown: Shown, target: Path) -> None:
         found = read_field(folder / file)
         name = f"{file.removesuffix('.json')}.svg"
         write_bytes(target / name, field_picture(found))
-        shown.pictures.append(Picture(tuple(roles), shown.about["fields"][roles[0]], name, counted(found)))
+        caption, facts = "; ".join(_ROLES[role] for role in roles), shown.about["fields"][roles[0]]
+        shown.pictures.append(Picture(tuple(roles), caption, facts, name, counted(found)))
 
 
 def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], stage: Path) -> list[Path]:
     """Write every page and return their paths inside the site."""
-    environment = _environment()
+    environment = ENVIRONMENT.overlay()
+    environment.filters = ENVIRONMENT.filters | {
+        each.__name__: each for each in (count, value, exact, percent, size)
+    }
+    environment.globals = ENVIRONMENT.globals | {"shown_types": _SHOWN}
+    families: dict[str, list[Shown]] = {}
+    for each in shown:
+        families.setdefault(each.about["family"], []).append(each)
     common = {
         "library": library.document,
         "entries": library.entries,
         "instances": shown,
         "instance_of": {entry["name"]: each for each in shown for entry in each.entries},
-        "families": (families := _families(shown)),
-        "faces": {name: max(members, key=_standing) for name, members in families.items()},
+        "families": families,
+        "faces": {name: max(members, key=_detail) for name, members in families.items()},
         "tokens": {name: declared.short for name, declared in FORMULATIONS.items()},
         "model": model,
         "sizes": {name: (library.folder / name).stat().st_size for name in (*sums, SUMS)},
         "sums": sums,
-        "licences": _licences(library.entries),
+        "licences": sorted({entry["licence"] or "" for entry in library.entries}),
     }
     written = []
-    pictures = stage / "pictures"
 
     def write(path: str, template: str, **context: Any) -> None:
         root = "../" * path.count("/")
@@ -225,32 +216,25 @@ def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], sta
         write_bytes(stage / path, text.encode())
         written.append(Path(path))
 
+    present = {file["format"] for entry in library.entries for file in entry["files"]}
     write("index.html", "index", choices=_choices(library.entries))
     write(
         "about.html",
         "about",
-        formats=_formats(library.entries),
-        citation=(read_bytes(library.folder / "CITATION.cff").decode()),
-        licence=(read_bytes(library.folder / "LICENSE").decode()),
+        formats=[each for name, each in FORMATS.items() if name in present],
+        citation=read_bytes(library.folder / "CITATION.cff").decode(),
+        licence=read_bytes(library.folder / "LICENSE").decode(),
         solu=SOLU,
     )
     for each in shown:
         write(f"instance/{each.name}.html", "instance", shown=each)
         for entry in each.entries:
-            worked_out = study(library, entry, pictures)
-            write(f"entry/{entry['name']}.html", "entry", shown=each, entry=entry, study=worked_out)
+            details = study(library, entry, stage / "pictures")
+            write(f"entry/{entry['name']}.html", "entry", shown=each, entry=entry, study=details)
     return written
 
 
-def _families(shown: list[Shown]) -> dict[str, list[Shown]]:
-    """Instances by sketch, in the order of the library."""
-    found: dict[str, list[Shown]] = {}
-    for each in shown:
-        found.setdefault(each.about["family"], []).append(each)
-    return found
-
-
-def _standing(shown: Shown) -> tuple[int, bool]:
+def _detail(shown: Shown) -> tuple[int, bool]:
     """Sort key for the picture of a sketch: the largest grid, in the gauge `strokes`."""
     source = shown.entries[0]["source"]
     return source["size"], source["gauge"] == "strokes"
@@ -258,38 +242,9 @@ def _standing(shown: Shown) -> tuple[int, bool]:
 
 def _choices(entries: tuple[dict[str, Any], ...]) -> dict[str, list[str]]:
     """The choices of the filters of the table."""
-    present = {
-        key: dict.fromkeys(entry[key] for entry in entries if key in entry)
-        for key in ("family", "rung", "formulation", "class", "difficulty", "status")
-    }
-    return {key: list(values) for key, values in present.items()} | {
-        "rung": [name for name in RUNGS if name in present["rung"]]
-    }
-
-
-def _licences(entries: tuple[dict[str, Any], ...]) -> list[str]:
-    """The stated licences of the entries without repetition, an empty one for none."""
-    return sorted({entry.get("origin", {}).get("license") or entry.get("licence") or "" for entry in entries})
-
-
-def _formats(entries: tuple[dict[str, Any], ...]) -> list[Any]:
-    written = {file["format"] for entry in entries for file in entry["files"]}
-    return [entry for name, entry in FORMATS.items() if name in written]
-
-
-def _environment() -> Environment:
-    """The templates with filters that format numbers."""
-    environment = ENVIRONMENT.overlay()
-    environment.filters = {
-        **ENVIRONMENT.filters,
-        "count": count,
-        "value": value,
-        "exact": exact,
-        "percent": percent,
-        "size": size,
-    }
-    environment.globals = {**ENVIRONMENT.globals, "shown_types": _SHOWN}
-    return environment
+    keys = ("family", "rung", "formulation", "class", "difficulty", "status")
+    found = {key: list(dict.fromkeys(entry[key] for entry in entries)) for key in keys}
+    return found | {"rung": [name for name in RUNGS if name in found["rung"]]}
 
 
 def count(number: int) -> str:
@@ -324,10 +279,7 @@ def size(number: int) -> str:
 
 @contextmanager
 def _replacing_folder(output: Path) -> Iterator[Path]:
-    """Yield an empty folder that replaces the output on success; on failure it is removed.
-
-    Raises OutputError when the folder holds something other than a site, or nothing can be written beside it.
-    """
+    """Yield an empty folder that replaces the output on success. Raises OutputError."""
     output = output.resolve()
     _check_replaceable(output)
     make_folder(output.parent)

@@ -1,26 +1,34 @@
-"""Content of an entry's page beyond its sidecar: structure, presolve, a plot of runs, loading."""
+"""Content of an entry's page beyond its sidecar: structure, presolve, a plot of runs, loading.
+
+The structure is the sparsity of the matrix and of the Hessian of the Lagrangian, as in MINLPLib.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations, combinations_with_replacement
 from pathlib import Path
 from typing import Any, Final
 
 import highspy
+import numpy as np
+import sympy as sp
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from ....models.formulations.families import PlacedFamily
+from ....models.formulations.problem import Problem
 from ....models.storage import write_bytes
-from ...pictures.sparsity import Pattern, sparsity_picture
+from ...pictures.sparsity import Parts, Pattern, Places, sparsity_picture
 from ...pictures.traces import curve, trace_picture
 from ...programs.highs import loaded, version
 from ...programs.protocol import RefusedError
 from ..documents.documents import Library, problem_of
 from .loading import Way, ways
-from .structure import Blocks, blocks, hessian, matrix
 
-LINEAR: Final = ("LP", "MILP")
-"""Classes that HiGHS presolves: of a quadratic objective it presolves nothing, and quadratic rows it does not
-read.
-"""
+LINEAR: Final = ("LP", "MILP")  # classes that HiGHS presolves
+_HIGHEST: Final = 4  # the greatest degree of a polynomial in any formulation
 
 
 @dataclass(frozen=True)
@@ -44,11 +52,18 @@ class Presolved:
 
 
 @dataclass(frozen=True)
-class Study:
-    """Results computed from an entry. matrix, hessian: None if empty; blocks: of the Hessian.
+class Blocks:
+    """Number and sizes of the blocks of a Hessian: sets of columns that no entry joins."""
 
-    plot: the picture of runs over time, empty without traces.
-    """
+    count: int
+    least: int
+    greatest: int
+    average: float
+
+
+@dataclass(frozen=True)
+class Study:
+    """Results computed from an entry. matrix, hessian: None if empty; plot: file of the plot of runs."""
 
     matrix: Pattern | None
     hessian: Pattern | None
@@ -59,11 +74,7 @@ class Study:
 
 
 def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
-    """Compute the content of an entry's page and write its pictures, NAME.matrix.svg and so on.
-
-    Raises InputError, InstanceError when the instance is missing, damaged, or another one than the sidecar
-    names, and OutputError when a picture cannot be written.
-    """
+    """Compute the content of an entry's page and write its pictures. Raises as `problem_of`; OutputError."""
     problem = problem_of(library, entry)
     patterns = {
         kind: pattern
@@ -77,7 +88,7 @@ def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
         patterns.get("hessian"),
         blocks(patterns["hessian"]) if "hessian" in patterns else None,
         _presolved(library.folder, entry),
-        ways(entry, problem),
+        list(ways(entry, problem)),
         _plot(entry, pictures),
     )
 
@@ -98,10 +109,7 @@ def _plot(entry: dict[str, Any], pictures: Path) -> str:
 
 
 def _presolved(folder: Path, entry: dict[str, Any]) -> Presolved | None:
-    """Return the size of an entry's .mps or .lp before and after presolve; None for other classes.
-
-    None, too, where there is no such file, or HiGHS does not read it.
-    """
+    """The size of an entry's .mps or .lp before and after presolve; None if HiGHS does not presolve it."""
     files = [each["name"] for form in ("mps", "lp") for each in entry["files"] if each["format"] == form]
     if entry["class"] not in LINEAR or not files:
         return None
@@ -118,3 +126,83 @@ def _presolved(folder: Path, entry: dict[str, Any]) -> Presolved | None:
 def _counts(model: Any) -> Counts:
     kinds = [kind for kind in model.integrality_ if kind != highspy.HighsVarType.kContinuous]
     return Counts(model.num_col_, len(kinds), model.num_row_, len(model.a_matrix_.value_))
+
+
+def matrix(problem: Problem) -> Pattern:
+    """Return the entries of the Jacobian of the rows by family, with nonlinear ones marked."""
+    rows, columns, curved, offset = [], [], [], 0
+    for family in problem.rows:
+        nonlinear = _nonlinear(family)
+        for symbol in family.variables:
+            rows.append(np.arange(family.count, dtype=np.int64) + offset)
+            columns.append(family.column_of(symbol))
+            curved.append(np.full(family.count, symbol in nonlinear))
+        offset += family.count
+    down = Parts(
+        tuple(family.family.tag for family in problem.rows), tuple(family.count for family in problem.rows)
+    )
+    return Pattern(
+        down,
+        _columns(problem),
+        np.concatenate([np.zeros(0, np.int64), *rows]),
+        np.concatenate([np.zeros(0, np.int64), *columns]),
+        np.concatenate([np.zeros(0, bool), *curved]),
+    )
+
+
+def hessian(problem: Problem) -> Pattern:
+    """Return the entries of the Hessian of the Lagrangian, both triangles."""
+    pairs = np.concatenate([np.zeros((0, 2), np.int64), *_pairs(problem)])
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    keys = np.unique(both[:, 0] * problem.n_columns + both[:, 1])
+    parts = _columns(problem)
+    return Pattern(
+        parts, parts, keys // problem.n_columns, keys % problem.n_columns, np.ones(len(keys), bool)
+    )
+
+
+def blocks(pattern: Pattern) -> Blocks:
+    """Return the blocks of a Hessian among the columns of nonlinear terms."""
+    used, place = np.unique(np.concatenate([pattern.rows, pattern.columns]), return_inverse=True)
+    ends = place[: pattern.entries], place[pattern.entries :]
+    graph = coo_array((np.ones(pattern.entries, bool), ends), shape=(len(used), len(used)))
+    count, labels = connected_components(graph, directed=False)
+    sizes = np.bincount(labels)
+    return Blocks(int(count), int(sizes.min()), int(sizes.max()), len(used) / int(count))
+
+
+def _columns(problem: Problem) -> Parts:
+    shown = [block for block in problem.blocks.values() if block.count]
+    return Parts(tuple(block.name for block in shown), tuple(block.count for block in shown))
+
+
+def _nonlinear(family: PlacedFamily) -> set[sp.Symbol]:
+    """The symbols that stand in nonlinear terms of a family."""
+    if family.terms is None:
+        return set(family.variables)
+    return {symbol for term in family.terms if term.degree > 1 for symbol in term.symbols}
+
+
+def _pairs(problem: Problem) -> Iterator[Places]:
+    """Columns whose mixed second derivative is not zero everywhere, arrays (k, 2).
+
+    Terms of the objective that cancel are omitted.
+    """
+    for degree in range(2, _HIGHEST + 1):
+        index, _ = problem.merged_objective(degree)
+        yield from (index[:, ends].astype(np.int64) for ends in map(list, combinations(range(degree), 2)))
+    for family in problem.objective:
+        if family.terms is None:
+            yield from _general(family)
+    for family in problem.rows:
+        if family.terms is None:
+            yield from _general(family)
+        for term in family.terms or ():
+            yield from (np.stack(both, axis=1).astype(np.int64) for both in combinations(term.factors, 2))
+
+
+def _general(family: PlacedFamily) -> Iterator[Places]:
+    """Pairs of columns whose second derivative is not zero, for other families than polynomials."""
+    for one, other in combinations_with_replacement(family.variables, 2):
+        if sp.diff(family.family.body, one, other) != 0:
+            yield np.stack([family.column_of(one), family.column_of(other)], axis=1).astype(np.int64)

@@ -24,7 +24,6 @@ from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.file import write_instance
 from crossfield.models.instance.instance import Instance
-from crossfield.models.sketch.samples import sample
 from loops import for_each
 
 SOLUTIONS = places.SOLUTIONS / "tiny"
@@ -407,14 +406,6 @@ def test_it_is_one_file_for_python_3_9_with_the_standard_library_alone():
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }
     assert not called_names & {"eval", "exec", "compile", "__import__"}
-
-
-def test_a_grid_of_32_by_32_is_checked(tmp_path):
-    instance = sample("mouse", 32)
-    problem = formulate(instance, "milp-mccormick")
-    write(problem, tmp_path / "m.mps.gz")
-    point = save_point(tmp_path / "p.sol", problem, problem.point(make_field(instance)))
-    assert check(str(tmp_path / "m.mps.gz"), point).worst < 1e-14
 
 
 # bad input

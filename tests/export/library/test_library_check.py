@@ -9,19 +9,17 @@ import places
 import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
-from crossfield.export.formats.registry import write
+from crossfield.export.formats.registry import FORMATS
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.documents import check_point
-from crossfield.export.library.documents.documents import problem_of, read_library
+from crossfield.export.library.documents.documents import read_library
 from crossfield.export.library.ledger.given import read_points
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import CrossfieldError, InputError, SolutionError
-from crossfield.models.field.file import read_field
-from crossfield.models.formulations.problem import with_integers_fixed
 from forging import change, seal
 from loops import for_each
-from submitting import submit_one
+from submitting import better_point, submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -33,8 +31,6 @@ def everything_below(folder):
         path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()
     }
 
-
-# verifying
 
 SPEC = """
 format = "crossfield-library-spec"
@@ -220,13 +216,14 @@ SEALED = {
         QP,
         "a number that is not finite",
     ),
-    "a bound beyond all numbers": (edit(QP, **bound_of(10**400)), QP, "no entry can have"),
+    "a bound beyond all numbers": (edit(QP, **bound_of(10**400)), QP, "another bounds"),
     "another option": (edit(MILP, options__facet="printed"), f"{STEM}.instance.json", "is not the instance"),
     "another objective": (
         edit(MIQP, best__objective=lambda value: value + 1e-7),
         f"{STEM}_miqp.sol",
         "has objective",
     ),
+    "an entry without a point": (edit(MILP, best=None), MILP, "$.best"),
     "another energy": (
         edit(MIQP, best__energy_2norm=lambda value: value + 1e-7),
         f"{STEM}_miqp.sol",
@@ -244,9 +241,9 @@ SEALED = {
         f"{STEM}_milp.nl.sol",
         "not a solution file of a known kind",
     ),
-    "a bound above a point": (edit(MIQP, **bound_of(1e3)), MIQP, "above the objective"),
-    "a status that does not follow": (edit(MIQP, **bound_of(-1.0)), MIQP, "another status or gap"),
-    "a bound that is none of the bounds": (edit(QP, bound=-5.0), QP, "the best of its bounds"),
+    "a bound above a point": (edit(MIQP, **bound_of(1e3)), MIQP, "another bounds"),
+    "a status that does not follow": (edit(MIQP, **bound_of(-1.0)), MIQP, "another status"),
+    "a bound that is none of the bounds": (edit(QP, bound=-5.0), QP, "another bound "),
     "a fact in library.solu": (
         text("library.solu", b"= " + MILP[:-5].encode(), b"= " + MIQP[:-5].encode()),
         "library.solu",
@@ -348,22 +345,6 @@ def test_another_file_than_a_library_is_one_line(path, tmp_path, capsys):
 
 
 # submitting
-
-
-def better_point(library, entry, path):
-    """A solution file as HiGHS writes it: the optimal angles of a convex entry for the
-    jumps of the least 2-norm field.
-    """
-    highspy = pytest.importorskip("highspy")
-    problem = problem_of(library, json.loads((library / f"{entry}.json").read_text()))
-    write(with_integers_fixed(problem, read_field(library / f"{STEM}.field.json")), path.with_suffix(".mps"))
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", False)
-    highs.setOptionValue("primal_feasibility_tolerance", 1e-10)
-    highs.readModel(str(path.with_suffix(".mps")))
-    highs.run()
-    highs.writeSolution(str(path), 0)
-    return highs.getInfo().objective_function_value
 
 
 ENTRY = f"{STEM}_miqp"
@@ -560,5 +541,7 @@ def test_all_formulations_and_formats_verify(tmp_path):
     (tmp_path / "spec.toml").write_text(text)
     library = build(read_spec(tmp_path / "spec.toml"), tmp_path / "lib")
     assert len(library.entries) == 11
+    for each in library.entries:
+        assert {file["format"] for file in each["files"]} | set(each["refused"]) == {*FORMATS, "sol"}
     assert verify_library(tmp_path / "lib") == []
     assert read_library(tmp_path / "lib").document == library.document

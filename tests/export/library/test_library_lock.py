@@ -9,21 +9,18 @@ from pathlib import Path
 
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.formats.registry import write
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.documents import lock
-from crossfield.export.library.documents.documents import problem_of
 from crossfield.export.library.documents.lock import locked
 from crossfield.export.library.ledger.ledger import Record, add_record, merged, read_ledger, write_ledger
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, OutputError
 from crossfield.models.field.file import read_field
-from crossfield.models.formulations.problem import with_integers_fixed
+from submitting import better_point
 
 pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
 
-SEEDS = (1, 2)
 SPEC = """format = "crossfield-library-spec"
 version = 1
 title = "a library for tests"
@@ -54,27 +51,13 @@ def copy(built, tmp_path):
     return Path(shutil.copytree(built.folder, tmp_path / "library"))
 
 
-def better_points(library, folder):
-    """A solution file by HiGHS for each entry that is better than the library's point."""
-    highspy = pytest.importorskip("highspy")
-    for document in library.entries:
-        name = document["name"]
-        field = read_field(library.folder / f"{name.rpartition('_')[0]}.field.json")
-        write(with_integers_fixed(problem_of(library, document), field), folder / f"{name}.mps")
-        highs = highspy.Highs()
-        highs.setOptionValue("output_flag", False)
-        highs.setOptionValue("primal_feasibility_tolerance", 1e-10)
-        highs.readModel(str(folder / f"{name}.mps"))
-        highs.run()
-        highs.writeSolution(str(folder / f"{name}.sol"), 0)
-        yield folder / f"{name}.sol"
-
-
 @pytest.mark.slow
 def test_submissions_at_one_moment_are_all_kept(tmp_path):
     copy = tmp_path / "library"
-    files = list(better_points(build(write_spec(tmp_path, size=6), copy), tmp_path))
-    assert len(files) == len(SEEDS)
+    names = [each["name"] for each in build(write_spec(tmp_path, size=6), copy).entries]
+    files = [tmp_path / f"{name}.sol" for name in names]
+    for file in files:
+        better_point(copy, file.stem, file)
     command = [sys.executable, "-m", "crossfield", "library", "submit", str(copy)]
     others = [subprocess.Popen([*command, str(file)], stdout=subprocess.PIPE, text=True) for file in files]
     said = [other.communicate()[0] for other in others]

@@ -66,7 +66,7 @@ def test_the_system_checks_its_checksum(library, tmp_path):
     if shutil.which("sha256sum") is None:
         pytest.skip("sha256sum is not installed")
     frozen = release_library(library, tmp_path / "it.tar.gz")
-    command = ["sha256sum", "--check", "--quiet", frozen.sum_file.name]
+    command = ["sha256sum", "--check", "--quiet", f"{frozen.file.name}.sha256"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 

@@ -16,8 +16,8 @@ import pytest
 from browsing import CONTRAST, find, served, show, sideways
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
-from crossfield.export.library.documents.mathematics import model
 from crossfield.export.library.plan.spec import read_spec
+from crossfield.export.library.site.mathematics import model
 from crossfield.export.library.site.site import count, percent, size, value, write_site
 from crossfield.export.pictures.draw import counted
 from crossfield.export.pictures.marks import FAMILIES, NEGATIVE, POSITIVE, STROKE

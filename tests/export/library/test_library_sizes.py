@@ -50,7 +50,7 @@ def test_a_size_that_does_not_suit_is_skipped_with_a_message(spec, tmp_path, cap
     assert index["skipped"] == dict.fromkeys(names, COARSE)
     assert {name.split("_")[1] for name in index["entries"]} == {"mouse"}
     assert not list(folder.glob("cf_bottle_n*"))
-    assert "Left out" in (folder / "README.md").read_text()
+    assert "Omitted" in (folder / "README.md").read_text()
     assert verify_library(folder) == []
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert invoke(["library", "build", str(spec), "-o", str(folder), "-q", "--jobs", "2"]) == 0
@@ -62,9 +62,9 @@ def test_an_instance_that_is_skipped_without_need_is_found(spec, tmp_path):
     path = folder / "library.json"
     index = json.loads(path.read_text())
     for skipped, words in (
-        (index["skipped"] | {"cf_mouse_n002": COARSE}, "leaves out cf_mouse_n002, which can be made"),
-        (index["skipped"] | {"cf_cat_n002": COARSE}, "leaves out cf_cat_n002, which can be made or is not"),
-        (index["skipped"] | {"cf_bottle_n003": "a whim"}, "another reason for leaving cf_bottle_n003 out"),
+        (index["skipped"] | {"cf_mouse_n002": COARSE}, "skips cf_mouse_n002, which can be made"),
+        (index["skipped"] | {"cf_cat_n002": COARSE}, "skips cf_cat_n002, which can be made or is not"),
+        (index["skipped"] | {"cf_bottle_n003": "a whim"}, "another reason for skipping cf_bottle_n003"),
         ({}, "skipped"),
     ):
         path.write_text(json.dumps(index | {"skipped": skipped}))
@@ -74,6 +74,6 @@ def test_an_instance_that_is_skipped_without_need_is_found(spec, tmp_path):
 
 def test_a_library_of_which_nothing_is_left_is_an_error(spec, tmp_path):
     spec.write_text(SPEC)
-    with pytest.raises(InputError, match="nothing is left on any grid that it asks for; cf_bottle_n003"):
+    with pytest.raises(InputError, match="every grid is too coarse for its sketch; cf_bottle_n003"):
         build(read_spec(spec), tmp_path / "library")
     assert not (tmp_path / "library" / "library.json").exists()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from cases import CASES, make_instance, make_problem, problem_of
 from crossfield.export.library.documents.statistics import counts
-from crossfield.export.library.site.structure import blocks, hessian, matrix
+from crossfield.export.library.site.study import blocks, hessian, matrix
 from crossfield.export.pictures.marks import FAMILIES, STROKE
 from crossfield.export.pictures.sparsity import CELLS, Parts, Pattern, sparsity_picture
 from crossfield.export.pictures.traces import curve, trace_picture
