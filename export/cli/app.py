@@ -42,8 +42,8 @@ from .verify_command import verify_command
 
 app = typer.Typer(
     name="crossfield",
-    help="Write a concept sketch as optimization problems for any solver, and turn a solver's answer into a"
-    " cross field: two line directions at every pixel.",
+    help="Example: crossfield run mouse -o out\n\nWrite a concept sketch as optimization problems for any"
+    " solver, and turn a solver's answer into a cross field: two line directions at every pixel.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

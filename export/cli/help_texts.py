@@ -61,14 +61,16 @@ def filled(text: str) -> str:
     return re.sub(r"\{([a-z ]+)\}", lambda match: ", ".join(NAMES[match[1]]()), text)
 
 
+FACTS: Final = "Facts about the run"
+"""Panel of the options that only describe a run, some of which set limits in other commands."""
 PANELS: Final = {
     "Sketch": "size mask silhouette curvature view gauge stroke-weight skew-weight",
-    "Formulation": "formulation facet stroke-norm beta-norm relax norm tightened manifest",
-    "Method and solver": "method solver start program solve curves check search",
-    "Files": "format gams-layout nl-form gzip on underlay",
+    "Formulation": "formulation facet stroke-norm beta-norm relax norm tightened",
+    "Method and solver": "method solver start program solve curves search",
+    "Files": "format gams-layout nl-form gzip manifest check on underlay",
     "Picture and surface": "kind title scale light flip hint",
     "Limits and processes": "time-limit gap threads jobs tolerance up-to scheduler",
-    "Facts about a run": "entry version status bound seconds machine by date",
+    FACTS: "",
     "Output": "output quiet json help",
 }
 """Panels of the help in their order, and their options."""
@@ -108,7 +110,7 @@ class Command(TyperCommand):
     def __init__(self, *args: Any, **given: Any) -> None:
         super().__init__(*args, **given)
         for option in (each for each in self.params if each.param_type_name == "option"):
-            option.rich_help_panel = _panel(option)  # type: ignore[attr-defined]
+            option.rich_help_panel = option.rich_help_panel or _panel(option)  # type: ignore[attr-defined]
         order = ["", *PANELS]
         self.params.sort(key=lambda each: order.index(getattr(each, "rich_help_panel", None) or ""))
         if self.rich_markup_mode != "rich":  # brackets are no markup then, and a backslash would be printed

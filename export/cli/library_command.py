@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from .help_texts import Command
+from .help_texts import FACTS, Command
 from .option_groups import with_option_groups
 from .options import Folder, PrintOptions, Processes, Quiet, Seconds
 from .output import print_line, print_notice, progress, show_table
@@ -16,8 +17,13 @@ from .output import print_line, print_notice, progress, show_table
 if TYPE_CHECKING:
     from ..library.contributions.submit import Submission
 
+_SUMMARY: Final = (
+    "Build, check, solve and show a library: instances in every formulation, with best known points."
+)
+
 library = typer.Typer(
-    help="Build, check, solve and show a library: instances in every formulation, with best known points.",
+    help=f"Example: crossfield library build default -o library\n\n{_SUMMARY}",
+    short_help=_SUMMARY,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -28,6 +34,9 @@ def command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     return lambda function: library.command(name, cls=Command)(with_option_groups(function))
 
 
+_fact = partial(typer.Option, rich_help_panel=FACTS)
+
+Machine = Annotated[str | None, _fact("--machine", metavar="TEXT", help="Processor and memory.")]
 Library = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield library build` wrote.")]
 
 
@@ -98,11 +107,9 @@ def solve_command(
     ] = None,
     by: Annotated[
         str | None,
-        typer.Option("--by", metavar="TEXT", help="Name of the person who runs them, for the ledger."),
+        _fact("--by", metavar="TEXT", help="Name of the person who runs them, for the ledger."),
     ] = None,
-    machine: Annotated[
-        str | None, typer.Option("--machine", metavar="TEXT", help="Processor and memory.")
-    ] = None,
+    machine: Machine = None,
     printing: PrintOptions,
 ) -> None:
     """Run the installed solvers on a library and add bounds, times and better points to its ledger.json."""
@@ -182,32 +189,24 @@ def submit_command(
     *,
     entry: Annotated[
         str | None,
-        typer.Option(
-            "--entry", metavar="NAME", help="Entry of all files; by default each file shows its own."
-        ),
+        _fact("--entry", metavar="NAME", help="Entry of all files; by default each file shows its own."),
     ] = None,
     solver: Annotated[
-        str | None, typer.Option("--solver", metavar="NAME", help="Solver that found the points.")
+        str | None, _fact("--solver", metavar="NAME", help="Solver that found the points.")
     ] = None,
-    version: Annotated[
-        str | None, typer.Option("--version", metavar="TEXT", help="Version of the solver.")
-    ] = None,
-    status: Annotated[str | None, typer.Option("--status", help="Result of the run: {run statuses}.")] = None,
+    version: Annotated[str | None, _fact("--version", metavar="TEXT", help="Version of the solver.")] = None,
+    status: Annotated[str | None, _fact("--status", help="Result of the run: {run statuses}.")] = None,
     bound: Annotated[
-        float | None, typer.Option("--bound", help="Dual bound of the run; by default the bound in its log.")
+        float | None, _fact("--bound", help="Dual bound of the run; by default the bound in its log.")
     ] = None,
-    seconds: Annotated[
-        float | None, typer.Option("--seconds", help="Duration of the run in seconds.")
-    ] = None,
-    threads: Annotated[int | None, typer.Option("--threads", help="Number of threads of the run.")] = None,
+    seconds: Annotated[float | None, _fact("--seconds", help="Duration of the run in seconds.")] = None,
+    threads: Annotated[int | None, _fact("--threads", help="Number of threads of the run.")] = None,
     time_limit: Annotated[
-        float | None, typer.Option("--time-limit", help="Time limit of the run in seconds.")
+        float | None, _fact("--time-limit", help="Time limit of the run in seconds.")
     ] = None,
-    machine: Annotated[
-        str | None, typer.Option("--machine", metavar="TEXT", help="Processor and memory.")
-    ] = None,
-    by: Annotated[str | None, typer.Option("--by", metavar="TEXT", help="Name of the submitter.")] = None,
-    date: Annotated[str | None, typer.Option("--date", metavar="YYYY-MM-DD", help="Day of the run.")] = None,
+    machine: Machine = None,
+    by: Annotated[str | None, _fact("--by", metavar="TEXT", help="Name of the submitter.")] = None,
+    date: Annotated[str | None, _fact("--date", metavar="YYYY-MM-DD", help="Day of the run.")] = None,
     printing: PrintOptions,
 ) -> None:
     """Check files against a library, keep what improves it, and rebuild what depends on them once.

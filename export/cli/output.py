@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import re
+import shutil
 import sys
 import textwrap
 import threading
@@ -11,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -101,7 +104,7 @@ def escape_unencodable() -> None:
 
 def print_line(text: str) -> None:
     """Print a line on standard output."""
-    typer.echo(text)
+    typer.echo(text, file=sys.stdout)  # another stream would lack the escapes of `escape_unencodable`
 
 
 def print_json(value: object) -> None:
@@ -129,26 +132,48 @@ def show_table(
     numbers: Sequence[str] = (),
     header: bool = True,
 ) -> None:
-    """Print a title and a table; the columns in `numbers` are right-aligned."""
-    from rich import box
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
+    """Print a title and a table without broken words; the columns in `numbers` are right-aligned.
 
-    rule = box.SIMPLE_HEAD if header else None
-    table = Table(header_style="bold", show_header=header, box=rule, pad_edge=False, padding=(0, 1, 0, 0))
-    for column in columns:
-        first = column == columns[0]
-        table.add_column(
-            column, overflow="fold", no_wrap=first, justify="right" if column in numbers else "left"
-        )
-    for row in rows:
-        table.add_row(*(escape(printable(cell)) for cell in row))
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=WIDTH)
-    console.print(printable(title), style="bold", markup=False, highlight=False, soft_wrap=True)
-    console.print(table)
+    If the longest words of a row do not fit next to each other, each cell is printed on its own line.
+    """
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
+    cells = [[printable(cell) for cell in row] for row in rows]
+    shown = [list(columns), *cells] if header else cells
+    print_line(typer.style(printable(title), bold=True))
+    fitting = ((widths, gap) for gap in ("  ", " ") if (widths := _widths(shown, width, len(gap))))
+    widths, gap = next(fitting, (None, ""))
+    if widths is None:
+        for row in cells:
+            named = (f"{name}: {cell}" for name, cell in zip(columns, row, strict=True))
+            print_line("\n".join(_wrapped(text, width) for text in named) + "\n")
+        return
+    if header:
+        shown.insert(1, ["-" * each for each in widths])
+    right = [name in numbers for name in columns]
+    lines = [gap.join(parts).rstrip() for row in shown for parts in _lines_of(row, widths, right)]
+    print_line("\n".join([*lines, ""] if header else lines))
+
+
+def _widths(rows: list[list[str]], width: int, gap: int) -> list[int] | None:
+    """Widths of columns that fit, the widest ones narrowed first; None if a word would break."""
+    columns = list(zip(*rows, strict=True))
+    least = [max(len(word) for cell in column for word in [*cell.split(), "-"]) for column in columns]
+    most = [max(map(len, column)) for column in columns]
+    room = width - gap * (len(columns) - 1)
+    caps = ([max(n, min(m, cap)) for n, m in zip(least, most, strict=True)] for cap in range(room, -1, -1))
+    return next((widths for widths in caps if sum(widths) <= room), None)
+
+
+def _lines_of(row: list[str], widths: list[int], right: list[bool]) -> list[list[str]]:
+    """Lines of a row, in which longer cells are wrapped."""
+    cells = [_wrapped(cell, width, indent="").split("\n") for cell, width in zip(row, widths, strict=True)]
+    return [
+        [
+            part.rjust(width) if at else part.ljust(width)
+            for part, width, at in zip(line, widths, right, strict=True)
+        ]
+        for line in zip_longest(*cells, fillvalue="")
+    ]
 
 
 _LEGEND: Final = """\
@@ -216,8 +241,16 @@ def _print_proof(report: Report, best: dict[str, Any]) -> None:
         print_line(_wrapped(NOTHING))
 
 
-def _wrapped(text: str) -> str:
-    return textwrap.fill(text, WIDTH, initial_indent="  ", subsequent_indent="  ")
+def _wrapped(text: str, width: int = WIDTH, indent: str = "  ") -> str:
+    """The text in lines of at most this width, unless a word is longer."""
+    return textwrap.fill(
+        text,
+        width,
+        initial_indent=indent,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _gap(facts: dict[str, Any]) -> str:
@@ -249,14 +282,14 @@ def show_manifests(manifests: list[Manifest], folder: Path) -> None:
     """Print the files of an export, and the reasons for files that were refused."""
     documents = [manifest.document for manifest in manifests]
     names = list(dict.fromkeys(name for document in documents for name in _sizes(document)))
-    columns = ("formulation", "class", "columns", "rows", *(f"{name}, kB" for name in names))
+    columns = ("formulation", "class", "columns", "rows", *names)
     rows = []
     for document in documents:
         sizes, counts = _sizes(document), document["counts"]
         written = [f"{sizes[name] / 1e3:.0f}" if name in sizes else "-" for name in names]
         size = [str(counts["columns"]), str(counts["rows"])]
         rows.append([document["formulation"], document["class"], *size, *written])
-    show_table(manifests[0].instance().summary, columns, rows, numbers=columns[2:])
+    show_table(f"{manifests[0].instance().summary}; files in kB", columns, rows, numbers=columns[2:])
     for document in documents:
         for reason in document["refused"].values():
             print_line(f"not written: {reason}")
@@ -328,7 +361,8 @@ def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) 
     show("formulations", "formulations", ("name", "short", "paper", "class", "summary"))
     names = [row["name"] for row in tables["formats"][1]]
     carried = [
-        [row["name"], *(row[name].partition(":")[0] for name in names)] for row in tables["formulations"][1]
+        [row["name"], *(re.split("[:,]", row[name])[0] for name in names)]
+        for row in tables["formulations"][1]
     ]
     show_table("formulations in each format (--json: alternatives)", ("formulation", *names), carried)
     (first, *bundled), rows = tables["solvers"]

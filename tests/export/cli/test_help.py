@@ -166,11 +166,21 @@ def commands_of(group=None, prefix=""):
 
 def test_every_help_begins_with_an_example_and_every_option_has_a_panel(text):
     assert [name for name, _ in commands_of()] == list(EXAMPLES)
-    panels = {name for names in PANELS.values() for name in names.split()}
-    for name, each in commands_of():
-        assert words(text(name)).split("Example: ")[1].startswith(EXAMPLES[name]), name
-        options = {option.lstrip("-") for each in each.params for option in each.opts if option[:2] == "--"}
-        assert options <= panels, name
+    for name, _ in commands_of():
+        shown = text(name)
+        assert words(shown).split("Example: ")[1].startswith(EXAMPLES[name]), name
+        panels = re.findall(r"^╭─ ([A-Z][a-z ]+) ─", shown, re.MULTILINE)
+        assert panels == [each for each in ("Arguments", *PANELS) if each in panels], name
+        output = shown.split("─ Output ─")[1]
+        assert set(re.findall(r"^│ [ *]+--([a-z-]+)", output, re.MULTILINE)) <= set(PANELS["Output"].split())
+    for group in ("", "library"):
+        assert words(text(group)).split("[ARGS]... ")[1].startswith("Example: crossfield "), group
+    assert text("").count("Example") == text("library").count("Example") == 1
+
+
+def test_a_submission_describes_its_run_in_one_panel(text):
+    panel = text("library submit").split("─ Facts about the run ─")[1].split("╰")[0]
+    assert {"--solver", "--threads", "--time-limit", "--machine"} < set(re.findall(r"--[a-z-]+", panel))
 
 
 @pytest.mark.slow
