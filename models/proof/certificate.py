@@ -13,8 +13,10 @@ level, with the prefixes `level_0_`, `level_1_`, ...:
     steps_16, steps_32  the messages one after the other: what a pair gives to the labels of its earlier
                         pixel, each number less the one before, which compresses well; sums are modulo 2^32
 
-Levels that are branches have an additional array `parents`: the number of the level from which each follows,
--1 for the first. Without it each follows from the level before.
+    quads       (q,)    clusters: the lower left pixels of their quads, ascending
+    table_scale (4q,)   of each table
+    table_steps         the tables of each cluster one after the other, as whole numbers of their scales, each
+                        number less the one before
 
 The share of a pair's later pixel is not stored, because the best one follows from the earlier pixel's
 (models/proof/check_certificate.py, 3). So half of a level's shares are enough. They are whole numbers
@@ -35,12 +37,14 @@ from ..array_archive import Arrays, pack_arrays
 from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField
 from ..instance.file import arrays_of, of_arrays
+from ..instance.grid import Floats
 from ..instance.instance import Instance
 from ..processes.deadline import Over, Stop, stop_function
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict
-from .lattice import Lattice
+from .clusters import clusters_on
+from .lattice import Lattice, Starts
 from .record import Claim, LevelRecord, Proof, Status
 
 _PREFIX: Final = "instance_"
@@ -119,7 +123,7 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
     status = cast("Status", verdict.status)
     bound = max(0.0, verdict.bound - _SPARE * (1 + verdict.bound))
     kept = len(verdict.levels)
-    confirmed = replace(proof, levels=proof.levels[:kept], parents=proof.parents[:kept])
+    confirmed = replace(proof, levels=proof.levels[:kept])
     write_bytes(path, pack_arrays(_arrays(confirmed, status, bound)))
     return Certificate(proof.field, verdict.energy, bound, status, verdict)
 
@@ -207,8 +211,6 @@ def _arrays(proof: Proof, status: Status, bound: float) -> Arrays:
         "beta": field.beta,
         "p": field.p,
     }
-    if proof.parents:
-        arrays["parents"] = np.array(proof.parents, dtype=np.int32)
     arrays |= {_PREFIX + name: array for name, array in arrays_of(field.instance).items()}
     for number, level in enumerate(proof.levels):
         arrays |= {f"level_{number}_{name}": array for name, array in _of_level(level).items()}
@@ -224,6 +226,7 @@ def _of_level(level: LevelRecord) -> Arrays:
         "ranges": np.stack(ranges, axis=1).astype(np.int32),
         "allowed": np.packbits(level.allowed),
         **_messages(level),
+        **_tables(level),
     }
 
 
@@ -239,11 +242,10 @@ def _messages(level: LevelRecord) -> Arrays:
     flat = np.zeros(len(mine))
     flat[mine] = level.shares_first[np.repeat(is_first, level.count[grid.first])]
     flat[~mine] = level.shares_second[np.repeat(~is_first, level.count[grid.second])]
-    scale = np.maximum(level.quantum, np.maximum.reduceat(np.abs(flat), begin) / _MOST_32)
+    scale = np.maximum(level.quantum, _greatest(flat, begin) / _MOST_32)
     whole = np.round(flat / np.repeat(scale, counts)).astype(np.int64)
-    steps = np.diff(whole, prepend=0)
-    steps[begin] = whole[begin]
-    wide = np.maximum.reduceat(np.abs(steps), begin) > _MOST_16
+    steps = _steps(whole, begin)
+    wide = _greatest(steps, begin) > _MOST_16
     each = np.repeat(wide, counts)
     return {
         "scale": scale,
@@ -251,6 +253,33 @@ def _messages(level: LevelRecord) -> Arrays:
         "steps_16": steps[~each].astype(np.int16),
         "steps_32": steps[each].astype(np.int32),  # modulo 2^32, because the checker adds them up so
     }
+
+
+def _tables(level: LevelRecord) -> Arrays:
+    """The tables of the clusters, as whole numbers of the scale of each."""
+    clusters, grid = level.clusters, level.instance.grid
+    begin = clusters.start[:-1]
+    scale = np.maximum(level.quantum, _greatest(clusters.tables, begin) / _MOST_32)
+    whole = np.round(clusters.tables / np.repeat(scale, np.diff(clusters.start))).astype(np.int64)
+    return {
+        "quads": grid.first[clusters.quads[:, 0]].astype(np.int32),
+        "table_scale": scale,
+        "table_steps": _steps(whole, begin).astype(np.int32),  # modulo 2^32
+    }
+
+
+def _greatest(values: Floats | Starts, begin: Starts) -> Floats:
+    """The greatest size of the values in each block."""
+    if not len(begin):
+        return np.zeros(0)
+    return np.maximum.reduceat(np.abs(values), begin).astype(np.float64)
+
+
+def _steps(whole: Starts, begin: Starts) -> Starts:
+    """Differences of consecutive whole numbers; in the first place of each block, the number itself."""
+    steps = np.diff(whole, prepend=0)
+    steps[begin] = whole[begin]
+    return steps
 
 
 def certificate_effort(level: Lattice) -> float:
@@ -273,7 +302,15 @@ def checking_pace() -> float:
     first, second = (
         np.zeros(at.share_starts(end)[-1]) for end in (instance.grid.first, instance.grid.second)
     )
-    level = LevelRecord.on(at, shares_first=first, shares_second=second, quantum=1.0, bound=0.0, energy=0.0)
+    level = LevelRecord.on(
+        at,
+        shares_first=first,
+        shares_second=second,
+        clusters=clusters_on(at, np.zeros(0, np.int64)),
+        quantum=1.0,
+        bound=0.0,
+        energy=0.0,
+    )
     arrays = _arrays(Proof(field, 0.0, 0.0, "gap", 0, (level,), 0.0, "time"), "gap", 0.0)
     began = time.perf_counter()
     check_certificate.check(arrays)

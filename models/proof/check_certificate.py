@@ -34,6 +34,14 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
    pixel's vertex is the same at all its pairs. Hence a sum of functions of single vertices and of pairs that
    is below the discrete costs everywhere is, in the mean, below F.
 
+   Tables move costs between pairs and quads (the pixels of 2 x 2). Let lambda_e be any numbers for the labels
+   of alpha at the four pairs e of a quad. A pair then costs c + the sum of its lambda_e, and the quad costs
+   minus the sum of its four lambda_e: the sum of all costs is the same for all labels. One threshold rounds
+   all alphas, whatever the jumps. So the alphas of a quad have a joint distribution, whose parts at two
+   pixels are those of their pair. Hence the mean of a quad's cost is at least its minimum over the alphas
+   that have an allowed label, and these minima are added to every bound in 3. (Betas have no joint
+   distribution: a pair with an odd jump takes 1 - t for one of them.)
+
    The minimum over p is one over all integers: with d = alpha_i - alpha_j, the best jump of a given parity
    has |A| <= pi/2, so that it is among ceil(-2 d/pi - 1) .. floor(-2 d/pi + 1). For all labels of two pixels
    at once these are the jumps from the least to the greatest of them; see `jumps`.
@@ -58,9 +66,8 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
    for crosses in the domain. Where the right side, with t_i in the place of E[t_i], exceeds U at all four
    vertices of a cell, no field of energy U or less has its cross in that cell. The cells that are left must
    lie in the domain of the next level; the first domain must be all of the strip. With i the last pixel, the
-   bound is the sum of mu. Several levels may follow from one, as branches: each holds all the cells left, but
-   at one pixel, the same for all, where each cell is held by one of them. Then each field with its crosses in
-   the cells left is in the domain of one of them, and the least of their bounds is one for all.
+   bound is the sum of mu. With tables, c is a pair's cost with them, and the minima of the quads are added to
+   every right side.
 
 4. Optimality. The last cells span a box for each pixel. There p is a best jump everywhere if max |A| <= pi/2
    and pi max |A| - pi^2/4 <= 4 min (-1)^p beta_i beta_j: against p +- 1, A'^2 - A^2 >= pi^2/4 - pi |A| and
@@ -115,6 +122,7 @@ MOST_WEIGHT = 1e6
 INSTANCE_PARTS = ("head", "origin", "mask", "stroke_pixels", "theta", "w")
 PARTS = ("head", "alpha", "beta", "p", *(f"instance_{part}" for part in INSTANCE_PARTS))
 LEVEL_PARTS = ("h", "alpha", "beta", "ranges", "allowed", "scale", "wide", "steps_16", "steps_32")
+CLUSTER_PARTS = ("quads", "table_scale", "table_steps")  # of a level, since version 2
 NAME = re.compile(rb"[a-z0-9_]+\.npy")
 HEAD = re.compile(
     rb"\x93NUMPY\x01\x00\x76\x00\{'descr': '(\|[bu]1|<i[24]|<f8)', 'fortran_order': False, "
@@ -160,11 +168,24 @@ class Sketch:
 
 
 @dataclass
+class Cluster:
+    """Four tables on a quad, which has the pixels a (lower left), b, c, d counter-clockwise.
+
+    tables: of the pairs (a, b), (b, c), (d, c) and (a, d), by the alphas of these.
+    """
+
+    pixels: list[int]
+    pairs: list[int]
+    tables: list[Array]
+
+
+@dataclass
 class Level:
     """A lattice, its allowed labels, and the messages of the pairs.
 
     ranges (n, 4): steps, as first and count of alpha, first and count of beta; allowed (a, b) of each pixel;
-    the message of each pair is to its earlier pixel.
+    the message of each pair is to its earlier pixel. clusters: the tables of quads; tables: their sum at each
+    pair that has some, by alphas of its first and of its second pixel.
     """
 
     h: float
@@ -173,6 +194,8 @@ class Level:
     ranges: Array
     allowed: list[Array]
     messages: list[Array]
+    clusters: list[Cluster]
+    tables: dict[int, Array]
 
 
 @dataclass
@@ -315,11 +338,12 @@ def _array(name: str, packed: bytes, facts: list[int]) -> Array:
 
 def _need_names(arrays: dict[str, Array]) -> None:
     """Raise an error unless the arrays are exactly those of a certificate with that many levels."""
-    levels = _levels(head_of(arrays))
-    names = set(PARTS) | {f"level_{number}_{part}" for number in range(levels) for part in LEVEL_PARTS}
+    head = head_of(arrays)
+    levels, parts = _levels(head), LEVEL_PARTS + (CLUSTER_PARTS if head["version"] > 1 else ())
+    names = set(PARTS) | {f"level_{number}_{part}" for number in range(levels) for part in parts}
     for name in sorted(names - set(arrays)):
         raise UnreadableError(f"has no array {name}")
-    for name in sorted(set(arrays) - names - {"parents"}):
+    for name in sorted(set(arrays) - names):
         raise UnreadableError(f"has an array {name[:40]} too many for a certificate with {levels} levels")
 
 
@@ -498,7 +522,45 @@ def level_of(arrays: dict[str, Array], number: int, sketch: Sketch) -> Level:
     packed = _given(arrays, f"{at}allowed", "|u1", (int(counts.sum()) + 7) // 8)
     allowed = _cut(np.unpackbits(packed, count=int(counts.sum())).astype(bool), shapes)
     _need([corners(each, np.logical_and).any() for each in allowed], f"{at}allowed of pixel", "has no cell")
-    return Level(h, alpha, beta, ranges, allowed, _messages(arrays, at, sketch, shapes))
+    clusters = _clusters(arrays, at, sketch, shapes) if f"{at}quads" in arrays else []
+    tables: dict[int, Array] = {}
+    for cluster in clusters:
+        for e, table in zip(cluster.pairs, cluster.tables):
+            tables[e] = tables[e] + table if e in tables else table
+    return Level(h, alpha, beta, ranges, allowed, _messages(arrays, at, sketch, shapes), clusters, tables)
+
+
+def _clusters(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) -> list[Cluster]:
+    """The clusters of a level."""
+    lower_left = _given(arrays, f"{at}quads", "<i4", None).astype(np.int64)
+    _need((lower_left >= 0) & (lower_left < len(shapes)), f"{at}quads", "is no pixel")
+    _need(np.diff(lower_left) > 0, f"{at}quads", "is out of order")
+    pair_of = {ends: e for e, ends in enumerate(zip(sketch.first.tolist(), sketch.second.tolist()))}
+    upper = {i: j for i, j in pair_of if j < i}
+    right = {i: j for i, j in pair_of if j > i}
+    found = []
+    for a in lower_left.tolist():
+        b, d = right.get(a, -1), upper.get(a, -1)
+        c = right.get(d, -1)
+        _need(c >= 0 and upper.get(b, -1) == c, f"{at}quads", f"has no quad at pixel {a}")
+        found.append(Cluster([a, b, c, d], [pair_of[ends] for ends in ((a, b), (b, c), (d, c), (a, d))], []))
+    ends = np.array([[cluster.pixels[k] for k in (0, 1, 1, 2, 3, 2, 0, 3)] for cluster in found], np.int64)
+    sides = shapes[ends.reshape(-1, 2), 0]
+    counts = sides.prod(axis=1)
+    scale = _given(arrays, f"{at}table_scale", "<f8", len(counts))
+    _need((scale >= 0) & (scale <= 1), f"{at}table_scale", "is not in [0, 1]")
+    steps = _given(arrays, f"{at}table_steps", "<i4", int(counts.sum())).astype(np.int64)
+    tables = _cut(_summed(steps, counts) * np.repeat(scale, counts), sides)
+    for number, cluster in enumerate(found):
+        cluster.tables = tables[4 * number : 4 * number + 4]
+    return found
+
+
+def _summed(steps: Array, counts: Array) -> Array:
+    """The whole numbers, modulo 2^32, of which blocks hold the first and then the differences."""
+    total = np.cumsum(steps)
+    before = np.repeat((total - steps)[np.cumsum(counts) - counts], counts)
+    return (total - before).astype(np.int32)
 
 
 def _messages(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) -> list[Array]:
@@ -512,10 +574,7 @@ def _messages(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) 
     for chosen, name, kind in ((~each, f"{at}steps_16", "<i2"), (each, f"{at}steps_32", "<i4")):
         steps[chosen] = _given(arrays, name, kind, int(chosen.sum()))
     _need((scale >= 0) & (scale <= 1), f"{at}scale", "is not in [0, 1]")
-    total = np.cumsum(steps)
-    before = np.repeat((total - steps)[np.cumsum(counts) - counts], counts)
-    whole = (total - before).astype(np.int32)  # sums are modulo 2^32
-    return _cut(whole * np.repeat(scale, counts), receivers)
+    return _cut(_summed(steps, counts) * np.repeat(scale, counts), receivers)
 
 
 def _cut(flat: Array, shapes: Array) -> list[Array]:
@@ -586,10 +645,11 @@ class Pair:
             a = [2 * (apart + HALF * p) ** 2 for p in span if p % 2 == parity]
             b = 2 * ((1 - 2 * parity) * beta_i[:, None] - beta_j[None, :]) ** 2
             if a:
-                along = np.min(a, axis=0) - level.h * level.h
+                along = np.min(a, axis=0) - level.h * level.h + level.tables.get(e, 0.0)
                 self.parts.append((along, b) if i < j else (along.T, b.T))
         reach = [float(np.abs(each).max()) for each in (alpha_i, alpha_j, beta_i, beta_j)]
         self.size = (sum(reach) + HALF * max(abs(p) for p in span)) ** 2
+        self.size += float(np.abs(level.tables.get(e, 0.0)).max())
         self._drop_idle()
 
     def _drop_idle(self) -> None:
@@ -646,9 +706,21 @@ class Pass:
             least.append(lowest)
             for e in self.sketch.later[i]:
                 self._send(e, over, len(self.sketch.earlier[i]), len(self.sketch.later[i]))
+        quads = [self._quad(cluster) for cluster in self.level.clusters]
         error = 2 * math.fsum(self.errors)
-        rights = [over + math.fsum([*least[: i + 1], *waiting[i + 1 :]]) for i, over in enumerate(numbers)]
-        return Passed(math.fsum(least) - error, rights, error)
+        rights = [
+            over + math.fsum([*quads, *least[: i + 1], *waiting[i + 1 :]]) for i, over in enumerate(numbers)
+        ]
+        return Passed(math.fsum([*quads, *least]) - error, rights, error)
+
+    def _quad(self, cluster: Cluster) -> float:
+        """The least cost of a quad over the alphas that have an allowed label."""
+        a, b, c, d = (self.level.allowed[i].any(axis=1) for i in cluster.pixels)
+        ab, bc, dc, ad = (-table for table in cluster.tables)
+        upper = _min_plus(ab[np.ix_(a, b)], bc[np.ix_(b, c)])
+        lower = _min_plus(ad[np.ix_(a, d)], dc[np.ix_(d, c)])
+        self._err(sum(float(np.abs(table).max()) for table in cluster.tables))
+        return float((upper + lower).min())
 
     def _theta(self, i: int, given: list[Array]) -> tuple[Array, float]:
         """Excess of theta_i over its minimum at each label, and the minimum."""
@@ -700,9 +772,11 @@ def need_whole_strip(level: Level, sketch: Sketch) -> None:
         _need(full, f"level_0_ranges[{i}]", "is less than all of beta")
 
 
-def covered(coarse: Level, cells: list[Array], fine: Level, sketch: Sketch) -> list[Array]:
-    """Whether cells left of a level, by pixel, lie in the domain of another, as far as |beta| <= pi/4."""
-    found = []
+def need_covered(coarse: Level, cells: list[Array], fine: Level, sketch: Sketch, number: int) -> None:
+    """Raise RefusedError unless the cells left of a level lie in the domain of the next one.
+
+    Parts of cells beyond |beta| = pi/4 need no cover. number: of the next level.
+    """
     for i, kept in enumerate(cells):
         at, other = positions(coarse, sketch, i), positions(fine, sketch, i)
         a, b = np.nonzero(kept)
@@ -711,21 +785,8 @@ def covered(coarse: Level, cells: list[Array], fine: Level, sketch: Sketch) -> l
         a, low, high = a[there], low[there], high[there]
         rows = _spanned(at[0][a], at[0][a + 1], other[0][0], fine.h)
         columns = _spanned(low, high, other[1][0], fine.h)
-        found.append(_held(corners(fine.allowed[i], np.logical_and), rows, columns))
-    return found
-
-
-def need_all_covered(parts: list[list[Array]], number: int) -> None:
-    """Raise RefusedError unless the next levels together hold each field with crosses in the cells left.
-
-    This holds if all of them contain all cells of all pixels except one. At that pixel each cell has to be
-    in one of them. number: number of the last of them.
-    """
-    cut = [i for i, each in enumerate(zip(*parts)) if not all(part.all() for part in each)]
-    for place, i in enumerate(cut):
-        held = [part[i] for part in parts]
-        together = np.any(held, axis=0) if place == 0 else np.all(held, axis=0)
-        _need(together, f"level {number}, pixel {i}, cell", "of the level before is not covered")
+        held = _held(corners(fine.allowed[i], np.logical_and), rows, columns)
+        _need(held, f"level {number}, pixel {i}, cell", "of the level before is not covered")
 
 
 def _spanned(low: Array, high: Array, origin: float, h: float) -> tuple[Array, Array]:
@@ -961,79 +1022,42 @@ def _check(arrays: dict[str, Array], over: Over) -> Verdict:
     energy, error = energy_of(sketch, *field)
     count = _levels(head)
     slack = slack_of(sketch, count)
-    tree, boxes, level = _descend(arrays, sketch, count, energy + error + slack, over)
-    bound = max(0.0, min(energy - error, tree.bound() - slack))
+    bounds, boxes, level = _descend(arrays, sketch, count, energy + error + slack, over)
+    bound = max(0.0, min(energy - error, max(bounds) - slack))
     enough = energy - error - OPTIMAL / 2 * max(1.0, energy)
     convex, held = lower_bound(sketch, field, level, boxes, enough, over=over)
     bound = max(bound, min(convex, energy - error))
     status = "optimal" if energy - bound <= OPTIMAL * max(1.0, energy) else "gap"
     centres = np.stack([level.alpha, level.beta], axis=1)
-    verdict = Verdict(status, energy, bound, boxes, centres, held, tree.bounds)
+    verdict = Verdict(status, energy, bound, boxes, centres, held, bounds)
     _compare(head, verdict, error)
     return verdict
 
 
-class Tree:
-    """The level that each level follows from, and the bound of each."""
-
-    def __init__(self, arrays: dict[str, Array], count: int) -> None:
-        """Read `parents`; without it each level follows from the one before."""
-        chain = np.arange(-1, count - 1)
-        self.parents = _given(arrays, "parents", "<i4", count) if "parents" in arrays else chain
-        _need((self.parents >= -1) & (self.parents <= chain), "parents", "is not of a level before")
-        _need((self.parents >= 0) == (chain >= 0), "parents", "is missing")
-        self.bounds: list[float] = []
-
-    def cut(self, number: int) -> None:
-        """Drop a level and later ones, and earlier ones that follow from the same level."""
-        first = int(np.flatnonzero(self.parents == self.parents[number])[0])
-        self.parents, self.bounds = self.parents[:first], self.bounds[:first]
-
-    def followers(self, number: int) -> list[int]:
-        """The levels that follow from a level."""
-        return [int(each) for each in np.flatnonzero(self.parents == number)]
-
-    def bound(self, number: int = 0) -> float:
-        """The bound of F on the domain of a level: its own, or the least bound of the levels after it."""
-        least = [self.bound(each) for each in self.followers(number)]
-        return max(self.bounds[number], min(least, default=-math.inf))
-
-
 def _descend(
     arrays: dict[str, Array], sketch: Sketch, count: int, most: float, over: Over
-) -> tuple[Tree, Array, Level]:
-    """The bounds of all levels, the boxes round the cells left after the last ones, and the first level."""
-    tree = Tree(arrays, count)
-    first = level_of(arrays, 0, sketch)
+) -> tuple[list[float], Array, Level]:
+    """The bounds of all levels, the boxes round the cells left after the last one, and the first level."""
+    first = level = level_of(arrays, 0, sketch)
     need_whole_strip(first, sketch)
-    passed: list[tuple[Level, list[Array]]] = []
+    bounds: list[float] = []
+    cells: list[Array] = []
     try:
         for number in range(count):
-            level = level_of(arrays, number, sketch)
-            centred = (level.alpha == first.alpha) & (level.beta == first.beta)
+            finer = level_of(arrays, number, sketch) if number else first
+            centred = (finer.alpha == first.alpha) & (finer.beta == first.beta)
             _need(centred, f"level_{number}_alpha or beta", "is not that of the first level")
-            found = Pass(level, sketch).run(over)
-            tree.bounds.append(found.bound)
-            level.messages.clear()
-            passed.append((level, surviving(level, found, most)))
+            if number:
+                need_covered(level, cells, finer, sketch, number)
+            found = Pass(finer, sketch).run(over)
+            bounds.append(found.bound)
+            level, cells = finer, surviving(finer, found, most)
     except StoppedError:
-        tree.cut(number)
-        if not tree.bounds:
+        if not bounds:
             raise
-    margin = 2 * (count + 1) * SLIVER
-    boxes: list[Array] = []
-    for number in range(len(tree.bounds)):
-        level, cells = passed[number]
-        followers = tree.followers(number)
-        if followers:
-            parts = [covered(level, cells, passed[each][0], sketch) for each in followers]
-            need_all_covered(parts, followers[-1])
-        elif all(kept.any() for kept in cells):
-            boxes.append(boxes_of(level, cells, sketch, margin))
-    _need(len(boxes) > 0, "the last level", "has a pixel without a cell, not even that of the field")
-    ends = np.stack(boxes)
-    around = np.stack([f(axis=0)[:, k] for k, f in enumerate((ends.min, ends.max) * 2)], axis=1)
-    return tree, around, first
+    left = all(kept.any() for kept in cells)
+    _need(left, "the last level", "has a pixel without a cell, not even that of the field")
+    return bounds, boxes_of(level, cells, sketch, 2 * (count + 1) * SLIVER), first
 
 
 def _compare(head: dict[str, Any], verdict: Verdict, error: float) -> None:

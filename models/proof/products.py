@@ -109,11 +109,11 @@ def product(pair: int, i: int, state: State, out: Floats) -> None:
     least, reached = source.min(), np.inf
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
-        cheapest = _alpha_costs(state.alpha[i] - state.alpha[j], state, odd, in_alpha)
-        cheapest += _beta_costs(state.beta[i], state.beta[j], state, odd, in_beta)
+        cheapest = alpha_costs(pair, i, state, odd, in_alpha)
+        cheapest += beta_costs(state.beta[i], state.beta[j], state, odd, in_beta)
         if cheapest + least < reached:
-            _over_beta(given, in_beta, half)
-            _over_alpha(half, in_alpha, found)
+            over_beta(given, in_beta, half)
+            _lower_by_product(in_alpha, half, found)
             reached = found.max()
     if state.norm == 2:
         out -= state.h * state.h
@@ -126,22 +126,44 @@ def sized(residual: float, norm: int) -> float:
 
 
 @compiled
-def _alpha_costs(a: float, state: State, odd: bool, cost: Floats) -> float:
-    """Fill in 2 A^2 or 2 |A| for labels x of one end and y of the other; return the least."""
+def alpha_costs(pair: int, i: int, state: State, odd: bool, cost: Floats) -> float:
+    """Fill in 2 A^2 or 2 |A|, plus the tables of the pair, at labels x of end i and y of the other end.
+
+    Returns the least.
+    """
+    j = state.first[pair] + state.second[pair] - i
+    a = state.alpha[i] - state.alpha[j]
     if odd:
         a += _HALF
-    least = np.inf
     for x in range(cost.shape[0]):
         for y in range(cost.shape[1]):
             away = a + state.h * (x - y)
             away -= _PI * np.round(away / _PI)
             cost[x, y] = 2 * sized(away, state.norm)
-            least = min(least, cost[x, y])
+    for place in range(2):
+        number = state.clusters.of_pair[pair, place]
+        if number >= 0:
+            _add_table(number, state.first[pair] == i, state, cost)
+    least: float = cost.min()
     return least
 
 
 @compiled
-def _beta_costs(x_first: float, y_first: float, state: State, odd: bool, cost: Floats) -> float:
+def _add_table(number: int, upright: bool, state: State, cost: Floats) -> None:
+    """Add a table to the costs, turned if their rows are the labels of the pair's second pixel."""
+    start = state.clusters.start
+    table = state.clusters.tables[start[number] : start[number + 1]]
+    if upright:
+        add(cost.reshape(-1), table)
+        return
+    rows, columns = cost.shape
+    for x in range(rows):
+        for y in range(columns):
+            cost[x, y] += table[y * rows + x]
+
+
+@compiled
+def beta_costs(x_first: float, y_first: float, state: State, odd: bool, cost: Floats) -> float:
     """Fill in 2 B^2 or 2 |B| for labels y of one end and x of the other; return the least."""
     least = np.inf
     for y in range(cost.shape[0]):
@@ -156,7 +178,7 @@ def _beta_costs(x_first: float, y_first: float, state: State, odd: bool, cost: F
 
 
 @compiled
-def _over_beta(given: Floats, cost: Floats, half: Floats) -> None:
+def over_beta(given: Floats, cost: Floats, half: Floats) -> None:
     """Fill in the least over y of given[row, y] + cost[y, x], without the y that cannot attain it."""
     half[:] = np.inf
     least, sums = np.empty(cost.shape[0]), np.empty(cost.shape[0])
@@ -176,20 +198,28 @@ def _over_beta(given: Floats, cost: Floats, half: Floats) -> None:
 
 
 @compiled
-def _over_alpha(half: Floats, cost: Floats, found: Floats) -> None:
-    """Lower found[row] to the least over y of half[y] + cost[row, y], without rows that cannot lower it."""
-    least, sums = np.empty(half.shape[0]), np.empty(half.shape[0])
-    for y in range(half.shape[0]):
-        least[y] = half[y].min()
-    for row in range(found.shape[0]):
-        for y in range(half.shape[0]):
-            sums[y] = least[y] + cost[row, y]
+def min_plus(left: Floats, right: Floats) -> Floats:
+    """The (min,+) product of two matrices."""
+    out = np.full((left.shape[0], right.shape[1]), np.inf)
+    _lower_by_product(left, right, out)
+    return out
+
+
+@compiled
+def _lower_by_product(left: Floats, right: Floats, out: Floats) -> None:
+    """Lower `out` to the (min,+) product of two matrices, without terms that cannot lower it."""
+    least, sums = np.empty(right.shape[0]), np.empty(right.shape[0])
+    for y in range(right.shape[0]):
+        least[y] = right[y].min()
+    for row in range(out.shape[0]):
+        for y in range(right.shape[0]):
+            sums[y] = least[y] + left[row, y]
         best = np.argmin(sums)
-        _lower(found[row], half[best], cost[row, best])
-        reached = found[row].max()
-        for y in range(half.shape[0]):
-            if least[y] + cost[row, y] < reached:
-                _lower(found[row], half[y], cost[row, y])
+        _lower(out[row], right[best], left[row, best])
+        reached = out[row].max()
+        for y in range(right.shape[0]):
+            if sums[y] < reached:
+                _lower(out[row], right[y], left[row, y])
 
 
 @compiled

@@ -16,7 +16,6 @@ cell that was dropped here.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -24,7 +23,8 @@ import numpy as np
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER
 from ..processes.compiled import compiled
-from .lattice import Lattice, Starts, ranges, reached, starts, strip
+from .clusters import prolonged_clusters
+from .lattice import Lattice, Starts, ranges, reached, strip
 from .sweep import Dual
 
 TOLERANCE: Final = 1e-7  # excess over U with which labels still survive, relative to 1 + U
@@ -85,40 +85,8 @@ def finer(left: RemainingCells) -> Lattice:
     return new
 
 
-def branches(dual: Dual, count: int) -> list[Dual]:
-    """The dual on parts of its lattice, cut at the alpha of one pixel; empty if there is nothing to cut."""
-    dual.backward()
-    pixel, lattice = _least_known(dual), dual.lattice
-    begin, end = lattice.start[pixel : pixel + 2]
-    mine = lattice.allowed[begin:end].reshape(lattice.alpha_count[pixel], -1)
-    rows = np.flatnonzero(mine.any(axis=1))
-    cuts = np.unique(np.linspace(rows[0], rows[-1], count + 1).round().astype(int))
-    found = []
-    for low, high in pairwise(cuts):
-        part = np.zeros_like(mine)
-        part[low : high + 1] = mine[low : high + 1]
-        if (part[1:, 1:] & part[:-1, 1:] & part[1:, :-1] & part[:-1, :-1]).any():
-            allowed = lattice.allowed.copy()
-            allowed[begin:end] = part.ravel()
-            shares = [dual.state.shares_first.copy(), dual.state.shares_second.copy()]
-            found.append(_on(replace(lattice, allowed=allowed), shares, dual))
-    return found if len(found) > 1 else []
-
-
-def _least_known(dual: Dual) -> int:
-    """The pixel whose alpha the dual determines least, after a pass: the dearest alpha costs least there."""
-    lattice, theta = dual.lattice, dual.state.theta
-    rows = starts(lattice.alpha_count)
-    row = starts(np.repeat(lattice.beta_count, lattice.alpha_count))[:-1]
-    cheapest = np.minimum.reduceat(theta, row)
-    cheapest[cheapest == np.inf] = -np.inf  # rows that are not allowed
-    dearest = np.maximum.reduceat(cheapest, rows[:-1]) - dual.state.least
-    dearest[~reached(lattice.instance)] = np.inf
-    return int(np.argmin(dearest))
-
-
 def prolonged(dual: Dual, lattice: Lattice) -> Dual:
-    """The dual on a finer lattice with the same centres: its shares are interpolated between labels."""
+    """The dual on a finer lattice with the same centres; shares and tables are interpolated."""
     old, grid = dual.lattice, dual.lattice.instance.grid
     shares = []
     for ends, values in ((grid.first, dual.state.shares_first), (grid.second, dual.state.shares_second)):
@@ -127,14 +95,10 @@ def prolonged(dual: Dual, lattice: Lattice) -> Dual:
         now = _rectangles(lattice), lattice.share_starts(ends), found
         _interpolate(was, now, ends, lattice.h / old.h, (lattice.offset, lattice.allowed))
         shares.append(found)
-    return _on(lattice, shares, dual)
-
-
-def _on(lattice: Lattice, shares: list[Floats], before: Dual) -> Dual:
-    """The dual with those shares on a following lattice, and the expected seconds per pass."""
-    dual = Dual(lattice, before.crew, *shares)
-    dual.seconds = before.seconds_on(lattice)
-    return dual
+    clusters = prolonged_clusters(old, dual.state.clusters, lattice)
+    finer_dual = Dual(lattice, dual.crew, (shares[0], shares[1]), clusters)
+    finer_dual.seconds = dual.seconds_on(lattice)
+    return finer_dual
 
 
 def _ends(lattice: Lattice, cells: Bools) -> Ints:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, Self
 from ..field.field import CrossField, Norm
 from ..instance.grid import Floats
 from .lattice import Lattice
+from .state import Clusters
 
 if TYPE_CHECKING:
     from .sweep import Dual
@@ -38,13 +39,16 @@ class LevelRecord(Lattice):
 
     shares_first, shares_second: flat over pairs in the grid's order, alpha-major: the shares of a pair at the
     labels of its first and of its second pixel; 0 at labels that are not allowed. Whole multiples of
-    `quantum`, a power of two, below 2^31 of them (2^49 in the 1-norm). bound: sum over pixels of min (D +
-    shares) + sum over pairs of min (c - shares), over allowed labels, minus a bound of its rounding error.
+    `quantum`, a power of two, below 2^31 of them (2^49 in the 1-norm). clusters: the tables of quads, also in
+    whole multiples of `quantum`. bound: sum over pixels of min (D + shares) + sum over pairs of min (c +
+    tables - shares) + sum over clusters of min (- tables), over allowed labels, minus a bound of its rounding
+    error.
     energy: U when the level was pruned; fields outside the next level have more (models/proof/pruning.py).
     """
 
     shares_first: Floats
     shares_second: Floats
+    clusters: Clusters
     quantum: float
     bound: float
     energy: float
@@ -54,7 +58,10 @@ class LevelRecord(Lattice):
         """The record of a dual; its shares are first rounded to multiples of their quantum."""
         quantum, state = dual.quantise(), dual.state
         shares = {name: getattr(state, name).copy() for name in ("shares_first", "shares_second")}
-        return cls.on(dual.lattice, **shares, quantum=quantum, bound=dual.bound(), energy=energy)
+        clusters = state.clusters._replace(tables=state.clusters.tables.copy())
+        return cls.on(
+            dual.lattice, **shares, clusters=clusters, quantum=quantum, bound=dual.bound(), energy=energy
+        )
 
     @classmethod
     def on(cls, lattice: Lattice, **solution: Any) -> Self:
@@ -80,7 +87,7 @@ class Proof(Claim):
     forced
         Number of pairs with the same jump in every field that could be better.
     levels
-        The last chain of lattices, coarsest first.
+        The last chain of lattices, coarsest first. Each follows from the one before.
     seconds
         Duration of the whole work.
     ended
@@ -88,9 +95,6 @@ class Proof(Claim):
         would be too large.
     norm
         1 or 2.
-    parents
-        Number of the level from which each one follows, -1 for the first. Empty if each follows from the one
-        before. Levels with the same parent are branches: they divide the alpha of one pixel.
 
     """
 
@@ -99,4 +103,3 @@ class Proof(Claim):
     seconds: float
     ended: str
     norm: Norm = 2
-    parents: tuple[int, ...] = ()

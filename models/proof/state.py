@@ -14,6 +14,17 @@ Indices = NDArray[np.int64]
 """Numbers of pixels and pairs: all of one type, so that each function is compiled once."""
 
 
+class Clusters(NamedTuple):
+    """Tables on pairs of alphas, four for each quad; see models/proof/clusters.py."""
+
+    quads: Indices  # (q, 4): the pairs of each quad, as in `Grid.quads`
+    start: (
+        Starts  # (4 q + 1,): start of each table, alpha-major from the first to the second pixel of its pair
+    )
+    of_pair: Indices  # (m, 2): numbers of the tables of each pair, or -1
+    tables: Floats
+
+
 class State(NamedTuple):
     """A lattice and the shares on it as arrays, which the compiled passes read and change."""
 
@@ -35,3 +46,4 @@ class State(NamedTuple):
     theta: Floats  # as the last pass found it at each pixel
     least: Floats  # of each pixel's theta
     norm: int  # 1 or 2
+    clusters: Clusters

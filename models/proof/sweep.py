@@ -31,9 +31,11 @@ from numpy.typing import NDArray
 from ..instance.grid import Floats, Grid
 from ..processes.compiled import Crew, compiled
 from ..processes.deadline import Over, never
+from .clusters import cluster_fronts, clusters_on, extended, least_of_clusters, update_clusters
 from .lattice import Lattice
 from .products import add, pair_minimum, pixel_pass, share_of
-from .state import Indices, State
+from .slack import quad_slacks
+from .state import Clusters, Indices, State
 
 _ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
 _ROUNDING: Final = 32 * 2.0**-53
@@ -44,11 +46,16 @@ class Dual:
     """A dual solution on a lattice: the shares of all pairs, and the bound of the last pass."""
 
     def __init__(
-        self, lattice: Lattice, crew: Crew, first: Floats | None = None, second: Floats | None = None
+        self,
+        lattice: Lattice,
+        crew: Crew,
+        shares: tuple[Floats, Floats] | None = None,
+        clusters: Clusters | None = None,
     ) -> None:
-        """Start from zero shares or the given ones."""
+        """Start from zero shares and without clusters, or from the given ones."""
         self.lattice, self.crew = lattice, crew
-        self.state = _state(lattice, first, second)
+        self.state = _state(lattice, shares, clusters)
+        self._take_clusters()
         self._fronts = fronts(lattice.instance.grid)
         self._parts = [crew.parts(lattice.count[front]) for front in self._fronts]
         self._before: list[NDArray[np.float32]] = []  # the direction of a change needs no more digits
@@ -68,7 +75,9 @@ class Dual:
         bound = -math.inf
         for _ in range(times):
             self._extrapolate()
+            self.update_clusters(1)
             self.forward(over)
+            self.update_clusters(-1)
             bound = self.backward(over)
             if bound < self._reached:
                 self._times = 0
@@ -89,6 +98,27 @@ class Dual:
             parts = [(shares[at], before[at]) for at in self.crew.equal_parts(len(shares))]
             self.crew.run(lambda each: _carry_on(*each, part), parts)
 
+    def add_clusters(self, count: int) -> None:
+        """Add clusters, with zero tables, on the quads that hold most of the gap. Before: a backward pass."""
+        old = self.state.clusters
+        grid = self.lattice.instance.grid
+        slack = quad_slacks(self.lattice, self.state)
+        slack[np.isin(grid.quads[:, 0], old.quads[:, 0])] = np.inf
+        quads = np.sort(np.argsort(-slack, kind="stable")[: len(old.quads) + count])
+        self.state = self.state._replace(clusters=extended(old, clusters_on(self.lattice, quads)))
+        self._take_clusters()
+
+    def _take_clusters(self) -> None:
+        self._cluster_fronts = cluster_fronts(self.lattice.instance.grid, self.state.clusters)
+        self._of_clusters = self._minima(least_of_clusters, len(self.state.clusters.quads))
+
+    def update_clusters(self, way: int = 1) -> None:
+        """Update all clusters; way: -1 for the reverse order."""
+        self._of_clusters[:] = 0.0
+        for front in self._cluster_fronts[::way]:
+            parts = [front[part] for part in self.crew.equal_parts(len(front))]
+            self.crew.run(lambda numbers: update_clusters(numbers, self.state), parts)
+
     def _pass(self, earlier: int, over: Over) -> float:
         def work(pixels: Indices) -> None:
             _pass_pixels(pixels, earlier, self.state)
@@ -102,7 +132,7 @@ class Dual:
                     return -math.inf
                 self.crew.run(work, [front[part] for part in parts])
         self.seconds = time.monotonic() - began
-        return math.fsum(self.state.least)
+        return math.fsum([*self.state.least, *self._of_clusters])
 
     def seconds_on(self, lattice: Lattice) -> float:
         """Expected seconds of a pass over another lattice, after one over this one."""
@@ -110,7 +140,7 @@ class Dual:
 
     def quantise(self) -> float:
         """Round the shares to whole multiples of a power of two, and return it; see `LevelRecord`."""
-        both = (self.state.shares_first, self.state.shares_second)
+        both = (self.state.shares_first, self.state.shares_second, self.state.clusters.tables)
         most = max(*(_most(shares) for shares in both), 2.0**-16)
         quantum = 2.0 ** (math.ceil(math.log2(most)) - (30 if self.lattice.norm == 2 else 48))
         for shares in both:
@@ -122,8 +152,9 @@ class Dual:
         """The bound that any shares prove, as `LevelRecord` defines it."""
         pixels = self._minima(_pixel_minima, self.lattice.instance.grid.size)
         pairs = self._minima(_pair_minima, len(self.state.first))
-        error = _ROUNDING * (len(pixels) + len(pairs)) * self._largest()
-        return math.fsum([*pixels, *pairs, -error])
+        clusters = self._minima(least_of_clusters, len(self.state.clusters.quads))
+        error = _ROUNDING * (len(pixels) + len(pairs) + len(clusters)) * self._largest()
+        return math.fsum([*pixels, *pairs, *clusters, -error])
 
     def _minima(self, work: Callable[[int, int, State, Floats], None], many: int) -> Floats:
         found = np.zeros(many)
@@ -135,7 +166,7 @@ class Dual:
     def _largest(self) -> float:
         """An upper limit of every angle's square, cost and sum of shares that enter a bound."""
         state = self.state
-        most = max(_most(state.shares_first), _most(state.shares_second))
+        most = max(map(_most, (state.shares_first, state.shares_second, state.clusters.tables)))
         return 64 + _most(state.unary[np.isfinite(state.unary)]) + 4 * most
 
 
@@ -148,10 +179,11 @@ def _carry_on(shares: Floats, before: NDArray[np.float32], part: float) -> None:
         before[x] = now
 
 
-def _state(lattice: Lattice, first: Floats | None, second: Floats | None) -> State:
+def _state(lattice: Lattice, shares: tuple[Floats, Floats] | None, clusters: Clusters | None) -> State:
     grid = lattice.instance.grid
     unary = lattice.unary_costs()
     start_first, start_second = lattice.share_starts(grid.first), lattice.share_starts(grid.second)
+    first, second = shares or (np.zeros(start_first[-1]), np.zeros(start_second[-1]))
     return State(
         lattice.h,
         lattice.alpha + lattice.h * (lattice.alpha_first + lattice.offset),
@@ -166,11 +198,12 @@ def _state(lattice: Lattice, first: Floats | None, second: Floats | None) -> Sta
         start_first,
         start_second,
         _around(grid),
-        np.zeros(start_first[-1]) if first is None else first,
-        np.zeros(start_second[-1]) if second is None else second,
+        first,
+        second,
         unary.copy(),
         np.zeros(grid.size),
         lattice.norm,
+        clusters_on(lattice, np.zeros(0, np.int64)) if clusters is None else clusters,
     )
 
 

@@ -6,16 +6,14 @@ dropped (pruning.py), until the jumps are forced (forced.py). A better field bec
 lattices begin anew round it.
 
 Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
-lattices leave its gap. Then the level before is cut into branches at the alpha of the pixel that the dual
-determines least. The branch with the least bound goes on, with half the spacing, or is cut again. The least
-of their bounds holds for all.
+lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second level if the
+best field has a vortex, and on every level where the gap shrinks slowly.
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
-from heapq import heappop, heappush
+from dataclasses import dataclass, field
 from typing import ClassVar, Final
 
 import numpy as np
@@ -29,10 +27,9 @@ from ..search.improvement import improved_field
 from ..search.search import search_patches
 from ..search.starts import best_start, polyvector_start
 from .certificate import certificate_effort, checking_pace
-from .check_certificate import MOST_LEVELS
 from .forced import Forced, forced
 from .lattice import Lattice, reached
-from .pruning import branches, finer, prolonged, remaining_cells
+from .pruning import finer, prolonged, remaining_cells
 from .record import EXACT, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
 from .sweep import Dual
@@ -40,14 +37,14 @@ from .sweep import Dual
 COARSEST: Final = 16  # steps in pi/2 of the first level
 _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
 _PASSES: Final = 3  # forwards and backwards between two roundings
+_ROUNDS_BEFORE: Final = 3  # of so many passes, before the gap shows where clusters are needed
 _SLOW: Final = 0.05  # share of the gap that passes must close for a level to go on; a tenth on the last one
 _MOST_ROUNDS: Final = 40  # a level
-_STALLED: Final = 0.5  # share of the gap that half the spacing leaves where branches are needed
-_PARTS: Final = 8  # branches of a level
-_SLOW_BRANCH: Final = 0.05  # as _SLOW, on branches
+_CLUSTERS: Final = 12  # quads that become clusters first
+_MORE_CLUSTERS: Final = 6  # later
+_STALLED: Final = 0.3  # share of the gap, left by half the spacing, above which there are more; 1/4 is usual
 _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
 MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
-_MOST_BRANCHED: Final = 5_000_000  # of all branches that wait: each keeps its messages
 _RECORDING: Final = 4  # passes: what rounding begins, the bound of a record and the pruning take as long
 _WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
@@ -114,7 +111,6 @@ class _Chain:
     """The levels round one centre, and what they prove together."""
 
     levels: list[LevelRecord] = field(default_factory=list)
-    parents: list[int] = field(default_factory=list)
     bound: float = 0.0
     forced: int = 0
 
@@ -122,16 +118,6 @@ class _Chain:
     def effort(self) -> float:
         """The effort of a certificate of these levels."""
         return sum(map(certificate_effort, self.levels))
-
-
-@dataclass(frozen=True, order=True)
-class _Branch:
-    """A level with nothing after it yet: its bound, its number, its dual, and whether it has to be cut."""
-
-    bound: float
-    number: int
-    dual: Dual = field(compare=False)
-    stalls: bool = field(compare=False)
 
 
 @dataclass
@@ -173,7 +159,7 @@ class Work:
         status: Status = "optimal" if self._exact(bound) else "gap"
         return Proof(
             self.best, energy, bound, status, self.proven.forced, tuple(self.proven.levels), seconds, ended,
-            self.norm, tuple(self.proven.parents),
+            self.norm,
         )  # fmt: skip
 
     def run(self) -> str:
@@ -200,26 +186,26 @@ class Work:
         if met := self.limits.met():
             return met
         self.chain, before, self.began = _Chain(), self.best, time.monotonic()
-        dual = coarser = Dual(self.level(_centre(before)), self.hands)
+        dual = Dual(self.level(_centre(before)), self.hands)
         self.limits.keep(self._effort_with(dual.lattice))
         patient = False
         while True:
+            if not patient and (count := self._wants_clusters()):
+                dual.ascend(_ROUNDS_BEFORE * _PASSES, self._closing(dual))
+                dual.add_clusters(count)
             self._ascend(dual, _SLOW / 10 if patient else _SLOW)
             what = self._record(dual, again=patient)
             if (ended := self._ended()) or what is None:
                 return ended or "labels"
             lattice = finer(what.left)
             small = not _too_large(lattice) and self._in_time(dual, lattice)
-            stalls = not patient and self._stalls()
             # The next level takes long, or the field may cause the rest of the gap.
             costly = len(self.chain.levels) == _MANY or lattice.start[-1] > _LARGE
-            if not self.searched and (stalls or costly):
+            if not self.searched and costly:
                 self.searched = True
                 self._search(_SEARCH)
             if self.energy(self.best) < self.energy(before) * (1 - _BETTER):
                 return self.limits.met()
-            if stalls:
-                return self._branch(coarser)
             if not small and patient:
                 return "labels"
             if not small and self._closing(dual)():
@@ -227,7 +213,7 @@ class Work:
             patient = not small
             if small:
                 self.limits.keep(self._effort_with(lattice))
-                coarser, dual = dual, prolonged(dual, lattice)
+                dual = prolonged(dual, lattice)
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for some passes over the lattice that follows, and for its certificate."""
@@ -243,56 +229,13 @@ class Work:
         """A function that returns whether only the time to record the level is left."""
         return lambda: self.limits.over(_RECORDING * dual.seconds)
 
-    def _stalls(self) -> bool:
-        """Whether half the spacing has left more than half of the gap, and the best field has a vortex."""
-        bounds = [self.energy(self.best) - level.bound for level in self.chain.levels[-2:]]
-        vortices = len(self.best.singularities.index) > 0
-        return len(self.chain.levels) > 2 and bounds[1] > _STALLED * bounds[0] and vortices
-
-    def _branch(self, dual: Dual) -> str:
-        """Cut the last level but one into branches, and follow the lowest; the reason of the end."""
-        levels = self.chain.levels[:-1]
-        self.chain = _Chain(levels, list(range(-1, len(levels) - 1)))
-        waiting = [_Branch(levels[-1].bound, len(levels) - 1, dual, stalls=True)]
-        while not (ended := self._ended()):
-            branch = heappop(waiting)
-            parts = self._parts(branch)
-            more = sum(int(part.lattice.allowed.sum()) for part in parts)
-            full = _labels(waiting) + more > _MOST_BRANCHED
-            if not parts or full or len(levels) + len(parts) > MOST_LEVELS:
-                return "labels"
-            for part in parts:
-                if not self._in_time(part, part.lattice):
-                    return self.limits.met() or "time"
-                heappush(waiting, self._raised(part, branch))
-            self.chain.bound = min(waiting[0].bound, self.energy(self.best))
-            if self.chain.bound > self.proven.bound:
-                self.proven = replace(self.chain, levels=levels[:], parents=self.chain.parents[:])
-            self._report(self.proven.bound, _labels(waiting))
-        return ended or self._ended()
-
-    def _parts(self, branch: _Branch) -> list[Dual]:
-        """The duals that follow from a branch: on the lattice of half the spacing, or on parts of its own."""
-        if branch.stalls:
-            return branches(branch.dual, _PARTS)
-        lattice = finer(remaining_cells(branch.dual, branch.bound, self.energy(self.best)))
-        return [] if _too_large(lattice) else [prolonged(branch.dual, lattice)]
-
-    def _raised(self, dual: Dual, parent: _Branch) -> _Branch:
-        """The branch of a dual, which is raised as long as it pays, and recorded."""
-        reached, energy = -np.inf, self.energy(self.best)
-        self.limits.keep(self._effort_with(dual.lattice))
-        closing = self._closing(dual)
-        for _ in range(_MOST_ROUNDS):
-            bound = dual.ascend(_PASSES, closing)
-            if closing() or bound > energy or bound - reached <= _SLOW_BRANCH * (energy - bound):
-                break
-            reached = bound
-        level, levels = LevelRecord.of(dual, energy), self.chain.levels
-        levels.append(level)
-        self.chain.parents.append(parent.number)
-        stalls = not parent.stalls and energy - level.bound > _STALLED * (energy - parent.bound)
-        return _Branch(level.bound, len(levels) - 1, dual, stalls=stalls)
+    def _wants_clusters(self) -> int:
+        """The number of quads to become clusters on the next level."""
+        gaps = [self.energy(self.best) - level.bound for level in self.chain.levels[-2:]]
+        vortex = len(gaps) == 1 and len(self.best.singularities.index) > 0
+        if not vortex and not (len(gaps) == 2 and gaps[1] > _STALLED * gaps[0]):
+            return 0
+        return _MORE_CLUSTERS if len(self.chain.levels[-1].clusters.quads) else _CLUSTERS
 
     def _ended(self) -> str:
         """The reason why the work ends; empty if it goes on."""
@@ -370,11 +313,6 @@ class Work:
             jumps = relabelled(self.instance, found.alpha, found.beta, found.p)
             self._offer(self.improved(jumps, self.limits.over))
             self.chain.bound = max(self.chain.bound, min(least, self.chain.levels[-1].energy))
-
-
-def _labels(waiting: list[_Branch]) -> int:
-    """The number of labels that are left on branches."""
-    return sum(int(branch.dual.lattice.allowed.sum()) for branch in waiting)
 
 
 def _too_large(lattice: Lattice) -> bool:

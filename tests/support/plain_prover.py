@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.proof.clusters import clusters_on
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.record import LevelRecord, Proof
 
@@ -129,7 +130,10 @@ class Table:
             "shares_first": np.concatenate([*first, []]),
             "shares_second": np.concatenate([*second, []]),
         }
-        return LevelRecord.on(lattice, **shares, quantum=QUANTUM, bound=bound, energy=energy)
+        clusters = clusters_on(lattice, np.zeros(0, int))
+        return LevelRecord.on(
+            lattice, **shares, clusters=clusters, quantum=QUANTUM, bound=bound, energy=energy
+        )
 
 
 def whole(field, h, i, offset):

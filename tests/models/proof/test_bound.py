@@ -1,5 +1,6 @@
 """The bound of a lattice against all labellings of small ones, after passes, with threads and pruning."""
 
+from dataclasses import replace
 from itertools import product
 
 import crossfield as cf
@@ -13,7 +14,7 @@ from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.pruning import finer, prolonged, remaining_cells
 from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.starts import first_field
-from exhaustive import random_instance
+from exhaustive import random_instance, sketch
 
 pytestmark = pytest.mark.numeric
 
@@ -116,6 +117,48 @@ def test_any_shares_give_a_bound():
             assert dual.bound() <= least_labelling(*discrete(lattice))
 
 
+def with_clusters(lattice, hands):
+    """A dual with clusters on all quads, after two passes."""
+    dual = Dual(lattice, hands)
+    dual.ascend(1)
+    dual.add_clusters(len(lattice.instance.grid.quads))
+    return dual
+
+
+def test_any_tables_of_clusters_give_a_bound():
+    with crew(1) as hands:
+        for seed in range(40):
+            rng = np.random.default_rng(seed)
+            instance = random_instance(seed, ((2, 2), (2, 3), (3, 2))[seed % 3])
+            lattice = Lattice.whole(first_field(instance), 4)
+            dual = with_clusters(lattice, hands)
+            state = dual.state
+            for values in (state.shares_first, state.shares_second, state.clusters.tables):
+                values += rng.normal(0, 0.3, len(values))
+            assert dual.bound() <= least_labelling(*discrete(lattice))
+
+
+def vortex():
+    """An instance whose best field has a vortex."""
+    instance = random_instance(44, (3, 3), strokes=9)
+    return replace(instance, stroke_coefficient=30.0, skew_coefficient=1.0)
+
+
+def test_no_update_of_clusters_lowers_the_bound():
+    best = cf.greedy_field(vortex())
+    assert len(best.singularities.index) == 1
+    with crew(1) as hands:
+        dual, bounds = Dual(Lattice.whole(best, 16), hands), []
+        dual.ascend(60)
+        passes = dual.bound()
+        dual.add_clusters(4)
+        for _ in range(25):
+            dual.update_clusters()
+            bounds += [dual.bound(), dual.forward(), dual.backward()]
+        assert (np.diff(bounds) >= -1e-9).all()
+        assert passes < dual.bound() <= best.energy().total
+
+
 def test_threads_change_no_bit():
     instance = cf.sample("bottle", 24)
     lattice = Lattice.whole(first_field(instance), 16)
@@ -123,7 +166,12 @@ def test_threads_change_no_bit():
     for count in (1, 2, 3):
         with crew(count) as hands:
             dual = Dual(lattice, hands)
-            found.append((dual.ascend(2), dual.bound(), dual.state.shares_first.tobytes()))
+            dual.ascend(2)
+            dual.add_clusters(5)
+            state = dual.state
+            found.append(
+                (dual.ascend(2), dual.bound(), state.shares_first.tobytes(), state.clusters.tables.tobytes())
+            )
     assert lattice.start[-1] > 30_000  # so that they were used
     assert found[0] == found[1] == found[2]
 
