@@ -6,8 +6,8 @@ dropped (pruning.py), until the jumps are forced (forced.py). A better field bec
 lattices begin anew round it.
 
 Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
-lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second level if the
-best field has a vortex, and on every level where the gap shrinks slowly.
+lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second level if
+the best field has a vortex, and on every level where the gap shrinks slowly.
 """
 
 from __future__ import annotations
