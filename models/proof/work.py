@@ -6,8 +6,8 @@ dropped (pruning.py), until the jumps are forced (forced.py). A better field bec
 lattices begin anew round it.
 
 Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
-lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second level if
-the best field has a vortex, and on every level where the gap shrinks slowly.
+lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second
+level if the best field has a vortex, and on every level where the gap shrinks slowly.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from .sweep import Dual
 COARSEST: Final = 16  # steps in pi/2 of the first level
 _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
 _PASSES: Final = 3  # forwards and backwards between two roundings
-_ROUNDS_BEFORE: Final = 3  # of so many passes, before the gap shows where clusters are needed
+_BEFORE: Final = 9  # forwards and backwards before the gap shows where the first clusters are needed
 _SLOW: Final = 0.05  # share of the gap that passes must close for a level to go on; a tenth on the last one
 _MOST_ROUNDS: Final = 40  # a level
 _CLUSTERS: Final = 12  # quads that become clusters first
@@ -191,7 +191,7 @@ class Work:
         patient = False
         while True:
             if not patient and (count := self._wants_clusters()):
-                dual.ascend(_ROUNDS_BEFORE * _PASSES, self._closing(dual))
+                dual.ascend(1 if len(dual.state.clusters.quads) else _BEFORE, self._closing(dual))
                 dual.add_clusters(count)
             self._ascend(dual, _SLOW / 10 if patient else _SLOW)
             what = self._record(dual, again=patient)
