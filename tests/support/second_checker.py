@@ -337,13 +337,13 @@ def convex_bound(problem, boxes):
     far = (problem.weight > 0) & (abs(boxes[:, :2]).max(axis=1) > 3 * PI / 4)
     need(not far.any(), f"lemma 5 does not apply at the stroke of pixel {problem.pixels[far.argmax()]}")
     enough = problem.energy() - TOLERANCE / 2 * max(1, problem.energy())
-    bound, pieces = np.inf, [(boxes, np.zeros(len(theta)))]
+    bound, count, pieces = np.inf, 0, [(boxes, np.zeros(len(theta)))]
     while pieces:
-        boxes, side = pieces.pop()
+        (boxes, side), count = pieces.pop(), count + 1
         least = piece_bound(problem, theta, boxes, side)
         beyond = np.stack([-PI / 4 - boxes[:, 0], boxes[:, 1] - PI / 4]) * problem.weight * (side == 0)
         which, i = np.unravel_index(beyond.argmax(), beyond.shape)
-        if least >= enough or beyond[which, i] <= 0:
+        if least >= enough or beyond[which, i] <= 0 or count > 200:
             bound = min(bound, least)
             continue
         inner, outer, sides = boxes.copy(), boxes.copy(), side.copy()
@@ -389,9 +389,9 @@ def piece_bound(problem, theta, boxes, side):
 # Section 7: the theorem -------------------------------------------------------------------------------------
 
 
-def check(path):
+def check(arrays):
     """Bound that a certificate proves for the energy of every field; at least what it claims."""
-    arrays = arrays_of(path)
+    arrays = dict(arrays)  # each reader below removes its array
     head = head_of(arrays, "head")
     version = head.get("version")
     known = head.get("format") == "crossfield-certificate" and type(version) is int and version in {1, 2}
@@ -403,11 +403,15 @@ def check(path):
 
     levels = levels_of(arrays, problem, count, version)
     bound = max(0.0, min(bound_of(levels, 0), energy))
-    if head["status"] == "optimal":
-        boxes, field = boxes_of(problem, levels), relabelled(problem, levels[0])
+    boxes, field = boxes_of(problem, levels), relabelled(problem, levels[0])
+    try:
         check_jumps(field, boxes)
         bound = max(bound, min(convex_bound(field, boxes), energy))
-        need(bound >= energy - TOLERANCE * max(1, energy), f"head: not optimal, with a bound of {bound}")
+    except Refused:
+        if head["status"] == "optimal":
+            raise
+    optimal = bound >= energy - TOLERANCE * max(1, energy)
+    need(optimal or head["status"] == "gap", f"head: not optimal, with a bound of {bound}")
     need(number(head, "bound", -1e300, 1e300) <= bound, f"head: the bound is {bound}, not {head['bound']}")
     return bound
 
@@ -437,6 +441,6 @@ def bound_of(levels, k):
 
 if __name__ == "__main__":
     try:
-        print(f"every field has an energy of at least {check(Path(sys.argv[1])):.15g}")
+        print(f"every field has an energy of at least {check(arrays_of(Path(sys.argv[1]))):.15g}")
     except Refused as refusal:
         sys.exit(str(refusal))

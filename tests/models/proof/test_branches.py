@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import second_checker
 from crossfield.models.errors import InputError
 from crossfield.models.processes.compiled import crew
 from crossfield.models.proof.certificate import read_certificate, write_certificate
@@ -102,6 +103,7 @@ def test_a_certificate_of_branches_proves_the_least_of_their_bounds(cut, tmp_pat
     path = tmp_path / "cut.npz"
     written = write_certificate(cut, path)
     assert cut.bound - 1e-4 <= written.bound <= cut.energy
+    assert written.bound <= second_checker.check(second_checker.arrays_of(path)) <= cut.energy
     assert read_certificate(path).bound == written.bound
     chain = replace(cut, levels=cut.levels[:1], parents=(-1,))
     assert write_certificate(chain, path).bound < written.bound
