@@ -397,11 +397,12 @@ def check(arrays):
     known = head.get("format") == "crossfield-certificate" and type(version) is int and version in {1, 2}
     need(known, "head: no certificate of version 1 or 2")
     need(head.get("status") in {"optimal", "gap"}, "head: the status is neither optimal nor gap")
-    problem, count = problem_of(arrays), int(number(head, "levels", 1, 64))
+    problem, count = problem_of(arrays), number(head, "levels", 1, 64)
     energy, claimed = problem.energy(), number(head, "energy", 0, 1e300)
-    need(abs(energy - claimed) <= 1e-11 * (1 + energy), f"head: the energy is {energy}, not {claimed}")
+    need(count == int(count), f"head: {count} levels")
+    need(abs(energy - claimed) <= 1e-12 * max(1, energy), f"head: the energy is {energy}, not {claimed}")
 
-    levels = levels_of(arrays, problem, count, version)
+    levels = levels_of(arrays, problem, int(count), version)
     bound = max(0.0, min(bound_of(levels, 0), energy))
     boxes, field = boxes_of(problem, levels), relabelled(problem, levels[0])
     try:
