@@ -415,6 +415,7 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
     head = _text(arrays, "instance_head")
     _need("instance_crossings" not in arrays, "instance_crossings", "is not covered by certificates")
     mask = _given(arrays, "instance_mask", "|b1", None, None)
+    _given(arrays, "instance_origin", "<f8", 2)  # not part of the proof, but of the instance
     rows, columns = np.nonzero(mask)
     n = len(rows)
     _need(n > 0, "instance_mask", "has no pixel")

@@ -1,0 +1,206 @@
+"""Forged certificates: whatever is changed, no checker confirms what is false of the instance in the file."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import plain_prover
+import pytest
+import second_checker
+from archives import array_of, forged, members_of, npy, packed
+from crossfield.models.errors import InputError, InstanceError
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.file import of_arrays
+from crossfield.models.proof import check_certificate
+from crossfield.models.proof.certificate import read_certificate, write_certificate
+from crossfield.models.proof.clusters import clusters_on
+from exhaustive import optimum, random_instance
+
+REFUSED = (check_certificate.RefusedError, check_certificate.UnreadableError, second_checker.Refused)
+KINDS = ("optimal", "a window binds", "a worse field", "tables")
+COARSE = 2.0**-12
+TRIES = 7
+"""Places of every array that are changed, each once up and once down."""
+
+
+def proof_of_kind(kind):
+    """A proof of four pixels."""
+    seed = {"optimal": 1, "a window binds": 5, "a worse field": 4, "tables": 3}[kind]
+    field = optimum(random_instance(seed, (2, 2), 4))
+    if kind == "a worse field":
+        field = CrossField(field.instance, field.alpha, field.beta + np.array([0, 0.01, 0, 0]), field.p)
+    proof = plain_prover.proof_of(field, levels=3, most=800)
+    if kind == "tables":
+        *before, last = proof.levels
+        clusters = clusters_on(last, np.zeros(1, int))
+        whole = np.random.default_rng(3).integers(-4, 5, len(clusters.tables))
+        clusters.tables[:] = COARSE * whole
+        proof = replace(proof, levels=(*before, replace(last, clusters=clusters)))
+    return proof
+
+
+@pytest.fixture
+def honest(tmp_path, monkeypatch):
+    """A function that returns the file of a certificate of a kind, which claims all that it proves.
+
+    Where there are tables, shares are coarse, so that they fit in 16 bits.
+    """
+
+    def of(kind):
+        monkeypatch.setattr(plain_prover, "QUANTUM", COARSE if kind == "tables" else 2.0**-24)
+        path = tmp_path / "it.npz"
+        write_certificate(proof_of_kind(kind), path)
+        return path
+
+    return of
+
+
+def with_head(arrays, name="head", **changes):
+    head = json.loads(arrays[name].tobytes()) | changes
+    return arrays | {name: np.frombuffer(json.dumps(head).encode(), np.uint8)}
+
+
+def modest(name, arrays):
+    """The arrays with the energy of the field in them and no claim beyond it, if there is such a field."""
+    try:
+        energy = second_checker.problem_of(dict(arrays)).energy()
+    except second_checker.Refused:
+        return []
+    return [with_head(arrays, status="gap", energy=energy, bound=0.0)] if name != "head" else []
+
+
+def moved(number, way, rng):
+    """A number of an array, moved in one direction, little or much."""
+    if number.dtype.kind == "b":
+        return ~number
+    if number.dtype.kind == "f":
+        return round(number + way * rng.choice([1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 100.0]), 12)
+    limit = np.iinfo(number.dtype)
+    value = int(number) + way * int(rng.choice([1, 1, 2, 16, 1000, limit.max]))
+    return number.dtype.type(min(max(value, limit.min), limit.max))
+
+
+def changes(arrays, rng):
+    """Names of arrays, and all arrays with one number of that one changed."""
+    for name in arrays:
+        size = arrays[name].size
+        for at in rng.permutation(size)[:TRIES]:
+            for way in (1, -1):
+                array = arrays[name].copy()
+                place = np.unravel_index(at, array.shape)
+                array[place] = moved(array[place], way, rng)
+                yield name, arrays | {name: array}
+    for name in ("head", "instance_head"):
+        head = json.loads(arrays[name].tobytes())
+        for key, value in head.items():
+            for factor in (0, 1 - 1e-3, 1 + 1e-9, 1 + 1e-3, 2, -1, 1e9, np.nan, np.inf):
+                if type(value) is int or (isinstance(value, float) and key != "pixel_size"):
+                    yield name, with_head(arrays, name, **{key: value * factor})
+
+
+def least_energy(arrays, known):
+    """The energy of a good field of the instance in a certificate; InstanceError where it is none."""
+    parts = {key.removeprefix("instance_"): arrays[key] for key in arrays if key.startswith("instance_")}
+    instance = of_arrays(parts)
+    if instance.sha256 not in known:
+        known[instance.sha256] = optimum(instance).energy().total
+    return known[instance.sha256]
+
+
+def verdicts(arrays):
+    """The bound that each checker confirms, None where it refuses."""
+
+    def confirmed(check):
+        try:
+            return check(arrays)
+        except REFUSED:
+            return None
+
+    return confirmed(lambda held: check_certificate.check(held).bound), confirmed(second_checker.check)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_changed_number_makes_a_false_claim_pass(kind, honest):
+    """With the claims of the file, and with none beyond the energy: a bound is not above the optimum.
+
+    Where the status is `optimal`, the bound confirms the energy, too.
+    """
+    arrays = check_certificate.read(str(honest(kind)))
+    rng, known, counts = np.random.default_rng(7), {}, Counter()
+    for name, other in changes(arrays, rng):
+        for held in [other, *modest(name, other)]:
+            found = verdicts(held)
+            counts["refused"] += found == (None, None)
+            counts["confirmed"] += None not in found
+            counts["disputed"] += found.count(None) == 1  # by less than the errors that a checker allows for
+            if found == (None, None):
+                continue
+            try:
+                least = least_energy(other, known)
+            except InstanceError:
+                continue  # crossfield does not read such an instance
+            head = json.loads(held["head"].tobytes())
+            for bound in found:
+                assert bound is None or head["bound"] <= bound <= least + 1e-11, name
+                assert bound is None or head["status"] == "gap" or head["energy"] <= least + 2e-8, name
+    assert counts["refused"] > 100
+    assert counts["confirmed"] > 100
+    assert counts["disputed"] < 5
+
+
+def other_forms(array):
+    """The array in forms that a certificate does not have."""
+    kind = array.dtype
+    swapped = kind.newbyteorder(">") if kind.itemsize > 1 else np.dtype("S1")
+    forms = {
+        "another type": array.astype("<i8" if kind != np.int64 else "<i4"),
+        "another width": array.astype("<f4" if kind.kind == "f" else "<u4"),
+        "another byte order": array.astype(swapped),
+        "one more": np.concatenate([array, array[-1:]]) if array.size else np.zeros(1, kind),
+        "one more axis": array[None],
+        "no entry": array[:0] if array.size else array[None],
+        "one less": array[:-1],
+        "flat": array.ravel() if array.ndim > 1 else array[:, None],
+    }
+    if array.ndim > 1 and min(array.shape) > 1:
+        forms["order of columns"] = np.asfortranarray(array)
+        forms["transposed"] = np.ascontiguousarray(array.T[:-1])
+    if kind.kind == "f":
+        for value in (np.nan, np.inf, -np.inf):
+            forms[str(value)] = np.where(np.arange(array.size) == array.size - 1, value, array)
+    return {what: form for what, form in forms.items() if array.size or what in {"one more", "another type"}}
+
+
+def refused_by_all(path):
+    """Raise unless no reader takes the file for a certificate."""
+    assert check_certificate.main([str(path)]) in {1, 2}
+    with pytest.raises((InputError, InstanceError)):
+        read_certificate(path)
+    with pytest.raises(second_checker.Refused):
+        second_checker.check(second_checker.arrays_of(path))
+
+
+def test_every_array_in_another_form_is_refused(honest, tmp_path, subtests):
+    """Also under another name, twice, and not at all; arrays of the last level stand for those of all."""
+    members, other = members_of(honest("tables").read_bytes()), tmp_path / "other.npz"
+    data = packed([*members.items()], zipfile.ZIP_STORED)
+    for member, content in members.items():
+        if member.startswith(("level_0", "level_1")):
+            continue
+        files = {
+            what: packed([*(members | {member: npy(form)}).items()], zipfile.ZIP_STORED)
+            for what, form in other_forms(array_of(content)).items()
+        }
+        forgeries = forged(member.removesuffix(".npy"))
+        names = ("a member twice", "a name in other case", "another ending", "a name in a folder")
+        files |= {what: forgeries[what](data) for what in names}
+        files["left out"] = packed([x for x in members.items() if x[0] != member], zipfile.ZIP_STORED)
+        for what, file in files.items():
+            with subtests.test(member=member, what=what):
+                other.write_bytes(file)
+                refused_by_all(other)

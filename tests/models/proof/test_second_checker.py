@@ -1,0 +1,135 @@
+"""Certificates of `crossfield prove`, checked by a program that was written from the documentation alone."""
+
+import ast
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import places
+import pytest
+import second_checker
+from crossfield.models.processes.limits import Limits
+from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.prove import prove
+from crossfield.models.sketch.samples import sample
+from exhaustive import optimum, random_instance
+from plain_prover import proof_of
+from second_checker import Refused, arrays_of, check
+
+pytestmark = pytest.mark.numeric
+
+SHIPPED = places.ROOT / "export" / "library" / "plan" / "known" / "points"
+
+
+@pytest.fixture(scope="module")
+def arrays(tmp_path_factory):
+    """A certificate of four pixels and four levels, which needs all of them."""
+    path = tmp_path_factory.mktemp("certificate") / "it.npz"
+    write_certificate(proof_of(optimum(random_instance(1, (2, 2), 4)), levels=4), path)
+    return arrays_of(path)
+
+
+def confirmed(instance, path):
+    """The field of a proof whose certificate the second checker confirms as optimal."""
+    proof = prove(instance, limits=Limits(120.0, gap=0))
+    written = write_certificate(proof, path)
+    bound = check(arrays_of(path))
+    assert written.status == "optimal"
+    assert written.bound <= bound <= written.energy
+    assert bound >= written.energy - 1e-10 * max(1, written.energy)
+    return proof.field
+
+
+@pytest.mark.parametrize("seed", [305, 306])
+def test_optima_of_nine_pixels_are_confirmed(seed, tmp_path):
+    confirmed(random_instance(seed, (3, 3), strokes=9), tmp_path / "it.npz")
+
+
+@pytest.mark.parametrize("gauge, seed", [("strokes", 5), ("box", 3)])
+def test_the_bound_of_a_certificate_with_a_gap_is_confirmed(gauge, seed, tmp_path):
+    """The convex step ends below the energy of the field, because a window binds."""
+    path, instance = tmp_path / "it.npz", random_instance(seed, (2, 2), 4, gauge)
+    written = write_certificate(proof_of(optimum(instance), levels=3, most=800), path)
+    assert written.status == "gap"
+    assert 0 < written.bound <= check(arrays_of(path)) <= written.bound + 1e-9
+
+
+@pytest.mark.parametrize("name", ["cf_cyl_n005", "cf_bottle_n014"])
+def test_certificates_of_version_1_are_confirmed(name):
+    arrays = arrays_of(SHIPPED / f"{name}.certificate.npz")
+    claimed = json.loads(arrays["head"].tobytes())
+    assert claimed["version"] == 1
+    assert claimed["bound"] <= check(arrays) <= claimed["energy"]
+
+
+@pytest.mark.slow
+def test_all_certificates_of_the_library_are_confirmed():
+    for path in sorted(SHIPPED.glob("*.certificate.npz")):
+        claimed = json.loads(arrays_of(path)["head"].tobytes())
+        assert claimed["bound"] <= check(arrays_of(path)) <= claimed["energy"]
+
+
+@pytest.mark.slow
+def test_bottle_at_24_pixels_is_confirmed(tmp_path):
+    confirmed(sample("bottle", size=24), tmp_path / "it.npz")
+
+
+@pytest.mark.slow
+def test_a_field_with_a_vortex_is_confirmed(tmp_path):
+    field = confirmed(sample("cylinder_bend", size=16), tmp_path / "it.npz")
+    assert len(field.singularities.row) == 1
+
+
+def with_head(arrays, **changes):
+    head = json.loads(arrays["head"].tobytes()) | changes
+    return arrays | {"head": np.frombuffer(json.dumps(head).encode(), np.uint8)}
+
+
+def test_a_bound_or_an_energy_raised_by_one_percent_is_refused(arrays):
+    claimed = json.loads(arrays["head"].tobytes())
+    with pytest.raises(Refused, match="head: the bound is"):
+        check(with_head(arrays, bound=1.01 * claimed["energy"]))
+    with pytest.raises(Refused, match="head: the energy is"):
+        check(with_head(arrays, energy=1.01 * claimed["energy"]))
+
+
+def test_shares_changed_by_a_hundredth_are_refused(arrays):
+    """At every second label of one pair, so that a constant does not move from one pixel to the other."""
+    level = json.loads(arrays["head"].tobytes())["levels"] - 2
+    steps = arrays[f"level_{level}_steps_32"].copy()
+    count = arrays[f"level_{level}_ranges"][0, 1::2].prod()
+    jump = round(0.01 / arrays[f"level_{level}_scale"][0])
+    steps[:count] += np.where(np.arange(count) % 2, jump, -jump).astype(np.int32)
+    with pytest.raises(Refused, match=rf"level_{level + 1}_allowed: does not cover"):
+        check(arrays | {f"level_{level}_steps_32": steps})
+
+
+def test_a_dropped_label_is_refused(arrays):
+    """The label of the field at the last pixel, at the second level."""
+    ranges = arrays["level_1_ranges"].astype(int)
+    before = ranges[:-1, 1::2].prod(axis=1).sum()
+    k, _, low, lows = ranges[-1]
+    bits = np.unpackbits(arrays["level_1_allowed"])
+    assert bits[before - k * lows - low] == 1
+    bits[before - k * lows - low] = 0
+    with pytest.raises(Refused, match=r"level_1_allowed: does not cover .* at pixel \[1 1\]"):
+        check(arrays | {"level_1_allowed": np.packbits(bits)})
+
+
+def test_a_coarser_first_level_is_refused(arrays):
+    """Labels that are left out at the edge of the strip."""
+    bits = np.unpackbits(arrays["level_0_allowed"])
+    bits[0] = 0
+    with pytest.raises(Refused, match=r"level_0_allowed: does not cover the strip at pixel \[0 0\]"):
+        check(arrays | {"level_0_allowed": np.packbits(bits)})
+
+
+def test_it_imports_nothing_but_numpy_and_the_standard_library():
+    imported = set()
+    for node in ast.walk(ast.parse(Path(second_checker.__file__).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            imported |= {name.name for name in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imported.add(node.module)
+    assert imported - {"numpy"} <= sys.stdlib_module_names

@@ -1,0 +1,476 @@
+"""A second checker of optimality certificates, written from the documentation: `second_checker.py FILE`.
+
+It follows docs/proofs.md and docs/files.md with dense arrays. It imports nothing of crossfield, and shares no
+code with models/proof. Section numbers are those of docs/proofs.md. Clarity comes before speed.
+"""
+
+import io
+import json
+import sys
+import zipfile
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+PI = np.pi
+SLIVER = 1e-14
+"""Radians by which a domain may fall short of the cells that it covers, as places of labels are rounded."""
+TOLERANCE = 1e-8
+"""Energy, relative to max(1, U), by which a field may be better than one that counts as optimal."""
+MOST_LABELS = 6000
+"""Labels of a pixel: the costs of a pair are one dense table."""
+
+
+class Refused(Exception):  # noqa: N818 - a verdict
+    """The archive is no certificate, or does not prove what it claims; the message names the place."""
+
+
+def need(holds, message):
+    """Raise Refused unless a condition holds."""
+    if not holds:
+        raise Refused(message)
+
+
+@dataclass
+class Problem:
+    """Instance and field: pixels row by row, and per pixel its pairs with the upper, then the right one."""
+
+    pixels: np.ndarray  # [n, 2]: row, column
+    pairs: np.ndarray  # [m, 2]: i, j
+    theta: np.ndarray  # [n], 0 where there is no stroke
+    weight: np.ndarray  # [n]: W_i, 0 where there is no stroke
+    w_beta: float
+    alpha: np.ndarray  # [n]
+    beta: np.ndarray  # [n]
+    p: np.ndarray  # [m]
+
+    def energy(self):
+        """Energy U of the field."""
+        (i, j), p = self.pairs.T, self.p
+        a = self.alpha[i] - self.alpha[j] + PI / 2 * p
+        b = (-1.0) ** p * self.beta[i] - self.beta[j]
+        strokes = self.weight @ (self.alpha + self.beta - self.theta) ** 2
+        return float(2 * (a @ a + b @ b) + strokes + self.w_beta * (self.beta @ self.beta))
+
+
+@dataclass
+class Level:
+    """Lattice of a level: places and allowed labels of every pixel, and the shares of every pair."""
+
+    number: int
+    h: float
+    centre: np.ndarray  # [n, 2]
+    steps: list  # per pixel, the numbers k + o and l + o
+    allowed: list  # per pixel, bool[k, l]
+    shares: list  # per pair, at the allowed labels of its earlier pixel
+    quads: list  # pixels a, b, c, d and the tables of the pairs (a, b), (b, c), (d, c), (a, d)
+    bound: float = 0.0
+    left: list = field(default_factory=list)  # per pixel, remaining cells as rows (a0, a1, b0, b1)
+
+    def places(self, i):
+        """Alpha of every k and beta of every l of a pixel."""
+        return tuple(c + self.h * steps for c, steps in zip(self.centre[i], self.steps[i], strict=True))
+
+    def labels(self, i):
+        """Alpha, beta and s of the allowed labels of a pixel."""
+        a, b = np.nonzero(self.allowed[i])
+        (alpha, beta), (k, low) = self.places(i), self.steps[i]
+        return alpha[a], beta[b], k[a] + low[b]
+
+
+def all_four(labels):
+    """The cells of a lattice whose four corners have a property."""
+    return labels[:-1, :-1] & labels[1:, :-1] & labels[:-1, 1:] & labels[1:, 1:]
+
+
+# Reading ----------------------------------------------------------------------------------------------------
+
+
+def arrays_of(path):
+    """All arrays of an archive, by name."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+            need(len({name.lower() for name in names}) == len(names), f"{path}: an array occurs twice")
+            need(all(name.endswith(".npy") for name in names), f"{path}: has a member that is no array")
+            return {name[:-4]: np.load(io.BytesIO(archive.read(name)), allow_pickle=False) for name in names}
+    except (OSError, ValueError, EOFError, RuntimeError, SyntaxError, zipfile.BadZipFile) as error:
+        raise Refused(f"{path}: {error}") from error
+
+
+def take(arrays, name, kind, *shape):
+    """Remove and return an array of this type and shape; None stands for any length."""
+    need(name in arrays, f"{name} is missing")
+    a = arrays.pop(name)
+    fits = a.ndim == len(shape) and all(n in {None, m} for n, m in zip(shape, a.shape, strict=True))
+    same = a.dtype.str == np.dtype(kind).str and fits and a.flags.c_contiguous
+    need(same, f"{name}: is {a.dtype.str}{a.shape}, not {kind}{shape}, in row order")
+    need(a.dtype.kind != "f" or np.isfinite(a).all(), f"{name}: contains NaN or infinity")
+    return a
+
+
+def head_of(arrays, name):
+    """A JSON object in an array of bytes."""
+
+    def once(items):
+        need(len(dict(items)) == len(items), f"{name}: a key occurs twice")
+        return dict(items)
+
+    try:
+        head = json.loads(take(arrays, name, "u1", None).tobytes().decode(), object_pairs_hook=once)
+    except ValueError as error:
+        raise Refused(f"{name}: {error}") from error
+    need(isinstance(head, dict), f"{name}: is no JSON object")
+    return head
+
+
+def number(head, name, low, high):
+    """A number of a head within its limits."""
+    x = head.get(name)
+    need(type(x) in {int, float} and low <= x <= high, f"head: {name} is {x}, not from {low} to {high}")
+    return x
+
+
+def problem_of(arrays):
+    """Instance and field."""
+    head = head_of(arrays, "instance_head")
+    need(head.get("gauge") in {"strokes", "box"}, "instance_head: unknown gauge")
+    mask = take(arrays, "instance_mask", "?", None, None)
+    take(arrays, "instance_origin", "<f8", 2)
+    pixels = np.argwhere(mask)
+    n, at = len(pixels), {(r, c): i for i, (r, c) in enumerate(pixels.tolist())}
+    need(n > 0, "instance_mask: has no pixel")
+    pairs = [(i, at[q]) for (r, c), i in at.items() for q in ((r - 1, c), (r, c + 1)) if q in at]
+
+    given = take(arrays, "instance_theta", "<f8", None)
+    w = take(arrays, "instance_w", "<f8", len(given))
+    places = take(arrays, "instance_stroke_pixels", "<i4", len(given), 2).tolist()
+    where = [at.get((r, c), -1) for r, c in places]
+    need(
+        -1 not in where and where == sorted(set(where)), "instance_stroke_pixels: not row by row in the mask"
+    )
+    need(((w > 0) & (w <= 1)).all(), "instance_w: outside (0, 1]")
+    need(((given >= 0) & (given < PI)).all(), "instance_theta: outside [0, pi)")
+    theta, weight, window = np.zeros((3, n))
+    weight[where] = number(head, "w_strokes", 0, 1e6) * w
+    if head["gauge"] == "strokes":
+        theta[where], window[where] = given, given - PI / 4
+    else:
+        theta[where] = np.where(given >= 3 * PI / 4 - 1e-9, np.maximum(given - PI, -PI / 4), given)
+
+    alpha, beta = (take(arrays, name, "<f8", n) for name in ("alpha", "beta"))
+    p = take(arrays, "p", "<i4", len(pairs)).astype(int)
+    outside = (abs(alpha - window - PI / 4) > PI / 4 + SLIVER * 2) | (abs(beta) > PI / 4 + SLIVER * 2)
+    need(not outside.any(), f"alpha, beta: outside the window at pixel {pixels[outside.argmax()]}")
+    need((abs(p) <= 64).all(), "p: too large")
+    pairs = np.array(pairs, int).reshape(-1, 2)
+    return Problem(pixels, pairs, theta, weight, number(head, "w_beta", 0, 1e6), alpha, beta, p)
+
+
+def quads_of(arrays, at, count, problem):
+    """Quads of a level with their tables."""
+    corners, ends = take(arrays, f"{at}quads", "<i4", None).tolist(), problem.pixels.tolist()
+    places = {tuple(place): i for i, place in enumerate(ends)}
+    need(corners == sorted(set(corners)), f"{at}quads: not ascending")
+    need(all(0 <= a < len(ends) for a in corners), f"{at}quads: no pixel")
+    walks = [[(r, c), (r, c + 1), (r - 1, c + 1), (r - 1, c)] for r, c in (ends[a] for a in corners)]
+    need(all(q in places for walk in walks for q in walk), f"{at}quads: outside the mask")
+    pixels = [[places[q] for q in walk] for walk in walks]
+    shapes = [(count[q[x], 0], count[q[y], 0]) for q in pixels for x, y in ((0, 1), (1, 2), (3, 2), (0, 3))]
+    scale = take(arrays, f"{at}table_scale", "<f8", len(shapes))
+    need(((scale >= 0) & (scale <= 1)).all(), f"{at}table_scale: outside [0, 1]")
+    steps = take(arrays, f"{at}table_steps", "<i4", sum(x * y for x, y in shapes))
+    tables, used = [], 0
+    for (x, y), unit in zip(shapes, scale, strict=True):
+        sums = steps[used : used + x * y].cumsum(dtype=np.int32)  # modulo 2^32
+        tables.append(unit * sums.reshape(x, y))
+        used += x * y
+    return [(q, tables[4 * k : 4 * k + 4]) for k, q in enumerate(pixels)]
+
+
+def level_of(arrays, number, problem, version):
+    """One level of the certificate."""
+    n, m, at = len(problem.pixels), len(problem.pairs), f"level_{number}_"
+    h = float(take(arrays, f"{at}h", "<f8", 1)[0])
+    centre = np.stack([take(arrays, at + name, "<f8", n) for name in ("alpha", "beta")], axis=1)
+    ranges = take(arrays, f"{at}ranges", "<i4", n, 4).astype(int)
+    first, count = ranges[:, ::2], ranges[:, 1::2]
+    need(1e-5 <= h <= PI / 4 + SLIVER and (count >= 2).all(), f"{at}h, {at}ranges: no lattice")
+    need(max(abs(centre).max(), (h * (abs(first) + count)).max()) <= 16, f"{at}ranges: too far away")
+    sizes = count.prod(axis=1)
+    bits = np.unpackbits(take(arrays, f"{at}allowed", "u1", -(-int(sizes.sum()) // 8))).astype(bool)
+    ends = sizes.cumsum()
+    allowed = [bits[ends[i] - sizes[i] : ends[i]].reshape(count[i]) for i in range(n)]
+    for labels, pixel in zip(allowed, problem.pixels, strict=True):
+        need(all_four(labels).any(), f"{at}allowed: no cell at pixel {pixel}")
+        need(labels.sum() <= MOST_LABELS, f"{at}allowed: pixel {pixel} has too many labels for dense tables")
+
+    scale, wide = take(arrays, f"{at}scale", "<f8", m), take(arrays, f"{at}wide", "?", m)
+    need(((scale >= 0) & (scale <= 1)).all(), f"{at}scale: outside [0, 1]")
+    earlier = problem.pairs.min(axis=1)
+    shares = [np.zeros(0)] * m
+    for narrow, name, kind in ((True, f"{at}steps_16", "<i2"), (False, f"{at}steps_32", "<i4")):
+        chosen = np.flatnonzero(wide != narrow)
+        steps, used = take(arrays, name, kind, sizes[earlier[chosen]].sum()), 0
+        for e in chosen:
+            i = earlier[e]
+            sums = steps[used : used + sizes[i]].cumsum(dtype=np.int32)  # modulo 2^32
+            shares[e], used = scale[e] * sums[allowed[i].ravel()], used + sizes[i]
+    offset = 0.5 * (problem.pixels.sum(axis=1) % 2)
+    k, low = (first + offset[:, None]).T
+    steps = [(k[i] + np.arange(count[i, 0]), low[i] + np.arange(count[i, 1])) for i in range(n)]
+    quads = quads_of(arrays, at, count, problem) if version > 1 else []
+    return Level(number, h, centre, steps, allowed, shares, quads)
+
+
+# Sections 3 to 5: bound and remaining cells of a level ------------------------------------------------------
+
+
+def pixel_costs(problem, level, i, version):
+    """D_i of the allowed labels."""
+    alpha, beta, s = level.labels(i)
+    theta, weight, h2 = problem.theta[i], problem.weight[i], level.h**2
+    cost = problem.w_beta * (beta**2 - h2 / 4)
+    if weight == 0:
+        return cost
+    known = np.rint((level.centre[i].sum() - theta) / PI)  # the turn of u at the centre of the lattice
+    sharp = np.choose(np.minimum(abs(s), 2).astype(int), [0, 1, 1 / 2])
+    white = problem.pixels[i].sum() % 2 == 1
+    nearest = np.full(len(s), np.inf)
+    for name, line in (("u", alpha + beta - theta), ("v", alpha + PI / 2 - beta - theta)):
+        for turn in np.arange(np.floor(line.min() / PI), np.ceil(line.max() / PI) + 1):
+            special = name == "u" and turn == known and not (version == 1 and white)
+            nearest = np.minimum(nearest, (line - PI * turn) ** 2 - h2 * (sharp if special else 1 / 2))
+    return cost + weight * nearest
+
+
+def pair_costs(level, i, j):
+    """c_ij with all tables, for allowed labels of i (rows) and j (columns); for (j, i) the transposed."""
+    (a, b, _), (c, d, _) = level.labels(i), level.labels(j)
+    apart = a[:, None] - c
+    even = (apart - PI * np.rint(apart / PI)) ** 2 + (b[:, None] - d) ** 2
+    apart += PI / 2
+    odd = (apart - PI * np.rint(apart / PI)) ** 2 + (b[:, None] + d) ** 2
+    costs = 2 * np.minimum(even, odd) - level.h**2
+    rows, columns = np.nonzero(level.allowed[i])[0], np.nonzero(level.allowed[j])[0]
+    for (a, b, c, d), tables in level.quads:
+        for ends, table in zip(((a, b), (b, c), (d, c), (a, d)), tables, strict=True):
+            if ends == (i, j):
+                costs += table[np.ix_(rows, columns)]
+            if ends == (j, i):
+                costs += table[np.ix_(columns, rows)].T
+    return costs
+
+
+def quad_least(level, pixels, tables):
+    """Q of a quad: the least of minus the sum of its tables, where a label is allowed at each alpha."""
+    a, b, c, d = (level.allowed[i].any(axis=1) for i in pixels)
+    ab, bc, dc, ad = (-table for table in tables)
+    over_b = (ab[np.ix_(a, b)][:, :, None] + bc[np.ix_(b, c)]).min(axis=1)
+    over_d = (ad[np.ix_(a, d)][:, :, None] + dc[np.ix_(d, c)]).min(axis=1)
+    return (over_b + over_d).min()
+
+
+def examine(problem, level, version, slack):
+    """Bound of a level (lemma 2), and the cells that its forward pass leaves (lemma 3)."""
+    n, pairs = len(problem.pixels), np.sort(problem.pairs, axis=1)
+    before = [pixel_costs(problem, level, i, version) for i in range(n)]
+    for (i, _), a in zip(pairs, level.shares, strict=True):
+        before[i] = before[i] + a
+    quads = sum(quad_least(level, *quad) for quad in level.quads)
+    after, size = list(before), sum(abs(cost).max() for cost in before)
+    size += sum(abs(table).max() for _, tables in level.quads for table in tables)
+    for i in range(n):
+        rest = after[i] - after[i].min()
+        forward, backward = np.flatnonzero(pairs[:, 0] == i), np.flatnonzero(pairs[:, 1] == i)
+        for e in forward:
+            j, a = pairs[e, 1], level.shares[e]
+            costs = pair_costs(level, i, j)
+            shares = (costs - a[:, None]).min(axis=0)
+            a = a - rest / max(len(forward), len(backward))
+            before[j], after[j] = before[j] + shares, after[j] + (costs - a[:, None]).min(axis=0)
+            size += abs(a).max() + abs(shares).max() + costs.max()
+    error = 1e-14 * size + slack
+    lowest = np.array([[theta.min() for theta in each] for each in (after, before)])
+    for i in range(n):
+        bound = quads + lowest[0, : i + 1].sum() + lowest[1, i + 1 :].sum()
+        good = np.zeros_like(level.allowed[i])
+        good[level.allowed[i]] = bound + after[i] - after[i].min() <= problem.energy() + error
+        level.left.append(remaining(level, i, good))
+    level.bound = quads + lowest[0].sum() - error
+
+
+def remaining(level, i, good):
+    """Cells of the domain with a good corner, cut at |beta| = pi/4: rows (a0, a1, b0, b1)."""
+    k, low = np.nonzero(all_four(level.allowed[i]) & ~all_four(~good))
+    alpha, beta = level.places(i)
+    ends = alpha[k], alpha[k + 1], np.maximum(beta[low], -PI / 4), np.minimum(beta[low + 1], PI / 4)
+    return np.stack(ends, axis=1)[ends[3] - ends[2] > 2 * SLIVER]
+
+
+def covered(level, i, cells):
+    """Whether the domain of a level contains each of the cells."""
+    inside, (alpha, beta) = all_four(level.allowed[i]), level.places(i)
+    result = np.zeros(len(cells), bool)
+    for c, (a0, a1, b0, b1) in enumerate(cells):
+        ks = (alpha[:-1] < a1 - SLIVER) & (alpha[1:] > a0 + SLIVER)
+        ls = (beta[:-1] < b1 - SLIVER) & (beta[1:] > b0 + SLIVER)
+        reach = alpha[0] - SLIVER <= a0 and a1 <= alpha[-1] + SLIVER
+        reach &= beta[0] - SLIVER <= b0 and b1 <= beta[-1] + SLIVER
+        result[c] = reach and inside[np.ix_(ks, ls)].all()
+    return result
+
+
+def check_covers(problem, levels):
+    """The first level covers the strip, and each later one what remains of the level before."""
+    for i, pixel in enumerate(problem.pixels):
+        low = levels[0].places(i)[0][0]
+        whole = covered(levels[0], i, [(low, low + PI / 2, -PI / 4, PI / 4)]).all()
+        need(whole, f"level_0_allowed: does not cover the strip at pixel {pixel}")
+    for level, after in pairwise(levels):
+        for i, pixel in enumerate(problem.pixels):
+            whole = covered(after, i, level.left[i]).all()
+            what = f"what level {level.number} leaves at pixel {pixel}"
+            need(whole, f"level_{after.number}_allowed: does not cover {what}")
+
+
+# Section 6: the last step -----------------------------------------------------------------------------------
+
+
+def boxes_of(problem, levels):
+    """Box of every pixel around the remaining cells of the last level: rows (a0, a1, b0, b1)."""
+    cells, margin = levels[-1].left, 2 * (len(levels) + 1) * SLIVER
+    last = f"level_{len(levels) - 1}_allowed"
+    need(all(map(len, cells)), f"{last}: no cell remains at a pixel, not even that of the field")
+    ends = np.array([[*c.min(axis=0)[[0, 2]], *c.max(axis=0)[[1, 3]]] for c in cells])
+    a0, b0, a1, b1 = (ends + np.array([-margin, -margin, margin, margin])).T
+    return np.stack([a0, a1, np.maximum(b0, -PI / 4), np.minimum(b1, PI / 4)], axis=1)
+
+
+def relabelled(problem, level):
+    """The same field, with the label of every cross that is nearest to the centre of the lattice."""
+    t, (i, j) = np.rint((level.centre[:, 0] - problem.alpha) / (PI / 2)), problem.pairs.T
+    beta, p = (-1.0) ** t * problem.beta, problem.p - t[i] + t[j]
+    return replace(problem, alpha=problem.alpha + PI / 2 * t, beta=beta, p=p)
+
+
+def check_jumps(problem, boxes):
+    """Lemma 4 for every pair, on all crosses of two boxes."""
+    for (i, j), p in zip(problem.pairs, problem.p, strict=True):
+        (a0, a1, b0, b1), (c0, c1, d0, d1) = boxes[i], boxes[j]
+        most = max(abs(a0 - c1 + PI / 2 * p), abs(a1 - c0 + PI / 2 * p))
+        least = min((-1.0) ** p * b * d for b in (b0, b1) for d in (d0, d1))
+        forced = most <= PI / 2 and PI * most - PI**2 / 4 <= 4 * least
+        need(forced, f"p: another jump may be better at the pixels {problem.pixels[[i, j]].tolist()}")
+
+
+def convex_bound(problem, boxes):
+    """Least bound of all pieces of the boxes, which are cut at |alpha - theta| = pi/4 where that helps."""
+    theta = problem.theta + PI * np.rint((problem.alpha - problem.theta) / PI)
+    boxes = boxes - np.stack(
+        [theta, theta, 0 * theta, 0 * theta], axis=1
+    )  # alpha is now relative to the stroke
+    far = (problem.weight > 0) & (abs(boxes[:, :2]).max(axis=1) > 3 * PI / 4)
+    need(not far.any(), f"lemma 5 does not apply at the stroke of pixel {problem.pixels[far.argmax()]}")
+    enough = problem.energy() - TOLERANCE / 2 * max(1, problem.energy())
+    bound, count, pieces = np.inf, 0, [(boxes, np.zeros(len(theta)))]
+    while pieces:
+        (boxes, side), count = pieces.pop(), count + 1
+        least = piece_bound(problem, theta, boxes, side)
+        beyond = np.stack([-PI / 4 - boxes[:, 0], boxes[:, 1] - PI / 4]) * problem.weight * (side == 0)
+        which, i = np.unravel_index(beyond.argmax(), beyond.shape)
+        if least >= enough or beyond[which, i] <= 0 or count > 200:
+            bound = min(bound, least)
+            continue
+        inner, outer, sides = boxes.copy(), boxes.copy(), side.copy()
+        sides[i] = 2 * which - 1
+        inner[i, which] = outer[i, 1 - which] = sides[i] * PI / 4
+        pieces += [(inner, side), (outer, sides)]
+    return bound
+
+
+def piece_bound(problem, theta, boxes, side):
+    """Lower bound of G on boxes; where side is 1 or -1, alpha lies beyond it, and v carries the stroke."""
+    n, m, (i, j) = len(boxes), len(problem.pairs), problem.pairs.T
+    a, b = np.zeros((2, m, 2 * n))  # A and B of all pairs, as functions of all alpha and beta
+    a[np.arange(m), i], a[np.arange(m), j] = 1, -1
+    b[np.arange(m), n + i], b[np.arange(m), n + j] = (-1.0) ** problem.p, -1
+    r = np.concatenate([np.eye(n), np.diag(np.where(side, -1.0, 1.0))], axis=1)
+    rows = np.concatenate([a, b, r, np.eye(2 * n)[n:]])
+    goal = [theta[j] - theta[i] - PI / 2 * problem.p, np.zeros(m), side * PI / 2, np.zeros(n)]
+    goal = np.concatenate(goal)
+    weights = np.concatenate([np.full(2 * m, 2.0), problem.weight, np.full(n, problem.w_beta)])
+    beyond = np.maximum([-PI / 4 - boxes[:, 0], boxes[:, 1] - PI / 4], 0)  # the greatest e below and above
+    below, above = 4 * problem.weight * beyond * (side == 0)
+    linear, constant = np.concatenate([np.zeros(n), below - above]), -PI / 4 * (above + below).sum()
+    low, high = (boxes[:, ends].T.ravel() for ends in ([0, 2], [1, 3]))
+
+    x = np.concatenate([problem.alpha - theta, problem.beta]).clip(low, high)
+    hessian = 2 * rows.T @ (weights[:, None] * rows) + 1e-9 * np.eye(2 * n)
+    for _ in range(200):  # an active set method; any x gives a bound, and the least one gives the best
+        slope = 2 * rows.T @ (weights * (rows @ x - goal)) + linear
+        free = ~((x <= low) & (slope > 0) | (x >= high) & (slope < 0))
+        step = np.zeros(2 * n)
+        step[free] = np.linalg.solve(hessian[np.ix_(free, free)], -slope[free])
+        if abs(step).max() < 1e-13:
+            break
+        room = np.divide(np.where(step > 0, high - x, low - x), step, out=np.ones(2 * n), where=step != 0)
+        x = (x + min(1, room.min()) * step).clip(low, high)
+    slope = 2 * rows.T @ (weights * (rows @ x - goal)) + linear
+    value = weights @ (rows @ x - goal) ** 2 + linear @ x + constant
+    size = value + abs(linear) @ abs(x) - constant + abs(slope) @ (high - low)
+    return float(value + np.minimum(slope * (low - x), slope * (high - x)).sum() - 1e-13 * n**0.5 * size)
+
+
+# Section 7: the theorem -------------------------------------------------------------------------------------
+
+
+def check(arrays):
+    """Bound that a certificate proves for the energy of every field; at least what it claims."""
+    arrays = dict(arrays)  # each reader below removes its array
+    head = head_of(arrays, "head")
+    version = head.get("version")
+    known = head.get("format") == "crossfield-certificate" and type(version) is int and version in {1, 2}
+    need(known, "head: no certificate of version 1 or 2")
+    need(head.get("status") in {"optimal", "gap"}, "head: the status is neither optimal nor gap")
+    problem, count = problem_of(arrays), number(head, "levels", 1, 64)
+    energy, claimed = problem.energy(), number(head, "energy", 0, 1e300)
+    need(count == int(count), f"head: {count} levels")
+    need(abs(energy - claimed) <= 1e-12 * max(1, energy), f"head: the energy is {energy}, not {claimed}")
+
+    levels = levels_of(arrays, problem, int(count), version)
+    bound = max(0.0, min(max(level.bound for level in levels), energy))
+    boxes, field = boxes_of(problem, levels), relabelled(problem, levels[0])
+    try:
+        check_jumps(field, boxes)
+        bound = max(bound, min(convex_bound(field, boxes), energy))
+    except Refused:
+        if head["status"] == "optimal":
+            raise
+    optimal = bound >= energy - TOLERANCE * max(1, energy)
+    need(optimal or head["status"] == "gap", f"head: not optimal, with a bound of {bound}")
+    need(number(head, "bound", -1e300, 1e300) <= bound, f"head: the bound is {bound}, not {head['bound']}")
+    return bound
+
+
+def levels_of(arrays, problem, count, version):
+    """All levels, each with its bound and with the domain that it needs."""
+    slack = 2 * (count + 1) * SLIVER * (64 + 8 * problem.weight + 4 * problem.w_beta).sum()
+    levels = [level_of(arrays, k, problem, version) for k in range(count)]
+    need(not arrays, f"{next(iter(arrays), '')} belongs to no certificate with {count} levels")
+    for level in levels:
+        need(
+            (level.centre == levels[0].centre).all(), f"level_{level.number}_alpha or beta: not as at level 0"
+        )
+        examine(problem, level, version, slack)
+    check_covers(problem, levels)
+    return levels
+
+
+if __name__ == "__main__":
+    try:
+        print(f"every field has an energy of at least {check(arrays_of(Path(sys.argv[1]))):.15g}")
+    except Refused as refusal:
+        sys.exit(str(refusal))
