@@ -63,6 +63,7 @@ def browser() -> str | None:
 OTHERS = {
     "baron": (importlib.util.find_spec("gamspy_baron"), "BARON", "pip install gamspy_baron"),
     "pyqplib": (importlib.util.find_spec("pyqplib"), "pyqplib", "pip install pyqplib"),
+    "toulbar2": (importlib.util.find_spec("pytoulbar2"), "toulbar2", "pip install pytoulbar2"),
     "trimesh": (importlib.util.find_spec("trimesh"), "trimesh", "pip install trimesh"),
     "bpy": (importlib.util.find_spec("bpy"), "Blender as a module", "pip install bpy (1 GB)"),
     "chromium": (

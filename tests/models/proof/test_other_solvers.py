@@ -1,10 +1,18 @@
-"""Proven optima against those that Gurobi and CPLEX prove of the same problem as a convex MIQP."""
+"""Proofs against other solvers: Gurobi and CPLEX on the convex MIQP, toulbar2 on the labels of a level."""
+
+from dataclasses import replace
 
 import crossfield as cf
+import numpy as np
 import pytest
 from crossfield.export.formats.registry import write
 from crossfield.models.formulations.problem import formulate
-from exhaustive import random_instance
+from crossfield.models.processes.compiled import crew
+from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.sweep import Dual
+from crossfield.models.search.starts import first_field
+from exhaustive import random_instance, sketch
+from labellings import discrete
 
 pytestmark = [pytest.mark.oracles, pytest.mark.numeric]
 
@@ -73,3 +81,36 @@ def test_cplex_proves_the_same_optima(tmp_path):
 @pytest.mark.needs("cplex")
 def test_cplex_proves_the_same_optima_of_larger_ones(tmp_path):
     agrees(by_cplex, LARGER, tmp_path)
+
+
+def least_by_toulbar2(unary, pairs):
+    """The least sum of costs that toulbar2 proves; costs are rounded up to whole millionths."""
+    import pytoulbar2
+
+    problem, least = pytoulbar2.CFN(10**9, resolution=0), 0.0
+    tables = [((i,), cost[np.isfinite(cost)]) for i, cost in enumerate(unary)]
+    for i, (_, cost) in enumerate(tables):
+        problem.AddVariable(f"x{i}", range(len(cost)))
+    allowed = [np.isfinite(cost) for cost in unary]
+    tables += [((i, j), cost[np.ix_(allowed[i], allowed[j])]) for i, j, cost in pairs]
+    for pixels, cost in tables:
+        least += float(cost.min())
+        whole = np.ceil((cost - cost.min()) * 1e6).astype(int)
+        problem.AddFunction([f"x{i}" for i in pixels], whole.ravel().tolist())
+    _, found, _ = problem.Solve()
+    return least + found / 1e6
+
+
+@pytest.mark.needs("toulbar2")
+def test_toulbar2_finds_no_labels_below_the_bound_of_a_level():
+    """Six pixels with a vortex, with the costs of the test's own dense tables."""
+    theta = np.random.default_rng(3).uniform(0, np.pi, (2, 3))
+    instance = replace(sketch(np.ones((2, 3), bool), theta, 1.0), stroke_coefficient=30.0)
+    lattice = Lattice.whole(first_field(instance), 6)
+    least = least_by_toulbar2(*discrete(lattice))
+    with crew(1) as hands:
+        dual = Dual(lattice, hands)
+        dual.ascend(20)
+        dual.add_clusters(2)
+        dual.ascend(20)
+        assert least - 1e-3 <= dual.bound() <= least
