@@ -67,6 +67,8 @@ def prove_command(
         show("writing and checking the certificate")
         document = _write(proof, output, deadline)
     printing.show(document, lambda: _show(proof, document, output))
+    if instance.gauge == "box":
+        print_notice("the proof is of the gauge strokes; its bound also holds in the gauge box")
     if proof.ended == "interrupted":
         print_notice("interrupted; the best field and bound so far were kept")
     if document["status"] == UNPROVEN:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ...models.field.field import CrossField
+from ...models.field.field import CrossField, relabelled
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock, Deadline, Over, Progress, never, silent
 from ...models.processes.limits import Limits
@@ -19,7 +19,7 @@ from ...models.proof.dual_start import search
 from ...models.search.box_qp import fitted
 from ...models.search.greedy import greedy_field
 from ...models.search.search import Search
-from ...models.search.starts import first_field, polyvector_start
+from ...models.search.starts import best_start, first_field, polyvector_start
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
 from ..solutions.solution import Solution
@@ -243,7 +243,11 @@ def _prove(request: Request) -> Iterator[Candidate]:
     )
     counts = (("levels", len(proof.levels)), ("forced_jumps", proof.forced))
     seconds, interrupted = time.perf_counter() - begin, proof.ended == "interrupted"
-    yield Candidate("prove", proof.field, seconds, interrupted=interrupted, counts=counts, proof=proof)
+    field = proof.field
+    if request.instance.gauge == "box":
+        near = relabelled(request.instance, field.alpha, field.beta, field.p)
+        field = best_start(request.instance, near, request.stop)
+    yield Candidate("prove", field, seconds, interrupted=interrupted, counts=counts, proof=proof)
 
 
 def _two_stage(request: Request) -> Iterator[Candidate]:

@@ -6,7 +6,7 @@ import math
 import time
 
 from ..errors import InputError
-from ..field.field import CrossField, Norm
+from ..field.field import CrossField, Norm, relabelled
 from ..instance.instance import Instance
 from ..processes.compiled import crew
 from ..processes.deadline import Progress, Stop, silent, stop_function
@@ -35,9 +35,10 @@ def prove(
 ) -> Proof:
     """Find a field of low energy, and prove a lower bound of the energy of all fields.
 
-    The bound holds for both gauges. Under `box` it is the bound of `strokes`, and seldom tight. Without a
-    time limit the same arguments give the same proof, for any number of threads. Ctrl-C ends the proof with
-    its best field and bound.
+    The proof of an instance in the gauge `box`, with its field, is that of the same sketch in the gauge
+    `strokes`. The bound holds for both gauges, because every field in `box` has a field in `strokes` of at
+    most its energy. Without a time limit the same arguments give the same proof, for any number of threads.
+    Ctrl-C ends the proof with its best field and bound.
 
     Parameters
     ----------
@@ -83,6 +84,8 @@ def prove(
         raise InputError(f"a proof is in the 1-norm or the 2-norm, not in norm {norm}")
     if start is not None:
         start.check_instance(instance)
+        start = relabelled(instance.with_gauge("strokes"), start.alpha, start.beta, start.p)
+    instance = instance.with_gauge("strokes")
     checked(jobs)
     given = limits or Limits(math.inf, gap=0.0)
     began = time.monotonic()
