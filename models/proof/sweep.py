@@ -55,10 +55,10 @@ class Dual:
         """Start from zero shares and without clusters, or from the given ones."""
         self.lattice, self.crew = lattice, crew
         self.state = _state(lattice, shares, clusters)
+        self._before: list[NDArray[np.float32]]  # the direction of a change needs no more digits
         self._take_clusters()
         self._fronts = fronts(lattice.instance.grid)
         self._parts = [crew.parts(lattice.count[front]) for front in self._fronts]
-        self._before: list[NDArray[np.float32]] = []  # the direction of a change needs no more digits
         self._times, self._reached = 0, -math.inf
         self.seconds = 0.0  # of the last pass that was not cut off
 
@@ -87,15 +87,16 @@ class Dual:
         return bound
 
     def _extrapolate(self) -> None:
-        """Move the shares along their last change, further the longer the bound has not fallen."""
+        """Move shares and tables along their last change, further the longer the bound has not fallen."""
         part = self._times / (self._times + 3)
         self._times += 1
-        both = (self.state.shares_first, self.state.shares_second)
+        state = self.state
+        moved = (state.shares_first, state.shares_second, state.clusters.tables)
         if not self._before:
-            self._before = [shares.astype(np.float32) for shares in both]
+            self._before = [values.astype(np.float32) for values in moved]
             return
-        for shares, before in zip(both, self._before, strict=True):
-            parts = [(shares[at], before[at]) for at in self.crew.equal_parts(len(shares))]
+        for values, before in zip(moved, self._before, strict=True):
+            parts = [(values[at], before[at]) for at in self.crew.equal_parts(len(values))]
             self.crew.run(lambda each: _carry_on(*each, part), parts)
 
     def add_clusters(self, count: int) -> None:
@@ -109,6 +110,7 @@ class Dual:
         self._take_clusters()
 
     def _take_clusters(self) -> None:
+        self._before = []
         self._cluster_fronts = cluster_fronts(self.lattice.instance.grid, self.state.clusters)
         self._of_clusters = self._minima(least_of_clusters, len(self.state.clusters.quads))
 
@@ -171,11 +173,11 @@ class Dual:
 
 
 @compiled
-def _carry_on(shares: Floats, before: NDArray[np.float32], part: float) -> None:
-    """Extrapolate by a part of the change since the previous pass, and store the shares as they were."""
-    for x in range(shares.size):
-        now = shares[x]
-        shares[x] = now + part * (now - before[x])
+def _carry_on(values: Floats, before: NDArray[np.float32], part: float) -> None:
+    """Extrapolate by a part of the change since the previous pass, and store the values as they were."""
+    for x in range(values.size):
+        now = values[x]
+        values[x] = now + part * (now - before[x])
         before[x] = now
 
 
