@@ -1,4 +1,4 @@
-"""A second checker of optimality certificates, written from the documentation: `second_checker.py FILE`.
+"""A second checker of optimality certificates, after the documentation: `second_checker.py FILE`.
 
 It follows docs/proofs.md and docs/files.md with dense arrays. It imports nothing of crossfield, and shares no
 code with models/proof. Section numbers are those of docs/proofs.md. Clarity comes before speed.

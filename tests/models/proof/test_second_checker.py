@@ -1,4 +1,4 @@
-"""Certificates of `crossfield prove`, checked by a program that was written from the documentation alone."""
+"""Certificates of `crossfield prove`, checked by a second program that follows the documentation."""
 
 import ast
 import json
