@@ -1,4 +1,4 @@
-"""A second checker of optimality certificates, written from the documentation: `second_checker.py FILE`.
+"""A second checker of optimality certificates, after the documentation: `second_checker.py FILE`.
 
 It follows docs/proofs.md and docs/files.md with dense arrays. It imports nothing of crossfield, and shares no
 code with models/proof. Section numbers are those of docs/proofs.md. Clarity comes before speed.
@@ -378,10 +378,9 @@ def convex_bound(problem, boxes):
     bound, count, pieces = np.inf, 0, [(boxes, np.zeros(len(theta)))]
     while pieces:
         (boxes, side), count = pieces.pop(), count + 1
-        least = piece_bound(problem, theta, boxes, side)
-        beyond = np.stack([-PI / 4 - boxes[:, 0], boxes[:, 1] - PI / 4]) * problem.weight * (side == 0)
-        which, i = np.unravel_index(beyond.argmax(), beyond.shape)
-        if least >= enough or beyond[which, i] <= 0 or count > 200:
+        least, lost = piece_bound(problem, theta, boxes, side)
+        which, i = np.unravel_index(lost.argmax(), lost.shape)  # the cut that helps most
+        if least >= enough or lost[which, i] <= 0 or count > 200:
             bound = min(bound, least)
             continue
         inner, outer, sides = boxes.copy(), boxes.copy(), side.copy()
@@ -392,7 +391,10 @@ def convex_bound(problem, boxes):
 
 
 def piece_bound(problem, theta, boxes, side):
-    """Lower bound of G on boxes; where side is 1 or -1, alpha lies beyond it, and v carries the stroke."""
+    """Lower bound of G on boxes, and what lemma 5 takes off there at both ends of every pixel.
+
+    Where side is 1 or -1, alpha lies beyond it, and v carries the stroke.
+    """
     n, m, (i, j) = len(boxes), len(problem.pairs), problem.pairs.T
     a, b = np.zeros((2, m, 2 * n))  # A and B of all pairs, as functions of all alpha and beta
     a[np.arange(m), i], a[np.arange(m), j] = 1, -1
@@ -407,21 +409,33 @@ def piece_bound(problem, theta, boxes, side):
     linear, constant = np.concatenate([np.zeros(n), below - above]), -PI / 4 * (above + below).sum()
     low, high = (boxes[:, ends].T.ravel() for ends in ([0, 2], [1, 3]))
 
+    def value(x):
+        return weights @ (rows @ x - goal) ** 2 + linear @ x + constant
+
+    def slope(x):
+        return 2 * rows.T @ (weights * (rows @ x - goal)) + linear
+
     x = np.concatenate([problem.alpha - theta, problem.beta]).clip(low, high)
     hessian = 2 * rows.T @ (weights[:, None] * rows) + 1e-9 * np.eye(2 * n)
-    for _ in range(200):  # an active set method; any x gives a bound, and the least one gives the best
-        slope = 2 * rows.T @ (weights * (rows @ x - goal)) + linear
-        free = ~((x <= low) & (slope > 0) | (x >= high) & (slope < 0))
+    for _ in range(
+        100
+    ):  # Newton steps on the angles that no bound holds: any x gives a bound, the least the best
+        free = ~((x <= low) & (slope(x) > 0) | (x >= high) & (slope(x) < 0))
         step = np.zeros(2 * n)
-        step[free] = np.linalg.solve(hessian[np.ix_(free, free)], -slope[free])
-        if abs(step).max() < 1e-13:
+        step[free] = np.linalg.solve(hessian[np.ix_(free, free)], -slope(x)[free])
+        ends = ((x + 0.5**k * step).clip(low, high) for k in range(30))
+        better = next((end for end in ends if value(end) < value(x)), None)
+        if better is None:
             break
-        room = np.divide(np.where(step > 0, high - x, low - x), step, out=np.ones(2 * n), where=step != 0)
-        x = (x + min(1, room.min()) * step).clip(low, high)
-    slope = 2 * rows.T @ (weights * (rows @ x - goal)) + linear
-    value = weights @ (rows @ x - goal) ** 2 + linear @ x + constant
-    size = value + abs(linear) @ abs(x) - constant + abs(slope) @ (high - low)
-    return float(value + np.minimum(slope * (low - x), slope * (high - x)).sum() - 1e-13 * n**0.5 * size)
+        x = better
+
+    def least(x):
+        rise = slope(x)
+        size = value(x) + abs(linear) @ abs(x) - constant + abs(rise) @ (high - low)
+        return value(x) + np.minimum(rise * (low - x), rise * (high - x)).sum() - 1e-13 * n**0.5 * size
+
+    bound = max(least(x), least((x + step).clip(low, high)))  # the values of both differ by rounding only
+    return bound, np.stack([below * (PI / 4 - x[n:]), above * (PI / 4 + x[n:])])
 
 
 # Section 7: the theorem -------------------------------------------------------------------------------------
@@ -445,7 +459,7 @@ def check(arrays):
     boxes, field = boxes_of(problem, levels), relabelled(problem, levels[0])
     try:
         check_jumps(field, boxes)
-        bound = max(bound, min(convex_bound(field, boxes), energy))
+        bound = max(bound, float(min(convex_bound(field, boxes), energy)))
     except Refused:
         if head["status"] == "optimal":
             raise

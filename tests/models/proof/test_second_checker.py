@@ -1,4 +1,4 @@
-"""Certificates of `crossfield prove`, checked by a program that was written from the documentation alone."""
+"""Certificates of `crossfield prove`, checked by a second program that follows the documentation."""
 
 import ast
 import json
@@ -71,8 +71,10 @@ def test_all_certificates_of_the_library_are_confirmed():
 
 
 @pytest.mark.slow
-def test_bottle_at_24_pixels_is_confirmed(tmp_path):
-    confirmed(sample("bottle", size=24), tmp_path / "it.npz")
+@pytest.mark.parametrize("name, size", [("bottle", 24), ("saddle", 20)])
+def test_samples_are_confirmed(name, size, tmp_path):
+    """The last boxes of `saddle` are cut at four strokes."""
+    confirmed(sample(name, size=size), tmp_path / "it.npz")
 
 
 @pytest.mark.slow
