@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import signal
 import sys
-from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Final, NoReturn
 
 import typer
@@ -18,10 +18,9 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from . import options
 from .evaluate_command import evaluate_command
-from .help_texts import Command
 from .inputs import SAVED, drawing_of, field_or_instance, formulations_of, known, read_start, require_suffix
 from .library_command import library
-from .option_groups import with_option_groups
+from .option_groups import command as command_of
 from .output import (
     INTERRUPTED,
     escape_unencodable,
@@ -32,7 +31,7 @@ from .output import (
     show_lists,
     show_manifests,
     show_report,
-    show_samples,
+    show_table,
 )
 from .prove_command import prove_command
 from .shade_command import shade_command
@@ -53,9 +52,7 @@ app = typer.Typer(
 _STOPPED: Final = 130  # exit code of typer after a Ctrl-C that no command handled
 
 
-def command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Decorator that adds a function as a command of this name."""
-    return lambda function: app.command(name, cls=Command)(with_option_groups(function))
+command = partial(command_of, app)
 
 
 @app.callback(invoke_without_command=True)
@@ -287,7 +284,9 @@ def samples_command(*, as_json: options.Json = False) -> None:
     if as_json:
         print_json(rows)
     else:
-        show_samples(rows)
+        columns = ("name", "grid", "pixels", "strokes", "description")
+        cells = [[str(row[column]) for column in columns] for row in rows]
+        show_table("samples", columns, cells, numbers=("pixels", "strokes"))
 
 
 app.add_typer(library, name="library")
