@@ -310,7 +310,6 @@ def test_spellings_of_numbers(text, value):
         f"Optimal - objective value {text}\n  0 x {text} 0\n  1 y 1 {text}\n",
         f"s mip 1 2 o {text}\ni 1 {text}\nj 1 {text}\nj 2 1\ne o f\n",
         f"NAME a\n  C x {text}\n  C y 1\nENDATA\n",
-        f'1,"x ","C","BS",{text},0,0,{text},0\n2,"y ","C","BS",1,0,0,{text},0\n',
         f"model_status,1\nsolver_status,1\nobjective,{text}\nx,{text}\ny, 1\n",
         f"=obj= {text}\nx {text}\ny 1\n",
         (
