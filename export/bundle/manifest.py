@@ -229,7 +229,7 @@ def write_all(
     options
         `facet`, `stroke_norm`, `beta_norm` and `relax`, each used where a formulation has it.
     dialects
-        By format: `text` or `binary` for nl, `indexed` or `scalar` for gms.
+        By format: `text` or `binary` for nl.
     compress
         Whether to write model files as .gz.
     jobs

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import signal
 import sys
-from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Final, NoReturn
 
 import typer
@@ -18,10 +18,9 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from . import options
 from .evaluate_command import evaluate_command
-from .help_texts import Command
 from .inputs import SAVED, drawing_of, field_or_instance, formulations_of, known, read_start, require_suffix
 from .library_command import library
-from .option_groups import with_option_groups
+from .option_groups import command as command_of
 from .output import (
     INTERRUPTED,
     escape_unencodable,
@@ -32,7 +31,7 @@ from .output import (
     show_lists,
     show_manifests,
     show_report,
-    show_samples,
+    show_table,
 )
 from .prove_command import prove_command
 from .shade_command import shade_command
@@ -53,9 +52,7 @@ app = typer.Typer(
 _STOPPED: Final = 130  # exit code of typer after a Ctrl-C that no command handled
 
 
-def command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Decorator that adds a function as a command of this name."""
-    return lambda function: app.command(name, cls=Command)(with_option_groups(function))
+command = partial(command_of, app)
 
 
 @app.callback(invoke_without_command=True)
@@ -85,7 +82,7 @@ def run_command(
     gap: options.Gap = 1e-6,
     threads: options.Threads = 0,
     jobs: options.Jobs = 1,
-    dialects: options.DialectOptions,
+    nl_form: options.NlForm = None,
     printing: options.PrintOptions,
 ) -> None:
     """Do all steps for one sketch: write the solver files, try the methods, keep a field and draw it.
@@ -108,7 +105,7 @@ def run_command(
             output,
             limits=limits,
             options={"facet": facet},
-            dialects=dialects.chosen(),
+            dialects={"nl": nl_form} if nl_form else {},
             drawing=drawing_of(source),
             jobs=jobs,
             progress=show,
@@ -150,7 +147,7 @@ def export_command(
     formulating: options.FormulationOptions,
     start: options.Start = None,
     tightened: options.Tightened = None,
-    dialects: options.DialectOptions,
+    nl_form: options.NlForm = None,
     compress: options.Gzip = False,
     jobs: options.Jobs = 1,
     printing: options.PrintOptions,
@@ -182,7 +179,7 @@ def export_command(
             jumps_of=None if proof is None else proof.field,
             windows=None if proof is None else windows_left(proof),
             options=formulating.chosen(),
-            dialects=dialects.chosen(),
+            dialects={"nl": nl_form} if nl_form else {},
             compress=compress,
             jobs=jobs,
             progress=show,
@@ -287,7 +284,9 @@ def samples_command(*, as_json: options.Json = False) -> None:
     if as_json:
         print_json(rows)
     else:
-        show_samples(rows)
+        columns = ("name", "grid", "pixels", "strokes", "description")
+        cells = [[str(row[column]) for column in columns] for row in rows]
+        show_table("samples", columns, cells, numbers=("pixels", "strokes"))
 
 
 app.add_typer(library, name="library")

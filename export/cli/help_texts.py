@@ -67,7 +67,7 @@ PANELS: Final = {
     "Sketch": "size mask silhouette curvature view gauge stroke-weight skew-weight",
     "Formulation": "formulation facet stroke-norm beta-norm relax norm tightened",
     "Method and solver": "method solver start program solve curves search",
-    "Files": "format gams-layout nl-form gzip manifest check on underlay",
+    "Files": "format nl-form gzip manifest check on underlay",
     "Picture and surface": "kind title scale light flip hint",
     "Limits and processes": "time-limit gap threads jobs tolerance up-to scheduler",
     FACTS: "",

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from .help_texts import FACTS, Command
-from .option_groups import with_option_groups
+from .help_texts import FACTS
+from .option_groups import command as command_of
 from .options import Folder, PrintOptions, Processes, Quiet, Seconds
 from .output import print_line, print_notice, progress, show_table
 
@@ -27,12 +26,7 @@ library = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-
-def command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Decorator that adds a function as a command of this name."""
-    return lambda function: library.command(name, cls=Command)(with_option_groups(function))
-
+command = partial(command_of, library)
 
 _fact = partial(typer.Option, rich_help_panel=FACTS)
 

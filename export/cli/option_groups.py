@@ -1,4 +1,4 @@
-"""Groups of options that several commands share: a dataclass with one field per option."""
+"""Declaration of commands. Options that several of them share are the fields of a dataclass."""
 
 from __future__ import annotations
 
@@ -8,8 +8,17 @@ from functools import wraps
 from inspect import Parameter, Signature, signature
 from typing import Any, get_type_hints
 
+import typer
 
-def with_option_groups(function: Callable[..., None]) -> Callable[..., None]:
+from .help_texts import Command
+
+
+def command(app: typer.Typer, name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Decorator that adds a function to the app as a command of this name."""
+    return lambda function: app.command(name, cls=Command)(_with_option_groups(function))
+
+
+def _with_option_groups(function: Callable[..., None]) -> Callable[..., None]:
     """Command in which each parameter whose type is a dataclass is replaced by one option per field.
 
     typer reads the options from the signature of the command. The function receives the dataclass.
@@ -25,15 +34,15 @@ def with_option_groups(function: Callable[..., None]) -> Callable[..., None]:
     ]
 
     @wraps(function)
-    def command(*arguments: Any, **given: Any) -> None:
+    def wrapped(*arguments: Any, **given: Any) -> None:
         for name, group in groups.items():
             names = [field.name for field in fields(group) if field.name in given]
             given[name] = group(**{each: given.pop(each) for each in names})
         function(*arguments, **given)
 
-    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    command.__annotations__ = {each.name: each.annotation for each in parameters}
-    return command
+    wrapped.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {each.name: each.annotation for each in parameters}
+    return wrapped
 
 
 def _options(group: Any) -> Iterator[Parameter]:

@@ -159,27 +159,6 @@ class FormulationOptions:
         }
 
 
-@dataclass(frozen=True)
-class DialectOptions:
-    """Options of the formats that have several dialects."""
-
-    gams_layout: Annotated[
-        Literal["indexed", "scalar"] | None,
-        typer.Option(
-            "--gams-layout",
-            help="GAMS files with equations over sets (indexed), or with one equation per row, as in MINLPLib"
-            " (scalar).",
-        ),
-    ] = None
-    nl_form: Annotated[
-        Literal["text", "binary"] | None, typer.Option("--nl-form", help="AMPL .nl files as text or binary.")
-    ] = None
-
-    def chosen(self) -> dict[str, str]:
-        """Dialect of each format for which one is given."""
-        return {name: value for name, value in (("gms", self.gams_layout), ("nl", self.nl_form)) if value}
-
-
 FormulationName = Annotated[
     str | None, _formulation(help="Solve this formulation: {formulations}; in short {short names}.")
 ]
@@ -192,6 +171,9 @@ FormatNames = Annotated[
     typer.Option(
         "-F", "--format", metavar="NAME", help="{formats}; {default formats} by default, may be repeated."
     ),
+]
+NlForm = Annotated[
+    Literal["text", "binary"] | None, typer.Option("--nl-form", help="AMPL .nl files as text or binary.")
 ]
 Gzip = Annotated[bool, typer.Option("--gzip", help="Compress the model files (.gz).")]
 

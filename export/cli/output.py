@@ -184,22 +184,15 @@ _LEGEND: Final = """\
 
 def show_report(report: Report, folder: Path) -> None:
     """Print the fields and files of a run, and which methods failed."""
+    from ..solving.methods import shown
+
     gap = ("gap",) if report.proven else ()  # the bound is the same for all
     columns = ("method", "2-norm", *gap, "1-norm", "off", "<45°", "sing.", "s", "status")
     rows = []
     for candidate in report.candidates:
         facts = report.facts(candidate)
-        numbers = [
-            f"{facts['energy_2_norm']:.4g}",
-            *([_gap(facts)] if gap else []),
-            f"{facts['energy_1_norm']:.4g}",
-            f"{facts['stroke_deviation_mean_degrees']:.1f}°",
-            f"{facts['lines_under_45_degrees']:.0%}",
-            str(facts["singularities"]),
-            f"{facts['seconds']:.1f}",
-        ]
         mark = "*" if candidate is report.kept else ""
-        rows.append([candidate.method + mark, *numbers, _status(facts)])
+        rows.append([candidate.method + mark, *shown(facts), _status(facts)])
     show_table(report.instance.summary, columns, rows, numbers=columns[1:-1])
     print_line(_LEGEND)
     for candidate in report.candidates:
@@ -251,10 +244,6 @@ def _wrapped(text: str, width: int = WIDTH, indent: str = "  ") -> str:
         break_long_words=False,
         break_on_hyphens=False,
     )
-
-
-def _gap(facts: dict[str, Any]) -> str:
-    return "optimal" if facts["proven_optimal"] else f"{facts['gap_2_norm']:.2%}"
 
 
 def _status(facts: dict[str, Any]) -> str:
@@ -316,15 +305,14 @@ _ONLY_IF_ANY: Final = (
 )
 
 
-_SENTENCES: Final = ("doubts", "freedom")
-
-
 def show_surface(surface: Surface, folder: Path) -> None:
     """Print the fit of a surface, its undetermined parts, doubts about it, and the folder of its files."""
     from ..surfaces.files import surface_facts
 
     facts = surface_facts(surface)
-    show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in _SENTENCES})
+    show_facts(
+        surface.instance.summary, {key: facts[key] for key in facts if key not in ("doubts", "freedom")}
+    )
     for text in surface.freedom:
         print_line(_wrapped(f"undetermined: {text}"))
     if surface.freedom:
@@ -356,7 +344,9 @@ def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) 
 
     def show(title: str, name: str, columns: Sequence[str] = ()) -> None:
         of_table, rows = tables[name]
-        show_table(title, columns or of_table, _cells(rows, columns or of_table))
+        show_table(
+            title, columns or of_table, [[str(row[key]) for key in columns or of_table] for row in rows]
+        )
 
     show("formulations", "formulations", ("name", "short", "paper", "class", "summary"))
     names = [row["name"] for row in tables["formats"][1]]
@@ -375,13 +365,3 @@ def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) 
     show("formats", "formats")
     show("methods (solve --method)", "methods")
     show("readers of solution files", "readers")
-
-
-def _cells(rows: list[dict[str, Any]], columns: Sequence[str]) -> list[list[str]]:
-    return [[str(row[column]) for column in columns] for row in rows]
-
-
-def show_samples(rows: list[dict[str, Any]]) -> None:
-    """Print the built-in samples."""
-    columns = ("name", "grid", "pixels", "strokes", "description")
-    show_table("samples", columns, _cells(rows, columns), numbers=("pixels", "strokes"))

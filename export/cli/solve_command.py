@@ -147,9 +147,11 @@ def _print_candidate(
 
 def print_solution(solution: Solution, field: Path, printing: options.PrintOptions) -> None:
     """Print the facts of a solution, and the path of its field, which exists unless there is a doubt."""
-    from ..solving.run import facts_with_energies
+    from ..solving.methods import field_facts, finite, solution_facts
 
-    facts = facts_with_energies(solution)
+    facts = solution_facts(solution)
+    if solution.point is not None:
+        facts |= {key: finite(value) for key, value in field_facts(solution.field).items()}
     written = solution.point is not None and not solution.doubt
 
     lines = [f"field: {field}"] if written else []

@@ -27,17 +27,32 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.names import name_length
 from ...models.formulations.problem import Problem
-from ...models.formulations.symbols import IndexSet, Variable, elements, pixel_of
+from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet, Variable, elements, pixel_of
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
 from ..writing.counting import Expected, check
-from ..writing.records import Counted, Decimals, Pieces, Words, number, render, table, words
-from .indexed import Indexed, check_indexed, described, narrowed
+from ..writing.expressions import Language, wrapped
+from ..writing.records import (
+    Counted,
+    Decimals,
+    Piece,
+    Pieces,
+    Words,
+    check_coefficients,
+    number,
+    render,
+    table,
+    words,
+)
+
+WIDTH: Final = 110
+"""Approximate length of lines."""
 
 SECOND: Final = "r - north[h], c + east[h]"
 """The pixel j of the pair (r,c,h)."""
@@ -63,7 +78,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     fixed.
     """
     problem = form.problem
-    check_indexed(problem, "mod", "nl, lp or mps")
+    _check(problem)
     context = {
         "header": header,
         "sets": ["I", "S_c"] + ["E"] * bool(len(problem.instance.grid.first)),
@@ -107,13 +122,13 @@ def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
         yield b";\n"
     yield from _windows(problem, counts)
     yield b"end;\n"
-    narrow = {f"bounds of {over}": elements(instance, over) for over in narrowed(problem)}
+    narrow = {f"bounds of {over}": elements(instance, over) for over in _narrowed(problem)}
     check(counts, Expected(problem).data() | narrow)
 
 
 def _windows(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
     """The windows, and the ranges of jumps that are variables, where they are narrower than the gauge's."""
-    for over, names in narrowed(problem).items():
+    for over, names in _narrowed(problem).items():
         yield f"param: {' '.join(names)} :=\n".encode()
         values = (words(problem.data[name].astype(np.float64)) for name in names)
         parts = [part for each in values for part in (b" ", each)][1:]
@@ -162,7 +177,16 @@ def _label(instance: Instance, block: Block) -> str:
 
 
 def _described(family: PlacedFamily) -> dict[str, str]:
-    return described(_Ampl, family, SENSES) | {"domain": _domain(family)}
+    """A family as the template prints it: its tag, its place in the paper, its set, and its text."""
+    declared = family.family
+    words = _Ampl(declared.over)
+    if declared.is_row:
+        left, right = (words.expression(side) for side in (declared.expression.lhs, declared.expression.rhs))
+        pieces = [*left, SENSES[declared.sense], *right]
+    else:
+        pieces = wrapped(words.summands(declared.expression), WIDTH, b"  ")
+    paper = f"section {declared.paper}" if declared.paper[0].isdigit() else declared.paper
+    return {"tag": declared.tag, "paper": paper, "text": _text(pieces), "domain": _domain(family)}
 
 
 def _domain(family: PlacedFamily) -> str:
@@ -173,12 +197,59 @@ def _domain(family: PlacedFamily) -> str:
     return f"{DOMAINS[over][:-1]}: abs({only[0]}[{_INDEX[over]}]) mod 2 = {only[1]}}}"
 
 
-class _Ampl(Indexed):
-    """The language of AMPL."""
+class _Ampl(Language):
+    """The language of AMPL over an index set: names with indices, constants in mathematical notation."""
 
-    index = _INDEX
-    second = SECOND
-    brackets = "[]"
+    def __init__(self, over: IndexSet) -> None:
+        """Store the index set."""
+        self._over = over
 
-    def exact(self, constant: sp.Expr) -> str:
-        return str(constant).replace("**", "^")
+    def symbol(self, symbol: sp.Symbol) -> Piece:
+        """A symbol's name and index; scalars have none."""
+        if symbol in SCALARS:
+            return str(symbol.name).encode()
+        name, kind = SLOTS[self._over][symbol]
+        index = {"second": SECOND, "first": _INDEX["pixels"]}.get(kind, _INDEX[self._over])
+        return f"{name}[{index}]".encode()
+
+    def is_data(self, expression: sp.Expr) -> bool:
+        """Whether it is a constant: data have names in this language."""
+        return not expression.free_symbols
+
+    def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
+        """A constant in mathematical notation."""
+        negative = bool(expression < 0)
+        text = str(-expression if negative else expression).replace("**", "^")
+        if signed:
+            return f"{'-' if negative else '+'} {text}".encode()
+        return f"(-{text})".encode() if negative else text.encode()
+
+    coefficient = constant
+
+    def bound(self, expression: sp.Expr) -> str:
+        """A bound of a variable for all elements of its set."""
+        return _text(self.alone(expression))
+
+
+def _text(pieces: list[Piece]) -> str:
+    """The text of pieces that are all literal."""
+    return b"".join(piece for piece in pieces if isinstance(piece, bytes)).decode().removeprefix(" + ")
+
+
+def _narrowed(problem: Problem) -> dict[IndexSet, tuple[str, ...]]:
+    """Names of the data that are bounds where a proof has narrowed them, by index set; otherwise empty."""
+    if problem.windows is None:
+        return {}
+    names: dict[IndexSet, tuple[str, ...]] = {"pixels": ("alpha_lo", "alpha_up", "beta_lo", "beta_up")}
+    has_jumps = problem.jumps is None and len(problem.instance.grid.first) > 0
+    return names | ({"pairs": ("p_min", "p_max")} if has_jumps else {})
+
+
+def _check(problem: Problem) -> None:
+    """Raise UnsupportedByFormatError for columns fixed one by one, or weights that solvers would drop."""
+    instance = problem.instance
+    if problem.pinned is not None:
+        raise UnsupportedByFormatError("mod has no place for columns fixed one by one; write nl, lp or mps")
+    check_coefficients(instance.w, f"w of {instance.name}")
+    check_coefficients(instance.stroke_coefficient, f"w_strokes of {instance.name}")
+    check_coefficients(instance.skew_coefficient, f"w_beta of {instance.name}")

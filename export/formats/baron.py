@@ -33,7 +33,7 @@ from ..writing.counting import Expected, check
 from ..writing.expressions import Language, wrapped
 from ..writing.names import Names
 from ..writing.records import Counted, Piece, Tagged, render, scalar_when_constant, signed, words
-from .gams_scalar import Scalar, declared
+from .gams import Scalar, declared
 
 WIDTH = 160
 """Approximate length of lines."""

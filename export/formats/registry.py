@@ -53,7 +53,7 @@ class Format:
         options: dict[str, Any] = {"start": start} if self.starts else {}
         if dialect == "binary":
             options["binary"] = True
-        writer = import_module(f"{__package__}.{self.module.format(dialect=dialect or self.dialects[0])}")
+        writer = import_module(f"{__package__}.{self.module}")
         content: Iterator[bytes] = writer.generate(form, header, **options)
         return content
 
@@ -66,8 +66,8 @@ FORMATS: Final = {
             ANY_DEGREE, "nl", ("text", "binary"), starts=True,
         ),
         Format(
-            "gms", "GAMS model, self-contained: sets and equations, or scalar",
-            ANY_DEGREE, "gams_{dialect}", ("indexed", "scalar"), starts=True,
+            "gms", "GAMS model, self-contained, one equation per row",
+            ANY_DEGREE, "gams", ("scalar",), starts=True,
         ),
         Format("lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, "lp"),
         Format(
@@ -183,7 +183,7 @@ def write(
     path
         File to write. Its suffix names the format, and a further `.gz` compresses it.
     dialect
-        `text` or `binary` for .nl, `indexed` or `scalar` for .gms.
+        `text` or `binary` for .nl.
     start
         A field whose point becomes the starting point, in formats that have a place for one.
 

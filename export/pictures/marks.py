@@ -40,7 +40,6 @@ class Lines:
     lines: list[Floats]
     single: bool = False
     opacity: float = 1.0
-    dashed: bool = False
 
 
 @dataclass(frozen=True, eq=False)

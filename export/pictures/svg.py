@@ -100,11 +100,9 @@ def _image(ink: NDArray[np.uint8], scale: float) -> str:
 
 
 def _lines(part: Lines, step: float) -> Iterator[str]:
-    dashes = f' stroke-dasharray="{3 * part.width:.4g} {2 * part.width:.4g}"' if part.dashed else ""
-    ends = "butt" if part.dashed else "round"
     pen = (
-        f'fill="none" stroke="{part.colour}" stroke-width="{part.width:.4g}" stroke-linecap="{ends}" '
-        f'stroke-linejoin="round"{dashes}{_faded(part.opacity)}'
+        f'fill="none" stroke="{part.colour}" stroke-width="{part.width:.4g}" stroke-linecap="round" '
+        f'stroke-linejoin="round"{_faded(part.opacity)}'
     )
     data = [_path(line, step) for line in part.lines]
     if part.single:

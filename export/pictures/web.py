@@ -17,8 +17,6 @@ CROSSES_UP_TO: Final = 12  # longer side of a grid with crosses at all pixels; l
 GRID: Final = "#e4e6ea"
 EDGE: Final = "#8b929c"
 CUT: Final = "#c3c8ce"
-HUES: Final = (FAMILIES[0], "#b5179e", "#a35c00", "#2f6b2f", "#4361ee", "#9b2226")
-"""Colours of curves, one after the other."""
 _SHADE: Final = "#e1e4e9"
 _FAINT: Final = "#d3d6db"
 _NIGHT: Final = {  # colours in dark mode by those in light mode
@@ -34,7 +32,6 @@ _NIGHT: Final = {  # colours in dark mode by those in light mode
     POSITIVE: "#ff6b70",
     NEGATIVE: "#7c9cff",
     LABEL: "#a3acb6",
-    **dict(zip(HUES[1:], ("#f07be0", "#f0a35e", "#7ccf7c", "#8fa2ff", "#ff8a8f"), strict=True)),
 }
 _MARGIN: Final = 7.0
 _CHARACTER: Final = 6.2  # the widest digits and letters of usual fonts at the size of the labels

@@ -188,10 +188,10 @@ def version() -> str:
     return str(ca.CasadiMeta.version())
 
 
-def evaluate(path: Path, points: Points, renamed: Callable[[str], str] = str) -> Evaluation:
-    """The .nl file as CasADi reads it; names come from .col and .row, through `renamed`."""
+def evaluate(path: Path, points: Points) -> Evaluation:
+    """The .nl file as CasADi reads it; names come from .col and .row."""
     model = read_nl(path)
-    columns, rows = ([renamed(name) for name in names] for names in file_names(path))
+    columns, rows = file_names(path)
     values = [model.evaluate(point) for point in points.of(columns)]
     return Evaluation(
         columns,

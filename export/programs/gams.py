@@ -99,18 +99,13 @@ def _text(path: Path) -> str:
     return path.read_text("utf-8", "replace") if path.exists() else ""
 
 
-def our_name(name: str) -> str:
-    """Our name of an indexed symbol: `s(00,01,u)` is `s_00_01_u`."""
-    return re.sub(r"[(,]", "_", name).rstrip(")")
-
-
 def evaluate(path: Path, points: Points) -> Evaluation:
     """The GAMS model as CONVERT translates it and CasADi reads it, without columns in no term."""
     Path("out.nl").unlink(missing_ok=True)
     _run(path, "convert")
     if not Path("out.nl").exists():
         raise RefusedError("CONVERT wrote no .nl")
-    found = casadi_program.evaluate(Path("out.nl").resolve(), points, our_name)
+    found = casadi_program.evaluate(Path("out.nl").resolve(), points)
     return replace(found, may_lack=True, rounding=1e-14)
 
 

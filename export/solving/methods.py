@@ -75,6 +75,22 @@ def field_facts(field: CrossField) -> dict[str, Any]:
     }
 
 
+def shown(facts: dict[str, Any]) -> list[str]:
+    """Facts of a field of a run as the cells of a table; the gap only if there is a bound."""
+    gap = []
+    if "gap_2_norm" in facts:
+        gap = ["optimal" if facts["proven_optimal"] else f"{facts['gap_2_norm']:.2%}"]
+    return [
+        f"{facts['energy_2_norm']:.4g}",
+        *gap,
+        f"{facts['energy_1_norm']:.4g}",
+        f"{facts['stroke_deviation_mean_degrees']:.1f}°",
+        f"{facts['lines_under_45_degrees']:.0%}",
+        str(facts["singularities"]),
+        f"{facts['seconds']:.1f}",
+    ]
+
+
 def solution_facts(solution: Solution) -> dict[str, Any]:
     """Claims of a solution file, with the values recomputed from the instance."""
     violation = solution.violation

@@ -22,10 +22,9 @@ from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
 from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.mask import has_mask, write_mask
-from ..solutions.solution import Solution
 from ..surfaces.files import SHADED, surface_facts, write_shaded
 from .compiling import compiling
-from .methods import METHODS, Candidate, Request, field_facts, finite, solution_facts
+from .methods import METHODS, Candidate, Request
 from .proven import Proven
 from .run_page import PAGE, write_page
 
@@ -43,14 +42,6 @@ LOWEST: Final = "lowest.npz"
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """Name of the field from which the methods of a run start: `first_field`, or the given one."""
-
-
-def facts_with_energies(solution: Solution) -> dict[str, Any]:
-    """The facts of a solution, with the facts of its field if it has a point."""
-    facts = solution_facts(solution)
-    if solution.point is None:
-        return facts
-    return facts | {key: finite(value) for key, value in field_facts(solution.field).items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from typing import Any, Final
 from ...models.storage import read_bytes, write_bytes
 from ...templates import ENVIRONMENT
 from ..bundle.manifest import Manifest
+from .methods import shown
 
 PAGE: Final = "index.html"
 _LAYERS: Final = (
@@ -20,6 +21,7 @@ _LAYERS: Final = (
     ("singularities", True),
 )
 """Layers of overlay.svg, and whether they are shown at first."""
+_COLUMNS: Final = ("1-norm", "off strokes", "lines < 45°", "singularities", "seconds")
 _SOLVED: Final = {
     "nl": ("bonmin models/{file} -AMPL", "models/{stem}.sol"),
     "gms": ("gams models/{file} --RESULTS={answer}", "{stem}.csv"),
@@ -46,24 +48,24 @@ _FILES: Final = {
 
 def write_page(folder: Path, report: dict[str, Any], manifests: tuple[Manifest, ...]) -> None:
     """Write the page of a run. report: the document of report.json. Raises InputError, OutputError."""
+    overlay = _svg(folder / "overlay.svg")
     text = ENVIRONMENT.get_template("run/index.html.j2").render(
         report=report,
         seconds=f"{report['seconds']:.0f}",
         bound=report["proof"] and f"{report['proof']['bound_2_norm']:.6g}",
-        layers=[each for each in _LAYERS if each[0] != "drawing" or _has(folder / "overlay.svg", "drawing")],
-        overlay=_svg(folder / "overlay.svg"),
+        layers=[each for each in _LAYERS if each[0] != "drawing" or 'id="drawing"' in overlay],
+        overlay=overlay,
         overview=_picture(folder / "overview.png"),
         shaded=_picture(folder / "shaded.png"),
-        columns=_columns(report),
-        methods=[_row(report, facts) for facts in report["methods"]],
+        columns=["method", "2-norm", *["gap"] * bool(report["proof"]), *_COLUMNS],
+        methods=[
+            [facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""), *shown(facts)]
+            for facts in report["methods"]
+        ],
         sets=[_set(manifest.document) for manifest in manifests],
         files=[(name, meaning) for name, meaning in _FILES.items() if (folder / name).exists()],
     )
     write_bytes(folder / PAGE, text.encode())
-
-
-def _has(path: Path, layer: str) -> bool:
-    return f'id="{layer}"' in _svg(path)
 
 
 def _svg(path: Path) -> str:
@@ -74,25 +76,6 @@ def _svg(path: Path) -> str:
 def _picture(path: Path) -> str:
     """A PNG as the address that contains it; empty if it was not drawn."""
     return f"data:image/png;base64,{b64encode(read_bytes(path)).decode()}" if path.exists() else ""
-
-
-def _columns(report: dict[str, Any]) -> list[str]:
-    gap = ["gap"] if report["proof"] else []
-    return ["method", "2-norm", *gap, "1-norm", "off strokes", "lines < 45°", "singularities", "seconds"]
-
-
-def _row(report: dict[str, Any], facts: dict[str, Any]) -> list[str]:
-    gap = ["optimal" if facts["proven_optimal"] else f"{facts['gap_2_norm']:.1%}"] if report["proof"] else []
-    return [
-        facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""),
-        f"{facts['energy_2_norm']:.4g}",
-        *gap,
-        f"{facts['energy_1_norm']:.4g}",
-        f"{facts['stroke_deviation_mean_degrees']:.1f}°",
-        f"{facts['lines_under_45_degrees']:.0%}",
-        str(facts["singularities"]),
-        f"{facts['seconds']:.1f}",
-    ]
 
 
 def _set(document: dict[str, Any]) -> dict[str, Any]:

@@ -13,28 +13,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import limits
 import page
+from crossfield.models.formulations.catalogue import FORMULATIONS
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 SIZES = (64, 128, 256, 512)
-PEERS = ("linopy", "highs", "pyoptinterface", "pyomo")
-FORMULATIONS = (
-    "minlp-parity",
-    "minlp-quartic",
-    "minlp-cubic",
-    "miqcp-bilinear",
-    "miqcp-bilinear-l1",
-    "miqp-mccormick",
-    "milp-mccormick",
-    "qp-fixed",
-    "miqp-exact",
-)
+PEERS = ("linopy", "highs", "pyomo")
 MILP = "milp-mccormick"
 LONG = 75.0
 """Seconds that the next size of a peer may be expected to take."""
@@ -104,37 +93,24 @@ def writers(bench: Bench, sizes: tuple[int, ...]) -> None:
 
 
 def formulations(bench: Bench, size: int, names: tuple[str, ...]) -> None:
-    """Every formulation in every format, against Pyomo."""
-    for name, (suffix, dialect) in cases(names):
-        bench.run("ours", size, name, suffix, **({"dialect": dialect} if dialect else {}))
-        bench.run("pyomo", size, name, suffix)
-
-
-def cases(names: tuple[str, ...]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Formulations and the formats that hold them."""
+    """Every formulation in every format that holds it, against Pyomo."""
     for name in names:
-        for suffix, dialect in (("nl", ""), ("lp", ""), ("mps", ""), ("gms", "scalar")):
+        for suffix in ("nl", "lp", "mps", "gms"):
             if name != "minlp-parity" or suffix in {"nl", "gms"}:
-                yield name, (suffix, dialect)
+                bench.run("ours", size, name, suffix)
+                bench.run("pyomo", size, name, suffix)
 
 
 def ours(bench: Bench, sizes: tuple[int, ...], pixels: int) -> None:
-    """Measurements without a peer: all formats, growth, sections, pictures and solutions."""
+    """Measurements without a peer: all formats, growth and solutions."""
     for size in sizes[-2:]:
-        for suffix, dialect in (("nl", "text"), ("nl", "binary"), ("gms", "scalar"), ("gms", "indexed")):
-            bench.run("ours", size, MILP, suffix, dialect=dialect)
-        for dialect in ("text", "scalar"):
-            bench.run("copied", size, MILP, {"text": "nl", "scalar": "gms"}[dialect], dialect=dialect)
+        for dialect in ("text", "binary"):
+            bench.run("ours", size, MILP, "nl", dialect=dialect)
+        bench.run("ours", size, MILP, "gms")
     for jobs in (1, 2):
-        bench.run("everything", sizes[-1], MILP, "scalar", jobs=jobs)
-        bench.run("everything", min(24, sizes[-1]), "all", "indexed", jobs=jobs)
-    for suffix in ("lp", "mps", "nl"):
-        bench.run("sections", sizes[-2], MILP, suffix)
-        for size in sizes[-2:]:
-            bench.run("rendered", size, MILP, suffix, dialect="")
-            bench.run("hashed", size, MILP, suffix)
+        bench.run("everything", sizes[-1], MILP, "", jobs=jobs)
+    bench.run("everything", min(24, sizes[-1]), "all", "", jobs=1)
     bench.run("ours", sizes[-2], MILP, "lp.gz")
-    bench.run("picture", sizes[-1])
     for suffix in ("highs", "ampl"):
         bench.run("solution", pixels, MILP, suffix)
 
@@ -156,19 +132,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description="Measure export against its peers and write docs/performance.md."
     )
-    commands = parser.add_subparsers(dest="command")
-    limits.arguments(commands.add_parser("limits", help="wall time of every method under time limits"))
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "performance.md")
     parser.add_argument(
         "--smoke", action="store_true", help="sizes 4 and 8, one run each, in one process: shows that it runs"
     )
     parser.add_argument("--data", type=Path, help="write the measurements, or read them if the file is there")
     options = parser.parse_args()
-    if options.command == "limits":
-        limits.run(options)
-        return
     sizes, names, middle, pixels = (
-        ((4, 8), ("minlp-quartic",), 8, 8) if options.smoke else (SIZES, FORMULATIONS, 128, 552)
+        ((4, 8), ("minlp-quartic",), 8, 8) if options.smoke else (SIZES, tuple(FORMULATIONS), 128, 552)
     )
     if options.data and options.data.exists():
         document = json.loads(options.data.read_text())

@@ -18,7 +18,6 @@ NAMES = {
     "copied": "one write",
     "highs": "HiGHS",
     "pyomo": "Pyomo",
-    "pyoptinterface": "PyOptInterface",
 }
 WHAT = {"seconds": "seconds", "cpu": "CPU"}
 MET: dict[str, Callable[[float, float], bool]] = {
@@ -36,7 +35,7 @@ METHOD = (
     "- CPU: time of all threads. Compare it if other programs shared the cores.",
     "- Peak memory: of the whole process, with its libraries.",
 )
-PACKAGES = ("numpy", "sympy", "pyomo", "linopy", "highspy", "pyoptinterface")
+PACKAGES = ("numpy", "sympy", "pyomo", "linopy", "highspy")
 
 
 def machine() -> dict[str, str]:
@@ -86,15 +85,15 @@ def seconds(found: Found | None, what: str = "seconds") -> str:
 def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: int, pixels: int) -> str:
     """The page as Markdown."""
     at = Page(document)
-    given = document["machine"]
+    given, found = document["machine"], targets(at, sizes, names, middle, pixels)
     packages = ", ".join(f"{name} {given[name]}" for name in PACKAGES)
-    loads = [found["load"] for found in at.found.values()]
+    loads = [each["load"] for each in at.found.values()]
     lines = [
         "# How fast files are written",
         "",
         "[All pages](index.md). Speed and memory of the writers, compared with other programs.",
         "",
-        in_short(at, sizes, targets(at, sizes, names, middle, pixels)),
+        f"{sum(line[3] == 'met' for line in found)} of {len(found)} [targets](#targets) are met.",
         "",
         *METHOD,
         "",
@@ -103,8 +102,7 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
         "",
         "## Targets",
         "",
-        *table(["", "target", "measured", ""], targets(at, sizes, names, middle, pixels)),
-        *reasons(at, sizes[-2], sizes[-1], middle),
+        *table(["", "target", "measured", ""], found),
         f"## LP and MPS of `{MILP}` next to other programs",
         "",
         "linopy and HiGHS build their models from whole arrays. The other programs do not write our names.",
@@ -121,101 +119,7 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
         "",
     ]
     lines += against_pyomo(at, names, middle)
-    lines += ["## Where the time goes", "", *where(at, sizes[-2]), *others(at, sizes, pixels)]
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def in_short(at: Page, sizes: Sequence[int], lines: list[list[str]]) -> str:
-    """How many targets are met, how fast LP and MPS are written, and what all formats take.
-    lines: the table of targets.
-    """
-    size = sizes[-2]
-    speeds = {
-        suffix.upper(): found["bytes"] / 1e6 / found["seconds"]
-        for suffix in ("lp", "mps")
-        if (found := at("ours", size, suffix))
-    }
-    rates = " and ".join(f"{suffix} at {speed:.0f} MB/s" for suffix, speed in speeds.items())
-    all_formats = at("everything", sizes[-1], "scalar", MILP, 1)
-    took = f"{seconds(all_formats)} s" if all_formats else "a time that was not measured"
-    return (
-        f"{sum(line[3] == 'met' for line in lines)} of {len(lines)} [targets](#targets) are met. "
-        f"At {size} x {size} pixels crossfield writes {rates or 'at a speed that was not measured'}. "
-        f"All formats of the largest grid, {sizes[-1]} x {sizes[-1]}, take {took}."
-    )
-
-
-def reasons(at: Page, half: int, big: int, middle: int) -> list[str]:
-    """The limits of the writers, in numbers of the same run."""
-    lines = [linopy_reason(at, half), pyomo_reason(at, middle), growth_reason(at, half, big)]
-    return [
-        "Limits behind these numbers:",
-        "",
-        *filter(None, lines),
-        "- One write computes nothing. SHA-256 works through a file from end to end in one thread,",
-        "  and a file is closed after its last byte is hashed:",
-        "",
-        *table(
-            ["file", "one write, s", "SHA-256 / one write", "half of our CPU seconds / one write"],
-            [row for suffix in ("lp", "mps") for size in (half, big) for row in hashing(at, size, suffix)],
-        ),
-    ]
-
-
-def pyomo_reason(at: Page, size: int) -> str:
-    """Comparison of a small file with products and a larger one without."""
-    mine, other = (at("ours", size, "lp", name) for name in ("qp-fixed", MILP))
-    if not (mine and other):
-        return ""
-    small, large = (
-        f"{found['bytes'] / 1e6:.1f} MB at {found['bytes'] / 1e6 / found['seconds']:.0f} MB/s"
-        for found in (mine, other)
-    )
-    return (
-        "- Pyomo, LP and MPS: fixed costs weigh more in small files, and products in objectives are sorted. "
-        f"At {size} x {size}, the LP of `qp-fixed` is {small}, that of `{MILP}` {large}."
-    )
-
-
-def linopy_reason(at: Page, size: int) -> str:
-    """Work that linopy does not do, and the least time of ours."""
-    mine, theirs = at("ours", size), at("linopy", size)
-    if not (mine and theirs):
-        return ""
-    return (
-        "- linopy, LP: it receives arrays of column numbers, hashes nothing and writes numbered names: "
-        f"{100 * theirs['bytes'] / mine['bytes']:.0f} % of our bytes. "
-        f"A tenth of its time is {theirs['seconds'] / 10:.3f} s. "
-        f"On two cores our {mine['cpu']:.3f} CPU seconds take at least {mine['cpu'] / 2:.3f} s."
-    )
-
-
-def hashing(at: Page, size: int, suffix: str) -> list[list[str]]:
-    """A row with the time of hashing, and of our CPU seconds on two cores, relative to one write."""
-    mine, hashed, written = at("ours", size, suffix), at("hashed", size, suffix), at("copied", size, suffix)
-    if not (mine and hashed and written):
-        return []
-    ratios = (hashed["seconds"] / written["seconds"], mine["cpu"] / 2 / written["seconds"])
-    name = f"{suffix.upper()} {size}"
-    return [[name, f"{written['seconds']:.3f}", *(f"{ratio:.1f}" for ratio in ratios)]]
-
-
-def growth_reason(at: Page, half: int, big: int) -> str:
-    """The growth of the parts with size."""
-    made = {
-        s: at.ratio(at("rendered", big, s, MILP, ""), at("rendered", half, s, MILP, ""), "cpu")
-        for s in ("lp", "mps", "nl")
-    }
-    gms = [at("copied", size, "gms", MILP, "scalar") for size in (big, half)]
-    copies = {"lp": at.ratio(at("copied", big), at("copied", half)), "gms": at.ratio(*gms)}
-    making, writing = (
-        ", ".join(f"{suffix} {times(value)}" for suffix, value in found.items() if value)
-        for found in (made, copies)
-    )
-    return (
-        f"- Growth from {half} to {big}: CPU seconds for making the text grow {making} times. "
-        f"Seconds for one write, which depend on the system, grow {writing} times."
-    )
+    return "\n".join([*lines, *others(at, sizes, pixels)]).rstrip() + "\n"
 
 
 def times(value: float | None) -> str:
@@ -279,7 +183,7 @@ def write_target(at: Page, half: int, big: int) -> list[str]:
 
 def everything_targets(at: Page, size: int) -> list[list[str]]:
     """All formats of the largest size: seconds and memory."""
-    runs = {f"{jobs} at once": at("everything", size, "scalar", MILP, jobs) for jobs in (1, 2)}
+    runs = {f"{jobs} at once": at("everything", size, "", MILP, jobs) for jobs in (1, 2)}
     spent = {name: found and found["seconds"] for name, found in runs.items()}
     peak = {name: found and found["memory"] / 1e9 for name, found in runs.items()}
     return [
@@ -292,14 +196,14 @@ def growth_target(at: Page, half: int, big: int, what: str) -> list[str]:
     """Ratio of times for four times the pixels."""
     grown = {
         s.upper(): at.ratio(at("ours", big, s, MILP, *rest), at("ours", half, s, MILP, *rest), what)
-        for s, rest in (("lp", ()), ("mps", ()), ("nl", ("text",)), ("gms", ("scalar",)))
+        for s, rest in (("lp", ()), ("mps", ()), ("nl", ("text",)), ("gms", ()))
     }
     return target(f"growth of {WHAT.get(what, what)} from {half} to {big}", grown, "below", 4.4)
 
 
 def small_targets(at: Page, size: int) -> list[list[str]]:
     """Targets of small tasks: one drawing in everything, and the help."""
-    found = at("everything", size, "indexed", "all", 1)
+    found = at("everything", size, "", "all", 1)
     spent = {"": found and found["seconds"]}
     return [
         target(f"size {size}, all formulations in all formats", spent, "under", 2, " s"),
@@ -317,8 +221,7 @@ def solution_target(at: Page, pixels: int) -> list[str]:
 
 def pair(at: Page, name: str, suffix: str, size: int) -> tuple[Found | None, Found | None]:
     """Pyomo's measurement and ours."""
-    dialect = ("scalar",) if suffix == "gms" else ()
-    return at("pyomo", size, suffix, name), at("ours", size, suffix, name, *dialect)
+    return at("pyomo", size, suffix, name), at("ours", size, suffix, name)
 
 
 def peers(at: Page, sizes: Sequence[int], suffix: str) -> list[str]:
@@ -326,7 +229,7 @@ def peers(at: Page, sizes: Sequence[int], suffix: str) -> list[str]:
     rows = []
     for size in sizes:
         mine = at("ours", size, suffix)
-        for task in ("ours", "copied", "linopy", "highs", "pyoptinterface", "pyomo"):
+        for task in ("ours", "copied", "linopy", "highs", "pyomo"):
             found = at(task, size, suffix)
             if found and mine:
                 written = (mine if task == "copied" else found)["bytes"]
@@ -354,100 +257,29 @@ def against_pyomo(at: Page, names: Sequence[str], size: int) -> list[str]:
             ratio = at.ratio(theirs, mine)
             cells.append(f"{seconds(mine)} / {seconds(theirs)} = {ratio:.0f}x" if ratio else seconds(mine))
         rows.append([f"`{name}`", *cells])
-    return table(["", "nl", "lp", "mps", "gms scalar"], rows)
-
-
-def where(at: Page, size: int) -> list[str]:
-    """Times of making, hashing and writing, and the sections of a file."""
-    lines = [
-        (
-            f"`{MILP}`, {size} x {size}. CPU seconds for making the bytes, for their SHA-256, "
-            "for one write of them, and for the whole."
-        ),
-        "",
-    ]
-    rows = []
-    for suffix, rest in (("lp", ()), ("mps", ()), ("nl", ("text",))):
-        steps = [
-            at("rendered", size, suffix, MILP, ""),
-            at("hashed", size, suffix),
-            at("copied", size, suffix, MILP, *rest),
-            at("ours", size, suffix, MILP, *rest),
-        ]
-        rows.append([suffix, *(seconds(step, "cpu") for step in steps)])
-    lines += table(["", "made", "hashed", "written", "whole"], rows)
-    rows = []
-    for suffix in ("lp", "mps", "nl"):
-        found = at("sections", size, suffix)
-        for title, (spent, length) in (found or {"sections": {}})["sections"].items():
-            rows.append(
-                [
-                    suffix,
-                    title,
-                    f"{spent:.3f}",
-                    f"{length / 1e6:.1f}",
-                    f"{length / 1e6 / spent:.0f}" if spent else "",
-                ]
-            )
-    lines += [
-        "By section, in file order. The first sections include SymPy, about 10 ms per family at every size.",
-        "",
-    ]
-    return lines + table(["", "section", "seconds", "MB", "MB/s"], rows)
+    return table(["", "nl", "lp", "mps", "gms"], rows)
 
 
 def others(at: Page, sizes: Sequence[int], pixels: int) -> list[str]:
     """All formats at the two largest sizes, and other tasks that users wait for."""
-    rows = []
-    for size in sizes[-2:]:
-        for suffix, rest in (
-            ("lp", ()),
-            ("mps", ()),
-            ("nl", ("text",)),
-            ("nl", ("binary",)),
-            ("gms", ("scalar",)),
-            ("gms", ("indexed",)),
-        ):
-            found = at("ours", size, suffix, MILP, *rest)
-            if found:
-                label = " ".join([suffix, *rest])
-                rows.append(
-                    [
-                        str(size),
-                        label,
-                        f"{found['bytes'] / 1e6:.0f}",
-                        seconds(found),
-                        seconds(found, "cpu"),
-                        f"{found['memory'] / 1e6:.0f}",
-                    ]
-                )
-    lines = [
-        "## Every format",
-        "",
-        *table(["size", "format", "MB", "seconds", "CPU s", "peak MB"], rows),
-        "## Other tasks",
-        "",
+    formats = [("lp", ()), ("mps", ()), ("nl", ("text",)), ("nl", ("binary",)), ("gms", ())]
+    found = [
+        (" ".join([suffix, *rest]), size, at("ours", size, suffix, MILP, *rest))
+        for size in sizes[-2:]
+        for suffix, rest in formats
     ]
-    rest = [
-        (
-            "all formats, one at a time (`--jobs 1`)",
-            at("everything", sizes[-1], "scalar", MILP, 1),
-            sizes[-1],
-        ),
-        ("all formats, two at once (`--jobs 2`)", at("everything", sizes[-1], "scalar", MILP, 2), sizes[-1]),
-        (
-            "all formulations in all formats",
-            at("everything", min(24, sizes[-1]), "indexed", "all", 1),
-            min(24, sizes[-1]),
-        ),
-        ("LP, compressed", at("ours", sizes[-2], "lp.gz"), sizes[-2]),
-        ("a picture of four times the size to an instance", at("picture", sizes[-1]), sizes[-1]),
-        ("a solution file of HiGHS to a field", at("solution", pixels, "highs"), pixels),
-        ("a solution file of AMPL to a field", at("solution", pixels, "ampl"), pixels),
+    half, big, small = sizes[-2], sizes[-1], min(24, sizes[-1])
+    found += [
+        ("all formats, one at a time (`--jobs 1`)", big, at("everything", big, "", MILP, 1)),
+        ("all formats, two at once (`--jobs 2`)", big, at("everything", big, "", MILP, 2)),
+        ("all formulations in all formats", small, at("everything", small, "", "all", 1)),
+        ("LP, compressed", half, at("ours", half, "lp.gz")),
+        ("a solution file of HiGHS to a field", pixels, at("solution", pixels, "highs")),
+        ("a solution file of AMPL to a field", pixels, at("solution", pixels, "ampl")),
     ]
     cells = [
         [what, str(size), seconds(f), seconds(f, "cpu"), f"{f['memory'] / 1e6:.0f}"]
-        for what, f, size in rest
+        for what, size, f in found
         if f
     ]
-    return lines + table(["", "size", "seconds", "CPU s", "peak MB"], cells)
+    return ["## Formats and other tasks", "", *table(["", "size", "seconds", "CPU s", "peak MB"], cells)]

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 from crossfield.export.formats.registry import FORMATS, carried, write
-from crossfield.export.writing.canonical import Canonical
 from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.instance import Instance
 
@@ -51,22 +50,6 @@ def ours(
 ) -> Measured:
     """From the instance to the closed file, with names, hash and, for .nl, the files of names."""
     return lambda: write(formulated(formulation, instance), path, dialect=dialect)
-
-
-def rendered(instance: Instance, formulation: str, suffix: str, path: Path, dialect: str) -> Measured:
-    """The bytes of the file, neither hashed nor written."""
-
-    def run() -> None:
-        for _ in chunks_of(formulated(formulation, instance), suffix, dialect):
-            pass
-
-    return run
-
-
-def chunks_of(problem: Problem, suffix: str, dialect: str) -> Any:
-    """The chunks of a file."""
-    held = carried(problem, FORMATS[suffix])
-    return FORMATS[suffix].generate(Canonical(held), [], None, dialect or FORMATS[suffix].dialects[0])
 
 
 def pyomo(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
@@ -117,77 +100,11 @@ def linopy(instance: Instance, formulation: str, suffix: str, path: Path) -> Mea
 
 def highs(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
     """HiGHS: a model passed as whole arrays, with our names left out, and its writeModel."""
-    import highspy
-    from scipy import sparse
+    from crossfield.models.formulations.highs_model import highs_of
 
     def run() -> None:
-        problem = formulated(formulation, instance)
-        rows, columns, values, low, high, start = [], [], [], [], [], 0
-        for family in problem.rows:
-            for term in family.of_degree(1):
-                rows.append(np.arange(start, start + family.count, dtype=np.int32))
-                columns.append(term.factors[0])
-                values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=float), (family.count,)))
-            low.append(family.limit if family.family.sense != "<=" else np.full(family.count, -np.inf))
-            high.append(family.limit if family.family.sense != ">=" else np.full(family.count, np.inf))
-            start += family.count
-        triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        matrix = sparse.coo_matrix(triplets, shape=(start, problem.n_columns)).tocsc()
-        lp = highspy.HighsLp()
-        lp.num_col_, lp.num_row_ = problem.n_columns, start
-        lp.col_cost_ = np.zeros(problem.n_columns)
-        index, cost = problem.merged_objective(1)
-        costs = np.zeros(problem.n_columns)
-        costs[index[:, 0]] = cost
-        lp.col_cost_, lp.col_lower_, lp.col_upper_ = costs, problem.lower, problem.upper
-        lp.row_lower_, lp.row_upper_ = np.concatenate(low), np.concatenate(high)
-        lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-        lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = (
-            matrix.indptr,
-            matrix.indices,
-            matrix.data,
-        )
-        kinds = (highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger)
-        lp.integrality_ = [kinds[integer] for integer in problem.integer.tolist()]
-        solver = highspy.Highs()
-        solver.setOptionValue("output_flag", False)
-        solver.passModel(lp)
-        solver.writeModel(str(path))
-
-    return run
-
-
-def pyoptinterface(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
-    """PyOptInterface: building the model row by row over HiGHS, and its writer."""
-    import pyoptinterface as poi
-    from pyoptinterface import highs as backend
-
-    def run() -> None:
-        problem = formulated(formulation, instance)
-        model = backend.Model()
-        model.set_model_attribute(poi.ModelAttribute.Silent, True)
-        kinds = (poi.VariableDomain.Continuous, poi.VariableDomain.Integer)
-        given = zip(problem.lower.tolist(), problem.upper.tolist(), problem.integer.tolist(), strict=True)
-        variables = [
-            model.add_variable(lb=low, ub=high, domain=kinds[integer]) for low, high, integer in given
-        ]
-        senses = {
-            ">=": poi.ConstraintSense.GreaterEqual,
-            "<=": poi.ConstraintSense.LessEqual,
-            "==": poi.ConstraintSense.Equal,
-        }
-        for family in problem.rows:
-            terms = family.of_degree(1)
-            columns = np.stack([term.factors[0] for term in terms], axis=1).tolist()
-            values = np.stack([np.broadcast_to(term.coefficient, (family.count,)) for term in terms], axis=1)
-            sense = senses[family.family.sense]
-            for row, coefficients, limit in zip(columns, values.tolist(), family.limit.tolist(), strict=True):
-                left = poi.ScalarAffineFunction(coefficients, row)
-                model.add_linear_constraint(left, sense, limit)
-        index, cost = problem.merged_objective(1)
-        assert len(variables) == problem.n_columns
-        model.set_objective(poi.ScalarAffineFunction(cost.tolist(), index[:, 0].tolist()))
-        model.write(str(path))
+        arrays = formulated(formulation, instance).to_arrays(names=False)
+        highs_of(arrays, "square").writeModel(str(path))
 
     return run
 
@@ -213,63 +130,7 @@ def everything(instance: Instance, formulation: str, suffix: str, path: Path, jo
     from crossfield.models.formulations.catalogue import FORMULATIONS
 
     names = [formulation] if formulation != "all" else list(FORMULATIONS)
-    dialects = {"gms": suffix} if suffix in {"scalar", "indexed"} else {}
-    return lambda: write_all(
-        instance, path.with_name("set"), formulations=names, dialects=dialects, jobs=jobs
-    )
-
-
-TITLES = {
-    "lp": (b"Minimize", b"Subject To", b"Bounds", b"Generals", b"Binaries"),
-    "mps": (b"NAME", b"COLUMNS", b"RHS", b"BOUNDS"),
-    "nl": (b"C", b"O", b"r", b"b", b"k", b"J", b"G"),
-}
-
-
-def sections(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
-    """Seconds and bytes of each section, as its chunks come;
-    preparation counts for the section that needs it first.
-    """
-
-    def run() -> dict[str, Any]:
-        found: dict[str, list[float]] = {}
-        title, last = "head", time.perf_counter()
-        for chunk in chunks_of(formulated(formulation, instance), suffix, ""):
-            title = next((name.decode() for name in TITLES[suffix] if chunk.startswith(name)), title)
-            now = time.perf_counter()
-            entry = found.setdefault(title, [0.0, 0])
-            entry[0], entry[1], last = entry[0] + now - last, entry[1] + len(chunk), now
-        return {"sections": found}
-
-    return run
-
-
-def hashed(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
-    """SHA-256 of the finished file's bytes."""
-    import hashlib
-
-    write(formulated(formulation, instance), path)
-    data = path.read_bytes()
-    return lambda: hashlib.sha256(data).digest()
-
-
-def picture(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
-    """A drawing as a bitmap of four times the size to an instance."""
-    from crossfield.models.sketch.read import read_sketch
-    from PIL import Image, ImageDraw
-
-    size = instance.grid.height
-    side = 4 * size
-    image = Image.new("RGB", (side, side), "white")
-    pen = ImageDraw.Draw(image)
-    pen.rectangle((side // 50, side // 50, side - side // 50, side - side // 50), outline="black", width=3)
-    for place in np.linspace(0.07, 0.93, min(15, side // 16)) * side:  # no more than leave paper between
-        pen.arc(
-            (place - side / 2, side / 30, place + side / 2, side - side / 30), 300, 60, fill="red", width=3
-        )
-        pen.line((side / 30, place, side - side / 30, place), fill="red", width=3)
-    image.save(path.with_suffix(".png"))
-    return lambda: read_sketch(path.with_suffix(".png"), size=size)
+    return lambda: write_all(instance, path.with_name("set"), formulations=names, jobs=jobs)
 
 
 def solution(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
@@ -316,23 +177,14 @@ TASKS = {
     task.__name__: task
     for task in (
         ours,
-        rendered,
-        sections,
-        hashed,
         pyomo,
         linopy,
         highs,
-        pyoptinterface,
         copied,
         everything,
-        picture,
         solution,
     )
 }
-
-
-READERS = ("picture", "solution")
-"""Tasks that read a file that they prepared."""
 
 
 def peak_memory() -> int:
@@ -354,7 +206,7 @@ def measured(task: str, size: int, folder: str, *, once: bool = False, **given: 
     if not once:
         TASKS[task](square(WARM), path=path, **given)()
     run = TASKS[task](square(size), path=path, **given)
-    before = (lambda: None) if task in READERS else (lambda: remove_written(path))
+    before = (lambda: None) if task == "solution" else (lambda: remove_written(path))
     first = timed(run, before)
     memory = peak_memory()
     runs = [first] if once or first["seconds"] > ONCE else [first, timed(run, before), timed(run, before)]

@@ -42,15 +42,3 @@ def test_the_page_in_docs_measures_the_same_targets():
     assert len(targets(page)) >= 10
     assert re.search(r"\| 512 \| crossfield \| \d{3}", page)
     assert not re.search(r"/work|/home|/root|/tmp", page)
-
-
-@pytest.mark.slow
-def test_the_benchmark_of_limits_continues_where_it_was_interrupted(tmp_path):
-    data = tmp_path / "limits.json"
-    command = [sys.executable, str(ROOT / "tests" / "bench"), "limits", "--busy", "1", "--data", str(data)]
-    command += ["--size", "6", "--limit", "2", "--method", "power"]
-    first = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    assert first.splitlines()[1].split()[:3] == ["power", "6", "2"]
-    held = data.read_bytes()
-    assert subprocess.run(command, check=True, capture_output=True, text=True).stdout == first
-    assert data.read_bytes() == held

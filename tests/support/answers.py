@@ -66,9 +66,6 @@ FILES = {
     f"{X}_milp_time_without_point.slx": ("xpress-slx", FEASIBLE),
     f"{X}_milp_infeasible.slx": ("xpress-slx", SILENT),
     "xpress-by-layout_milp_two_solutions.slx": ("xpress-slx", FEASIBLE),
-    f"{X}_milp_optimal.asc": ("xpress-asc", FEASIBLE),
-    f"{X}_qp_optimal.asc": ("xpress-asc", FEASIBLE),
-    f"{X}_milp_time_without_point.asc": ("xpress-asc", FEASIBLE),
     f"{A}_cplex_milp_optimal.csv": ("gams-csv", GLOBAL),
     f"{A}_conopt_qp_optimal.csv": ("gams-csv", LOCAL),
     f"{A}_baron_quartic_optimal.csv": ("gams-csv", GLOBAL),
@@ -76,14 +73,6 @@ FILES = {
     f"{A}_baron_quartic_time_with_point.csv": ("gams-csv", LIMIT),
     f"{A}_cplex_milp_time_without_point.csv": ("gams-csv", NOTHING),
     f"{A}_cplex_milp_infeasible.csv": ("gams-csv", INFEASIBLE),
-    f"{A}_cplex_milp_optimal.lst": ("gams-lst", GLOBAL),
-    f"{A}_conopt_qp_optimal.lst": ("gams-lst", LOCAL),
-    f"{A}_baron_quartic_optimal.lst": ("gams-lst", GLOBAL),
-    f"{A}_sbb_quartic_optimal.lst": ("gams-lst", FEASIBLE),
-    f"{A}_baron_quartic_time_with_point.lst": ("gams-lst", LIMIT),
-    f"{A}_cplex_milp_time_without_point.lst": ("gams-lst", NOTHING),
-    f"{A}_cplex_milp_infeasible.lst": ("gams-lst", INFEASIBLE),
-    f"{A}_other_error.lst": ("gams-lst", ERROR),
     f"{R}_qp_optimal_res.lst": ("baron-res", GLOBAL),
     f"{R}_pair_optimal_res.lst": ("baron-res", GLOBAL),
     f"{R}_pair_first_point_res.lst": ("baron-res", FEASIBLE),
@@ -91,22 +80,11 @@ FILES = {
     f"{R}_qp_infeasible_res.lst": ("baron-res", INFEASIBLE),
     f"{R}_other_unbounded_res.lst": ("baron-res", UNBOUNDED),
     f"{R}_other_iterations_without_point_res.lst": ("baron-res", NOTHING),
-    f"{R}_qp_optimal_tim.lst": ("baron-tim", GLOBAL),
-    f"{R}_pair_optimal_tim.lst": ("baron-tim", GLOBAL),
-    f"{R}_pair_first_point_tim.lst": ("baron-tim", GLOBAL),
-    f"{R}_pair_iterations_with_point_tim.lst": ("baron-tim", LIMIT),
-    f"{R}_qp_infeasible_tim.lst": ("baron-tim", INFEASIBLE),
-    f"{R}_other_unbounded_tim.lst": ("baron-tim", UNBOUNDED),
-    f"{R}_other_iterations_without_point_tim.lst": ("baron-tim", NOTHING),
-    f"{R}_qp_time_without_point_tim.lst": ("baron-tim", NOTHING),
-    f"{R}_other_syntax_tim.lst": ("baron-tim", ERROR),
-    f"{R}_quartic_licence_tim.lst": ("baron-tim", ERROR),
     "miplib-by-layout_milp_optimal.sol": ("miplib", FEASIBLE),
     "miplib-by-layout_milp_infeasible.sol": ("miplib", INFEASIBLE),
 }
 """Every file of the folder: its reader and what it claims."""
 
-STATUS_ALONE = {"gams-lst", "baron-tim"}
 RELAXATIONS = {"milp_time_without_point", "milp_relaxed"}
 """Files that hold the point of a relaxation, as the solver writes it."""
 

@@ -1,4 +1,4 @@
-"""Content of an entry's page beyond its sidecar: structure, presolve, a plot of runs, loading.
+"""Content of an entry's page beyond its sidecar: structure, presolve, loading.
 
 The structure is the sparsity of the matrix and of the Hessian of the Lagrangian, as in MINLPLib.
 """
@@ -21,7 +21,6 @@ from ....models.formulations.families import PlacedFamily
 from ....models.formulations.problem import Problem
 from ....models.storage import write_bytes
 from ...pictures.sparsity import Parts, Pattern, Places, sparsity_picture
-from ...pictures.traces import curve, trace_picture
 from ...programs.highs import loaded, version
 from ...programs.protocol import RefusedError
 from ..documents.documents import Library, problem_of
@@ -63,14 +62,13 @@ class Blocks:
 
 @dataclass(frozen=True)
 class Study:
-    """Results computed from an entry. matrix, hessian: None if empty; plot: file of the plot of runs."""
+    """Results computed from an entry. matrix, hessian: None if empty."""
 
     matrix: Pattern | None
     hessian: Pattern | None
     blocks: Blocks | None
     presolved: Presolved | None
     ways: list[Way]
-    plot: str
 
 
 def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
@@ -89,23 +87,7 @@ def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
         blocks(patterns["hessian"]) if "hessian" in patterns else None,
         _presolved(library.folder, entry),
         list(ways(entry, problem)),
-        _plot(entry, pictures),
     )
-
-
-def _plot(entry: dict[str, Any], pictures: Path) -> str:
-    """Write the plot of an entry's runs and return its name; empty without traces."""
-    curves = [
-        curve(f"{run['solver']} {run.get('version', '')}".strip(), run["trace"])
-        for run in entry.get("runs", ())
-        if run.get("trace")
-    ]
-    shown = [each for each in curves if each.bounds or each.objectives]
-    if not shown:
-        return ""
-    name = f"{entry['name']}.runs.svg"
-    write_bytes(pictures / name, trace_picture(shown))
-    return name
 
 
 def _presolved(folder: Path, entry: dict[str, Any]) -> Presolved | None:

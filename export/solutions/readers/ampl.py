@@ -2,12 +2,12 @@
 
 Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl and ampl/mp):
 
-    optimal solution found          message: Bonmin and Couenne begin with an empty line, Minto has none
+    optimal solution found          message: Bonmin and Couenne begin with an empty line
                                     an empty line
     Options
     3                               number k of options, the first number of the .nl file
     1
-    1                               if 3, then k is 2 too large and a number (vbtol) follows the counts
+    1
     0
     2                               number of constraints
     0                               number of dual values that follow: all or none
@@ -18,10 +18,9 @@ Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl an
     objno 0 0                       objective's number and solve code; code or line may be missing
     suffix ...                      suffixes and other text, not needed here
 
-If the .nl file begins with g0 there is neither an Options block nor a count: without the problem, duals and
-values cannot be distinguished. The binary form has the same parts as records between their lengths, as in
-Fortran: integers of 4 bytes, numbers of 8, low byte first. With vbtol its Options record states 8 bytes
-too few.
+The options are those of the .nl file: ours have no tolerance (vbtol), and their .sol have the Options block,
+without which duals and values could not be distinguished. The binary form has the same parts as records
+between their lengths, as in Fortran: integers of 4 bytes, numbers of 8, low byte first.
 
 The solve code states only `solved`. It counts as a global proof only if the message names a solver that
 proves global optimality. Ipopt, Knitro and Bonmin (exact for convex problems) do not, and Couenne is
@@ -46,7 +45,6 @@ from ....models.storage import replacing
 from .text import HEAD, Cursor, RawSolution, Reader, Status, begins, is_number, numbers, one_line, shown
 
 _OPTIONS = re.compile(rb"^Options[ \t]*\n", re.MULTILINE)
-_AFTER_NUMBERS = re.compile(rb"^(?:objno|suffix)\b", re.MULTILINE)
 _OBJNO = re.compile(rb"^objno\b.*", re.MULTILINE)
 _CODE = re.compile(rb"objno[ \t]+\d{1,9}(?:[ \t]+(-?\d{1,9}))?[ \t]*")
 _MOST_OPTIONS: Final = 16
@@ -76,30 +74,18 @@ _CODES: Final = (
 
 
 def _recognises_text(head: bytes) -> bool:
-    return _OPTIONS.search(head) is not None or _start_of_numbers(head) is not None
+    return _OPTIONS.search(head) is not None
 
 
 def parse_text(data: bytes) -> RawSolution:
     """Read a text file. Raises SolutionError if it is cut off or numbers do not fit."""
     found = _OPTIONS.search(data, 0, HEAD)
-    if found is None:
-        return _parse_without_options(data)
+    assert found
     cursor = Cursor(data, found.end())
     counts = _read_counts(cursor)
     values = _read_values(cursor, counts)
     code = _read_code(cursor)
     return _solution(data[: found.start()], code, values, counts.rows)
-
-
-def _start_of_numbers(head: bytes) -> int | None:
-    """Start of the first number or `objno` on a line after an empty one; None without one."""
-    start, after_empty = 0, False
-    for line in head.split(b"\n"):
-        word = line.strip()
-        if after_empty and (is_number(word) or word.startswith(b"objno ")):
-            return start
-        start, after_empty = start + len(line) + 1, not word
-    return None
 
 
 class _Counts(NamedTuple):
@@ -125,15 +111,11 @@ def _read_counts(cursor: Cursor) -> _Counts:
     count = cursor.count("the number of options")
     if count > _MOST_OPTIONS:
         raise cursor.fault(f"{count} options are announced")
-    options = [cursor.integer("an option") for _ in range(min(count, 2))]
-    with_vbtol = options[1:] == [3]
-    for _ in range(count - len(options) - 2 * with_vbtol):
+    for _ in range(count):
         cursor.integer("an option")
     counts = _Counts(*(cursor.count("a count of constraints, variables or values") for _ in range(4)))
     if counts.complaint:
         raise cursor.fault(counts.complaint)
-    if with_vbtol:
-        cursor.number(cursor.line("vbtol"))
     return counts
 
 
@@ -167,19 +149,7 @@ def _read_code(cursor: Cursor) -> int | None:
     return None if code[1] is None else int(code[1])
 
 
-def _parse_without_options(data: bytes) -> RawSolution:
-    start = _start_of_numbers(data[:HEAD])
-    if start is None:
-        raise SolutionError(
-            "there is neither an Options line nor a number after the message; "
-            "let the solver write the file again"
-        )
-    found = _AFTER_NUMBERS.search(data, start)
-    stop = len(data) if found is None else found.start()
-    return _solution(data[:start], _read_code(Cursor(data, stop)), numbers(data, start, stop), None)
-
-
-def _solution(message: bytes, code: int | None, values: Floats, rows: int | None) -> RawSolution:
+def _solution(message: bytes, code: int | None, values: Floats, rows: int) -> RawSolution:
     words = one_line(message)
     if code is not None and 0 <= code <= 99 and not values.size:
         raise SolutionError("the file states solved but holds no values; let the solver write the file again")
@@ -204,15 +174,14 @@ def parse_binary(data: bytes) -> RawSolution:
     message = b"\n".join(iter(records.take, b""))
     counts = records.take_counts()
     duals, values = records.take_numbers("dual values"), records.take_numbers("values")
-    if counts and (duals.size, values.size) != (counts.duals, counts.values):
+    if (duals.size, values.size) != (counts.duals, counts.values):
         raise records.fault(
             f"{counts.duals} dual values and {counts.values} values are announced, "
             f"{duals.size} and {values.size} follow"
         )
     if np.isnan(values).any():
         raise records.fault("one of the values is not a number")
-    rows = counts.rows if counts else duals.size
-    return _solution(message, records.take_code(), values, rows)
+    return _solution(message, records.take_code(), values, counts.rows)
 
 
 @dataclass
@@ -225,11 +194,11 @@ class _Records:
     def fault(self, text: str) -> SolutionError:
         return SolutionError(f"byte {self.position}: {text}; let the solver write the file again")
 
-    def take(self, unstated: int = 0) -> bytes:
-        """The next record, which is `unstated` bytes longer than its stated length."""
+    def take(self) -> bytes:
+        """The next record."""
         start = self.position + 4
         length = self._length(self.position)
-        end = start + length + unstated
+        end = start + length
         if self._length(end) != length:
             raise self.fault(f"a record of {length} bytes does not end at its stated length")
         self.position = end + 4
@@ -240,19 +209,16 @@ class _Records:
             raise self.fault("the file is cut off in this record")
         return int.from_bytes(self.data[at : at + 4], "little")
 
-    def take_counts(self) -> _Counts | None:
-        """The counts of the Options record, if there is one."""
-        start = self.position + 4 + len(_OPTIONS_WORD)
-        if self.data[start - len(_OPTIONS_WORD) : start] != _OPTIONS_WORD:
-            return None
-        count, _, second = struct.unpack("<3i", self.data[start : start + 12].ljust(12, b"\0"))
-        with_vbtol = second == 3
-        size = len(_OPTIONS_WORD) + 4 * (count + 5 - 2 * with_vbtol)
-        stated = self._length(self.position)
-        record = self.take(8 if with_vbtol and stated == size else 0)
-        if not 0 <= count <= _MOST_OPTIONS or stated not in {size, size + 8 * with_vbtol}:
-            raise self.fault(f"the Options record of {stated} bytes announces {count} options")
-        return self._checked(_Counts(*struct.unpack("<4i", record[size - 16 : size])))
+    def take_counts(self) -> _Counts:
+        """The counts of the Options record."""
+        record = self.take()
+        size = len(record) - len(_OPTIONS_WORD)
+        if not record.startswith(_OPTIONS_WORD) or size % 4:
+            raise self.fault("no Options record follows the message")
+        count, *numbers = struct.unpack(f"<{size // 4}i", record[len(_OPTIONS_WORD) :]) or (0,)
+        if not 0 <= count <= _MOST_OPTIONS or len(numbers) != count + 4:
+            raise self.fault(f"the Options record of {len(record)} bytes announces {count} options")
+        return self._checked(_Counts(*numbers[-4:]))
 
     def _checked(self, counts: _Counts) -> _Counts:
         if min(counts) < 0 or counts.complaint:

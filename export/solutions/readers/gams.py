@@ -1,4 +1,4 @@
-"""Answers of GAMS: the CSV of our own files, and listings, which have the status only.
+"""Answers of GAMS: the CSV that our own files write.
 
 After `gams x.gms --RESULTS=x.csv` the CSV has lines `name,value`:
 
@@ -12,14 +12,7 @@ EPS is a zero, +INF and -INF occur, NA and UNDF are not values. GAMS's numbers o
 manual under modelStat and solveStat. If the model status promises no point, GAMS keeps the start in the
 levels: values are then not read.
 
-A listing (.lst) has values of four decimals, too few for a point:
-
-                   S O L V E      S U M M A R Y
-    **** SOLVER STATUS     1 Normal Completion
-    **** MODEL STATUS      2 Locally Optimal
-
-Several solves write several summaries: the last one counts, and `**** FILE SUMMARY` ends the listing. A model
-that does not compile has none, but `**** 2 ERROR(S)`. Layout: GAMS 54.6.1.
+A listing (.lst) has four decimals, too few for a point, and is not read. Layout: GAMS 54.6.1.
 """
 
 from __future__ import annotations
@@ -27,7 +20,6 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from ....models.errors import SolutionError
 from .text import Cursor, RawSolution, Reader, Status, begins, named_numbers, shown, without_point
 
 _EPS = re.compile(rb",[ ]*EPS[ ]*$", re.MULTILINE)
@@ -101,44 +93,8 @@ def _state(cursor: Cursor, expected: str) -> int:
     return int(text)
 
 
-_SUMMARY: Final = b"S O L V E      S U M M A R Y"
-_LONGEST_SUMMARY: Final = 4096
-_END: Final = b"\n**** FILE SUMMARY"
-_STATES = re.compile(
-    rb"^\*\*\*\* SOLVER STATUS +(\d{1,3})\b[^\n]*\n\*\*\*\* MODEL STATUS +(\d{1,3})\b[^\n]*\n", re.MULTILINE
-)
-_ERRORS = re.compile(rb"^\*\*\*\* +(\d+ ERROR\(S\)[^\n]*|USER ERROR\(S\) ENCOUNTERED)", re.MULTILINE)
-
-
-def parse_listing(data: bytes) -> RawSolution:
-    """The status of the last solve in a listing, without a point.
-
-    Raises SolutionError when it is cut off or has neither a solve nor an error.
-    """
-    at = data.rfind(_SUMMARY)
-    if at < 0:
-        return _without_solve(data)
-    states = _STATES.search(data, at, at + _LONGEST_SUMMARY)
-    if states is None:
-        raise SolutionError("the listing is cut off in the summary of its last solve; run GAMS again")
-    if data.find(_END, states.end()) < 0:
-        raise SolutionError("the listing is cut off after a solve: it has no FILE SUMMARY; run GAMS again")
-    status, words = _claim(int(states[2]), int(states[1]))
-    return without_point(status, words)
-
-
-def _without_solve(data: bytes) -> RawSolution:
-    found = _ERRORS.search(data)
-    if found is None:
-        raise SolutionError("the listing has no summary of a solve; let the GAMS file run to its end")
-    return without_point(Status.ERROR, found[1])
-
-
-_PAGE: Final = rb"(?m)GAMS [^\n]{1,200} Page 1[ \t]*$"
-
 READERS: Final = (
     Reader(
         "gams-csv", "GAMS, the CSV that our models write with --RESULTS", begins(rb"model_status,"), parse_csv
     ),
-    Reader("gams-lst", "GAMS listing (.lst), for the status alone", begins(_PAGE), parse_listing),
 )

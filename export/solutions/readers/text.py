@@ -99,9 +99,9 @@ class RawSolution:
     status: the solver's claim. message: its own words on one line. objective: its objective value, or None.
     names: byte strings (k,), or None when the format is positional. values: float (k,), in the order of the
     file; infinities may occur, NaN may not. omits_zeros: whether a column that is not listed is 0. rows:
-    number of constraints in the file, or None: then a positional file has a dual value for each row
-    before the values. order: the order of the values without names. bound: the solver's dual
-    bound, or None. of_rows: names (k,) that the file lists as names of rows, whose values are left out.
+    number of constraints in the file, or None if it does not state them. order: the order of the values
+    without names. bound: the solver's dual bound, or None. of_rows: names (k,) that the file lists as names
+    of rows, whose values are left out.
     stamp: of the problem, if the solver repeated it, or empty. reader: name of the reader of the file.
     """
 
@@ -230,18 +230,17 @@ def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
     """
     _check_point(raw)
     found = raw.values.size
-    if (raw.rows, found) not in {(rows, columns), (None, rows + columns)}:
+    if (raw.rows, found) != (rows, columns):
         if raw.order != "nl" and (raw.rows, found) == (rows + 1, columns):
             raise SolutionError(
                 "the file counts one row too many: this is HiGHS style 2 (GLPK raw); "
                 "write it with write_solution_style = 0 (raw) or 4 (sparse)"
             )
-        size = f"{found} values" if raw.rows is None else f"{found} columns and {raw.rows} rows"
         raise SolutionError(
-            f"the file is of {size}, the problem has {columns} columns and {rows} rows; "
-            "give the solution of this problem"
+            f"the file is of {found} columns and {raw.rows} rows, the problem has {columns} columns and "
+            f"{rows} rows; give the solution of this problem"
         )
-    return raw.values[found - columns :].copy()
+    return raw.values.copy()
 
 
 def one_line(text: bytes) -> str:

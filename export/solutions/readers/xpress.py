@@ -1,15 +1,12 @@
-"""Solution files of Xpress: .slx and .asc.
+"""Solution files of Xpress, .slx.
 
-    NAME          mip                          .slx: NAME .. ENDATA for each solution, the first is taken
+    NAME          mip                          NAME .. ENDATA for each solution, the first is taken
       C x                       10
     ENDATA                                     only ENDATA: there was no solution
 
-    1,"c1      ","G","BS",11,0.3,0,11.3,0      .asc: number, name and blanks, kind, state, value, ...
-    3,"x       ","C","SB",10,0.1,0,10,0        columns have the kind C and come after the rows
-
-Neither has a status: the point counts as feasible. Without an integer solution
-Xpress writes the relaxation, which the recomputed violation reveals. .prt has six decimals and
-.hdr no columns: they are not read. Layouts: Xpress 9.9.1.
+There is no status: the point counts as feasible. Without an integer solution Xpress writes the relaxation,
+which the recomputed violation reveals. .prt has six decimals, .hdr no columns, and .asc the same values: they
+are not read. Layouts: Xpress 9.9.1.
 """
 
 from __future__ import annotations
@@ -27,14 +24,11 @@ from .text import (
     fault,
     labelled_numbers,
     without_point,
-    words_of_line,
 )
 
 _END: Final = b"ENDATA"
 _COLUMN: Final = b"\n  C "
 _NO_COLUMN = re.compile(rb"\n(?!  C )")
-_APART = bytes.maketrans(b',"', b"  ")
-_FIRST_COLUMN = re.compile(rb'^ *\d+,"[^"\n]*","C",', re.MULTILINE)
 
 
 def parse_slx(data: bytes) -> RawSolution:
@@ -68,21 +62,6 @@ def _check_kinds(data: bytes, start: int, stop: int) -> None:
         raise fault(data, at, "this line is of no column (C)")
 
 
-def parse_asc(data: bytes) -> RawSolution:
-    """Read an .asc. Raises SolutionError for words that are not numbers and for a cut file."""
-    found = _FIRST_COLUMN.search(data)
-    if found is None:
-        raise SolutionError("the file holds no line of a column (kind C); let Xpress write it again")
-    spaced = data.translate(_APART)
-    per_line = len(words_of_line(spaced, found.start()))
-    names, values = labelled_numbers(spaced, found.start(), len(data), per_line, label=1, numeric=(4,))
-    return RawSolution(Status.FEASIBLE, "", None, names, values[:, 0])
-
-
 _BLOCK: Final = rb"NAME\b[^\n]*\n(?: +[A-Z]+ |ENDATA)|ENDATA[ \t]*(?:\n|\Z)"
-_LINE: Final = rb' *\d+,"[^"\n]*","[A-Z]","[A-Z*]{2}",'
 
-READERS: Final = (
-    Reader("xpress-slx", "Xpress .slx", begins(_BLOCK), parse_slx),
-    Reader("xpress-asc", "Xpress .asc", begins(_LINE), parse_asc),
-)
+READERS: Final = (Reader("xpress-slx", "Xpress .slx", begins(_BLOCK), parse_slx),)

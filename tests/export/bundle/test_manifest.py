@@ -161,7 +161,7 @@ from crossfield.export.bundle.manifest import write_all
 from crossfield.models.instance.file import read_instance
 instance = read_instance(sys.argv[1])
 write_all(instance, sys.argv[2])
-write_all(instance, sys.argv[2] + "/packed", compress=True, dialects={"nl": "binary", "gms": "scalar"})
+write_all(instance, sys.argv[2] + "/packed", compress=True, dialects={"nl": "binary"})
 """
 
 
@@ -287,10 +287,10 @@ def test_problems_that_no_manifest_records(tmp_path):
     assert list(tmp_path.iterdir()) == []
     write(lifted(problem), tmp_path / "single.lp")
     fixed = with_integers_fixed(problem, make_field(problem.instance))
-    with pytest.raises(UnsupportedByFormatError, match="write the scalar layout"):
-        write(fixed, tmp_path / "fixed.gms")
+    with pytest.raises(UnsupportedByFormatError, match="write nl, lp or mps"):
+        write(fixed, tmp_path / "fixed.mod")
     assert [path.name for path in tmp_path.iterdir()] == ["single.lp"]
-    write(fixed, tmp_path / "fixed.gms", dialect="scalar")
+    write(fixed, tmp_path / "fixed.gms")
 
 
 def test_unknown_formats_dialects_and_folders(tmp_path):

@@ -3,10 +3,8 @@
 import json
 import math
 import re
-import struct
 import subprocess
 import sys
-import zlib
 from pathlib import Path
 
 import crossfield as cf
@@ -86,49 +84,17 @@ PICTURES = {
 }
 
 
-def png_header(width, height):
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    return (
-        b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", head)
-        + chunk(b"IDAT", zlib.compress(bytes(1000)))
-        + chunk(b"IEND", b"")
-    )
-
-
-def with_entities(declared: str, used: str) -> str:
-    drawing = SVG.format(f"<text>&{used};</text>" + STROKES)
-    return f'<?xml version="1.0"?><!DOCTYPE svg [{declared}]>{drawing}'
-
-
-DOUBLED = "".join(f'<!ENTITY e{k} "&e{k - 1};&e{k - 1};">' for k in range(1, 40))
 SKETCHES = {
-    "empty.png": (b"", "empty"),
     "words.png": (b"these are words", "not a whole picture"),
-    "huge.png": (png_header(60_000, 60_000), "pixels; scale it down"),
-    "large.png": (png_header(12_000, 12_000), "pixels; "),
     "bare.svg": (SVG.format("").encode(), "no stroke"),
-    "invisible.svg": (SVG.format(STROKES.replace('stroke="black"', 'fill="none"')).encode(), "no stroke"),
-    "bomb.svg": (with_entities(f'<!ENTITY e0 "ha">{DOUBLED}', "e39").encode(), "entities"),
-    "external.svg": (with_entities('<!ENTITY e SYSTEM "file:///etc/hostname">', "e").encode(), "entities"),
-    "cut.svg": (SVG.format(STROKES).encode()[:90], "not well-formed XML"),
-    "page.svg": (b"<html><body/></html>", "<html>"),
-    "empty.svg": (b"", "empty"),
-    "broken.scap": (b"#60\t40\n@1\n{\n#1\t1\n", ""),
+    "broken.scap": (b"#60\t40\n@1\n{\n#1\t1\n", "does not end"),
 }
+"""The other faults of sketches: tests/models/sketch/test_sketch.py."""
 INSTANCES = {
     "nan.json": (lambda d: d["strokes"][0].__setitem__(2, float("nan")), "theta is not a finite number"),
-    "sure.json": (lambda d: d["strokes"][0].__setitem__(3, 2.0), "maximum of 1"),
-    "far.json": (lambda d: d["strokes"][0].__setitem__(0, 99), "outside the mask"),
-    "version.json": (lambda d: d.__setitem__("version", 2), "version 2"),
-    "format.json": (lambda d: d.__setitem__("format", "other"), "format"),
     "maskless.json": (lambda d: d.pop("mask"), "mask"),
-    "skew.json": (lambda d: d.__setitem__("w_beta", "much"), "w_beta"),
-    "row.json": (lambda d: d["mask"].append("#"), "mask row 2"),
 }
+"""The other faults of instances: tests/models/instance/test_instance_file.py."""
 
 
 @pytest.fixture

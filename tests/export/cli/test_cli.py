@@ -169,7 +169,7 @@ def test_a_folder_with_the_name_of_a_sample_does_not_hide_it(crossfield):
 
 
 def test_options_of_the_formulation_reach_the_files(crossfield, instance_file):
-    options = "--facet printed --stroke-norm 2 --relax --gauge box --gams-layout scalar --nl-form binary"
+    options = "--facet printed --stroke-norm 2 --relax --gauge box --nl-form binary"
     crossfield(f"export tiny.json -f milp-mccormick {options} --gzip -o out")
     document = json.loads(Path("out/tiny.milp-mccormick.manifest.json").read_text())
     assert document["options"] == {"facet": "printed", "stroke_norm": 2, "beta_norm": 1, "relax": True}

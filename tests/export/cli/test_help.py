@@ -125,7 +125,7 @@ def test_brackets_in_a_help_are_shown(text, markup):
 
 def test_choices_are_those_of_the_models_and_of_the_formats(text):
     shown = words(text("export"))
-    for table in (GAUGES, FACETS, FORMATS["gms"].dialects, FORMATS["nl"].dialects):
+    for table in (GAUGES, FACETS, FORMATS["nl"].dialects):
         assert re.search(rf"[<\[]{re.escape('|'.join(table))}[>\]]", shown), table
 
 

@@ -26,9 +26,6 @@ LAYOUTS = [
 ]
 """Formats that list columns and rows."""
 
-OVER_SETS = [("gms", "indexed"), ("mod", "")]
-"""Formats that list the data of the instance."""
-
 
 class FewerRows(Problem):
     """The last family of rows lacks its last element."""
@@ -116,11 +113,10 @@ def test_a_lost_product_is_an_error(suffix, tmp_path):
     refused(damaged(FewerCosts, "qp-fixed"), suffix, "", tmp_path, "but th.* problem ", kept=whole)
 
 
-@for_each("suffix, dialect", OVER_SETS)
-def test_a_lost_stroke_is_an_error(suffix, dialect, tmp_path):
+def test_a_lost_stroke_is_an_error(tmp_path):
     instance = make_instance(gauge="box")
     fewer = FewerStrokes(*(getattr(instance, each.name) for each in fields(Instance)))
     whole, problem = (formulate(each, "milp-mccormick") for each in (instance, fewer))
     count = len(instance.theta)
     found = f"holds {count - 1} strokes, but the problem has {count};"
-    refused(problem, suffix, dialect, tmp_path, found, kept=whole)
+    refused(problem, "mod", "", tmp_path, found, kept=whole)

@@ -1,4 +1,4 @@
-"""Both GAMS layouts, read back by GAMS: translated by CONVERT, evaluated by CasADi, solved."""
+"""GAMS files, read back by GAMS: translated by CONVERT, evaluated by CasADi, solved."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import places
 import pytest
 from cases import CASES, make_field, make_problem, names_of, problem_of
 from crossfield import templates
-from crossfield.export.formats import gams_indexed
-from crossfield.export.formats import gams_scalar as gams
+from crossfield.export.formats import gams
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import gams as gams_program
 from crossfield.export.solving.local import solve
@@ -26,15 +25,14 @@ from loops import for_each
 from oracles import random_points
 
 GOLDEN = places.GOLDEN
-LAYOUTS = {"scalar": gams.generate, "indexed": gams_indexed.generate}
 HEADER = ["a comment with %per cent%, a $dollar and an é", "$call in a comment"]
 CHOSEN = [label for label in CASES if re.search("strokes|relax|facet|norm=|parts|row", label)]
 needs_gams = pytest.mark.needs("gams")
 SOLVED = ["milp-mccormick gauge=strokes", "qp-fixed gauge=strokes", "milp-mccormick shape=row"]
 
 
-def text_of(problem: Problem, layout: str, **options: np.ndarray) -> bytes:
-    return b"".join(LAYOUTS[layout](Canonical(problem), HEADER, **options))
+def text_of(problem: Problem, **options: np.ndarray) -> bytes:
+    return b"".join(gams.generate(Canonical(problem), HEADER, **options))
 
 
 def run_gams(folder: Path, text: bytes, *options: str) -> dict[str, float]:
@@ -51,34 +49,32 @@ def run_gams(folder: Path, text: bytes, *options: str) -> dict[str, float]:
     return {name: float(value) for name, value in pairs if name != "problem"}
 
 
-def solved(folder: Path, problem: Problem, layout: str, *options: str) -> tuple[float, np.ndarray]:
-    results = run_gams(folder, text_of(problem, layout), *options)
+def solved(folder: Path, problem: Problem, *options: str) -> tuple[float, np.ndarray]:
+    results = run_gams(folder, text_of(problem), *options)
     assert results["solver_status"] == 1
     assert results["model_status"] in {1, 2, 8}
     return results["objective"], np.array([results[name] for name in names_of(column_names(problem))])
 
 
 @needs_gams
-@for_each("layout", LAYOUTS)
 @for_each("label", CHOSEN)
-def test_gams_reads_the_problem(label: str, layout: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_gams_reads_the_problem(label: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)  # where GAMS puts its files
     problem = problem_of(label)
-    write(problem, tmp_path / "model.gms", dialect=layout)
+    write(problem, tmp_path / "model.gms")
     points = random_points(problem)
     found = gams_program.evaluate(tmp_path / "model.gms", points)
     assert evaluation_difference(found, problem, points) == ""
 
 
 @needs_gams
-@for_each("layout", LAYOUTS)
 @for_each("label", [*SOLVED, "milp-mccormick shape=parts"])
-def test_a_start_comes_back_under_our_names(label: str, layout: str, tmp_path: Path):
+def test_a_start_comes_back_under_our_names(label: str, tmp_path: Path):
     """CONVERT solves nothing, so the results are the start; `parts` has a column in no term."""
     problem = problem_of(label)
     start = problem.point(make_field(problem.instance))
     convert = [f"{model}=convert" for model in sorted(set(gams.MODEL_TYPES.values()))]
-    results = run_gams(tmp_path, text_of(problem, layout, start=start), *convert)
+    results = run_gams(tmp_path, text_of(problem, start=start), *convert)
     head, names = list(results)[:3], list(results)[3:]
     assert head == ["model_status", "solver_status", "objective"]
     assert names == names_of(column_names(problem))
@@ -87,42 +83,38 @@ def test_a_start_comes_back_under_our_names(label: str, layout: str, tmp_path: P
 
 
 @needs_gams
-@for_each("layout", LAYOUTS)
 @for_each("label", SOLVED)
-def test_optimum_is_that_of_another_solver(label: str, layout: str, tmp_path: Path):
+def test_optimum_is_that_of_another_solver(label: str, tmp_path: Path):
     problem = problem_of(label)
-    value, point = solved(tmp_path, problem, layout)
+    value, point = solved(tmp_path, problem)
     assert value == pytest.approx(solve(problem, "highs").objective, rel=1e-6)
     assert problem.objective_value(point) == pytest.approx(value, rel=1e-9)
     assert problem.violation(point).worst < 1e-6
 
 
 @needs_gams
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_exact_convex_model_has_the_energy_of_its_field(tmp_path: Path, layout: str):
+def test_exact_convex_model_has_the_energy_of_its_field(tmp_path: Path):
     """The point of `miqp-exact` by CPLEX costs the same in (8), and at most as much as any tried field."""
     problem = problem_of("miqp-exact shape=row")
-    value, point = solved(tmp_path, problem, layout, "miqcp=cplex")
+    value, point = solved(tmp_path, problem, "miqcp=cplex")
     quartic = make_problem("minlp-quartic", problem.instance)
     assert quartic.objective_value(quartic.point(problem.field(point))) == pytest.approx(value, rel=1e-5)
     assert all(make_field(problem.instance, seed).energy().total >= value - 1e-9 for seed in range(20))
 
 
 @needs_gams
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_one_pixel(tmp_path: Path, layout: str):
+def test_one_pixel(tmp_path: Path):
     """Stroke at 120 degrees: gauge box forces beta = 30 degrees and alpha = 90; gauge strokes nothing."""
     for gauge, expected in (("box", (np.pi / 2, np.pi / 6)), ("strokes", (2 * np.pi / 3, 0.0))):
         instance = Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0], gauge=gauge)
-        _, point = solved(tmp_path, make_problem("minlp-quartic", instance), layout)
+        _, point = solved(tmp_path, make_problem("minlp-quartic", instance))
         np.testing.assert_allclose(point[:2], expected, atol=1e-5)
 
 
-@for_each("layout", LAYOUTS)
 @for_each("label", CHOSEN)
-def test_text_is_plain(label: str, layout: str):
+def test_text_is_plain(label: str):
     problem = problem_of(label)
-    text = text_of(problem, layout, start=problem.point(make_field(problem.instance))).decode()
+    text = text_of(problem, start=problem.point(make_field(problem.instance))).decode()
     lines = text.splitlines()
     assert max(map(len, lines)) < 200
     assert not re.search(r"\t|\*\*|\0", text)
@@ -135,40 +127,13 @@ def test_text_is_plain(label: str, layout: str):
 
 
 @needs_gams
-@pytest.mark.parametrize("gauge", ["strokes", "box"])
-def test_jump_bounds_computed_by_gams_are_ours(tmp_path: Path, gauge: str):
-    """Directions in steps of pi/24 put differences of windows onto the jumps of floor and ceil."""
-    rng = np.random.default_rng(2)
-    mask = rng.random((30, 30)) < 0.9
-    pixels = np.argwhere(mask & (rng.random(mask.shape) < 0.7))
-    theta = rng.integers(0, 24, len(pixels)) * np.pi / 24
-    instance = Instance("steps", mask, pixels, theta, np.ones(len(pixels)), gauge=gauge)
-    model = text_of(make_problem("minlp-parity", instance), "indexed").partition(b"solve m")[0]
-    values = b"p.lo(r,c,side):0:0 ' ' p.up(r,c,side):0:0"
-    put = b"File out / bounds.txt /; put out; loop(E(r,c,side), put %b /);\n" % values
-    run_gams(tmp_path, model + put)
-    bounds = np.loadtxt(tmp_path / "bounds.txt", dtype=int)
-    np.testing.assert_array_equal(bounds, np.stack([instance.p_min, instance.p_max], axis=1))
-
-
-@needs_gams
 def test_no_lists_of_names_end_open(tmp_path: Path):
     """Declarations that end on the last place of a line, before and after it: of 8 to 28 pixels."""
     for count in range(8, 29, 5):
         instance = Instance("line", np.ones((1, count), bool), [[0, 0], [0, 5]], [0.3, 2.0], [0.5, 0.9])
         problem = make_problem("miqp-mccormick", instance, relax=True)
-        _, point = solved(tmp_path, problem, "scalar")
+        _, point = solved(tmp_path, problem)
         assert problem.violation(point).worst < 1e-6
-
-
-def test_text_of_the_indexed_layout_grows_with_the_data_alone():
-    """A rectangle is one line per row for any width; each stroke pixel is two lines."""
-    sizes = []
-    for width in (20, 40):
-        mask = np.ones((10, width), dtype=bool)
-        instance = Instance("wide", mask, [[0, 0]], [0.3], [1.0])
-        sizes.append(text_of(make_problem("milp-mccormick", instance), "indexed").count(b"\n"))
-    assert sizes[0] == sizes[1]
 
 
 def test_stream_reads_a_block_when_its_place_comes(monkeypatch: pytest.MonkeyPatch):
@@ -188,9 +153,7 @@ def test_golden_file():
     """A small model that people can read; the other tests check its meaning."""
     instance = Instance("golden", [[True, True], [True, False]], [[0, 1]], [2.5], [0.5])
     text = b"".join(
-        gams_indexed.generate(
-            Canonical(make_problem("minlp-quartic", instance)), ["minlp-quartic on three pixels"]
-        )
+        gams.generate(Canonical(make_problem("minlp-quartic", instance)), ["minlp-quartic on three pixels"])
     )
     assert text == (GOLDEN / "minlp-quartic.gms").read_bytes()
     assert text.count(b"\n") < 80

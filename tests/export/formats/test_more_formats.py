@@ -3,7 +3,7 @@
 .mod, .dat: GLPK reads the linear ones. Of the others it evaluates every expression once variables are
 parameters: its MathProg is a second implementation of the language, and AMPL itself cannot be had for free.
 .osil: SCIP, and the XML taken at its word. .qplib: pyqplib, where it is installed, and a reader after
-qplib.zib.de/doc.html. .bar: Pyomo's BARON writer, and BARON itself in its free size.
+qplib.zib.de/doc.html. .bar: BARON itself in its free size.
 """
 
 from __future__ import annotations
@@ -644,32 +644,6 @@ def by_baron(path: Path, problem: Problem) -> Any:
     done = subprocess.run([program, path.name], cwd=path.parent, capture_output=True, text=True, check=False)
     assert "Normal completion" in done.stdout, done.stdout
     return read_solution(path.parent / "res.lst", problem)
-
-
-@for_each("formulation", [name for name in FORMULATIONS if name != "minlp-parity"])
-def test_pyomos_baron_writer_says_the_same(formulation: str, tmp_path: Path):
-    """Kinds, bounds, and values at random points; Pyomo bounds binaries too, and adds ONE_VAR_CONST__."""
-    from crossfield.export.formats.pyomo_model import to_pyomo
-
-    problem = make_problem(formulation, make_instance("row"))
-    ours = bar_model(written(problem, tmp_path / "model.bar"))
-    model = to_pyomo(problem)
-    _, key = model.write(str(tmp_path / "theirs.bar"), format="bar")
-    symbols = model.solutions.symbol_map[key].bySymbol
-    place = lambda m: "_".join(["", m[1].zfill(2), m[2].zfill(2), *m[3]])  # noqa: E731
-    known = {symbol: re.sub(r"\[(\d+),(\d+),?(\w?)\]", place, part.name) for symbol, part in symbols.items()}
-    text = re.sub(r"\w+", lambda m: known.get(m[0], m[0]), (tmp_path / "theirs.bar").read_text())
-    theirs = bar_model(re.sub(r"minimize\s+", "minimize ", text))
-    columns, rows = names(problem)
-    used = [name for name in columns if name in theirs["kind"]]
-    assert len(used) >= len(columns) - 2
-    merged = lambda found: [found["kind"][name].replace("POSITIVE_", "") for name in used]  # noqa: E731
-    assert merged(theirs) == merged(ours)
-    for point in points_of(problem, 3):
-        mine, mine_rows = evaluated(ours, columns, point)
-        other, other_rows = evaluated(theirs, [*columns, "ONE_VAR_CONST__"], np.append(point, 1.0))
-        assert_values([mine], [other])
-        assert_values([mine_rows[name] for name in rows], [other_rows[name] for name in rows])
 
 
 @pytest.mark.needs("baron")

@@ -173,7 +173,7 @@ def test_one_pixel_has_empty_components(name: str):
 def test_pyomo_is_imported_for_this_alone():
     """The rest of the package starts fast, and works without Pyomo."""
     wanted = (
-        "writing.names formats.registry formats.nl formats.lp formats.mps formats.gams_scalar "
+        "writing.names formats.registry formats.nl formats.lp formats.mps formats.gams "
         "bundle.manifest solving.local"
     )
     imports = ", ".join(f"crossfield.export.{name}" for name in wanted.split())

@@ -16,7 +16,6 @@ from crossfield.export.library.documents.documents import problem_of
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.export.library.site.site import write_site
 from crossfield.export.pictures.marks import FAMILIES, STROKE
-from crossfield.export.pictures.web import HUES
 from crossfield.export.writing.canonical import Canonical
 from forging import seal
 
@@ -260,7 +259,6 @@ def test_an_entry_shows_its_runs_origin_and_citation(site, detailed):
         "hard",
         "Gurobi 13.0.3",
         "SCIP 10.0",
-        f"{ENTRY}.runs.svg",
     ]
     assert [each for each in wanted if each not in text] == []
     assert re.search(r"Optimality is\s+claimed by Gurobi 13\.0\.3", text)
@@ -269,11 +267,8 @@ def test_an_entry_shows_its_runs_origin_and_citation(site, detailed):
     assert "@misc{a_library_to_cite," in text_of(site, ENTRY)
     agreed = r"Solved\s+by agreement of Gurobi 1, SCIP 1, Bonmin 2 on cf_mouse_n004_cubic\."
     assert re.search(agreed, text_of(detailed, f"{INSTANCE}_exact"))
-    plot = ET.parse(detailed / "pictures" / f"{ENTRY}.runs.svg").getroot()
-    assert [len(plot.findall(f".//*[@stroke='{hue}']")) for hue in HUES[:2]] == [3, 2]
     for other in (text_of(site, ENTRY), text_of(detailed, f"{INSTANCE}_qp")):
         assert [each for each in wanted[:4] if each in other] == []
-        assert "runs.svg" not in other
     about = (detailed / "about.html").read_text()
     assert "@misc{crossfield-library," in about
     assert "1.2" in about

@@ -12,8 +12,6 @@ from crossfield.export.library.documents.statistics import counts
 from crossfield.export.library.site.study import blocks, hessian, matrix
 from crossfield.export.pictures.marks import FAMILIES, STROKE
 from crossfield.export.pictures.sparsity import CELLS, Parts, Pattern, sparsity_picture
-from crossfield.export.pictures.traces import curve, trace_picture
-from crossfield.export.pictures.web import EDGE, GRID, HUES
 from crossfield.export.writing.canonical import Canonical
 from loops import for_each
 from oracles import by_casadi
@@ -106,56 +104,18 @@ def test_a_large_matrix_is_binned_and_its_picture_stays_small():
     assert sparsity_picture(pattern) == picture
 
 
-def test_a_plot_draws_the_known_values_of_logs():
-    stated = [
-        curve("A <b> 1", [[0, None, 9.5], [1.5, -2.0, 9.5], [4, float("inf"), 7.25], [5, 7.25, 7.25]]),
-        curve("B", [[2.0, 3.0, None]]),
-        curve("C", [[None, 3.0, 1.0]]),
-    ]
-    assert [len(each.bounds) for each in stated] == [2, 1, 0]
-    assert [len(each.objectives) for each in stated] == [4, 0, 0]
-    picture = trace_picture(stated[:2])
-    root = ET.fromstring(picture)
-    paths = [(each.get("stroke"), "stroke-dasharray" in each.attrib) for each in root.iter(f"{SVG}path")]
-    first, second = HUES[:2]
-    assert paths == [
-        (GRID, False),
-        (EDGE, False),
-        *((first, dashed) for dashed in (False, True, False)),
-        *[(second, False)] * 2,
-    ]
-    texts = [each.text for each in root.iter(f"{SVG}text")]
-    assert {"A <b> 1", "B", "seconds", "0", "10"} <= set(texts)
-    assert trace_picture(stated[:2]) == picture
-
-
-@pytest.mark.parametrize("value", [0.0, -3.5, 1e-9, 1e9])
-def test_a_plot_of_one_value_has_a_scale(value):
-    root = ET.fromstring(trace_picture([curve("A", [[0, value, None]])]))
-    assert len(list(root.iter(f"{SVG}text"))) >= 5
-
-
-def test_first_values_that_are_larger_by_powers_of_ten_do_not_flatten_a_plot():
-    trace = [[0, -1e6, 1e9], [1, 3.0, 6.0], [2, 4.0, 5.0]]
-    root = ET.fromstring(trace_picture([curve("A", trace)]))
-    ticks = [each.text for each in root.iter(f"{SVG}text") if each.get("text-anchor") == "end"]
-    assert {"0", "5", "10"} <= set(ticks)
-    assert len(ticks) < 8
-
-
 @pytest.mark.parametrize("name", ["a", "a_rather_long_name_of_a_column"])
 def test_names_and_numbers_have_room_on_the_page(name):
     parts = Parts(("other", name), (100, 2))
     nowhere = np.zeros(0, np.int64)
     pattern = Pattern(parts, parts, nowhere, nowhere, np.zeros(0, bool))
-    for picture in (sparsity_picture(pattern), trace_picture([curve("A", [[0, -1.23457e7, None]])])):
-        root = ET.fromstring(picture)
-        left, top, width, height = map(float, root.get("viewBox").split())
-        for each in root.iter(f"{SVG}text"):
-            x, y, reach = float(each.get("x")), float(each.get("y")), 6 * len(each.text)
-            if each.get("transform"):
-                assert y - reach * np.sin(np.pi / 3) >= top
-                assert x + reach * np.cos(np.pi / 3) <= left + width
-            elif each.get("text-anchor") == "end":
-                assert x - reach >= left
-            assert y + 3 <= top + height
+    root = ET.fromstring(sparsity_picture(pattern))
+    left, top, width, height = map(float, root.get("viewBox").split())
+    for each in root.iter(f"{SVG}text"):
+        x, y, reach = float(each.get("x")), float(each.get("y")), 6 * len(each.text)
+        if each.get("transform"):
+            assert y - reach * np.sin(np.pi / 3) >= top
+            assert x + reach * np.cos(np.pi / 3) <= left + width
+        elif each.get("text-anchor") == "end":
+            assert x - reach >= left
+        assert y + 3 <= top + height

@@ -43,7 +43,6 @@ def ampl(
     message="done",
     *,
     options=(1, 1, 0),
-    vbtol="",
     rows=2,
     duals=0,
     values=(1.5, -2),
@@ -51,8 +50,8 @@ def ampl(
     tail="objno 0 0\n",
 ):
     columns = len(values) if columns is None else columns
-    numbers_before = [len(options) + 2 * bool(vbtol), *options, rows, duals, columns, len(values)]
-    lines = [message, "", "Options", *numbers_before, *([vbtol] if vbtol else []), *[7] * duals, *values]
+    numbers_before = [len(options), *options, rows, duals, columns, len(values)]
+    lines = [message, "", "Options", *numbers_before, *[7] * duals, *values]
     return ("\n".join(map(str, lines)) + "\n" + tail).encode()
 
 
@@ -83,11 +82,7 @@ def named(**values):
         ("scip-10.0_limit_with_point", "ampl-text", "limit-with-point", [5, 100000, 1, 0, 0], 2),
         ("scip-10.0_limit_without_point", "ampl-text", "limit-without-point", [], 2),
         ("asl-20190605_text", "ampl-text", "feasible", [0.1] * 5, 2),
-        ("asl-20190605_text_vbtol", "ampl-text", "feasible", [0.1] * 5, 2),
-        ("asl-20190605_text_without_options", "ampl-text", "feasible", [1] * 7, None),
         ("asl-20190605_binary", "ampl-binary", "feasible", [0.1] * 5, 2),
-        ("asl-20190605_binary_vbtol", "ampl-binary", "feasible", [0.1] * 5, 2),
-        ("asl-20190605_binary_without_options", "ampl-binary", "feasible", [0.1] * 5, 2),
     ],
 )
 def test_files_of_real_solvers(file, reader, status, values, rows):
@@ -99,7 +94,7 @@ def test_files_of_real_solvers(file, reader, status, values, rows):
 
 
 def test_every_good_file_is_in_the_table_above_and_every_reader_is_used():
-    assert len(GOOD) == 21
+    assert len(GOOD) == 17
     assert {read_raw(path).reader for path in GOOD} == {"highs", "ampl-text", "ampl-binary"}
 
 
@@ -239,9 +234,9 @@ def test_infeasible_or_unbounded_is_believed_from_its_words_alone():
     "tail", ["", "objno 0\n", "objno 0 403\n", "objno 0 403\nsuffix 0 1 4 0 0\nrc\n0 1\nkestrel_option x\n"]
 )
 @for_each("duals", [0, 2])
-@for_each("options, vbtol", [((1, 1, 0), ""), ((1, 3, 0), "1e-07"), ((), ""), ((1, 1, 0, 20020401), "")])
-def test_layouts_of_ampl_text(options, vbtol, duals, tail):
-    raw = parse_raw(ampl(options=options, vbtol=vbtol, duals=duals, tail=tail))
+@for_each("options", [(1, 1, 0), (), (1, 1, 0, 20020401)])
+def test_layouts_of_ampl_text(options, duals, tail):
+    raw = parse_raw(ampl(options=options, duals=duals, tail=tail))
     assert (raw.values.tolist(), raw.rows) == ([1.5, -2], 2)
     assert raw.status == ("limit-with-point" if "403" in tail else "feasible")
 
@@ -250,17 +245,6 @@ def test_text_right_up_to_options_and_no_message_at_all():
     text = ampl("one\ntwo").replace(b"two\n\n", b"two\n")
     assert parse_raw(text).message == "one two"
     assert parse_raw(text[text.index(b"Options") :]).values.tolist() == [1.5, -2]
-
-
-def test_without_options_the_values_are_the_last_ones():
-    raw = parse_raw(b"\nminto: done\n\n7\n8\n1.5\n-2\nobjno 0 0\n")
-    assert (raw.rows, raw.message, raw.status) == (None, "minto: done", "optimal-local")
-    assert values_in_order(2, 2, raw).tolist() == [1.5, -2]
-    for columns, rows in ((3, 2), (4, 2), (2, 3)):
-        with pytest.raises(
-            SolutionError, match=f"of 4 values, the problem has {columns} columns and {rows} rows"
-        ):
-            values_in_order(columns, rows, raw)
 
 
 def test_values_in_order_belong_to_a_problem_of_the_same_size():
@@ -310,7 +294,6 @@ def test_spellings_of_numbers(text, value):
         f"Optimal - objective value {text}\n  0 x {text} 0\n  1 y 1 {text}\n",
         f"s mip 1 2 o {text}\ni 1 {text}\nj 1 {text}\nj 2 1\ne o f\n",
         f"NAME a\n  C x {text}\n  C y 1\nENDATA\n",
-        f'1,"x ","C","BS",{text},0,0,{text},0\n2,"y ","C","BS",1,0,0,{text},0\n',
         f"model_status,1\nsolver_status,1\nobjective,{text}\nx,{text}\ny, 1\n",
         f"=obj= {text}\nx {text}\ny 1\n",
         (

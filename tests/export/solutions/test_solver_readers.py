@@ -22,7 +22,6 @@ from answers import (
     OPTIMA,
     RELAXATIONS,
     SILENT,
-    STATUS_ALONE,
     TINY,
     UNBOUNDED,
     WITH_POINT,
@@ -75,7 +74,7 @@ def test_reader_status_and_point(path):
     reader, status = FILES[path.name]
     raw = read_raw(path)
     assert (raw.reader, raw.status) == (reader, status)
-    assert raw.has_point == (status in WITH_POINT and reader not in STATUS_ALONE)
+    assert raw.has_point == (status in WITH_POINT)
     assert (raw.names is None) == (reader == "glpk" and raw.has_point)
     assert "\n" not in raw.message
 
@@ -92,12 +91,8 @@ def test_no_file_is_claimed_by_two_readers(path):
 
 @for_each("path", [path for path in GOOD if FILES[path.name][1] in WITH_POINT and problem_of(path)])
 def test_the_point_is_the_one_that_the_solver_had(path):
-    reader, status = FILES[path.name]
-    name = problem_of(path)
+    status, name = FILES[path.name][1], problem_of(path)
     solution = read_solution(path, problem(name))
-    if reader in STATUS_ALONE:
-        assert (solution.point, solution.status, solution.reported) == (None, status, None)
-        return
     assert (solution.unknown, solution.claimed) == (0, status)
     if solution.reported is not None:
         assert solution.objective == pytest.approx(solution.reported, abs=1e-6)
@@ -308,13 +303,6 @@ def test_highs_style_2_is_told_from_glpk_by_its_extra_row():
         read_solution(TINY / "bad" / "highs-1.15.1_milp_style2.sol", problem("milp"))
 
 
-def test_both_files_of_xpress_hold_the_same_columns():
-    for name in ("milp_optimal", "qp_optimal"):
-        slx, asc = (read_raw(TINY / f"{X}_{name}.{end}") for end in ("slx", "asc"))
-        assert slx.names.tolist() == asc.names.tolist()
-        np.testing.assert_allclose(slx.values, asc.values, rtol=1e-14)
-
-
 @pytest.mark.parametrize(
     "word, value", [("EPS", 0), ("  EPS", 0), ("+INF", np.inf), ("-INF", -np.inf), ("-1.5E+00", -1.5)]
 )
@@ -335,39 +323,6 @@ def test_states_of_gams(model, solver, status):
     )
     raw = parse_raw(data)
     assert (raw.status, raw.has_point) == (status, status in WITH_POINT)
-    listing = swapped(
-        f"{A}_conopt_qp_optimal.lst", b"SOLVER STATUS     1", f"SOLVER STATUS     {solver}".encode()
-    )
-    listing = listing.replace(b"MODEL STATUS      2", f"MODEL STATUS      {model}".encode())
-    assert parse_raw(listing).status == status
-
-
-def test_the_last_solve_of_a_listing_counts():
-    first, last = text(f"{A}_cplex_milp_optimal.lst"), text(f"{A}_cplex_milp_time_without_point.lst")
-    summary = last[last.index(b"               S O L V E      S") :]
-    assert parse_raw(first + summary).status == NOTHING
-
-
-def test_the_csv_and_the_listing_of_a_run_agree():
-    for path in GOOD:
-        if FILES[path.name][0] == "gams-csv":
-            csv, listing = read_raw(path), read_raw(path.with_suffix(".lst"))
-            assert (csv.status, csv.message) == (listing.status, listing.message)
-
-
-@for_each("solver, model, missing, node, status", [
-        (1, 1, 0, 5, GLOBAL), (1, 1, -1, 5, LOCAL), (1, 2, 0, -3, INFEASIBLE), (1, 2, -1, -3, NOTHING),
-        (1, 3, 0, -1, UNBOUNDED), (1, 4, 0, 5, FEASIBLE), (4, 4, 0, 5, LIMIT), (4, 4, 0, -3, NOTHING),
-        (3, 5, 0, -3, NOTHING), (5, 5, 0, -3, ERROR), (9, 4, 0, 5, FEASIBLE), (10, 5, 0, -3, ERROR),
-        (11, 5, -1, -3, ERROR),
-    ])  # fmt: skip
-def test_codes_of_baron(solver, model, missing, node, status):
-    raw = parse_raw(f"problem 2 16 10 5 0.1 0.2 {solver} {model} {missing} 13 {node} 3 0.2 0.3\n".encode())
-    assert (raw.reader, raw.status, raw.has_point) == ("baron-tim", status, False)
-
-
-def test_a_short_line_of_an_older_baron():
-    assert parse_raw(b"problem 2 16 10 5 0.1 0.2 1 1\n").status == GLOBAL
 
 
 def test_the_value_is_the_third_column_of_barons_table():

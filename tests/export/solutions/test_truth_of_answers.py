@@ -13,7 +13,7 @@ import crossfield as cf
 import highspy
 import numpy as np
 import pytest
-from answers import FILES, GOOD, STATUS_ALONE, TINY, WITH_POINT, problem, problem_of
+from answers import FILES, GOOD, TINY, WITH_POINT, problem, problem_of
 from cases import make_field, make_instance
 from crossfield.export.cli.app import invoke, read_command
 from crossfield.export.formats.nl import Layout
@@ -224,11 +224,7 @@ def answers(tmp_path_factory):
     found = {}
     for path in GOOD:
         reader, status = FILES[path.name]
-        if (
-            status in WITH_POINT
-            and reader not in STATUS_ALONE
-            and problem_of(path) in {"milp", "qp", "quartic"}
-        ):
+        if status in WITH_POINT and problem_of(path) in {"milp", "qp", "quartic"}:
             found.setdefault(reader, (path.read_bytes(), problem(problem_of(path))))
     data, milp = found["cbc"]
     found["cbc without zeros"] = (re.sub(rb"(?m)^ +\d+ \S+ +0 .*\n", b"", data), milp)
@@ -300,18 +296,6 @@ def test_a_file_cut_down_to_its_head_says_nothing(answers, tmp_path):
             found = attempt(tmp_path / "x", b"".join(lines[:kept]), of)
             assert found.status == "unknown"
             assert found.contradictions
-
-
-def test_files_of_a_status_alone_are_told_to_be_cut():
-    """A listing that is cut may lack the solve that counts."""
-    for path in (each for each in GOOD if FILES[each.name][0] in STATUS_ALONE and "error" not in each.name):
-        data = path.read_bytes()
-        end = len(data) - 1 if path.name.endswith("_tim.lst") else data.index(b"\n**** FILE SUMMARY")
-        for length in (end, end - 1, end - 10):
-            with pytest.raises(
-                SolutionError, match=r"cut off|not a solution file|not the number of a status"
-            ):
-                parse_raw(data[:length])
 
 
 def damages(data):

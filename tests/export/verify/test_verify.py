@@ -161,7 +161,7 @@ def test_options_and_packed_files(tmp_path: Path):
     instance = make_instance("hole", "box")
     chosen = {"facet": "printed", "stroke_norm": 1, "beta_norm": 1}
     names = ["miqp-mccormick", "milp-mccormick", "miqcp-bilinear"]
-    dialects = {"nl": "binary", "gms": "scalar"}
+    dialects = {"nl": "binary"}
     write_all(
         instance, tmp_path / "options", formulations=names, options=chosen, dialects=dialects, compress=True
     )

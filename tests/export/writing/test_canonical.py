@@ -62,7 +62,7 @@ def test_no_rule_of_the_form_stands_anywhere_else():
 
 
 def test_a_writer_imports_nothing_of_another_but_its_language():
-    """gams_scalar is the language of scalar GAMS and BARON; what writers share else is in export/writing."""
+    """`gams` holds the language of GAMS and BARON; what writers share else is in export/writing."""
     found = {
         (path.name, node.module)
         for path in (EXPORT / "formats").glob("*.py")
@@ -70,4 +70,4 @@ def test_a_writer_imports_nothing_of_another_but_its_language():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.ImportFrom) and node.level == 1 and node.module
     }
-    assert {module for _, module in found} <= {"gams_scalar", "indexed"}
+    assert {module for _, module in found} <= {"gams"}

@@ -20,7 +20,6 @@ from crossfield.models.formulations.problem import formulate, with_integers_fixe
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.processes.limits import Limits
 from loops import for_each
-from scipy.optimize import linprog, lsq_linear
 
 pytestmark = pytest.mark.numeric
 
@@ -154,46 +153,6 @@ def test_two_pixels_by_hand():
 # optima
 
 
-def one_pixel(gauge, skew_coefficient):
-    theta = np.array([2 * np.pi / 3])
-    return Instance(
-        "one",
-        np.ones((1, 1), bool),
-        np.array([[0, 0]]),
-        theta,
-        np.ones(1),
-        skew_coefficient=skew_coefficient,
-        gauge=gauge,
-    )
-
-
-@pytest.mark.parametrize("solver", ["highs", "ipopt"])
-@pytest.mark.parametrize("gauge, alpha, beta", [("box", HALF, np.pi / 6), ("strokes", 2 * np.pi / 3, 0.0)])
-def test_one_pixel_solved(gauge, alpha, beta, solver):
-    """A stroke at 120 degrees: the box ends at 90, so that the skew makes up for the rest,
-    less what its weight takes.
-    """
-    weight = 1e-2
-    found = solve(formulate(one_pixel(gauge, weight), "qp-fixed", p=[]), solver)
-    assert found.field.alpha[0] == pytest.approx(alpha, abs=1e-4)
-    assert found.field.beta[0] == pytest.approx(beta / (1 + weight), abs=1e-4)
-    assert found.objective == pytest.approx(weight / (1 + weight) * beta**2, abs=1e-7)
-    assert solve(formulate(one_pixel(gauge, 1e-6), "qp-fixed", p=[]), solver).objective == pytest.approx(
-        1e-6 * beta**2, abs=1e-7
-    )
-
-
-def test_two_pixels_solved():
-    """The jump +1 as data: the two labels of one cross are found; its stroke holds the first one."""
-    instance = Instance(
-        "two", np.ones((1, 2), bool), np.array([[0, 0], [0, 1]]), np.array([0.3, HALF + 0.3]), np.ones(2)
-    )
-    found = solve(formulate(instance, "qp-fixed", p=[1]), "ipopt")
-    assert found.field.energy().total < 1e-6
-    assert found.field.alpha[1] - found.field.alpha[0] == pytest.approx(HALF, abs=1e-4)
-    assert solve(formulate(instance, "qp-fixed", p=[0]), "ipopt").field.energy().total > 0.1
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("degrees", [(20, 20), (0, 90), (100, 100), (30, 120), (10, 70), (170, 50)])
 def test_parallel_strokes_and_two_families_cost_nothing(degrees):
@@ -266,116 +225,6 @@ def test_printed_facet_is_a_relaxation(gauge, seed):
 def test_printed_facet_loses_something():
     gaps = [optimum(sketch(seed=seed)) - optimum(sketch(seed=seed), facet="printed") for seed in range(4, 8)]
     assert max(gaps) > 1e-3
-
-
-# a second implementation: all jumps one after the other, by SciPy
-
-
-def corner(gauge):
-    """Three pixels with three strokes that no constant cross meets."""
-    pixels, theta = np.array([[0, 0], [1, 0], [1, 1]]), np.array([0.2, 1.1, 2.1])
-    return Instance(
-        "corner",
-        np.array([[True, False], [True, True]]),
-        pixels,
-        theta,
-        np.array([1, 0.9, 0.6]),
-        skew_coefficient=1e-2,
-        gauge=gauge,
-    )
-
-
-def every_field_of_jumps(instance):
-    return product(
-        *(
-            range(low, high + 1)
-            for low, high in zip(instance.p_min.tolist(), instance.p_max.tolist(), strict=True)
-        )
-    )
-
-
-def square_optimum(instance, p):
-    """Least (8) + (5) + (6) over the angles in their bounds, as bounded least squares written by hand."""
-    grid, count = instance.grid, instance.grid.size
-    rows, right = [], []
-    for i, j, jump in zip(grid.first, grid.second, p, strict=True):
-        a, b = np.zeros(2 * count), np.zeros(2 * count)
-        a[i], a[j] = 1, -1
-        b[count + i], b[count + j] = (-1) ** jump, -1
-        rows += [np.sqrt(2) * a, np.sqrt(2) * b]
-        right += [-np.sqrt(2) * HALF * jump, 0]
-    for i, theta, w in zip(instance.stroke_index, instance.target, instance.w, strict=True):
-        r = np.zeros(2 * count)
-        r[i] = r[count + i] = 1
-        weight = np.sqrt(instance.stroke_coefficient * w)
-        rows.append(weight * r)
-        right.append(weight * theta)
-    rows += list(np.sqrt(instance.skew_coefficient) * np.eye(2 * count)[count:])
-    right += [0.0] * count
-    low = np.concatenate([instance.alpha_lower, np.full(count, -QUARTER)])
-    high = np.concatenate([instance.alpha_upper, np.full(count, QUARTER)])
-    return 2 * lsq_linear(np.array(rows), np.array(right), (low, high), tol=1e-14).cost
-
-
-def absolute_optimum(instance, p):
-    """Least sum of absolute residuals for given jumps, as an LP written by hand: |r| = r+ + r-."""
-    grid, count = instance.grid, instance.grid.size
-    rows, right, cost = [], [], []
-    for i, j, jump in zip(grid.first, grid.second, p, strict=True):
-        for first, second, sign, constant in (
-            (i, j, 1, HALF * jump),
-            (count + i, count + j, (-1) ** jump, 0),
-        ):
-            row = np.zeros(2 * count)
-            row[first], row[second] = sign, -1
-            rows.append(row)
-            right.append(-constant)
-            cost.append(2)
-    for i, theta, w in zip(instance.stroke_index, instance.target, instance.w, strict=True):
-        row = np.zeros(2 * count)
-        row[i] = row[count + i] = 1
-        rows.append(row)
-        right.append(theta)
-        cost.append(instance.stroke_coefficient * w)
-    rows += list(np.eye(2 * count)[count:])
-    right += [0.0] * count
-    cost += [instance.skew_coefficient] * count
-    size = len(rows)
-    bounds = [
-        *zip(instance.alpha_lower, instance.alpha_upper, strict=True),
-        *[(-QUARTER, QUARTER)] * count,
-        *[(0, None)] * 2 * size,
-    ]
-    equations = np.hstack([np.array(rows), -np.eye(size), np.eye(size)])
-    return linprog([0] * 2 * count + cost + cost, A_eq=equations, b_eq=right, bounds=bounds).fun
-
-
-@pytest.mark.parametrize("gauge", GAUGES)
-def test_milp_against_every_jump(gauge):
-    instance = corner(gauge)
-    best = min(absolute_optimum(instance, p) for p in every_field_of_jumps(instance))
-    assert best > 1e-2
-    assert optimum(instance) == pytest.approx(best, abs=1e-7)
-    assert optimum(instance.turned()) == pytest.approx(best, abs=1e-7) or gauge == "box"
-
-
-@pytest.mark.parametrize("gauge", GAUGES)
-def test_convex_miqp_is_exactly_8(gauge, tmp_path):
-    """The bounded least squares of every jump, against SCIP on the written miqp-exact."""
-    import pyscipopt
-    from crossfield.export.formats.registry import write
-
-    instance = corner(gauge)
-    best = min(square_optimum(instance, p) for p in every_field_of_jumps(instance))
-    assert best > 1e-2
-    write(formulate(instance, "miqp-exact"), tmp_path / "exact.mps")
-    scip = pyscipopt.Model()
-    scip.hideOutput()
-    scip.readProblem(str(tmp_path / "exact.mps"))
-    scip.setParam("limits/time", 20)
-    scip.optimize()
-    assert scip.getStatus() == "optimal"
-    assert scip.getObjVal() == pytest.approx(best, abs=1e-5)
 
 
 # declarations

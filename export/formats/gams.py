@@ -1,4 +1,4 @@
-"""GAMS, scalar layout, as in instance libraries: one variable per column, one equation per row, our names.
+"""GAMS, as in instance libraries: one variable per column, one equation per row, our names.
 
     Variables objvar;                        a free scalar (G10); obj.. objvar =e= one summand per line (G6)
     Variables alpha_00_00, ...;              Binary only with bounds [0, 1], else Integer; no line of a list
@@ -89,7 +89,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
     }
     objective = None if start is None else number(problem.objective_value(start))
     yield from stream(
-        "models/gams_scalar.gms.j2",
+        "models/gams.gms.j2",
         blocks,
         header=header,
         stamp=problem.stamp,
