@@ -219,12 +219,17 @@ def _whole(request: Request, name: str) -> int:
 
 async def _body(request: Request) -> bytes:
     """The body of a request. Raises InputError when it is too long."""
-    parts, length = [], 0
-    async for part in request.stream():
-        parts.append(part)
-        length += len(part)
-        if length > MAX_BYTES:
-            raise InputError(f"the file has more than {MAX_BYTES // 10**6} MB; simplify the drawing")
+    stated = request.headers.get("content-length", "0")
+    parts, length = [], int(stated) if stated.isdigit() else 0
+    if length <= MAX_BYTES:
+        length = 0
+        async for part in request.stream():
+            parts.append(part)
+            length += len(part)
+            if length > MAX_BYTES:
+                break
+    if length > MAX_BYTES:
+        raise InputError(f"the file has more than {MAX_BYTES // 10**6} MB; simplify the drawing")
     return b"".join(parts)
 
 
@@ -282,6 +287,7 @@ def listening(port: int) -> socket.socket:
     place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         place.bind((LOOPBACK, port))
+        place.listen()  # a browser may be faster than the server
     except OSError as error:
         place.close()
         reason = (error.strerror or str(error)).lower()

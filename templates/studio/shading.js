@@ -72,7 +72,9 @@ export function paintSurface(view, { surface, frame, kind, lamp, doubtful, hints
     }
     context.imageSmoothingQuality = "high";
     context.drawImage(surface.shown.picture, frame.x, frame.y, wide, high);
+    context.globalCompositeOperation = "source-atop"; // only on the surface
     if (doubtful) context.drawImage(doubtMap(surface), frame.x, frame.y, wide, high);
+    context.globalCompositeOperation = "source-over";
   }
   const reach = reachOf(frame), thin = 1 / view.scale;
   for (const hint of live ? [...hints, live] : hints) {

@@ -129,8 +129,8 @@ function take(found) {
 // Numbers, doubts, proof.
 const degrees = value => `${value.toFixed(1)}°`;
 function numbers({ numbers: n, frame }) {
-  const facts = { Grid: `${frame.columns} × ${frame.rows}`, Pixels: n.pixels, "Stroke pixels": n.strokes, "Off the strokes": `${degrees(n.deviation)} mean`,
-    "": `${degrees(n.most_deviation)} for 90 %`, Energy: n.energy.toPrecision(5), Singular: n.singularities };
+  const facts = { Grid: `${frame.columns} × ${frame.rows}`, Pixels: n.pixels, "Stroke pixels": n.strokes, Deviation: `${degrees(n.deviation)} mean`,
+    "": `${degrees(n.most_deviation)} for 90 %`, Energy: n.energy.toPrecision(5), Singular: n.singularities.replace(/ singularit\w+/, "") };
   $("#numbers").replaceChildren(...Object.entries(facts).flatMap(([key, value]) => [element("dt", key), element("dd", value)]));
 }
 const element = (tag, text, ...children) => { const made = document.createElement(tag); made.textContent = text; made.append(...children); return made; };
