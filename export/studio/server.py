@@ -25,7 +25,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response, Strea
 from starlette.routing import Mount, Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from ...models.errors import CrossfieldError, InputError
+from ...models.errors import CrossfieldError, InputError, shortened
 from ...models.formulations.catalogue import FORMULATIONS
 from ...models.input_limits import MAX_BYTES
 from ...models.processes.deadline import Over
@@ -255,12 +255,17 @@ def _stream(steps: Iterator[dict[str, Any]]) -> Response:
         except OvertakenError:
             yield b'{"stage": "overtaken"}\n'
         except CrossfieldError as error:
-            yield json.dumps({"stage": "error", "message": str(error)}).encode() + b"\n"
+            yield _error_line(str(error))
         except MemoryError:
-            message = "there is not enough memory; choose a smaller size"
-            yield json.dumps({"stage": "error", "message": message}).encode() + b"\n"
+            yield _error_line("there is not enough memory; choose a smaller size")
+        except Exception as error:  # noqa: BLE001 - the page shows it, and keeps its drawing
+            yield _error_line(f"internal error, please report it: {type(error).__name__}: {shortened(error)}")
 
     return StreamingResponse(lines(), media_type="application/x-ndjson")
+
+
+def _error_line(message: str) -> bytes:
+    return json.dumps({"stage": "error", "message": message}).encode() + b"\n"
 
 
 def _finite(step: dict[str, Any]) -> dict[str, Any]:

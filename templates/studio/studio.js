@@ -52,7 +52,7 @@ function start(doc, opened = null) {
   state.history.reset(doc); state.opened = opened; state.chosen.clear(); forget(); left.fit(pageBox(doc)); keep(); show(doc);
   if (state.tool === "turn" && !opened) choose("draw");
 }
-const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); $("#doubts").replaceChildren(); };
+const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); doubts(); };
 const pageBox = ({ page: [x, y, w, h] }) => [x, y, x + w, y + h];
 function keep() {
   try { sessionStorage.setItem(KEPT, JSON.stringify(state.history.now)); } catch { sessionStorage.removeItem(KEPT); }
@@ -130,7 +130,7 @@ function take(found) {
 const degrees = value => `${value.toFixed(1)}°`;
 function numbers({ numbers: n, frame }) {
   const facts = { Grid: `${frame.columns} × ${frame.rows}`, Pixels: n.pixels, "Stroke pixels": n.strokes, Deviation: `${degrees(n.deviation)} mean`,
-    "": `${degrees(n.most_deviation)} for 90 %`, Energy: n.energy.toPrecision(5), Singular: n.singularities.replace(/ singularit\w+/, "") };
+    "": `${degrees(n.most_deviation)} for 90 %`, Energy: n.energy.toPrecision(5), Singular: n.singularities.replace(/ singularit\w+/, "").replace(/^no$/, "none") };
   $("#numbers").replaceChildren(...Object.entries(facts).flatMap(([key, value]) => [element("dt", key), element("dd", value)]));
 }
 const element = (tag, text, ...children) => { const made = document.createElement(tag); made.textContent = text; made.append(...children); return made; };
@@ -159,7 +159,7 @@ function stopProof() {
 async function prove() {
   if (state.proving) { stopProof(); return; }
   if (!state.field) { status("There is no field to prove."); return; }
-  const own = state.proving = new AbortController(); $("#prove").textContent = "Stop the proof"; $("#proof").textContent = "starting …";
+  const own = state.proving = new AbortController(); $("#prove").textContent = "Stop the proof"; $("#proof").textContent = "Starting. The first proof on a machine compiles its functions, for up to a minute.";
   try {
     const response = await ask(`prove?page=${page}-proof&edit=${state.edit}`, { method: "POST", body: JSON.stringify(state.doc), signal: own.signal });
     for await (const found of lined(response)) {
@@ -177,6 +177,7 @@ async function prove() {
 function controls() {
   const { doc, history, chosen } = state;
   $("#undo").disabled = !history.can(-1); $("#redo").disabled = !history.can(1); $("#delete").disabled = !chosen.size;
+  $("#welcome").hidden = doc.strokes.length > 0;
   $("#unhint").disabled = !doc.hints.length; $("#flip").setAttribute("aria-pressed", doc.flip);
   $("#selected").textContent = chosen.size ? `${chosen.size} selected` : "";
   if (document.activeElement !== $("#name")) $("#name").value = doc.name;

@@ -30,6 +30,13 @@ PEBBLE = {
     "silhouette": "none",
 }
 """A box with two curvature lines."""
+CONTRADICTING = [
+    PEBBLE["strokes"][0],
+    *({"points": [10, y, 110, y], "mark": "line", "weight": 1} for y in range(18, 88, 10)),
+    {"points": [30, 20, 50, 75], "mark": "line", "weight": 0.05},
+    {"points": [70, 75, 95, 20], "mark": "line", "weight": 0.05},
+]
+"""Parallel lines, and two faint ones across them that no field follows."""
 
 
 def changed(**parts) -> bytes:

@@ -10,7 +10,7 @@ from browsing import CONTRAST, find, show, sideways
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
-from studios import PEBBLE, studio
+from studios import CONTRADICTING, PEBBLE, studio
 
 pytestmark = pytest.mark.slow
 
@@ -337,15 +337,23 @@ def test_a_drawing_in_space_is_turned_by_dragging(empty, tmp_path):
     assert document(settled(browser)) == before
 
 
-def test_the_doubts_suggest_cuts(empty, tmp_path):
-    lines = [{"points": [10, y, 110, y], "mark": "line", "weight": 1} for y in range(14, 88, 6)]
-    odd = [{"points": [30, 20, 80, 75], "mark": "line", "weight": 1}]
-    browser = pebble(empty, tmp_path, strokes=[PEBBLE["strokes"][0], *lines, *odd], size=32)
-    cut = [
-        each
-        for each in browser.find_elements("css selector", "#doubts button")
-        if each.text == "Mark as cuts"
-    ]
-    if cut:
-        cut[0].click()
-        assert sum(stroke["mark"] == "cut" for stroke in document(settled(browser))["strokes"]) > 1
+def test_a_doubt_is_followed_by_its_suggestion(empty, tmp_path):
+    browser = pebble(empty, tmp_path, strokes=CONTRADICTING, size=32)
+    assert "2 strokes do not fit" in find(browser, "#doubts").text
+    find(browser, "#doubts button:nth-of-type(2)").click()
+    marks = [stroke["mark"] for stroke in document(settled(browser))["strokes"]]
+    assert marks == ["cut", *["line"] * 7, "cut", "cut"]
+    assert "do not fit" not in find(browser, "#doubts").text
+
+
+def test_a_proof_runs_beside_the_drawing_and_ends_with_an_edit(empty, tmp_path):
+    browser = pebble(empty, tmp_path, size=16)
+    find(browser, "#prove").click()
+    proof = find(browser, "#proof")
+    WebDriverWait(browser, 200, 0.1).until(lambda _: "proven bound" in proof.text)
+    find(browser, "#prove").click()
+    pebble(browser, tmp_path, size=40)
+    find(browser, "#prove").click()
+    find(browser, "#silhouette").click()
+    assert "drawing has changed" in proof.text
+    assert find(settled(browser), "#prove").text == "Prove in the background"

@@ -18,7 +18,7 @@ from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, drawn, field_
 from crossfield.export.studio.views import field_step, lines_step, surface_step
 from crossfield.models.sketch.samples import sample_svg
 from PIL import Image, ImageDraw
-from studios import PEBBLE, changed
+from studios import CONTRADICTING, PEBBLE, changed
 
 
 def document(**parts):
@@ -181,11 +181,9 @@ def test_views_hold_arrays_of_the_grid():
     json.dumps([view, surface])
 
 
-def test_a_stroke_that_contradicts_the_others_is_a_suspect():
-    odd = {"points": [30, 20, 44, 34], "mark": "line", "weight": 0.05}
-    more = [{"points": [10, y, 110, y], "mark": "line", "weight": 1} for y in range(14, 88, 3)]
-    view, *_ = field_step(changed(strokes=[PEBBLE["strokes"][0], *more, odd], size=32))
-    assert view["suspects"] == [] or len(more) + 1 in view["suspects"]
+def test_strokes_that_the_field_does_not_follow_are_suspects():
+    assert field_step(changed(strokes=CONTRADICTING, size=32))[0]["suspects"] == [8, 9]
+    assert field_step(changed(strokes=CONTRADICTING[:8], size=32))[0]["suspects"] == []
 
 
 @pytest.mark.parametrize("what", [name for name in DOWNLOADS if name != "solver"])
@@ -212,6 +210,7 @@ def test_a_refused_pair_of_formulation_and_format_gives_the_reason():
         download(changed(size=8), "solver", "nothing", "mps")
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_menu_compute_the_same(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     hints = [{"x": 30, "y": 25, "slant": 40, "tilt": -90}]
@@ -228,6 +227,7 @@ def test_the_commands_of_the_menu_compute_the_same(tmp_path, monkeypatch, capsys
         assert archive.read(name) == (tmp_path / "surface" / name).read_bytes(), name
 
 
+@pytest.mark.slow
 def test_the_python_lines_of_the_menu_compute_the_same(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     data = changed(hints=[{"x": 30, "y": 25, "slant": 40, "tilt": -90}])
