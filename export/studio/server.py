@@ -25,7 +25,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response, Strea
 from starlette.routing import Mount, Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from ...models.errors import CrossfieldError, InputError, shortened
+from ...models.errors import CrossfieldError, InputError, NoStrokeError, shortened
 from ...models.formulations.catalogue import FORMULATIONS
 from ...models.input_limits import MAX_BYTES
 from ...models.processes.deadline import Over
@@ -189,7 +189,12 @@ class Page:
     def _computed(self, data: bytes, size: int, stop: Over, *, lines: bool) -> Iterator[dict[str, Any]]:
         surfaces: list[Future[Any]] = []
         for each in ([COARSE] if size > _FINE else []) + [None]:
-            view, found, field = self.desk.submit("fields", field_step, data, each, stop=stop).result()
+            try:
+                view, found, field = self.desk.submit("fields", field_step, data, each, stop=stop).result()
+            except NoStrokeError:
+                if each is None:
+                    raise
+                continue  # too coarse a grid for this drawing
             yield view
             surfaces.append(self.desk.submit("surfaces", surface_step, data, found, field, stop=stop))
         if lines:
@@ -305,7 +310,13 @@ def serve(place: socket.socket, token: str, first: dict[str, Any] | None) -> Non
     with Desk() as desk:
         app = application(desk, place.getsockname()[1], token, first)
         config = uvicorn.Config(
-            app, log_level="warning", access_log=False, lifespan="off", timeout_graceful_shutdown=5
+            app,
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            lifespan="off",
+            ws="none",
+            timeout_graceful_shutdown=5,
         )
         with suppress(KeyboardInterrupt):
             _Ending(config, desk).run(sockets=[place])

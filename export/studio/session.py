@@ -1,14 +1,14 @@
 """From a document of the page to its instance, field and surface. Functions of the document alone.
 
-They run in child processes. A process keeps its last field, so that files and proofs need not repeat it.
+They run in child processes. A process keeps its last fields and surfaces for requests that repeat them.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from ...models.surface.lift import surface
 from ...models.surface.surface import Surface
 from .document import Document, MaskEdit
 
+_Result = TypeVar("_Result")
+
+_MOST_KEPT: Final = 4
 NEAR: Final = 4.0  # pixels between a click on a gap and the gap
 OUT, IN, LEFT_OUT, STROKE = range(4)
 """Kinds of pixels: outside, solved for, enclosed but left out, and covered by a stroke that cuts."""
@@ -162,22 +165,34 @@ def _brushed(edit: MaskEdit, frame: Frame) -> Bools:
     return np.asarray(ndimage.distance_transform_edt(free) <= edit.radius / frame.pixel)
 
 
-_KEPT: Final[OrderedDict[bytes, tuple[Drawn, CrossField]]] = OrderedDict()
-_MOST_KEPT: Final = 4
+class _Kept(OrderedDict[object, Any]):
+    """The last few results of work that no edit has ended."""
+
+    def found(self, key: object, work: Callable[[], _Result]) -> _Result:
+        """The result for a key, computed if it is new. Raises OvertakenError."""
+        if key not in self:
+            result = work()
+            if stopped():
+                raise OvertakenError("a newer edit replaced this one")
+            self[key] = result
+            while len(self) > _MOST_KEPT:
+                self.popitem(last=False)
+        kept: _Result = self[key]
+        return kept
+
+
+_FIELDS: Final = _Kept()
+_SURFACES: Final = _Kept()
 
 
 def field_of(document: Document, size: int | None = None) -> tuple[Drawn, CrossField]:
-    """The instance of a document and its bend field, kept for the next call. Raises OvertakenError."""
+    """The instance of a document and its bend field. Raises OvertakenError."""
     found = drawn(document, size)
-    key = hashlib.sha256(f"{found.instance.sha256} {found.instance.stroke_weight}".encode()).digest()
-    if key not in _KEPT:
-        field = bend_field(polyvector_field(found.instance, hold=max(HOLDS)), stop=stopped)
-        if stopped():
-            raise OvertakenError("a newer edit replaced this one")
-        _KEPT[key] = (found, field)
-        while len(_KEPT) > _MOST_KEPT:
-            _KEPT.popitem(last=False)
-    return found, _KEPT[key][1]
+    instance = found.instance
+    return found, _FIELDS.found(
+        instance.sha256,
+        lambda: bend_field(polyvector_field(instance, hold=max(HOLDS)), stop=stopped),
+    )
 
 
 def hints_of(document: Document, instance: Instance) -> list[Hint]:
@@ -193,8 +208,9 @@ def hints_of(document: Document, instance: Instance) -> list[Hint]:
 
 
 def surface_of(document: Document, field: CrossField) -> Surface:
-    """The surface of a field with the hints of the document. Raises OvertakenError."""
-    found = surface(field, hints_of(document, field.instance), flip=document.flip, stop=stopped)
-    if stopped():
-        raise OvertakenError("a newer edit replaced this one")
-    return found
+    """The surface of a document's field, with its hints. Raises OvertakenError."""
+    hints, flip = tuple(hints_of(document, field.instance)), document.flip
+    return _SURFACES.found(
+        (field.instance.sha256, hints, flip),
+        lambda: surface(field, hints, flip=flip, stop=stopped),
+    )

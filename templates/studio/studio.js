@@ -55,7 +55,10 @@ function start(doc, opened = null) {
 const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); doubts(); };
 const pageBox = ({ page: [x, y, w, h] }) => [x, y, x + w, y + h];
 function keep() {
-  try { sessionStorage.setItem(KEPT, JSON.stringify(state.history.now)); } catch { sessionStorage.removeItem(KEPT); }
+  try { sessionStorage.setItem(KEPT, JSON.stringify(state.history.now)); } catch {
+    sessionStorage.removeItem(KEPT);
+    banner("This drawing is too large to survive a reload of the page. Save it as a session.", { kind: "large" });
+  }
 }
 
 // Requests. A newer edit aborts older ones, here and on the server.
