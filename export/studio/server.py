@@ -11,10 +11,11 @@ import secrets
 import socket
 import tempfile
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import FIRST_COMPLETED, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 from typing import Any, Final
 
 import uvicorn
@@ -187,19 +188,26 @@ class Page:
         return data, self.desk.begin(request.query_params.get("page", "")[:64], _whole(request, "edit"))
 
     def _computed(self, data: bytes, size: int, stop: Over, *, lines: bool) -> Iterator[dict[str, Any]]:
-        surfaces: list[Future[Any]] = []
-        for each in ([COARSE] if size > _FINE else []) + [None]:
-            try:
-                view, found, field = self.desk.submit("fields", field_step, data, each, stop=stop).result()
-            except NoStrokeError:
-                if each is None:
-                    raise
-                continue  # too coarse a grid for this drawing
-            yield view
-            surfaces.append(self.desk.submit("surfaces", surface_step, data, found, field, stop=stop))
+        early, fine = None, Event()
+        if size > _FINE:
+            with suppress(NoStrokeError):  # on so coarse a grid
+                view, found, field = self.desk.submit("fields", field_step, data, COARSE, stop=stop).result()
+                yield view
+                late = _either(stop, fine.is_set)
+                early = self.desk.submit("surfaces", surface_step, data, found, field, stop=late)
+        finer = self.desk.submit("fields", field_step, data, stop=stop)
+        if early is not None:
+            wait({early, finer}, return_when=FIRST_COMPLETED)
+            if early.done() and early.exception() is None:
+                yield early.result()
+        view, found, field = finer.result()
+        fine.set()
+        yield view
+        surface = self.desk.submit("surfaces", surface_step, data, found, field, stop=stop)
         if lines:
             yield self.desk.submit("fields", lines_step, field, stop=stop).result()
-        yield from (surface.result() for surface in surfaces)
+        yield surface.result()
+        yield {"stage": "done"}
 
     def _proven(self, data: bytes, stop: Over) -> Iterator[dict[str, Any]]:
         with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
@@ -214,6 +222,10 @@ class Page:
                     shown = progress
                     yield progress
             yield proof.result()
+
+
+def _either(stop: Over, late: Over) -> Over:
+    return lambda: stop() or late()
 
 
 def _whole(request: Request, name: str) -> int:

@@ -102,7 +102,6 @@ async function request() {
     clear("lost");
     if (!response.ok) { banner(await trouble(response)); ready(""); return; }
     for await (const found of lined(response)) if (edit === state.edit) take(found);
-    if (edit === state.edit && $("#status").textContent === "computing …") ready("");
   } catch (error) { if (error.name !== "AbortError" && edit === state.edit) missing(); }
 }
 const seconds = () => `${((performance.now() - begun) / 1000).toFixed(2)} s`;
@@ -110,6 +109,7 @@ const numbered = mask => { let n = 0; return Int32Array.from(mask, inside => ins
 function take(found) {
   if (found.stage === "error") { forget(); banner(found.message); refresh(); ready(""); return; }
   if (found.stage === "overtaken") return;
+  if (found.stage === "done") { ready(""); return; }
   const times = $("#times").dataset;
   if (found.stage === "field") {
     clear("error");
@@ -120,11 +120,8 @@ function take(found) {
   } else if (found.stage === "lines") { state.lines = found.families; times.lines = seconds(); }
   else if (found.stage === "surface") {
     state.surface = { ...found, frame: state.field.frame, normals: decoded.shorts(found.normals), opacity: decoded.bytes(found.opacity), confidence: decoded.bytes(found.confidence), number: numbered(decoded.bytes(found.mask)) };
-    if (found.size !== state.field.size) state.surface.frame = state.coarse;
     times.surface = seconds(); doubts();
-    if (found.size === state.doc.size || state.field.size === found.size) ready("");
   }
-  if (found.stage === "field" && found.size < state.doc.size) state.coarse = found.frame;
   $("#times").textContent = Object.entries({ ...times }).filter(([, value]) => value).map(([key, value]) => `${key} ${value}`).join(" · ");
   refresh();
 }
