@@ -6,12 +6,12 @@ import base64
 import secrets
 import webbrowser
 from pathlib import Path
+from threading import Thread
 from typing import Annotated, Any
 
 import typer
 
 from ...models.errors import InputError
-from . import options
 from .output import print_line, progress
 
 
@@ -19,7 +19,8 @@ def studio_command(
     drawing: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SKETCH|SAMPLE]", help="A drawing (SVG, picture, .scap, .curves) or one of {samples}."
+            metavar="[SKETCH|SAMPLE]",
+            help="A drawing (SVG, picture, .scap, .curves), or the name of a drawn sample.",
         ),
     ] = None,
     *,
@@ -29,7 +30,6 @@ def studio_command(
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Only print the address, and open no browser.")
     ] = False,
-    quiet: options.Quiet = False,
 ) -> None:
     """Draw strokes on a page in the browser, and see field and surface follow.
 
@@ -42,7 +42,7 @@ def studio_command(
         raise InputError(
             f"studio needs the package {error.name}; pip install 'crossfield[studio]'"
         ) from error
-    with progress(quiet=quiet) as show:
+    with progress(quiet=False) as show:
         show("reading the drawing")
         first = None if drawing is None else _opened(drawing)
     token = secrets.token_urlsafe(24)
@@ -50,7 +50,8 @@ def studio_command(
         address = f"http://{LOOPBACK}:{place.getsockname()[1]}/{token}/"
         print_line(address)
         if not no_browser:
-            webbrowser.open(address)
+            # A browser in the terminal returns only when it is closed.
+            Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         serve(place, token, first)
 
 

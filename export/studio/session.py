@@ -107,14 +107,27 @@ def _edited(
             kept[(away == away.min()) & (away <= NEAR * frame.pixel)] ^= True
     mask = solve if kept.all() else solve & _closed(walls, ends[kept], frame)
     cells, _ = ndimage.label(~walls)
+    left = solve & ~mask
     for edit in edits:
         if edit.kind == "toggle":
             cell = _cell(cells, edit.points[0], frame)
-            mask = mask & ~cell if (mask & cell).any() else mask | cell
+            gone = (mask & cell).any()
+            mask, left = (
+                (mask & ~cell, left | cell) if gone else (mask | cell | _rim(cell, walls), left & ~cell)
+            )
         elif edit.kind != "gap":
             brushed = _brushed(edit, frame)
             mask = mask | brushed if edit.kind == "paint" else mask & ~brushed
+    # Strokes that only bound areas without a field would be thin parts of their own.
+    mask = mask & ~(_rim(left, walls) & ~_rim(mask & ~walls, walls))
     return mask, tuple(zip(ends, (~kept).tolist(), strict=True))
+
+
+def _rim(area: Bools, walls: Bools) -> Bools:
+    """The pixels of strokes next to an area."""
+    from scipy import ndimage
+
+    return np.asarray(ndimage.binary_dilation(area, np.ones((3, 3), dtype=bool)) & walls)
 
 
 def _closed(walls: Bools, bridges: Floats, frame: Frame) -> Bools:

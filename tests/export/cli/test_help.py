@@ -35,7 +35,6 @@ NAMED = {
     "read": [],
     "draw": [KINDS],
     "shade": [SAMPLES, METHODS],
-    "studio": [SAMPLES],
     "verify": [PROGRAMS],
     "library solve": [SOLVERS, RUNGS],
     "library submit": [get_args(RunStatus)],
@@ -43,6 +42,7 @@ NAMED = {
 """Tables whose names the help of a command lists."""
 OTHERS = (
     "",
+    "studio",
     "list",
     "samples",
     "library",

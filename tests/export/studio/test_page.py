@@ -7,9 +7,6 @@ import math
 
 import pytest
 from browsing import CONTRAST, find, show, sideways
-from selenium.webdriver.common.action_chains import ActionChains
-from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.support.ui import WebDriverWait
 from studios import CONTRADICTING, PEBBLE, studio
 
 pytestmark = pytest.mark.slow
@@ -40,9 +37,16 @@ def opened(browser, address):
     return settled(browser)
 
 
+def until(browser, holds):
+    """What a function of the browser returns as soon as it is true."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    return WebDriverWait(browser, 200, 0.05).until(holds)
+
+
 def settled(browser):
     """The browser once all answers to the last edit have arrived."""
-    WebDriverWait(browser, 120, 0.05).until(lambda each: each.execute_script(READY))
+    until(browser, lambda each: each.execute_script(READY))
     return browser
 
 
@@ -94,8 +98,8 @@ def given(browser, folder, pressed):
     """Name and content of the file that arrives when a button is pressed."""
     browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(folder)})
     pressed()
-    kept = WebDriverWait(browser, 60, 0.05).until(
-        lambda _: [path for path in folder.iterdir() if path.suffix not in {".crdownload", ".tmp"}]
+    kept = until(
+        browser, lambda _: [path for path in folder.iterdir() if path.suffix not in {".crdownload", ".tmp"}]
     )
     return kept[0]
 
@@ -184,6 +188,9 @@ def test_a_lasso_selects_the_strokes_inside_of_it(empty, tmp_path):
 
 
 def test_it_works_with_the_keyboard_alone(empty):
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
     browser = empty
     keys = ActionChains(browser)
     browser.execute_script("document.querySelector('#name').focus()")
@@ -264,7 +271,7 @@ def test_a_wrong_file_gets_a_message_and_nothing_is_lost(empty, tmp_path, name, 
     path = tmp_path / name
     path.write_bytes(content)
     find(browser, "#file").send_keys(str(path))
-    WebDriverWait(browser, 30, 0.05).until(lambda _: name in banner(browser))
+    until(browser, lambda _: name in banner(browser))
     assert document(browser) == PEBBLE
 
 
@@ -274,7 +281,7 @@ def test_a_lost_server_gets_a_message_and_nothing_is_lost(browser, tmp_path):
         pebble(browser, tmp_path)
         page.stop()
         find(browser, "#silhouette").click()
-        WebDriverWait(browser, 30, 0.05).until(lambda _: "does not answer" in banner(browser))
+        until(browser, lambda _: "does not answer" in banner(browser))
         kept = document(browser)
         assert kept == PEBBLE | {"silhouette": "outer"}
         folder = tmp_path / "saved"
@@ -282,7 +289,7 @@ def test_a_lost_server_gets_a_message_and_nothing_is_lost(browser, tmp_path):
         saved = given(browser, folder, find(browser, "[data-do=save]").click)
         with studio("--port", page.host.split(":")[1]) as another:
             find(browser, "#retry").click()
-            WebDriverWait(browser, 30, 0.05).until(lambda _: "token" in banner(browser))
+            until(browser, lambda _: "token" in banner(browser))
             opened(browser, another.address)
             assert document(browser) == kept
         assert json.loads(saved.read_text()) == kept
@@ -293,7 +300,7 @@ def test_a_second_tab_has_its_own_drawing_and_says_so(empty, page, tmp_path):
     first = browser.current_window_handle
     browser.switch_to.new_window("tab")
     opened(browser, page.address)
-    WebDriverWait(browser, 30, 0.05).until(lambda _: "another tab" in banner(browser))
+    until(browser, lambda _: "another tab" in banner(browser))
     assert document(browser)["strokes"] == []
     browser.close()
     browser.switch_to.window(first)
@@ -332,7 +339,7 @@ def test_a_drawing_in_space_is_turned_by_dragging(empty, tmp_path):
     before = document(browser)
     tool(browser, "turn")
     drag(browser, [(200, 300), (230, 310), (280, 330), (300, 340)])
-    WebDriverWait(browser, 30, 0.05).until(lambda _: document(browser)["strokes"] != before["strokes"])
+    until(browser, lambda _: document(browser)["strokes"] != before["strokes"])
     find(browser, "#undo").click()
     assert document(settled(browser)) == before
 
@@ -350,7 +357,7 @@ def test_a_proof_runs_beside_the_drawing_and_ends_with_an_edit(empty, tmp_path):
     browser = pebble(empty, tmp_path, size=16)
     find(browser, "#prove").click()
     proof = find(browser, "#proof")
-    WebDriverWait(browser, 200, 0.1).until(lambda _: "proven bound" in proof.text)
+    until(browser, lambda _: "proven bound" in proof.text)
     find(browser, "#prove").click()
     pebble(browser, tmp_path, size=40)
     find(browser, "#prove").click()

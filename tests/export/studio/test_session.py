@@ -104,7 +104,7 @@ def test_a_click_excludes_an_area_between_strokes_and_includes_it_again():
     without = drawn(document(mask=click(30, 25)))
     gone = before.instance.mask & ~without.instance.mask
     assert 0.1 < gone.sum() / before.instance.mask.sum() < 0.4
-    assert (without.kinds[gone] == LEFT_OUT).all()
+    assert (without.kinds[gone] == LEFT_OUT).mean() > 0.9  # the rest is a stroke's corner
     assert (before.kinds[gone] == IN).all()
     assert drawn(document(mask=click(30, 25) * 2)).instance.sha256 == before.instance.sha256
 
@@ -152,7 +152,11 @@ def test_a_bridged_gap_is_opened_and_closed_by_a_click():
     assert not is_open
     opened_ = drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap")))
     assert [gap for _, gap in opened_.gaps] == [True]
-    assert opened_.instance.mask.sum() < closed.instance.mask.sum()
+    instance = opened_.instance
+    above = int((30 - instance.origin[1]) / instance.pixel_size)
+    assert closed.instance.mask[:above].any()
+    assert not instance.mask[:above].any()
+    assert instance.mask[above:].any()
     again = drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap") * 2))
     assert again.instance.sha256 == closed.instance.sha256
 
