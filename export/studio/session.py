@@ -105,9 +105,11 @@ def _edited(
         if edit.kind == "gap" and len(ends):
             away = np.hypot(*(ends.mean(axis=1) - edit.points[0]).T)
             kept[(away == away.min()) & (away <= NEAR * frame.pixel)] ^= True
-    mask = solve if kept.all() else solve & _closed(walls, ends[kept], frame)
+    left = np.zeros_like(solve)
+    if not kept.all():
+        left = _mostly(solve & ~_closed(walls, ends[kept], frame), solve & ~walls)
+    mask = solve & ~left
     cells, _ = ndimage.label(~walls)
-    left = solve & ~mask
     for edit in edits:
         if edit.kind == "toggle":
             cell = _cell(cells, edit.points[0], frame)
@@ -121,6 +123,15 @@ def _edited(
     # Strokes that only bound areas without a field would be thin parts of their own.
     mask = mask & ~(_rim(left, walls) & ~_rim(mask & ~walls, walls))
     return mask, tuple(zip(ends, (~kept).tolist(), strict=True))
+
+
+def _mostly(chosen: Bools, area: Bools) -> Bools:
+    """The connected parts of an area of which more than half is chosen."""
+    from scipy import ndimage
+
+    label, count = ndimage.label(area)
+    share = ndimage.mean(chosen, label, np.arange(count + 1))
+    return np.asarray((share > 0.5)[label] & area)
 
 
 def _rim(area: Bools, walls: Bools) -> Bools:

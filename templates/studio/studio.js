@@ -55,7 +55,7 @@ function start(doc, opened = null) {
 const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); doubts(); };
 const pageBox = ({ page: [x, y, w, h] }) => [x, y, x + w, y + h];
 function keep() {
-  try { sessionStorage.setItem(KEPT, JSON.stringify(state.history.now)); } catch {
+  try { sessionStorage.setItem(`${KEPT}-at`, location.pathname); sessionStorage.setItem(KEPT, JSON.stringify(state.history.now)); } catch {
     sessionStorage.removeItem(KEPT);
     banner("This drawing is too large to survive a reload of the page. Save it as a session.", { kind: "large" });
   }
@@ -453,8 +453,10 @@ addEventListener("beforeunload", event => { if (state.history.saved !== state.hi
 
 // What this tab had before it was loaded again, or the drawing of the command line.
 async function begin() {
-  const kept = sessionStorage.getItem(KEPT);
-  if (kept) try { const doc = JSON.parse(kept); check(doc); start(doc); return; } catch { sessionStorage.removeItem(KEPT); }
-  try { const found = await (await ask("first")).json(); found ? drawn(found, found.file ? { bytes: decoded.bytes(found.file.data), name: found.file.name } : null) : start(emptyDocument()); } catch { /* shown */ }
+  const kept = sessionStorage.getItem(KEPT), same = sessionStorage.getItem(`${KEPT}-at`) === location.pathname;
+  let found = null;
+  try { found = await (await ask("first")).json(); } catch { return; }
+  if (kept && (same || !found || confirm("This tab has a drawing of an earlier page. Keep it instead of the new one?"))) try { const doc = JSON.parse(kept); check(doc); start(doc); return; } catch { sessionStorage.removeItem(KEPT); }
+  found ? drawn(found, found.file ? { bytes: decoded.bytes(found.file.data), name: found.file.name } : null) : start(emptyDocument());
 }
 controls(); doubts(); begin();
