@@ -18,18 +18,9 @@ from selenium import webdriver
 from selenium.webdriver.support.ui import WebDriverWait
 
 PICTURES: Final = Path(__file__).resolve().parent / "pictures"
-SIZE: Final = (1280, 840)
+METRICS: Final = {"width": 1280, "height": 840, "deviceScaleFactor": 1, "mobile": False}
+PIPE: Final = "#open-menu summary|[data-sample=cylinder_bend]|input[value=angle]|input[value=normals]"
 PATIENCE: Final = 120
-
-
-def browser() -> Any:
-    """A headless Chromium of that size."""
-    options = webdriver.ChromeOptions()
-    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", f"--window-size={SIZE[0]},{SIZE[1]}"):
-        options.add_argument(argument)
-    return webdriver.Chrome(
-        options=options, service=webdriver.ChromeService(shutil.which("chromedriver") or "")
-    )
 
 
 def shot(page: Any, name: str, *selectors: str) -> None:
@@ -49,22 +40,15 @@ def main() -> None:
     command = [sys.executable, "-m", "crossfield", "studio", "bottle", "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
-        page = browser()
+        options = webdriver.ChromeOptions()
+        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu"):
+            options.add_argument(argument)
+        page = webdriver.Chrome(options, webdriver.ChromeService(shutil.which("chromedriver") or ""))
         try:
-            page.execute_cdp_cmd(
-                "Emulation.setDeviceMetricsOverride",
-                {"width": SIZE[0], "height": SIZE[1], "deviceScaleFactor": 1, "mobile": False},
-            )
+            page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", METRICS)
             page.get(server.stdout.readline().strip())
             shot(page, "studio_page.png", "input[value=lines]", "input[value=matcap]")
-            shot(
-                page,
-                "studio_doubts.png",
-                "#open-menu summary",
-                "[data-sample=cylinder_bend]",
-                "input[value=angle]",
-                "input[value=normals]",
-            )
+            shot(page, "studio_doubts.png", *PIPE.split("|"))
         finally:
             page.quit()
             server.terminate()

@@ -143,15 +143,18 @@ class Document:
         return np.array([stroke.weight for stroke in self.strokes])
 
 
-def _each(given: Mapping[str, Any], key: str, read: Callable[[Any, str], _Read]) -> tuple[_Read, ...]:
+def _each(
+    given: Mapping[str, Any], key: str, read: Callable[[dict[str, Any], str], _Read]
+) -> tuple[_Read, ...]:
     entries = given.get(key, [])
     if not isinstance(entries, list) or len(entries) > MAX_ELEMENTS:
         raise InputError(f"{key} of the session must be a list of at most {MAX_ELEMENTS} entries")
+    if not all(isinstance(entry, dict) for entry in entries):
+        raise InputError(f"an entry of {key} of the session is not an object")
     return tuple(read(entry, f"{key}, entry {number}") for number, entry in enumerate(entries, start=1))
 
 
-def _stroke(given: Any, where: str) -> Stroke:
-    entry = _object(given, where)
+def _stroke(entry: dict[str, Any], where: str) -> Stroke:
     weight = _number(entry.get("weight", 1.0), f"{where}, weight", 0.0, 1.0)
     return Stroke(
         _points(entry.get("points"), where),
@@ -160,27 +163,20 @@ def _stroke(given: Any, where: str) -> Stroke:
     )
 
 
-def _edit(given: Any, where: str) -> MaskEdit:
-    entry = _object(given, where)
+def _edit(entry: dict[str, Any], where: str) -> MaskEdit:
     radius = _number(entry.get("radius", 0.0), f"{where}, radius", 0.0, FARTHEST)
     kind = _one_of(entry.get("kind"), f"{where}, kind", EditKind)
     return MaskEdit(kind, _points(entry.get("points"), where), radius)
 
 
-def _hint(given: Any, where: str) -> PlacedHint:
-    entry, number = _object(given, where), partial(_number, most=FARTHEST)
+def _hint(entry: dict[str, Any], where: str) -> PlacedHint:
+    number = partial(_number, most=FARTHEST)
     return PlacedHint(
         number(entry.get("x"), f"{where}, x", least=-FARTHEST),
         number(entry.get("y"), f"{where}, y", least=-FARTHEST),
         _number(entry.get("slant"), f"{where}, slant", 0.0, 89.0),
         _number(entry.get("tilt"), f"{where}, tilt", -720.0, 720.0),
     )
-
-
-def _object(given: Any, where: str) -> dict[str, Any]:
-    if not isinstance(given, dict):
-        raise InputError(f"{where} of the session is not an object")
-    return given
 
 
 def _points(given: Any, where: str) -> Floats:

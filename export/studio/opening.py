@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from ...models.errors import InputError
 from ...models.instance.grid import Bools, Floats
@@ -80,8 +81,6 @@ def _of_picture(picture: Picture) -> tuple[tuple[float, float, float, float], li
 
 def _smoothed(way: NDArray[np.int64]) -> Floats:
     """The pixels of a way as a smooth line with the same ends, with half of its points."""
-    from scipy import ndimage
-
     even = ndimage.gaussian_filter1d(way.astype(np.float64), _SMOOTH, axis=0, mode="nearest")
     if (way[0] == way[-1]).all():
         even = ndimage.gaussian_filter1d(way[:-1].astype(np.float64), _SMOOTH, axis=0, mode="wrap")

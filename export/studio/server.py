@@ -6,7 +6,6 @@ It stores no drawing: each request holds the whole document, and the answers are
 from __future__ import annotations
 
 import json
-import math
 import secrets
 import socket
 import tempfile
@@ -193,8 +192,9 @@ class Page:
             with suppress(NoStrokeError):  # on so coarse a grid
                 view, found, field = self.desk.submit("fields", field_step, data, COARSE, stop=stop).result()
                 yield view
-                late = _either(stop, fine.is_set)
-                early = self.desk.submit("surfaces", surface_step, data, found, field, stop=late)
+                early = self.desk.submit(
+                    "surfaces", surface_step, data, found, field, stop=lambda: stop() or fine.is_set()
+                )
         finer = self.desk.submit("fields", field_step, data, stop=stop)
         if early is not None:
             wait({early, finer}, return_when=FIRST_COMPLETED)
@@ -222,10 +222,6 @@ class Page:
                     shown = progress
                     yield progress
             yield proof.result()
-
-
-def _either(stop: Over, late: Over) -> Over:
-    return lambda: stop() or late()
 
 
 def _whole(request: Request, name: str) -> int:
@@ -268,7 +264,7 @@ def _stream(steps: Iterator[dict[str, Any]]) -> Response:
     def lines() -> Iterator[bytes]:
         try:
             for step in steps:
-                yield json.dumps(_finite(step)).encode() + b"\n"
+                yield json.dumps(step, allow_nan=False).encode() + b"\n"
         except OvertakenError:
             yield b'{"stage": "overtaken"}\n'
         except CrossfieldError as error:
@@ -283,14 +279,6 @@ def _stream(steps: Iterator[dict[str, Any]]) -> Response:
 
 def _error_line(message: str) -> bytes:
     return json.dumps({"stage": "error", "message": message}).encode() + b"\n"
-
-
-def _finite(step: dict[str, Any]) -> dict[str, Any]:
-    """The step with null for infinities, which JSON cannot hold."""
-    return {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in step.items()
-    }
 
 
 async def _refused(_: Request, error: Exception) -> Response:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
 import numpy as np
+from scipy import ndimage
 
 from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
@@ -19,6 +20,7 @@ from ...models.instance.instance import Instance, Reading
 from ...models.processes.control import stopped
 from ...models.sketch.choice import Choice
 from ...models.sketch.cover import Cover, Frame, covering_curves
+from ...models.sketch.outline import enclosed
 from ...models.sketch.read import CUT, LEAST_WEIGHT, instance_of, segments_of
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field
@@ -61,7 +63,7 @@ def drawn(document: Document, size: int | None = None) -> Drawn:
         walls = (lines.amount >= LEAST_WEIGHT) | (others.amount >= CUT)
         edited, gaps = _edited(document.mask, solve, walls, found, frame)
         kinds = np.where(edited, IN, np.where(_enclosed(~edited & ~walls), LEFT_OUT, OUT))
-        seen["kinds"] = np.where(others.amount >= CUT, STROKE, kinds).astype(np.int32)
+        seen["kinds"] = np.where(others.amount >= CUT, STROKE, kinds)
         seen["gaps"] = gaps
         return edited
 
@@ -81,7 +83,8 @@ def drawn(document: Document, size: int | None = None) -> Drawn:
     number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
     pairs = np.stack([owner, number[row, column]], axis=1)
     pairs = pairs[pairs[:, 1] >= 0].astype(np.int32)
-    return Drawn(_weighted(instance, document.weights, pairs), seen["kinds"], seen["gaps"], pairs)
+    kinds = np.where((seen["kinds"] == IN) & ~instance.mask, LEFT_OUT, seen["kinds"]).astype(np.int32)
+    return Drawn(_weighted(instance, document.weights, pairs), kinds, seen["gaps"], pairs)
 
 
 def _weighted(instance: Instance, weights: Floats, pairs: Ints) -> Instance:
@@ -97,8 +100,6 @@ def _edited(
     edits: tuple[MaskEdit, ...], solve: Bools, walls: Bools, found: Reading, frame: Frame
 ) -> tuple[Bools, tuple[tuple[Floats, bool], ...]]:
     """The mask after the edits in their order, and the gaps with whether they are open."""
-    from scipy import ndimage
-
     ends = np.array(found.openings).reshape(-1, 2, 2)
     kept = np.ones(len(ends), dtype=bool)
     for edit in edits:
@@ -127,8 +128,6 @@ def _edited(
 
 def _mostly(chosen: Bools, area: Bools) -> Bools:
     """The connected parts of an area of which more than half is chosen."""
-    from scipy import ndimage
-
     label, count = ndimage.label(area)
     share = ndimage.mean(chosen, label, np.arange(count + 1))
     return np.asarray((share > 0.5)[label] & area)
@@ -136,15 +135,11 @@ def _mostly(chosen: Bools, area: Bools) -> Bools:
 
 def _rim(area: Bools, walls: Bools) -> Bools:
     """The pixels of strokes next to an area."""
-    from scipy import ndimage
-
     return np.asarray(ndimage.binary_dilation(area, np.ones((3, 3), dtype=bool)) & walls)
 
 
 def _closed(walls: Bools, bridges: Floats, frame: Frame) -> Bools:
     """The region inside of the walls and these bridges (m, 2, 2)."""
-    from ...models.sketch.outline import enclosed
-
     closed = walls.copy()
     if len(bridges):
         _, row, column = covering_curves(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
@@ -162,8 +157,6 @@ def _cell(cells: Ints, point: Floats, frame: Frame) -> Bools:
 
 def _enclosed(area: Bools) -> Bools:
     """The parts of an area that do not reach the edge of the grid."""
-    from scipy import ndimage
-
     label, count = ndimage.label(area)
     free = np.ones(count + 1, dtype=bool)
     free[[0, *label[0], *label[-1], *label[:, 0], *label[:, -1]]] = False
@@ -172,8 +165,6 @@ def _enclosed(area: Bools) -> Bools:
 
 def _brushed(edit: MaskEdit, frame: Frame) -> Bools:
     """The pixels whose middles a brush passes over, at least the pixels under its path."""
-    from scipy import ndimage
-
     points = (edit.points - (frame.x, frame.y)) / frame.pixel
     steps = np.maximum(np.ceil(2 * np.hypot(*np.diff(points, axis=0).T)).astype(int), 1)
     parts = [

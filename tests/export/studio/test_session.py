@@ -42,7 +42,7 @@ def click(x, y, kind="toggle"):
         ({"strokes": [{"points": [1, "x"], "mark": "line"}]}, "strokes, entry 1"),
         ({"strokes": [{"points": [1, 1e300], "mark": "line"}]}, "strokes, entry 1"),
         ({"strokes": [{"points": [1, 2], "mark": "dashed"}]}, "mark"),
-        ({"strokes": [7]}, "strokes, entry 1"),
+        ({"strokes": [7]}, "entry of strokes"),
         ({"strokes": {}}, "strokes"),
         ({"hints": [{"x": 1, "y": 1, "slant": 95, "tilt": 0}]}, "slant"),
         ({"mask": [{"kind": "fill", "points": [1, 1]}]}, "kind"),
