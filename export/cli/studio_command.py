@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import secrets
 import webbrowser
 from pathlib import Path
@@ -20,7 +21,7 @@ def studio_command(
         str | None,
         typer.Argument(
             metavar="[SKETCH|SAMPLE]",
-            help="A drawing (SVG, picture, .scap, .curves), or the name of a drawn sample.",
+            help="A drawing (SVG, picture, .scap, .curves), a saved session, or a drawn sample.",
         ),
     ] = None,
     *,
@@ -60,6 +61,7 @@ def _opened(drawing: str) -> dict[str, Any]:
     from ...models.errors import naming
     from ...models.sketch.read import bytes_of
     from ...models.sketch.samples import SAMPLES, sample_svg
+    from ..studio.document import Document
     from ..studio.opening import opened
 
     path = Path(drawing)
@@ -67,6 +69,9 @@ def _opened(drawing: str) -> dict[str, Any]:
         return opened(sample_svg(drawing).encode(), f"{drawing}.svg")
     data = bytes_of(path)
     with naming(path):
+        if data.lstrip().startswith(b"{"):
+            Document.of_bytes(data)
+            return {"document": json.loads(data)}
         found = opened(data, path.name)
     if found["spatial"]:  # the page reads it again from other sides
         found["file"] = {"name": path.name, "data": base64.b64encode(data).decode()}

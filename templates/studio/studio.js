@@ -457,6 +457,7 @@ async function begin() {
   let found = null;
   try { found = await (await ask("first")).json(); } catch { return; }
   if (kept && (same || !found || confirm("This tab has a drawing of an earlier page. Keep it instead of the new one?"))) try { const doc = JSON.parse(kept); check(doc); start(doc); return; } catch { sessionStorage.removeItem(KEPT); }
-  found ? drawn(found, found.file ? { bytes: decoded.bytes(found.file.data), name: found.file.name } : null) : start(emptyDocument());
+  if (found?.document) start({ ...emptyDocument(), ...found.document });
+  else found ? drawn(found, found.file ? { bytes: decoded.bytes(found.file.data), name: found.file.name } : null) : start(emptyDocument());
 }
 controls(); doubts(); begin();

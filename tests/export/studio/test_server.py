@@ -150,6 +150,16 @@ def test_it_ends_on_an_interrupt_also_while_it_works():
         assert page.process.stderr.read() == ""
 
 
+def test_a_saved_session_is_opened_by_the_command(tmp_path, capsys):
+    saved = tmp_path / "pebble.studio.json"
+    saved.write_bytes(changed())
+    with studio(str(saved)) as page:
+        assert json.loads(page.ask("first")[2])["document"] == json.loads(changed())
+    saved.write_bytes(changed(size=1))
+    assert invoke(["studio", "--no-browser", str(saved)]) == 1
+    assert "size of the session is 1" in capsys.readouterr().err
+
+
 def test_a_port_in_use_and_a_missing_drawing_are_reported(page, capsys):
     port = page.host.split(":")[1]
     assert invoke(["studio", "--no-browser", "--port", port]) == 1
