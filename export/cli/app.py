@@ -37,6 +37,7 @@ from .prove_command import prove_command
 from .shade_command import shade_command
 from .sketch_options import SketchOptions
 from .solve_command import print_solution, solve_command
+from .studio_command import studio_command
 from .verify_command import verify_command
 
 app = typer.Typer(
@@ -260,6 +261,7 @@ def draw_command(
 
 
 command("shade")(shade_command)
+command("studio")(studio_command)
 command("verify")(verify_command)
 
 

@@ -51,6 +51,9 @@ _PICTURE: Final = re.compile(b"|".join(_PICTURES.values()), re.DOTALL)
 
 _FLATNESS: Final = 0.02  # of a pixel
 
+Edit = Callable[[Bools, Cover, Cover, Reading, Frame], Bools]
+"""A change of a mask, given the covers by curvature lines and by other strokes, the reading and the frame."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Sketch:
@@ -143,7 +146,7 @@ def read_sketch(
 
 
 def instance_of(
-    data: bytes,
+    data: bytes | Curves,
     *,
     size: int,
     name: str,
@@ -151,10 +154,13 @@ def instance_of(
     mask: Path | None = None,
     gauge: Gauge = "strokes",
     choice: Choice = AS_DRAWN,
+    edit: Edit | None = None,
 ) -> Instance:
-    """Read the instance of a sketch from a file's bytes, with the default weights. Raises InputError."""
-    curves = curves_in(data, Path(source).suffix.lower(), choice)
-    sketch = _of_picture(read_picture(data, size)) if curves is None else _of_curves(curves)
+    """Read the instance of curves, or of a file's bytes, with the default weights.
+
+    edit: changes the mask that was found. Raises InputError.
+    """
+    sketch = _sketch_of(data, size, Path(source).suffix.lower(), choice)
     if mask is None:
         frame, given = _framed(sketch.box, size, margin=True), None
     else:
@@ -162,6 +168,8 @@ def instance_of(
             frame, given = _mask_on_grid(read_white(bytes_of(mask)), sketch.page, size)
     lines, others = sketch.covers(frame)
     solve, found = _solve_mask(lines, others, given, sketch, frame)
+    if edit is not None:
+        solve = edit(solve, lines, others, found, frame) & (others.amount < CUT)
     weight = np.where(solve, lines.weight, 0.0)
     if choice.silhouette == "outer":
         region = solve | (others.amount >= CUT) if given is None else given
@@ -245,6 +253,14 @@ def kind_of(data: bytes, suffix: str) -> Kind:
 def suffix_of_picture(data: bytes) -> str:
     """Suffix of a picture by its content; Netpbm's for unknown content."""
     return next((suffix for suffix, start in _PICTURES.items() if re.match(start, data)), ".pnm")
+
+
+def _sketch_of(data: bytes | Curves, size: int, suffix: str, choice: Choice) -> _Sketch:
+    curves = data if isinstance(data, Curves) else curves_in(data, suffix, choice)
+    if curves is not None:
+        return _of_curves(curves)
+    assert isinstance(data, bytes)
+    return _of_picture(read_picture(data, size))
 
 
 def _of_picture(picture: Picture) -> _Sketch:

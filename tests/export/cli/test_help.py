@@ -42,6 +42,7 @@ NAMED = {
 """Tables whose names the help of a command lists."""
 OTHERS = (
     "",
+    "studio",
     "list",
     "samples",
     "library",
@@ -138,8 +139,8 @@ def test_every_command_that_reads_a_sketch_has_the_same_options_for_it(text):
 
 def test_the_help_lists_the_commands_in_the_order_of_use():
     assert list(typer.main.get_command(app).commands) == [
-        "run", "instance", "export", "solve", "prove", "evaluate", "read", "draw", "shade", "verify",
-        "list", "samples", "library",
+        "run", "instance", "export", "solve", "prove", "evaluate", "read", "draw", "shade", "studio",
+        "verify", "list", "samples", "library",
     ]  # fmt: skip
 
 
@@ -185,7 +186,10 @@ def test_a_submission_describes_its_run_in_one_panel(text):
 
 @pytest.mark.slow
 def test_examples_run(tmp_path, monkeypatch):
-    """In order: each uses files of earlier ones. That of `run` is in the README, whose commands are run."""
+    """Each example uses files of earlier ones.
+
+    The README has that of `run`, and its commands are run. That of `studio` serves until it is stopped.
+    """
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(SPECIFICATION)
     for name, example in EXAMPLES.items():
@@ -197,5 +201,5 @@ def test_examples_run(tmp_path, monkeypatch):
         if name == "library submit":
             shutil.rmtree("proof")
             assert invoke(["prove", "library/cf_skew_n005.instance.json", "-o", "proof"]) == 0
-        if name != "run":
+        if name not in {"run", "studio"}:
             assert invoke(shlex.split(example)[1:]) == 0, example

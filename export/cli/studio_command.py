@@ -1,0 +1,78 @@
+"""The command `studio`: a page in the browser where strokes are drawn and field and surface follow."""
+
+from __future__ import annotations
+
+import base64
+import json
+import secrets
+import webbrowser
+from pathlib import Path
+from threading import Thread
+from typing import Annotated, Any
+
+import typer
+
+from ...models.errors import InputError
+from .output import print_line, progress
+
+
+def studio_command(
+    drawing: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SKETCH|SAMPLE]",
+            help="A drawing (SVG, picture, .scap, .curves), a saved session, or a drawn sample.",
+        ),
+    ] = None,
+    *,
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=65535, help="Port of the page; 0 chooses a free one.")
+    ] = 0,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Only print the address, and open no browser.")
+    ] = False,
+) -> None:
+    """Draw strokes on a page in the browser, and see field and surface follow.
+
+    The page is served on this machine only, until Ctrl-C. Its address contains a secret token. Drawings stay
+    in the page; save them as session files. Needs the extra `studio`.
+    """
+    try:
+        from ..studio.server import LOOPBACK, listening, serve
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"studio needs the package {error.name}; pip install 'crossfield[studio]'"
+        ) from error
+    with progress(quiet=False) as show:
+        show("reading the drawing")
+        first = None if drawing is None else _opened(drawing)
+    token = secrets.token_urlsafe(24)
+    with listening(port) as place:
+        address = f"http://{LOOPBACK}:{place.getsockname()[1]}/{token}/"
+        print_line(address)
+        if not no_browser:
+            # A browser in the terminal returns only when it is closed.
+            Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+        serve(place, token, first)
+
+
+def _opened(drawing: str) -> dict[str, Any]:
+    """Strokes of a file or a sample. Raises InputError."""
+    from ...models.errors import naming
+    from ...models.sketch.read import bytes_of
+    from ...models.sketch.samples import SAMPLES, sample_svg
+    from ..studio.document import Document
+    from ..studio.opening import opened
+
+    path = Path(drawing)
+    if not path.is_file() and drawing in SAMPLES:
+        return opened(sample_svg(drawing).encode(), f"{drawing}.svg")
+    data = bytes_of(path)
+    with naming(path):
+        if data.lstrip().startswith(b"{"):
+            Document.of_bytes(data)
+            return {"document": json.loads(data)}
+        found = opened(data, path.name)
+    if found["spatial"]:  # the page reads it again from other sides
+        found["file"] = {"name": path.name, "data": base64.b64encode(data).decode()}
+    return found

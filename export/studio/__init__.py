@@ -1,0 +1,1 @@
+"""Drawing, field and surface on a page in the browser."""

@@ -1,0 +1,214 @@
+"""The document of a drawing on the page: strokes with marks, changes of the mask, hints and settings.
+
+The browser keeps the document, and sends all of it with every request. The server stores nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final, Literal, TypeVar, get_args
+
+import numpy as np
+
+from ...models.errors import InputError, InstanceError, NoStrokeError, shortened
+from ...models.input_limits import MAX_ELEMENTS, MAX_SEGMENTS
+from ...models.instance.file import parse_json
+from ...models.instance.grid import Bools, Floats, Ints
+from ...models.instance.instance import STROKE_WEIGHT
+from ...models.sketch.choice import Silhouette
+from ...models.sketch.curves import Curves, lines_as_cubics
+from ...models.sketch.read import name_from
+
+Mark = Literal["line", "cut", "ignored"]
+EditKind = Literal["paint", "erase", "toggle", "gap"]
+_Read = TypeVar("_Read")
+
+FORMAT: Final = "crossfield-studio"
+VERSION: Final = 1
+SIZES: Final = (8, 256)  # least and most pixels of the longer side that the page offers
+FARTHEST: Final = 1e6  # coordinates
+_MOST_WEIGHT: Final = 1e3  # of the strokes
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """A polyline (k, 2) in the units of the drawing, y down, its mark, and its weight in (0, 1]."""
+
+    points: Floats
+    mark: Mark
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class MaskEdit:
+    """A change of the mask: a brush of a radius along points (k, 2), or a click at the first point.
+
+    toggle: includes or excludes the area between strokes that was clicked. gap: opens a bridged gap.
+    """
+
+    kind: EditKind
+    points: Floats
+    radius: float
+
+
+@dataclass(frozen=True)
+class PlacedHint:
+    """A normal of the surface at a point of the drawing, in degrees as in `crossfield shade --hint`."""
+
+    x: float
+    y: float
+    slant: float
+    tilt: float
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """Everything that determines field and surface."""
+
+    name: str
+    page: tuple[float, float, float, float]
+    strokes: tuple[Stroke, ...]
+    mask: tuple[MaskEdit, ...]
+    hints: tuple[PlacedHint, ...]
+    flip: bool
+    size: int
+    stroke_weight: float
+    silhouette: Silhouette
+
+    @classmethod
+    def of_bytes(cls, data: bytes) -> Document:
+        """Read a document from JSON. Raises InputError that names the faulty entry."""
+        try:
+            return cls.of(parse_json(data.decode()))
+        except (UnicodeDecodeError, InstanceError) as error:
+            raise InputError(f"the drawing is not a session of crossfield: {shortened(error)}") from error
+
+    @classmethod
+    def of(cls, given: Any) -> Document:
+        """Check a parsed document. Raises InputError that names the faulty entry."""
+        if not isinstance(given, dict) or given.get("format") != FORMAT:
+            raise InputError("this is not a session of crossfield; open a file that the page saved")
+        if given.get("version") != VERSION:
+            raise InputError(f"the session has version {shortened(given.get('version'))}, not {VERSION}")
+        low, high = SIZES
+        found = cls(
+            name=name_from(str(given.get("name", ""))[:200]) or "drawing",
+            page=_page(given.get("page")),
+            strokes=_each(given, "strokes", _stroke),
+            mask=_each(given, "mask", _edit),
+            hints=_each(given, "hints", _hint),
+            flip=given.get("flip") is True,
+            size=int(_number(given.get("size"), "size", low, high)),
+            stroke_weight=_number(
+                given.get("stroke_weight", STROKE_WEIGHT), "stroke_weight", 0.0, _MOST_WEIGHT
+            ),
+            silhouette=_one_of(given.get("silhouette", "none"), "silhouette", Silhouette),
+        )
+        if sum(len(stroke.points) for stroke in found.strokes) > MAX_SEGMENTS:
+            raise InputError(f"the drawing has more than {MAX_SEGMENTS} points; simplify it")
+        return found
+
+    @property
+    def visible(self) -> Ints:
+        """Numbers of the strokes that are read: not ignored, and longer than a point."""
+        read = [
+            number
+            for number, stroke in enumerate(self.strokes)
+            if stroke.mark != "ignored" and (stroke.points != stroke.points[0]).any()
+        ]
+        return np.array(read, dtype=np.int32)
+
+    def curves(self) -> Curves:
+        """The visible strokes as curves with their numbers. Raises NoStrokeError without a curvature line."""
+        visible = self.visible
+        if not any(self.strokes[number].mark == "line" for number in visible):
+            raise NoStrokeError("there is no curvature line yet; draw one, or mark a stroke as one")
+        ends, owner = [], []
+        for number in visible:
+            points = self.strokes[number].points
+            ends.append(np.stack([points[:-1], points[1:]], axis=1))
+            owner.append(np.full(len(points) - 1, number, dtype=np.int32))
+        joined, curve = np.concatenate(ends), np.concatenate(owner)
+        long = (joined[:, 0] != joined[:, 1]).any(axis=1)
+        joined, curve = joined[long], curve[long]
+        line: Bools = np.array([stroke.mark == "line" for stroke in self.strokes])[curve]
+        return Curves(lines_as_cubics(joined[:, 0], joined[:, 1]), curve, line, self.page, line)
+
+    @property
+    def weights(self) -> Floats:
+        """Weight of each stroke, shape (number of strokes,)."""
+        return np.array([stroke.weight for stroke in self.strokes])
+
+
+def _each(
+    given: Mapping[str, Any], key: str, read: Callable[[dict[str, Any], str], _Read]
+) -> tuple[_Read, ...]:
+    entries = given.get(key, [])
+    if not isinstance(entries, list) or len(entries) > MAX_ELEMENTS:
+        raise InputError(f"{key} of the session must be a list of at most {MAX_ELEMENTS} entries")
+    if not all(isinstance(entry, dict) for entry in entries):
+        raise InputError(f"an entry of {key} of the session is not an object")
+    return tuple(read(entry, f"{key}, entry {number}") for number, entry in enumerate(entries, start=1))
+
+
+def _stroke(entry: dict[str, Any], where: str) -> Stroke:
+    weight = _number(entry.get("weight", 1.0), f"{where}, weight", 0.0, 1.0)
+    return Stroke(
+        _points(entry.get("points"), where),
+        _one_of(entry.get("mark"), f"{where}, mark", Mark),
+        max(weight, 0.05),
+    )
+
+
+def _edit(entry: dict[str, Any], where: str) -> MaskEdit:
+    radius = _number(entry.get("radius", 0.0), f"{where}, radius", 0.0, FARTHEST)
+    kind = _one_of(entry.get("kind"), f"{where}, kind", EditKind)
+    return MaskEdit(kind, _points(entry.get("points"), where), radius)
+
+
+def _hint(entry: dict[str, Any], where: str) -> PlacedHint:
+    number = partial(_number, most=FARTHEST)
+    return PlacedHint(
+        number(entry.get("x"), f"{where}, x", least=-FARTHEST),
+        number(entry.get("y"), f"{where}, y", least=-FARTHEST),
+        _number(entry.get("slant"), f"{where}, slant", 0.0, 89.0),
+        _number(entry.get("tilt"), f"{where}, tilt", -720.0, 720.0),
+    )
+
+
+def _points(given: Any, where: str) -> Floats:
+    """Points (k, 2) from a flat list x, y, x, y, ..."""
+    try:
+        points = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        points = np.empty(0)
+    if points.ndim != 1 or not len(points) or len(points) % 2 or not (np.abs(points) <= FARTHEST).all():
+        raise InputError(f"{where} of the session: points must be x, y, x, y, ... up to {FARTHEST:g}")
+    return points.reshape(-1, 2)
+
+
+def _page(given: Any) -> tuple[float, float, float, float]:
+    values = _points(given, "page").ravel()
+    if len(values) != 4 or not (values[2:] > 0).all():
+        raise InputError("page of the session must be x, y, width and height")
+    x, y, width, height = values.tolist()
+    return x, y, width, height
+
+
+def _number(given: Any, where: str, least: float, most: float) -> float:
+    if isinstance(given, bool) or not isinstance(given, (int, float)) or not math.isfinite(given):
+        raise InputError(f"{where} of the session is {shortened(given)}, not a number")
+    if not least <= given <= most:
+        raise InputError(f"{where} of the session is {given:g}; it must be between {least:g} and {most:g}")
+    return float(given)
+
+
+def _one_of(given: Any, where: str, choice: Any) -> Any:
+    if given not in get_args(choice):
+        raise InputError(
+            f"{where} of the session is {shortened(given)!r}; it must be {' or '.join(get_args(choice))}"
+        )
+    return given

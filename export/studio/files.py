@@ -1,0 +1,131 @@
+"""Files of a drawing to take home, by the writers that the commands use."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ...models.errors import InputError, shortened
+from ...models.field.file import write_field
+from ...models.instance.file import write_instance
+from ..bundle.manifest import write_all
+from ..pictures.draw import draw
+from ..shading.colours import normal_map
+from ..surfaces.files import png_of, write_surface
+from .document import Document, Stroke
+from .session import drawn, field_of, surface_of
+
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # of files in an archive: same drawing, same bytes
+_COLOURS: Final = {"line": "red", "cut": "black"}
+
+
+@dataclass(frozen=True)
+class Download:
+    """An entry of the menu: its text, and the function that writes files of a document into a folder."""
+
+    title: str
+    write: Callable[[Document, Path, str, str], Any]
+
+
+def _drawing(document: Document, folder: Path) -> Path:
+    path = folder / f"{document.name}.svg"
+    path.write_bytes(svg_of(document))
+    return path
+
+
+def svg_of(document: Document) -> bytes:
+    """The visible strokes as SVG: curvature lines in red, strokes that cut in black."""
+    x, y, width, height = (f"{value:.12g}" for value in document.page)
+    thick = f"{max(document.page[2:]) / 400:.4g}"
+    paths = [_path(document.strokes[number]) for number in document.visible]
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
+        f'viewBox="{x} {y} {width} {height}" fill="none" stroke-width="{thick}">'
+    )
+    return "\n".join([head, *paths, "</svg>", ""]).encode()
+
+
+def _path(stroke: Stroke) -> str:
+    points = " ".join(f"{value:.12g}" for value in stroke.points.ravel())
+    return f'<polyline stroke="{_COLOURS[stroke.mark]}" points="{points}"/>'
+
+
+def _layers(document: Document, folder: Path, *_: str) -> None:
+    with tempfile.TemporaryDirectory() as other:
+        underlay = _drawing(document, Path(other))
+        draw(field_of(document)[1], folder / f"{document.name}.layers.svg", underlay=underlay)
+
+
+def _normals(document: Document, folder: Path, *_: str) -> None:
+    found = surface_of(document, field_of(document)[1])
+    texels = normal_map(found.instance, found.normals, max(1, 1024 // max(found.instance.mask.shape)))
+    (folder / f"{document.name}.normals.png").write_bytes(png_of(texels))
+
+
+def _surface(document: Document, folder: Path, *_: str) -> None:
+    with tempfile.TemporaryDirectory() as other:
+        underlay = _drawing(document, Path(other))
+        write_surface(surface_of(document, field_of(document)[1]), folder, drawing=underlay)
+
+
+def _solver(document: Document, folder: Path, formulation: str, form: str) -> None:
+    found, field = field_of(document)
+    manifests = write_all(found.instance, folder, formulations=[formulation], formats=[form], start=field)
+    for reason in manifests[0].document["refused"].values():
+        raise InputError(reason)
+
+
+DOWNLOADS: Final = {
+    "drawing": Download("Drawing (SVG)", lambda document, folder, *_: _drawing(document, folder)),
+    "layers": Download("Field in layers (SVG)", _layers),
+    "overview": Download(
+        "Overview (PNG)",
+        lambda document, folder, *_: draw(
+            field_of(document)[1], folder / f"{document.name}.png", kind="overview"
+        ),
+    ),
+    "normals": Download("Normal map (PNG)", _normals),
+    "surface": Download("Surface (OBJ, heights, pictures)", _surface),
+    "field": Download(
+        "Field (NPZ)",
+        lambda document, folder, *_: write_field(
+            field_of(document)[1], folder / f"{document.name}.field.npz"
+        ),
+    ),
+    "instance": Download(
+        "Instance (JSON)",
+        lambda document, folder, *_: write_instance(
+            drawn(document).instance, folder / f"{document.name}.json"
+        ),
+    ),
+    "solver": Download("Solver files", _solver),
+}
+"""The entries of the menu by name."""
+
+
+def download(data: bytes, what: str, formulation: str = "", form: str = "") -> tuple[str, bytes]:
+    """Name and content of the file of an entry; several files are one archive. Raises InputError."""
+    if what not in DOWNLOADS:
+        raise InputError(f"there is no download {shortened(what)!r}; choose one of {', '.join(DOWNLOADS)}")
+    document = Document.of_bytes(data)
+    with tempfile.TemporaryDirectory(prefix="crossfield-") as name:
+        folder = Path(name)
+        DOWNLOADS[what].write(document, folder, formulation, form)
+        files = sorted(path for path in folder.rglob("*") if path.is_file())
+        if len(files) == 1:
+            return files[0].name, files[0].read_bytes()
+        return f"{document.name}.{what}.zip", _archive(files, folder)
+
+
+def _archive(files: list[Path], folder: Path) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in files:
+            entry = zipfile.ZipInfo(path.relative_to(folder).as_posix(), _EPOCH)
+            archive.writestr(entry, path.read_bytes(), zipfile.ZIP_DEFLATED)
+    return stream.getvalue()

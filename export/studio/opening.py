@@ -1,0 +1,122 @@
+"""Strokes of the page from a file: SVG, .scap and .curves by their curves, pictures by thinned ink."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ...models.errors import InputError
+from ...models.instance.grid import Bools, Floats
+from ...models.sketch.bitmap import Picture, read_picture
+from ...models.sketch.bridges import thinned
+from ...models.sketch.choice import Choice
+from ...models.sketch.cover import block_means
+from ...models.sketch.curves import bounding_box, flatten, runs
+from ...models.sketch.read import curves_in, kind_of, name_from
+
+_FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
+_THINNED: Final = 700  # pixels on the longer side of a picture while it is traced
+_INK: Final = 0.3
+_RED: Final = 0.5
+_SMOOTH: Final = 2.0  # pixels over which a traced line is smoothed
+_SHORTEST: Final = 6  # pixels of a traced line; shorter ones are burrs of the thinning
+_AROUND: Final = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
+
+_Pixel = tuple[int, int]
+_Way = list[_Pixel]
+
+
+def opened(data: bytes, file_name: str, view: str | None = None) -> dict[str, Any]:
+    """Name, page and strokes of a drawing, as in a document. Raises InputError.
+
+    view: direction of a .curves file, as for `read_sketch`. `spatial` states whether it has one.
+    """
+    if not data:
+        raise InputError("the file is empty; save the drawing again")
+    stem, dot, suffix = file_name.rpartition(".")
+    suffix = f".{suffix.lower()}" if dot else ""
+    spatial = kind_of(data, suffix) == "curves"
+    curves = curves_in(data, suffix, Choice(view=view if spatial else None))
+    if curves is None:
+        page, strokes = _of_picture(read_picture(data, _THINNED // 4))
+    else:
+        left, top, right, bottom = bounding_box(curves.points)
+        page = curves.canvas or (left, top, max(right - left, 1e-6), max(bottom - top, 1e-6))
+        segments, owner = flatten(curves.points, _FINE * max(right - left, bottom - top, 1e-6))
+        run = runs(curves.points, curves.curve)[owner]
+        starts = np.flatnonzero(np.diff(run, prepend=-1))
+        strokes = [
+            _stroke(np.concatenate([part[:, 0], part[-1:, 1]]), line=bool(line))
+            for part, line in zip(np.split(segments, starts[1:]), curves.line[owner[starts]], strict=True)
+        ]
+    return {"name": name_from(stem or file_name), "page": list(page), "strokes": strokes, "spatial": spatial}
+
+
+def _stroke(points: Floats, *, line: bool) -> dict[str, Any]:
+    rounded = np.round(points, 3).ravel().tolist()
+    return {"points": rounded, "mark": "line" if line else "cut", "weight": 1}
+
+
+def _of_picture(picture: Picture) -> tuple[tuple[float, float, float, float], list[dict[str, Any]]]:
+    """Page and strokes of a picture: the middle lines of its ink, from one end or junction to the next."""
+    reduced = max(1.0, max(picture.ink.shape) / _THINNED)
+    rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in picture.ink.shape)
+    small = block_means(picture.ink, rows, columns)
+    red = block_means(picture.red * picture.ink, rows, columns) / np.maximum(small, 1e-6)
+    line = thinned(small * max(1.0, reduced / picture.stroke_width) > _INK)
+    ways = [np.array(way) for way in _ways(line)]
+    ways = [way for way in ways if len(way) >= _SHORTEST] or ways
+    is_red = np.array([np.median(red[tuple(way.T)]) > _RED for way in ways], dtype=bool)
+    as_lines = is_red if is_red.any() and not is_red.all() else np.ones(len(ways), dtype=bool)
+    scale = reduced * picture.reduced
+    strokes = [
+        _stroke(scale * (_smoothed(way)[:, ::-1] + 0.5), line=bool(marked))
+        for way, marked in zip(ways, as_lines, strict=True)
+    ]
+    return (0.0, 0.0, float(picture.width), float(picture.height)), strokes
+
+
+def _smoothed(way: NDArray[np.int64]) -> Floats:
+    """The pixels of a way as a smooth line with the same ends, with half of its points."""
+    even = ndimage.gaussian_filter1d(way.astype(np.float64), _SMOOTH, axis=0, mode="nearest")
+    if (way[0] == way[-1]).all():
+        even = ndimage.gaussian_filter1d(way[:-1].astype(np.float64), _SMOOTH, axis=0, mode="wrap")
+        return np.concatenate([even[::2], even[:1]])
+    even[0], even[-1] = way[0], way[-1]
+    return np.concatenate([even[:-1:2], even[-1:]])
+
+
+def _ways(line: Bools) -> list[_Way]:
+    """The pixels of a thinned drawing as ways from one end or junction to the next, each link once."""
+    there: set[_Pixel] = {(row, column) for row, column in np.argwhere(line).tolist()}
+    links = {pixel: _neighbours(pixel, there) for pixel in there}
+    used: set[tuple[_Pixel, _Pixel]] = set()
+
+    def walk(first: _Pixel, second: _Pixel) -> _Way:
+        way = [first, second]
+        used.update({(first, second), (second, first)})
+        while len(links[way[-1]]) == 2:
+            after = next((each for each in links[way[-1]] if (way[-1], each) not in used), None)
+            if after is None:
+                break
+            used.update({(way[-1], after), (after, way[-1])})
+            way.append(after)
+        return way
+
+    # Ends and junctions first; what is left are closed ways.
+    order = sorted(there, key=lambda pixel: (len(links[pixel]) == 2, pixel))
+    return [walk(pixel, other) for pixel in order for other in links[pixel] if (pixel, other) not in used]
+
+
+def _neighbours(pixel: _Pixel, there: set[_Pixel]) -> list[_Pixel]:
+    """The neighbours of a pixel; one at a corner counts only if no neighbour at a side is next to it."""
+    row, column = pixel
+    return [
+        (row + down, column + right)
+        for down, right in _AROUND
+        if (row + down, column + right) in there
+        and not (down and right and ((row, column + right) in there or (row + down, column) in there))
+    ]

@@ -1,0 +1,54 @@
+"""A proof of a drawing's field in the background, with a line of progress every few passes."""
+
+from __future__ import annotations
+
+import re
+import sys
+from typing import Any, Final
+
+from ...models.processes.control import stopped
+from ...models.processes.limits import Limits
+from .document import Document
+from .session import field_of
+
+SECONDS: Final = 120.0  # of a proof
+_LINE: Final = re.compile(r"energy ([-+.\deE]+), bound ([-+.\deE]+)")
+
+
+def prove_step(data: bytes) -> dict[str, Any]:
+    """Energy, bound and gap of a document's instance; progress is written to the standard output."""
+    from ...models.proof.prove import prove
+
+    _, field = field_of(Document.of_bytes(data))
+    proof = prove(
+        field.instance,
+        start=field,
+        limits=Limits(SECONDS, gap=0.0, threads=1),
+        jobs=1,
+        progress=_printed,
+        stop=stopped,
+    )
+    return {
+        "stage": "proof",
+        "done": True,
+        "energy": proof.energy,
+        "bound": proof.bound,
+        "gap": proof.gap,
+        "status": proof.status,
+        "own": field.energy(2).total,
+    }
+
+
+def _printed(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def progress_of(text: str) -> dict[str, Any] | None:
+    """Energy, bound and gap in the last line of progress with both, or None."""
+    lines = _LINE.findall(text)
+    if not lines:
+        return None
+    energy, bound = (max(float(value), 0.0) for value in lines[-1])
+    gap = (energy - bound) / energy if energy else 0.0
+    return {"stage": "proof", "done": False, "energy": energy, "bound": bound, "gap": gap}

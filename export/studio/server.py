@@ -1,0 +1,335 @@
+"""The server of the page: on this machine only, with a token in the address, for pages from itself only.
+
+It stores no drawing: each request holds the whole document, and the answers are functions of it.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import socket
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, wait
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+from typing import Any, Final
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Mount, Route
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from ...models.errors import CrossfieldError, InputError, NoStrokeError, shortened
+from ...models.formulations.catalogue import FORMULATIONS
+from ...models.input_limits import MAX_BYTES
+from ...models.processes.deadline import Over
+from ...models.sketch.samples import SAMPLES, sample_svg
+from ...templates import ENVIRONMENT
+from ..formats.registry import FORMATS
+from .desk import Desk
+from .document import SIZES
+from .files import DOWNLOADS, download
+from .opening import opened
+from .proving import progress_of, prove_step
+from .session import OvertakenError
+from .views import field_step, lines_step, surface_step
+
+LOOPBACK: Final = "127.0.0.1"
+COARSE: Final = 48  # pixels of the field that is shown before a finer one
+_FINE: Final = 64  # pixels from which on there is a coarse field first
+_TICK: Final = 0.4  # seconds between two looks at the progress of a proof
+_FILES: Final = {
+    "studio.css": "text/css",
+    "studio.js": "text/javascript",
+    "document.js": "text/javascript",
+    "drawing.js": "text/javascript",
+    "shading.js": "text/javascript",
+}
+_HEADERS: Final = {
+    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "cache-control": "no-store",
+}
+
+
+class Guard:
+    """Refuses requests for another host, from another page, or without the token; adds safety headers."""
+
+    def __init__(self, app: ASGIApp, port: int, token: str) -> None:
+        self._app, self._token = app, token
+        self._hosts = (f"{LOOPBACK}:{port}", f"localhost:{port}")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it with 403."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            return
+        if reason := self._refusal(Request(scope)):
+            await PlainTextResponse(reason, 403, _HEADERS)(scope, receive, send)
+            return
+
+        async def with_headers(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] += [(key.encode(), value.encode()) for key, value in _HEADERS.items()]
+            await send(message)
+
+        await self._app(scope, receive, with_headers)
+
+    def _refusal(self, request: Request) -> str:
+        host, origin = request.headers.get("host", ""), request.headers.get("origin")
+        if host not in self._hosts:
+            return "This server answers only on the machine where it runs."
+        if origin is None and request.method not in {"GET", "HEAD"}:
+            return "This request states no origin."
+        elsewhere = request.headers.get("sec-fetch-site", "none") not in {"none", "same-origin"}
+        if elsewhere or origin not in {None, f"http://{host}"}:
+            return "This request comes from another page."
+        given = request.url.path.split("/")[1]
+        if not secrets.compare_digest(given.encode(), self._token.encode()):
+            return (
+                "The address lacks the token of the running server. Use the address that "
+                "`crossfield studio` printed; drawings of an earlier page can be saved there and opened here."
+            )
+        return ""
+
+
+@dataclass(frozen=True)
+class Page:
+    """The routes of the page. first: the drawing that it opens with, as from `opened`, or None."""
+
+    desk: Desk
+    first: dict[str, Any] | None
+
+    def routes(self) -> list[Route]:
+        """All addresses below the token."""
+        return [
+            Route("/", self.index),
+            Route("/first", self.start),
+            Route("/sample/{name}", self.sample),
+            Route("/open", self.open, methods=["POST"]),
+            Route("/compute", self.compute, methods=["POST"]),
+            Route("/prove", self.prove, methods=["POST"]),
+            Route("/stop", self.stop, methods=["POST"]),
+            Route("/download", self.download, methods=["POST"]),
+            Route("/{name}", self.file),
+        ]
+
+    async def index(self, _: Request) -> Response:
+        """The page."""
+        text = ENVIRONMENT.get_template("studio/index.html.j2").render(
+            samples=[sample for sample in SAMPLES.values() if sample.kind == "sketch"],
+            downloads={name: entry.title for name, entry in DOWNLOADS.items() if name != "solver"},
+            formulations=list(FORMULATIONS),
+            formats=list(FORMATS),
+            sizes=SIZES,
+        )
+        return Response(text, media_type="text/html")
+
+    async def file(self, request: Request) -> Response:
+        """A script or the style sheet."""
+        name = request.path_params["name"]
+        if name not in _FILES:
+            return PlainTextResponse("There is no such file.", 404)
+        folder = Path(ENVIRONMENT.get_template("studio/index.html.j2").filename or "").parent
+        return Response((folder / name).read_bytes(), media_type=_FILES[name])
+
+    async def start(self, _: Request) -> Response:
+        """The drawing that the page opens with."""
+        return JSONResponse(self.first)
+
+    async def sample(self, request: Request) -> Response:
+        """The strokes of a built-in sketch."""
+        name = request.path_params["name"]
+        return await _answered(lambda: opened(sample_svg(name).encode(), f"{name}.svg"))
+
+    async def open(self, request: Request) -> Response:
+        """The strokes of a file that the browser sends."""
+        data = await _body(request)
+        name, view = request.query_params.get("name", ""), request.query_params.get("view")
+        return await _answered(lambda: opened(data, name[:200], view))
+
+    async def compute(self, request: Request) -> Response:
+        """Field, streamlines and surface of a document, as lines of JSON while they are computed."""
+        data, stop = await self._edit(request)
+        size, lines = _whole(request, "size"), "lines" in request.query_params
+        return _stream(self._computed(data, size, stop, lines=lines))
+
+    async def prove(self, request: Request) -> Response:
+        """Energy and bound of a document, as lines of JSON while they improve."""
+        data, stop = await self._edit(request)
+        return _stream(self._proven(data, stop))
+
+    async def stop(self, request: Request) -> Response:
+        """End the work on earlier edits of a page."""
+        await self._edit(request)
+        return JSONResponse({})
+
+    async def download(self, request: Request) -> Response:
+        """A file of a document."""
+        data, query = await _body(request), request.query_params
+        wanted = query.get("what", ""), query.get("formulation", ""), query.get("format", "")
+        return await _answered(lambda: _file(self.desk.submit("files", download, data, *wanted).result()))
+
+    async def _edit(self, request: Request) -> tuple[bytes, Over]:
+        data = await _body(request)
+        return data, self.desk.begin(request.query_params.get("page", "")[:64], _whole(request, "edit"))
+
+    def _computed(self, data: bytes, size: int, stop: Over, *, lines: bool) -> Iterator[dict[str, Any]]:
+        early, fine = None, Event()
+        if size > _FINE:
+            with suppress(NoStrokeError):  # on so coarse a grid
+                view, found, field = self.desk.submit("fields", field_step, data, COARSE, stop=stop).result()
+                yield view
+                early = self.desk.submit(
+                    "surfaces", surface_step, data, found, field, stop=lambda: stop() or fine.is_set()
+                )
+        finer = self.desk.submit("fields", field_step, data, stop=stop)
+        if early is not None:
+            wait({early, finer}, return_when=FIRST_COMPLETED)
+            if early.done() and early.exception() is None:
+                yield early.result()
+        view, found, field = finer.result()
+        fine.set()
+        yield view
+        surface = self.desk.submit("surfaces", surface_step, data, found, field, stop=stop)
+        if lines:
+            yield self.desk.submit("fields", lines_step, field, stop=stop).result()
+        yield surface.result()
+        yield {"stage": "done"}
+
+    def _proven(self, data: bytes, stop: Over) -> Iterator[dict[str, Any]]:
+        with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
+            log = Path(folder) / "progress"
+            proof, shown = self.desk.submit("proofs", prove_step, data, stop=stop, log=log), None
+            while not proof.done():
+                with suppress(TimeoutError):
+                    proof.exception(_TICK)
+                text = log.read_text("utf-8", "replace") if log.exists() else ""
+                progress = progress_of(text[-10_000:])
+                if progress is not None and progress != shown:
+                    shown = progress
+                    yield progress
+            yield proof.result()
+
+
+def _whole(request: Request, name: str) -> int:
+    """A whole number in the address, 0 for anything else."""
+    text = request.query_params.get(name, "")
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0
+
+
+async def _body(request: Request) -> bytes:
+    """The body of a request. Raises InputError when it is too long."""
+    stated = request.headers.get("content-length", "0")
+    parts, length = [], int(stated) if stated.isdigit() else 0
+    if length <= MAX_BYTES:
+        length = 0
+        async for part in request.stream():
+            parts.append(part)
+            length += len(part)
+            if length > MAX_BYTES:
+                break
+    if length > MAX_BYTES:
+        raise InputError(f"the file has more than {MAX_BYTES // 10**6} MB; simplify the drawing")
+    return b"".join(parts)
+
+
+async def _answered(work: Callable[[], Any]) -> Response:
+    """The result of work as a response, or its error as a message."""
+    found = await run_in_threadpool(work)
+    return found if isinstance(found, Response) else JSONResponse(found)
+
+
+def _file(found: tuple[str, bytes]) -> Response:
+    name, content = found
+    headers = {"content-disposition": f'attachment; filename="{name}"'}
+    return Response(content, media_type="application/octet-stream", headers=headers)
+
+
+def _stream(steps: Iterator[dict[str, Any]]) -> Response:
+    """A response with a line of JSON per step; an error is the last line."""
+
+    def lines() -> Iterator[bytes]:
+        try:
+            for step in steps:
+                yield json.dumps(step, allow_nan=False).encode() + b"\n"
+        except OvertakenError:
+            yield b'{"stage": "overtaken"}\n'
+        except CrossfieldError as error:
+            yield _error_line(str(error))
+        except MemoryError:
+            yield _error_line("there is not enough memory; choose a smaller size")
+        except Exception as error:  # noqa: BLE001 - the page shows it, and keeps its drawing
+            yield _error_line(f"internal error, please report it: {type(error).__name__}: {shortened(error)}")
+
+    return StreamingResponse(lines(), media_type="application/x-ndjson")
+
+
+def _error_line(message: str) -> bytes:
+    return json.dumps({"stage": "error", "message": message}).encode() + b"\n"
+
+
+async def _refused(_: Request, error: Exception) -> Response:
+    return JSONResponse({"message": str(error)}, 422)
+
+
+def application(desk: Desk, port: int, token: str, first: dict[str, Any] | None = None) -> ASGIApp:
+    """The server behind its guard."""
+    routes = [Mount(f"/{token}", routes=Page(desk, first).routes())]
+    return Guard(Starlette(routes=routes, exception_handlers={CrossfieldError: _refused}), port, token)
+
+
+def listening(port: int) -> socket.socket:
+    """A socket on this machine only; port 0 chooses a free one. Raises InputError for a port in use."""
+    place = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        place.bind((LOOPBACK, port))
+        place.listen()  # a browser may be faster than the server
+    except OSError as error:
+        place.close()
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(f"port {port} cannot be used: {reason}; choose another with --port") from error
+    return place
+
+
+def serve(place: socket.socket, token: str, first: dict[str, Any] | None) -> None:
+    """Serve the page until Ctrl-C."""
+    with Desk() as desk:
+        app = application(desk, place.getsockname()[1], token, first)
+        config = uvicorn.Config(
+            app,
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            lifespan="off",
+            ws="none",
+            timeout_graceful_shutdown=5,
+        )
+        with suppress(KeyboardInterrupt):
+            _Ending(config, desk).run(sockets=[place])
+
+
+class _Ending(uvicorn.Server):
+    """A server that ends the work first, so that no answer keeps it running."""
+
+    def __init__(self, config: uvicorn.Config, desk: Desk) -> None:
+        super().__init__(config)
+        self._desk = desk
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End all work, then all connections."""
+        self._desk.close()
+        await super().shutdown(sockets)

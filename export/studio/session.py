@@ -1,0 +1,231 @@
+"""From a document of the page to its instance, field and surface. Functions of the document alone.
+
+They run in child processes. A process keeps its last fields and surfaces for requests that repeat them.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Final, TypeVar
+
+import numpy as np
+from scipy import ndimage
+
+from ...models.errors import CrossfieldError
+from ...models.field.field import CrossField
+from ...models.instance.grid import Bools, Floats, Ints
+from ...models.instance.instance import Instance, Reading
+from ...models.processes.control import stopped
+from ...models.sketch.choice import Choice
+from ...models.sketch.cover import Cover, Frame, covering_curves
+from ...models.sketch.outline import enclosed
+from ...models.sketch.read import CUT, LEAST_WEIGHT, instance_of, segments_of
+from ...models.smooth.bend import bend_field
+from ...models.smooth.polyvector import HOLDS, polyvector_field
+from ...models.surface.hints import Hint
+from ...models.surface.lift import surface
+from ...models.surface.surface import Surface
+from .document import Document, MaskEdit
+
+_Result = TypeVar("_Result")
+
+_MOST_KEPT: Final = 4
+NEAR: Final = 4.0  # pixels between a click on a gap and the gap
+OUT, IN, LEFT_OUT, STROKE = range(4)
+"""Kinds of pixels: outside, solved for, enclosed but left out, and covered by a stroke that cuts."""
+
+
+class OvertakenError(CrossfieldError):
+    """Work that ended early because a newer edit replaced it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """An instance, the kind (h, w) of each pixel, the gaps with whether they are open, and its strokes.
+
+    strokes: number of the stroke and of the stroke pixel for each pair of them, (k, 2).
+    """
+
+    instance: Instance
+    kinds: Ints
+    gaps: tuple[tuple[Floats, bool], ...]
+    strokes: Ints
+
+
+def drawn(document: Document, size: int | None = None) -> Drawn:
+    """The instance of a document. size: instead of that of the document. Raises InputError."""
+    curves = document.curves()
+    seen: dict[str, Any] = {}
+
+    def edit(solve: Bools, lines: Cover, others: Cover, found: Reading, frame: Frame) -> Bools:
+        walls = (lines.amount >= LEAST_WEIGHT) | (others.amount >= CUT)
+        edited, gaps = _edited(document.mask, solve, walls, found, frame)
+        kinds = np.where(edited, IN, np.where(_enclosed(~edited & ~walls), LEFT_OUT, OUT))
+        seen["kinds"] = np.where(others.amount >= CUT, STROKE, kinds)
+        seen["gaps"] = gaps
+        return edited
+
+    instance = instance_of(
+        curves,
+        size=size or document.size,
+        name=document.name,
+        source=f"{document.name}.svg",
+        choice=Choice(document.silhouette),
+        edit=edit,
+    ).with_weights(stroke_weight=document.stroke_weight)
+    x, y = instance.origin
+    frame = Frame(x, y, instance.pixel_size, *instance.mask.shape)
+    segments, curve, line = segments_of(curves, frame)
+    owner, row, column = covering_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
+    number = np.full(frame.shape, -1)
+    number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
+    pairs = np.stack([owner, number[row, column]], axis=1)
+    pairs = pairs[pairs[:, 1] >= 0].astype(np.int32)
+    kinds = np.where((seen["kinds"] == IN) & ~instance.mask, LEFT_OUT, seen["kinds"]).astype(np.int32)
+    return Drawn(_weighted(instance, document.weights, pairs), kinds, seen["gaps"], pairs)
+
+
+def _weighted(instance: Instance, weights: Floats, pairs: Ints) -> Instance:
+    """The instance with reliabilities scaled by the mean weight of the strokes in each pixel."""
+    if (weights == 1).all():
+        return instance
+    count = np.maximum(np.bincount(pairs[:, 1], minlength=len(instance.w)), 1)
+    mean = np.bincount(pairs[:, 1], weights[pairs[:, 0]], len(instance.w)) / count
+    return replace(instance, w=instance.w * np.where(mean > 0, mean, 1.0))
+
+
+def _edited(
+    edits: tuple[MaskEdit, ...], solve: Bools, walls: Bools, found: Reading, frame: Frame
+) -> tuple[Bools, tuple[tuple[Floats, bool], ...]]:
+    """The mask after the edits in their order, and the gaps with whether they are open."""
+    ends = np.array(found.openings).reshape(-1, 2, 2)
+    kept = np.ones(len(ends), dtype=bool)
+    for edit in edits:
+        if edit.kind == "gap" and len(ends):
+            away = np.hypot(*(ends.mean(axis=1) - edit.points[0]).T)
+            kept[(away == away.min()) & (away <= NEAR * frame.pixel)] ^= True
+    left = np.zeros_like(solve)
+    if not kept.all():
+        left = _mostly(solve & ~_closed(walls, ends[kept], frame), solve & ~walls)
+    mask = solve & ~left
+    cells, _ = ndimage.label(~walls)
+    for edit in edits:
+        if edit.kind == "toggle":
+            cell = _cell(cells, edit.points[0], frame)
+            gone = (mask & cell).any()
+            mask, left = (
+                (mask & ~cell, left | cell) if gone else (mask | cell | _rim(cell, walls), left & ~cell)
+            )
+        elif edit.kind != "gap":
+            brushed = _brushed(edit, frame)
+            mask = mask | brushed if edit.kind == "paint" else mask & ~brushed
+    # Strokes that only bound areas without a field would be thin parts of their own.
+    mask = mask & ~(_rim(left, walls) & ~_rim(mask & ~walls, walls))
+    return mask, tuple(zip(ends, (~kept).tolist(), strict=True))
+
+
+def _mostly(chosen: Bools, area: Bools) -> Bools:
+    """The connected parts of an area of which more than half is chosen."""
+    label, count = ndimage.label(area)
+    share = ndimage.mean(chosen, label, np.arange(count + 1))
+    return np.asarray((share > 0.5)[label] & area)
+
+
+def _rim(area: Bools, walls: Bools) -> Bools:
+    """The pixels of strokes next to an area."""
+    return np.asarray(ndimage.binary_dilation(area, np.ones((3, 3), dtype=bool)) & walls)
+
+
+def _closed(walls: Bools, bridges: Floats, frame: Frame) -> Bools:
+    """The region inside of the walls and these bridges (m, 2, 2)."""
+    closed = walls.copy()
+    if len(bridges):
+        _, row, column = covering_curves(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
+        closed[row, column] = True
+    return enclosed(closed)
+
+
+def _cell(cells: Ints, point: Floats, frame: Frame) -> Bools:
+    """The area between strokes that contains a point; nothing for the outside and on a stroke."""
+    column, row = np.floor((point - (frame.x, frame.y)) / frame.pixel).astype(int)
+    inside = 0 <= row < frame.height and 0 <= column < frame.width and cells[row, column] > 0
+    cell: Bools = cells == (cells[row, column] if inside else -1)
+    return cell if _enclosed(cell).any() else np.zeros_like(cell)
+
+
+def _enclosed(area: Bools) -> Bools:
+    """The parts of an area that do not reach the edge of the grid."""
+    label, count = ndimage.label(area)
+    free = np.ones(count + 1, dtype=bool)
+    free[[0, *label[0], *label[-1], *label[:, 0], *label[:, -1]]] = False
+    return np.asarray(free[label])
+
+
+def _brushed(edit: MaskEdit, frame: Frame) -> Bools:
+    """The pixels whose middles a brush passes over, at least the pixels under its path."""
+    points = (edit.points - (frame.x, frame.y)) / frame.pixel
+    steps = np.maximum(np.ceil(2 * np.hypot(*np.diff(points, axis=0).T)).astype(int), 1)
+    parts = [
+        np.linspace(begin, end, min(step, 4 * frame.width), endpoint=False)
+        for begin, end, step in zip(points[:-1], points[1:], steps, strict=True)
+    ]
+    column, row = np.floor(np.concatenate([*parts, points[-1:]])).astype(int).T
+    on = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
+    free = np.ones(frame.shape, dtype=bool)
+    free[row[on], column[on]] = False
+    if free.all():
+        return ~free
+    return np.asarray(ndimage.distance_transform_edt(free) <= edit.radius / frame.pixel)
+
+
+class _Kept(OrderedDict[object, Any]):
+    """The last few results of work that no edit has ended."""
+
+    def found(self, key: object, work: Callable[[], _Result]) -> _Result:
+        """The result for a key, computed if it is new. Raises OvertakenError."""
+        if key not in self:
+            result = work()
+            if stopped():
+                raise OvertakenError("a newer edit replaced this one")
+            self[key] = result
+            while len(self) > _MOST_KEPT:
+                self.popitem(last=False)
+        kept: _Result = self[key]
+        return kept
+
+
+_FIELDS: Final = _Kept()
+_SURFACES: Final = _Kept()
+
+
+def field_of(document: Document, size: int | None = None) -> tuple[Drawn, CrossField]:
+    """The instance of a document and its bend field. Raises OvertakenError."""
+    found = drawn(document, size)
+    instance = found.instance
+    return found, _FIELDS.found(
+        instance.sha256,
+        lambda: bend_field(polyvector_field(instance, hold=max(HOLDS)), stop=stopped),
+    )
+
+
+def hints_of(document: Document, instance: Instance) -> list[Hint]:
+    """The hints of a document at pixels of the mask; those outside have no effect."""
+    hints = []
+    for hint in document.hints:
+        x, y = instance.origin
+        row, column = (int(np.floor(v / instance.pixel_size)) for v in (hint.y - y, hint.x - x))
+        height, width = instance.mask.shape
+        if 0 <= row < height and 0 <= column < width and instance.mask[row, column]:
+            hints.append(Hint(row, column, np.radians(hint.slant), np.radians(hint.tilt)))
+    return hints
+
+
+def surface_of(document: Document, field: CrossField) -> Surface:
+    """The surface of a document's field, with its hints. Raises OvertakenError."""
+    hints, flip = tuple(hints_of(document, field.instance)), document.flip
+    return _SURFACES.found(
+        (field.instance.sha256, hints, flip),
+        lambda: surface(field, hints, flip=flip, stop=stopped),
+    )

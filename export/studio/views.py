@@ -1,0 +1,167 @@
+"""What the page shows of an instance, a field and a surface, as JSON with arrays in base64."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any, Final
+
+import numpy as np
+
+from ...models.field.field import FAR, CrossField
+from ...models.processes.control import stopped
+from ...models.surface.surface import Surface
+from ...models.surface.trust import OFF, UNFIT, off_right_angles
+from ..pictures.draw import counted
+from ..pictures.marks import runs
+from ..pictures.streamlines import streamlines
+from ..shading.raster import raster
+from .document import Document
+from .session import Drawn, OvertakenError, field_of, surface_of
+
+SIDE: Final = 480  # pixels of the longer side of a shaded picture
+_FINE: Final = 32767  # steps of a part of a normal: 8 bits would show as bands
+_SPACING: Final = 44  # streamlines of one family across the longer side of the grid
+_LEAST: Final = 2  # stroke pixels of a stroke about which there is a doubt
+
+
+def ready() -> None:
+    """Do nothing: this module is imported where the call arrives."""
+
+
+def packed(values: np.ndarray[Any, Any], kind: str) -> str:
+    """The numbers in little-endian order as base64."""
+    return base64.b64encode(values.astype(np.dtype(kind).newbyteorder("<")).tobytes()).decode()
+
+
+def field_step(data: bytes, size: int | None = None) -> tuple[dict[str, Any], Drawn, CrossField]:
+    """Instance and field of a document, and what the page shows of them. Raises InputError."""
+    document = Document.of_bytes(data)
+    found, field = field_of(document, size)
+    return _field_view(document, found, field), found, field
+
+
+def _field_view(document: Document, found: Drawn, field: CrossField) -> dict[str, Any]:
+    instance, (x, y), spots = found.instance, found.instance.origin, field.singularities
+    pixel = instance.pixel_size
+    shape, deviation = field.shape, field.stroke_deviation
+    return {
+        "stage": "field",
+        "size": max(instance.mask.shape),
+        "wanted": document.size,
+        "frame": {"x": x, "y": y, "pixel": pixel, "rows": len(found.kinds), "columns": found.kinds.shape[1]},
+        "kinds": packed(found.kinds, "u1"),
+        "gaps": [{"ends": ends.tolist(), "open": is_open} for ends, is_open in found.gaps],
+        "warnings": list(instance.reading.warnings) if instance.reading else [],
+        "mask": packed(instance.mask, "u1"),
+        "u": packed(field.u_angle, "f4"),
+        "v": packed(field.v_angle, "f4"),
+        "singularities": [
+            [x + pixel * (column + 1.0), y + pixel * (row + 1.0), index]
+            for row, column, index in zip(
+                spots.row.tolist(), spots.column.tolist(), spots.index.tolist(), strict=True
+            )
+        ],
+        "suspects": _suspects(found, deviation > FAR),
+        "numbers": {
+            "pixels": instance.grid.size,
+            "strokes": len(instance.theta),
+            "deviation": float(np.degrees(shape.mean_deviation)),
+            "most_deviation": float(np.degrees(shape.most_deviation)),
+            "energy": field.energy(2).total,
+            "singularities": counted(field),
+        },
+        **same_elsewhere(document, found),
+    }
+
+
+def _suspects(found: Drawn, wrong: np.ndarray[Any, Any]) -> list[int]:
+    """Numbers of the strokes with a doubt at most of their pixels."""
+    stroke, at = found.strokes.T
+    count = np.bincount(stroke) if len(stroke) else np.zeros(1)
+    off = np.bincount(stroke, wrong[at], len(count))
+    return np.flatnonzero((count >= _LEAST) & (off > count / 2)).tolist()
+
+
+def lines_step(found: CrossField) -> dict[str, Any]:
+    """Streamlines of a field in the units of the drawing, as flat lists x, y, x, y, ... of each family."""
+    (x, y), pixel = found.instance.origin, found.instance.pixel_size
+    lines = streamlines(found, max(max(found.instance.mask.shape) / _SPACING, 0.8))
+    families = [
+        [
+            np.round([x, y] + pixel * (points * [1, -1] + 0.5), 3).ravel().tolist()
+            for line in lines
+            for points in runs(line, family)
+        ]
+        for family in (0, 1)
+    ]
+    if stopped():
+        raise OvertakenError("a newer edit replaced this one")
+    return {"stage": "lines", "size": max(found.instance.mask.shape), "families": families}
+
+
+def surface_step(data: bytes, found: Drawn, field: CrossField) -> dict[str, Any]:
+    """What the page shows of the surface of a field."""
+    document = Document.of_bytes(data)
+    lifted = surface_of(document, field)
+    return _surface_view(found, lifted)
+
+
+def _surface_view(found: Drawn, lifted: Surface) -> dict[str, Any]:
+    instance, field = lifted.instance, lifted.field
+    longer = max(instance.mask.shape)
+    picture = raster(instance, lifted.normals, max(1, SIDE // longer))
+    height, width = picture.opacity.shape
+    off = off_right_angles(field, lifted.heights)
+    unfit = off > OFF
+    return {
+        "stage": "surface",
+        "size": longer,
+        "width": width,
+        "height": height,
+        "normals": packed(np.round(_FINE * picture.normals[..., :2]), "i2"),
+        "opacity": packed(np.round(255 * picture.opacity), "u1"),
+        "confidence": packed(np.round(255 * lifted.confidence), "u1"),
+        "mask": packed(instance.mask, "u1"),
+        "rows": instance.mask.shape[0],
+        "columns": instance.mask.shape[1],
+        "doubts": list(lifted.doubts),
+        "freedom": list(lifted.freedom),
+        "suspects": _suspects(found, unfit[instance.stroke_index]) if unfit.mean() > UNFIT / 2 else [],
+    }
+
+
+def same_elsewhere(document: Document, found: Drawn) -> dict[str, list[str]]:
+    """Commands and Python lines that compute the same from the downloaded instance and drawing."""
+    from .session import hints_of
+
+    name, hints = document.name, hints_of(document, found.instance)
+    angles = [
+        (h.row, h.column, round(float(np.degrees(h.slant)), 4), round(float(np.degrees(h.tilt)), 4))
+        for h in hints
+    ]
+    options = "".join(f" --hint={row},{column},{slant:g},{tilt:g}" for row, column, slant, tilt in angles)
+    flip = " --flip" if document.flip else ""
+    field = f"field/{name}.bend.field.npz"
+    listed = ", ".join(
+        f"cf.Hint({row}, {column}, math.radians({slant:g}), math.radians({tilt:g}))"
+        for row, column, slant, tilt in angles
+    )
+    return {
+        "commands": [
+            f"crossfield solve {name}.json --method bend -o field",
+            f"crossfield draw {field} --underlay {name}.svg -o {name}.layers.svg",
+            f"crossfield shade {field} --underlay {name}.svg{options}{flip} -o surface",
+            f"crossfield export {name}.json -f milp-mccormick -F mps -o files",
+            f"crossfield prove {name}.json -o proof",
+        ],
+        "python": [
+            *(["import math", ""] if hints else []),
+            "import crossfield as cf",
+            "",
+            f'instance = cf.read_instance("{name}.json")',
+            "field = cf.bend_field(cf.polyvector_field(instance, hold=100))",
+            f"surface = cf.surface(field, [{listed}], flip={document.flip})",
+            f'cf.draw(field, "{name}.layers.svg", underlay="{name}.svg")',
+            f'cf.write_surface(surface, "surface", drawing="{name}.svg")',
+        ],
+    }

@@ -1,0 +1,183 @@
+// The left picture: strokes, mask and field, in the units of the drawing.
+
+import { boxOf } from "./document.js";
+
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const COLOURS = {
+  light: { line: "#c2281d", cut: "#1c2430", ignored: "#9aa3ae", page: "#c9d0d9", chosen: "#0b6b8066", u: "#0b7285", v: "#b3560a",
+    plus: "#d6202b", minus: "#2f4bd0", cursor: "#0b6b80", suspect: "#f08c0066", tints: ["#0000", "#4a90e226", "#f5a5236b", "#0000"] },
+  dark: { line: "#ff7b72", cut: "#e6eaf0", ignored: "#6b7685", page: "#3a434f", chosen: "#5cc3d677", u: "#41b3c5", v: "#f0a35e",
+    plus: "#ff6b70", minus: "#8ba4ff", cursor: "#5cc3d6", suspect: "#f0a35e77", tints: ["#0000", "#6aa9f033", "#f5a5237a", "#0000"] },
+};
+const ANGLES = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
+const APART = 13; // pixels of the screen between crosses
+export const colours = () => COLOURS[dark.matches ? "dark" : "light"];
+
+/** A canvas with a view of the drawing: position of the origin and pixels per unit. */
+export class View {
+  constructor(canvas, changed) {
+    this.canvas = canvas; this.box = [0, 0, 1, 1]; this.zoomed = false; this.cursor = null;
+    this.base = document.createElement("canvas");
+    new ResizeObserver(() => { this.resize(); changed(); }).observe(canvas);
+    dark.addEventListener("change", changed);
+    this.resize();
+  }
+  resize() {
+    this.ratio = devicePixelRatio || 1;
+    this.wide = Math.max(1, this.canvas.clientWidth); this.high = Math.max(1, this.canvas.clientHeight);
+    for (const each of [this.canvas, this.base]) { each.width = this.wide * this.ratio; each.height = this.high * this.ratio; }
+    if (!this.zoomed) this.fit(this.box);
+  }
+  fit(box) {
+    this.box = box; this.zoomed = false;
+    const [left, top, right, bottom] = box, room = 0.94;
+    this.scale = room * Math.min(this.wide / Math.max(right - left, 1e-6), this.high / Math.max(bottom - top, 1e-6));
+    this.x = (this.wide - this.scale * (left + right)) / 2; this.y = (this.high - this.scale * (top + bottom)) / 2;
+  }
+  zoom(factor, px = this.wide / 2, py = this.high / 2, dx = 0, dy = 0) {
+    const scale = this.scale * factor;
+    this.x = px + dx - (px - this.x) * factor; this.y = py + dy - (py - this.y) * factor;
+    this.scale = scale; this.zoomed = true;
+  }
+  /** The point of the drawing under a place of the window. */
+  at(event) {
+    const place = this.canvas.getBoundingClientRect();
+    return [(event.clientX - place.left - this.x) / this.scale, (event.clientY - place.top - this.y) / this.scale];
+  }
+  begin(target) {
+    const context = target.getContext("2d");
+    context.setTransform(1, 0, 0, 1, 0, 0); context.clearRect(0, 0, target.width, target.height);
+    context.setTransform(this.ratio * this.scale, 0, 0, this.ratio * this.scale, this.ratio * this.x, this.ratio * this.y);
+    context.lineCap = context.lineJoin = "round";
+    return context;
+  }
+  drawCursor(context) {
+    if (!this.cursor || document.activeElement !== this.canvas) return;
+    const [x, y] = this.cursor, arm = 9 / this.scale;
+    context.strokeStyle = colours().cursor; context.lineWidth = 2 / this.scale; context.beginPath();
+    context.moveTo(x - arm, y); context.lineTo(x + arm, y); context.moveTo(x, y - arm); context.lineTo(x, y + arm); context.stroke();
+  }
+}
+
+export const trace = (context, points) => {
+  context.moveTo(points[0], points[1]);
+  for (let k = 2; k < points.length; k += 2) context.lineTo(points[k], points[k + 1]);
+};
+
+/** A small picture with a pixel per pixel of the grid. */
+export function gridPicture(rows, columns, colour) {
+  const picture = document.createElement("canvas");
+  picture.width = columns; picture.height = rows;
+  const context = picture.getContext("2d"), image = context.createImageData(columns, rows);
+  for (let k = 0; k < rows * columns; k++) image.data.set(colour(k), 4 * k);
+  context.putImageData(image, 0, 0);
+  return picture;
+}
+
+const rgba = text => {
+  const hex = text.length < 6 ? text.slice(1).replace(/./g, "$&$&") : text.slice(1);
+  return [0, 2, 4, 6].map(k => parseInt(hex.slice(k, k + 2) || "ff", 16));
+};
+
+function tint(field) {
+  const scheme = colours();
+  if (field.tint?.scheme !== scheme) {
+    const tints = scheme.tints.map(rgba);
+    field.tint = { scheme, picture: gridPicture(field.frame.rows, field.frame.columns, k => tints[field.kinds[k]]) };
+  }
+  return field.tint.picture;
+}
+
+function angleMap(field) {
+  field.angles ??= gridPicture(field.frame.rows, field.frame.columns, k => {
+    const n = field.number[k];
+    if (n < 0) return [0, 0, 0, 0];
+    const between = Math.abs(Math.asin(Math.sin(field.u[n] - field.v[n]))) / (Math.PI / 2) * (ANGLES.length - 1);
+    const low = Math.min(ANGLES.length - 2, Math.floor(between)), part = between - low;
+    return [...ANGLES[low].map((value, c) => value + part * (ANGLES[low + 1][c] - value)), 215];
+  });
+  return field.angles;
+}
+
+function crosses(context, field, scale) {
+  const { x, y, pixel, rows, columns } = field.frame, every = Math.max(1, Math.round(APART / (pixel * scale)));
+  const arm = 0.4 * pixel * every;
+  for (const family of ["u", "v"]) {
+    context.strokeStyle = colours()[family]; context.lineWidth = Math.max(0.7, Math.min(1.6, 0.12 * pixel * scale)) / scale;
+    context.beginPath();
+    for (let row = every >> 1; row < rows; row += every) for (let column = every >> 1; column < columns; column += every) {
+      const n = field.number[row * columns + column];
+      if (n < 0) continue;
+      const cx = x + pixel * (column + 0.5), cy = y + pixel * (row + 0.5);
+      const dx = arm * Math.cos(field[family][n]), dy = -arm * Math.sin(field[family][n]);
+      context.moveTo(cx - dx, cy - dy); context.lineTo(cx + dx, cy + dy);
+    }
+    context.stroke();
+  }
+}
+
+/** Draws everything that changes with the document, the field and the view, into the hidden canvas. */
+export function paintBase(view, { doc, chosen, field, lines, mode, suspects }) {
+  const context = view.begin(view.base), thin = 1 / view.scale, ink = colours();
+  context.strokeStyle = ink.page; context.lineWidth = thin; context.strokeRect(...doc.page);
+  if (field) {
+    const { x, y, pixel, rows, columns } = field.frame, place = [x, y, pixel * columns, pixel * rows];
+    context.imageSmoothingEnabled = false;
+    context.drawImage(tint(field), ...place);
+    if (mode === "angle") context.drawImage(angleMap(field), ...place);
+    context.globalAlpha = 0.75;
+    if (mode === "crosses" || (mode === "lines" && !lines)) crosses(context, field, view.scale);
+    if (mode === "lines" && lines) lines.forEach((family, k) => {
+      context.strokeStyle = ink[k ? "v" : "u"]; context.lineWidth = 1.2 * thin; context.beginPath();
+      family.forEach(points => trace(context, points)); context.stroke();
+    });
+    context.globalAlpha = 1;
+  }
+  const left = -view.x / view.scale, top = -view.y / view.scale, right = left + view.wide / view.scale, bottom = top + view.high / view.scale;
+  const seen = doc.strokes.map((stroke, number) => ({ stroke, number })).filter(({ stroke }) => {
+    const box = boxOf(stroke);
+    return box[2] >= left && box[0] <= right && box[3] >= top && box[1] <= bottom;
+  });
+  const draw = (some, colour, width) => {
+    if (!some.length) return;
+    context.strokeStyle = colour; context.lineWidth = width * thin; context.beginPath();
+    some.forEach(({ stroke }) => trace(context, stroke.points)); context.stroke();
+  };
+  draw(seen.filter(({ number }) => suspects.has(number)), ink.suspect, 11);
+  draw(seen.filter(({ number }) => chosen.has(number)), ink.chosen, 9);
+  for (const mark of ["ignored", "cut", "line"]) {
+    context.setLineDash(mark === "ignored" ? [4 * thin, 4 * thin] : []);
+    draw(seen.filter(({ stroke }) => stroke.mark === mark), ink[mark], mark === "ignored" ? 1.2 : 2.2);
+  }
+  context.setLineDash([]);
+  if (!field) return;
+  for (const { ends: [[ax, ay], [bx, by]], open } of field.gaps) {
+    context.strokeStyle = open ? ink.minus : "#f5a523"; context.lineWidth = 5 * thin; context.setLineDash(open ? [2 * thin, 9 * thin] : []);
+    context.beginPath(); context.moveTo(ax, ay); context.lineTo(bx, by); context.stroke();
+  }
+  context.setLineDash([]);
+  if (mode !== "none") for (const [x, y, index] of field.singularities) {
+    context.fillStyle = index > 0 ? ink.plus : ink.minus;
+    context.beginPath(); context.arc(x, y, 5 * thin, 0, 7); context.fill();
+  }
+}
+
+/** Copies the hidden canvas and draws what follows the pointer. live: path, kind and radius of a tool in use. */
+export function paint(view, live, brush) {
+  const context = view.canvas.getContext("2d"), ink = colours();
+  context.setTransform(1, 0, 0, 1, 0, 0); context.clearRect(0, 0, view.canvas.width, view.canvas.height);
+  context.drawImage(view.base, 0, 0);
+  context.setTransform(view.ratio * view.scale, 0, 0, view.ratio * view.scale, view.ratio * view.x, view.ratio * view.y);
+  context.lineCap = context.lineJoin = "round";
+  if (live) {
+    const wide = { erase: 2 * live.radius, paint: 2 * live.radius, unpaint: 2 * live.radius }[live.tool];
+    context.lineWidth = wide ?? (live.tool === "draw" ? 2 : 1.5) / view.scale;
+    context.strokeStyle = { draw: ink[live.mark], paint: "#4a90e266", unpaint: "#9aa3ae88", erase: "#9aa3ae66" }[live.tool] ?? ink.cursor;
+    context.setLineDash(live.tool === "select" ? [5 / view.scale, 4 / view.scale] : []);
+    context.beginPath(); trace(context, live.path.length > 2 ? live.path : [...live.path, ...live.path]); context.stroke(); context.setLineDash([]);
+  } else if (brush) {
+    context.strokeStyle = ink.cursor; context.lineWidth = 1 / view.scale;
+    context.beginPath(); context.arc(brush.x, brush.y, brush.radius, 0, 7); context.stroke();
+  }
+  view.drawCursor(context);
+}

@@ -1,0 +1,463 @@
+// The page: tools, keys, requests. The document lives here; the server computes functions of it.
+
+import { History, decoded, emptyDocument, erased, FORMAT, rounded, strokeAt, strokesIn } from "./document.js";
+import { View, paint, paintBase } from "./drawing.js";
+import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shading.js";
+
+const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
+const page = crypto.randomUUID(), KEPT = "crossfield-studio", REACH = 9, RETRY = 3000;
+const state = {
+  history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "line", live: null, brush: null, edit: 0,
+  field: null, lines: null, surface: null, mode: "crosses", kind: "shaded", lamp: LAMP_AT, suspects: new Set(), opened: null, proving: null,
+};
+state.doc = state.history.now;
+const left = new View($("#drawing"), () => refresh()), right = new View($("#surface"), () => refresh());
+let dirty = false, asked = false;
+
+// Painting: at most once per frame.
+function refresh(base = true) {
+  dirty ||= base;
+  if (asked) return;
+  asked = true;
+  requestAnimationFrame(() => {
+    asked = false;
+    if (dirty) paintBase(left, state);
+    dirty = false;
+    paint(left, state.live, state.brush);
+    paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked, hints: state.doc.hints, live: state.arrow });
+  });
+}
+
+// Messages.
+let bannerKind = "";
+function banner(text, { kind = "error", retry = false } = {}) {
+  bannerKind = text ? kind : ""; $("#banner").hidden = !text; $("#banner span").textContent = text; $("#retry").hidden = !retry;
+}
+const clear = kind => { if (bannerKind === kind) banner(""); };
+const status = text => { $("#status").textContent = text; };
+function ready(text) { status(text); document.documentElement.dataset.state = "ready"; }
+
+// Documents.
+function show(doc, { compute = true } = {}) {
+  state.doc = doc; state.chosen = new Set([...state.chosen].filter(k => k < doc.strokes.length));
+  controls(); refresh();
+  if (compute) request();
+}
+function commit(change) {
+  const next = typeof change === "function" ? change(state.history.now) : { ...state.history.now, ...change };
+  state.history.commit(next); keep(); show(next);
+}
+function step(by) { if (state.history.step(by)) { state.chosen.clear(); keep(); show(state.history.now); } }
+function start(doc, opened = null) {
+  state.history.reset(doc); state.opened = opened; state.chosen.clear(); forget(); left.fit(pageBox(doc)); keep(); show(doc);
+  if (state.tool === "turn" && !opened) choose("draw");
+}
+const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); doubts(); };
+const pageBox = ({ page: [x, y, w, h] }) => [x, y, x + w, y + h];
+function keep() {
+  try { sessionStorage.setItem(`${KEPT}-at`, location.pathname); sessionStorage.setItem(KEPT, JSON.stringify(state.history.now)); } catch {
+    sessionStorage.removeItem(KEPT);
+    banner("This drawing is too large to survive a reload of the page. Save it as a session.", { kind: "large" });
+  }
+}
+
+// Requests. A newer edit aborts older ones, here and on the server.
+let waiting = null, lost = null, begun = 0;
+const ask = (path, options) => fetch(path, options).catch(error => {
+  if (error.name !== "AbortError") missing();
+  throw error;
+});
+function missing() {
+  banner("The server does not answer. Your drawing is safe on this page. Save it, start “crossfield studio” again, and open the saved session there.", { kind: "lost", retry: true });
+  ready("no server"); clearTimeout(lost); lost = setTimeout(request, RETRY);
+}
+async function trouble(response) {
+  const text = await response.text();
+  try { return JSON.parse(text).message; } catch { return text.slice(0, 300) || `The server answered ${response.status}.`; }
+}
+async function* lined(response) {
+  let rest = "";
+  for await (const text of response.body.pipeThrough(new TextDecoderStream())) {
+    const parts = (rest + text).split("\n");
+    rest = parts.pop();
+    for (const part of parts) yield JSON.parse(part);
+  }
+}
+async function request() {
+  waiting?.abort(); clearTimeout(lost);
+  stopProof();
+  const doc = state.doc, edit = ++state.edit;
+  document.documentElement.dataset.state = "busy"; begun = performance.now(); state.first = true;
+  if (!doc.strokes.some(stroke => stroke.mark === "line")) {
+    forget(); $("#times").textContent = ""; $("#numbers").replaceChildren(); clear("error"); refresh();
+    fetch(`stop?page=${page}&edit=${edit}`, { method: "POST" }).catch(() => {});
+    ready(doc.strokes.length ? "Draw a curvature line, or mark a stroke as one." : "Draw the outline as cut, and curvature lines across it; or open a drawing.");
+    return;
+  }
+  waiting = new AbortController(); status("computing …");
+  const wanted = new URLSearchParams({ page, edit, size: doc.size });
+  if (state.mode === "lines") wanted.set("lines", 1);
+  try {
+    const response = await ask(`compute?${wanted}`, { method: "POST", body: JSON.stringify(doc), signal: waiting.signal });
+    clear("lost");
+    if (!response.ok) { banner(await trouble(response)); ready(""); return; }
+    for await (const found of lined(response)) if (edit === state.edit) take(found);
+  } catch (error) { if (error.name !== "AbortError" && edit === state.edit) missing(); }
+}
+const seconds = () => `${((performance.now() - begun) / 1000).toFixed(2)} s`;
+const numbered = mask => { let n = 0; return Int32Array.from(mask, inside => inside ? n++ : -1); };
+function take(found) {
+  if (found.stage === "error") { forget(); banner(found.message); refresh(); ready(""); return; }
+  if (found.stage === "overtaken") return;
+  if (found.stage === "done") { ready(""); return; }
+  const times = $("#times").dataset;
+  if (found.stage === "field") {
+    clear("error");
+    state.field = { ...found, kinds: decoded.bytes(found.kinds), u: decoded.floats(found.u), v: decoded.floats(found.v), number: numbered(decoded.bytes(found.mask)) };
+    state.lines = null; state.suspects = new Set(found.suspects); if (state.first) { state.first = false; times.field = seconds(); times.fine = times.lines = times.surface = ""; } else times.fine = seconds();
+    if (!right.zoomed) { const { x, y, pixel, rows, columns } = found.frame; right.fit([x, y, x + pixel * columns, y + pixel * rows]); }
+    numbers(found); doubts();
+  } else if (found.stage === "lines") { state.lines = found.families; times.lines = seconds(); }
+  else if (found.stage === "surface") {
+    state.surface = { ...found, frame: state.field.frame, normals: decoded.shorts(found.normals), opacity: decoded.bytes(found.opacity), confidence: decoded.bytes(found.confidence), number: numbered(decoded.bytes(found.mask)) };
+    times.surface = seconds(); doubts();
+  }
+  $("#times").textContent = Object.entries({ ...times }).filter(([, value]) => value).map(([key, value]) => `${key} ${value}`).join(" · ");
+  refresh();
+}
+
+// Numbers, doubts, proof.
+const degrees = value => `${value.toFixed(1)}°`;
+function numbers({ numbers: n, frame }) {
+  const facts = { Grid: `${frame.columns} × ${frame.rows}`, Pixels: n.pixels, "Stroke pixels": n.strokes, Deviation: `${degrees(n.deviation)} mean`,
+    "": `${degrees(n.most_deviation)} for 90 %`, Energy: n.energy.toPrecision(5), Singular: n.singularities.replace(/ singularit\w+/, "").replace(/^no$/, "none") };
+  $("#numbers").replaceChildren(...Object.entries(facts).flatMap(([key, value]) => [element("dt", key), element("dd", value)]));
+}
+const element = (tag, text, ...children) => { const made = document.createElement(tag); made.textContent = text; made.append(...children); return made; };
+const action = (text, run) => { const made = element("button", text); made.addEventListener("click", run); return made; };
+function doubts() {
+  const items = [], item = (text, ...actions) => {
+    const row = element("div", ""); row.className = "row"; row.append(...actions); items.push(element("li", text, row));
+  };
+  const { field, surface } = state;
+  for (const text of field?.warnings ?? []) item(`Mask: ${text}.`, action("Areas and gaps", () => choose("area")), action("Paint the mask", () => choose("paint")));
+  const some = [...new Set([...field?.suspects ?? [], ...surface?.suspects ?? []])].filter(k => state.doc.strokes[k]?.mark === "line");
+  state.suspects = new Set(some);
+  if (some.length) item(`${some.length === 1 ? "1 stroke does" : `${some.length} strokes do`} not fit: they may not be curvature lines.`,
+    action("Select them", () => select(some)), action("Mark as cuts", () => { select(some); mark("cut"); }));
+  for (const text of surface?.doubts ?? []) item(`Surface: ${text}.`);
+  for (const text of surface?.freedom ?? []) item(`Free: ${text}.`, ...text.startsWith("inside out") ? [action("Flip", flip)] : []);
+  if (!items.length) items.push(element("li", surface ? "None." : "Not computed yet."));
+  $("#doubts").replaceChildren(...items);
+}
+function stopProof() {
+  if (!state.proving) return;
+  state.proving.abort(); state.proving = null; $("#prove").textContent = "Prove in the background";
+  $("#proof").textContent = "The proof ended, because it was stopped or the drawing has changed.";
+  fetch(`stop?page=${page}-proof&edit=${++state.edit}`, { method: "POST" }).catch(() => {});
+}
+async function prove() {
+  if (state.proving) { stopProof(); return; }
+  if (!state.field) { status("There is no field to prove."); return; }
+  const own = state.proving = new AbortController(); $("#prove").textContent = "Stop the proof"; $("#proof").textContent = "Starting. The first proof on a machine compiles its functions, for up to a minute.";
+  try {
+    const response = await ask(`prove?page=${page}-proof&edit=${state.edit}`, { method: "POST", body: JSON.stringify(state.doc), signal: own.signal });
+    for await (const found of lined(response)) {
+      if (own !== state.proving) return;
+      if (found.stage !== "proof") { $("#proof").textContent = found.message ?? "ended"; continue; }
+      $("#gap").hidden = false; $("#gap-meter").value = Math.max(0, Math.min(1, found.bound / (found.energy || 1)));
+      $("#proof").textContent = `Lowest energy found ${found.energy.toPrecision(5)}, proven bound ${found.bound.toPrecision(5)}, gap ${(100 * found.gap).toFixed(2)} %.`
+        + (found.done ? ` ${found.status === "optimal" ? "Proven optimal." : "Time was over."} The field shown has ${found.own.toPrecision(5)}; it bends less, which the energy does not count.` : "");
+    }
+  } catch (error) { if (error.name !== "AbortError") missing(); }
+  if (own === state.proving) { state.proving = null; $("#prove").textContent = "Prove in the background"; }
+}
+
+// Controls.
+function controls() {
+  const { doc, history, chosen } = state;
+  $("#undo").disabled = !history.can(-1); $("#redo").disabled = !history.can(1); $("#delete").disabled = !chosen.size;
+  $("#welcome").hidden = doc.strokes.length > 0;
+  $("#unhint").disabled = !doc.hints.length; $("#flip").setAttribute("aria-pressed", doc.flip);
+  $("#selected").textContent = chosen.size ? `${chosen.size} selected` : "";
+  if (document.activeElement !== $("#name")) $("#name").value = doc.name;
+  $("#size").value = doc.size; $("#size-value").textContent = `${doc.size} pixels`;
+  $("#weight").value = Math.log10(Math.max(doc.stroke_weight, 0.1)); $("#weight-value").textContent = doc.stroke_weight.toPrecision(3);
+  $("#silhouette").checked = doc.silhouette === "outer"; $("#brush-value").textContent = `${$("#brush").value} pixels`;
+  const marks = new Set([...chosen].map(k => doc.strokes[k].mark)), shown = marks.size === 1 ? [...marks][0] : chosen.size ? "" : state.mark;
+  all("[data-mark]").forEach(each => each.setAttribute("aria-pressed", each.dataset.mark === shown));
+  all("[data-tool]").forEach(each => each.setAttribute("aria-pressed", each.dataset.tool === state.tool));
+  $("[data-tool=turn]").hidden = !state.opened;
+}
+function choose(tool) { if (tool === "turn" && !state.opened) return; state.tool = tool; state.brush = null; controls(); refresh(false); }
+function select(numbers) { state.chosen = new Set(numbers); controls(); refresh(); }
+function mark(kind) {
+  state.mark = kind;
+  if (!state.chosen.size) { controls(); return; }
+  commit(doc => ({ ...doc, strokes: doc.strokes.map((stroke, k) => state.chosen.has(k) ? { ...stroke, mark: kind } : stroke) }));
+}
+function remove() { if (state.chosen.size) commit(doc => { const rest = doc.strokes.filter((_, k) => !state.chosen.has(k)); state.chosen.clear(); return { ...doc, strokes: rest }; }); }
+function flip() {
+  if (state.surface) state.surface = mirrored(state.surface);
+  commit(doc => ({ ...doc, flip: !doc.flip, hints: doc.hints.map(hint => ({ ...hint, tilt: (hint.tilt + 360) % 360 - 180 })) }));
+}
+function next(name) {
+  const options = all(`input[name=${name}]`), at = options.findIndex(each => each.checked);
+  options[(at + 1) % options.length].click();
+}
+
+// Tools: begin, move and end at points of the drawing, by pointer or by keyboard.
+const brushRadius = () => $("#brush").value * (state.field?.frame.pixel ?? state.doc.page[2] / 60) / 2;
+const tools = {
+  begin([x, y], pressure) {
+    state.live = { tool: state.tool, mark: state.mark, path: [rounded(x), rounded(y)], radius: state.tool === "erase" ? REACH / left.scale : brushRadius(), pressure: [pressure] };
+    refresh(false);
+  },
+  move([x, y], pressure) {
+    const { live } = state;
+    if (!live) return;
+    const [px, py] = live.path.slice(-2);
+    if (Math.hypot(x - px, y - py) * left.scale < 1.2) return;
+    live.path.push(rounded(x), rounded(y)); live.pressure.push(pressure);
+    if (live.tool === "turn") turn(live);
+    refresh(false);
+  },
+  end() {
+    const { live } = state;
+    state.live = null;
+    if (live) finish(live);
+    refresh(false);
+  },
+};
+function finish({ tool, path, radius, mark: kind, pressure }) {
+  const moved = path.length > 2, first = path.slice(0, 2);
+  if (tool === "draw" && moved) {
+    const mean = pressure.reduce((sum, each) => sum + each, 0) / pressure.length;
+    state.chosen.clear(); commit(doc => ({ ...doc, strokes: [...doc.strokes, { points: path, mark: kind, weight: rounded(Math.max(0.05, Math.min(1, mean))) }] }));
+  } else if (tool === "select") {
+    const hit = strokeAt(state.doc.strokes, first, REACH / left.scale);
+    if (moved && path.length > 4) select(strokesIn(state.doc.strokes, path));
+    else select(hit < 0 ? [] : [hit]);
+  } else if (tool === "erase") {
+    const strokes = erased(state.doc.strokes, path, radius);
+    state.chosen.clear(); if (strokes.length !== state.doc.strokes.length || strokes.some((stroke, k) => stroke !== state.doc.strokes[k])) commit({ strokes });
+  } else if (tool === "paint" || tool === "unpaint") editMask({ kind: tool === "paint" ? "paint" : "erase", points: path, radius: rounded(radius) });
+  else if (tool === "area") {
+    const [x, y] = first, gap = state.field?.gaps.find(({ ends: [[ax, ay], [bx, by]] }) => Math.hypot((ax + bx) / 2 - x, (ay + by) / 2 - y) < REACH / left.scale + Math.hypot(ax - bx, ay - by) / 2);
+    editMask(gap ? { kind: "gap", radius: 0, points: [(gap.ends[0][0] + gap.ends[1][0]) / 2, (gap.ends[0][1] + gap.ends[1][1]) / 2] } : { kind: "toggle", points: first, radius: 0 });
+  } else if (tool === "turn") turn({ path }, true);
+}
+const editMask = edit => commit(doc => ({ ...doc, mask: [...doc.mask, edit] }));
+
+// Turning a drawing in space: the file is read again from another side.
+let turning = null;
+async function turn({ path }, done = false) {
+  const { opened } = state, from = opened.view ?? [30, 25], k = path.length - 2;
+  const view = [from[0] - (path[k] - path[0]) * left.scale / 3, Math.max(-89, Math.min(89, from[1] + (path[k + 1] - path[1]) * left.scale / 3))].map(Math.round);
+  if (turning && !done) return;
+  await turning;
+  turning = read(opened.bytes, opened.name, view.join(",")).finally(() => { turning = null; });
+  const found = await turning;
+  if (!found || opened !== state.opened) return;
+  const doc = { ...state.history.now, page: found.page, strokes: found.strokes, mask: [], hints: [] };
+  left.fit(pageBox(doc)); state.chosen.clear();
+  if (done) { opened.view = view; commit(doc); } else { state.doc = doc; state.field = state.lines = null; refresh(); }
+}
+
+// Hints.
+const arrows = {
+  begin([x, y]) { if (state.surface) { state.arrow = { x: rounded(x), y: rounded(y), slant: 0, tilt: 0 }; refresh(false); } },
+  move([x, y]) { if (state.arrow) { Object.assign(state.arrow, leaning(x - state.arrow.x, y - state.arrow.y, reachOf(state.surface.frame))); refresh(false); } },
+  end() {
+    const { arrow } = state;
+    state.arrow = null;
+    if (!arrow) return;
+    const { frame } = state.surface, close = 12 / right.scale;
+    const hit = state.doc.hints.findIndex(hint => [[hint.x, hint.y], tipOf(hint, reachOf(frame))].some(([x, y]) => Math.hypot(x - arrow.x, y - arrow.y) < close));
+    const rest = state.doc.hints.filter((_, k) => k !== hit);
+    if (arrow.slant >= 5) commit({ hints: [...rest, { ...arrow, slant: Math.round(arrow.slant), tilt: Math.round(arrow.tilt) }] });
+    else if (hit >= 0) commit({ hints: rest });
+    refresh();
+  },
+};
+
+// Pointers: one finger or the pen uses the tool, two fingers and the wheel zoom and move.
+function pointers(view, tool, hover) {
+  const { canvas } = view, down = new Map();
+  const middle = () => [...down.values()].reduce(([x, y], each) => [x + each.clientX / down.size, y + each.clientY / down.size], [0, 0]);
+  const spread = () => { const [a, b] = [...down.values()]; return Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY); };
+  const pressure = event => event.pointerType === "pen" && event.pressure ? event.pressure : 1;
+  canvas.addEventListener("pointerdown", event => {
+    canvas.focus({ preventScroll: true }); view.cursor = null;
+    try { canvas.setPointerCapture(event.pointerId); } catch { /* the pointer is gone */ }
+    down.set(event.pointerId, event);
+    if (down.size > 1 || event.button === 1) { state.live = state.arrow = null; refresh(false); } else if (event.button === 0) tool.begin(view.at(event), pressure(event));
+  });
+  canvas.addEventListener("pointermove", event => {
+    const before = down.get(event.pointerId);
+    if (before && (down.size > 1 || before.buttons & 4)) {
+      const [x, y] = middle(), wide = down.size > 1 ? spread() : 1;
+      down.set(event.pointerId, event);
+      const [nx, ny] = middle(), place = canvas.getBoundingClientRect();
+      view.zoom(down.size > 1 ? spread() / wide : 1, x - place.left, y - place.top, nx - x, ny - y); refresh();
+    } else if (before) for (const each of event.getCoalescedEvents?.().length ? event.getCoalescedEvents() : [event]) tool.move(view.at(each), pressure(each));
+    hover(event);
+  });
+  for (const kind of ["pointerup", "pointercancel"]) canvas.addEventListener(kind, event => {
+    if (down.delete(event.pointerId) && !down.size) kind === "pointerup" ? tool.end() : (state.live = state.arrow = null, refresh(false));
+  });
+  canvas.addEventListener("wheel", event => {
+    event.preventDefault();
+    const place = canvas.getBoundingClientRect();
+    view.zoom(Math.exp(-Math.max(-60, Math.min(60, event.deltaY)) / 250), event.clientX - place.left, event.clientY - place.top); refresh();
+  }, { passive: false });
+  canvas.addEventListener("focus", () => { refresh(false); });
+  canvas.addEventListener("blur", () => { if (view.cursor) { view.cursor = null; tool.end(); } });
+  let held = false;
+  canvas.addEventListener("keydown", event => {
+    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    if (!way && event.key !== " " && event.key !== "Enter" || event.ctrlKey || event.metaKey) return;
+    event.preventDefault();
+    if (!view.cursor) { held = false; view.cursor = [(view.wide / 2 - view.x) / view.scale, (view.high / 2 - view.y) / view.scale]; }
+    if (way) {
+      const far = (event.shiftKey ? 40 : 8) / view.scale;
+      view.cursor = view.cursor.map((value, k) => value + far * way[k]);
+      if (held) tool.move(view.cursor, 1);
+    } else if (event.key === "Enter") { held = false; tool.begin(view.cursor, 1); tool.end(); }
+    else { held = !held; held ? tool.begin(view.cursor, 1) : tool.end(); }
+    refresh(false);
+  });
+}
+pointers(left, tools, event => {
+  const wide = { paint: brushRadius(), unpaint: brushRadius(), erase: REACH / left.scale }[state.tool], [x, y] = left.at(event);
+  if (wide || state.brush) { state.brush = wide && event.pointerType !== "touch" ? { x, y, radius: wide } : null; refresh(false); }
+});
+pointers(right, arrows, event => {
+  if (state.arrow || state.kind !== "shaded" || event.pointerType === "touch") return;
+  const place = right.canvas.getBoundingClientRect(), x = 2 * (event.clientX - place.left) / place.width - 1, y = 1 - 2 * (event.clientY - place.top) / place.height;
+  state.lamp = { azimuth: Math.atan2(y, x), elevation: Math.PI / 2 * (1 - 0.85 * Math.min(1, Math.hypot(x, y))) }; refresh(false);
+});
+right.canvas.addEventListener("pointerleave", () => { state.lamp = LAMP_AT; refresh(false); });
+
+// Files.
+async function read(bytes, name, view) {
+  const query = new URLSearchParams({ name, ...view && { view } });
+  try {
+    const response = await ask(`open?${query}`, { method: "POST", body: bytes });
+    if (response.ok) return await response.json();
+    banner(`${name}: ${await trouble(response)}`);
+  } catch { /* the server is lost, which is shown */ }
+  return null;
+}
+const drawn = (found, opened) => start({ ...emptyDocument(), size: state.doc.size, name: found.name || "drawing", page: found.page, strokes: found.strokes }, opened);
+const mayReplace = () => state.history.saved === state.history.now || !state.doc.strokes.length || confirm("Replace the drawing? Changes since the last save are lost.");
+async function open(file) {
+  if (!file || !mayReplace()) return;
+  const bytes = await file.arrayBuffer();
+  const head = new TextDecoder().decode(bytes.slice(0, 200)).trimStart();
+  if (head.startsWith("{") && head.includes(FORMAT)) {
+    try { const doc = { ...emptyDocument(), ...JSON.parse(new TextDecoder().decode(bytes)) }; check(doc); banner(""); start(doc); } catch (error) { banner(`${file.name}: this session is damaged (${error.message}).`); }
+    return;
+  }
+  const found = await read(bytes, file.name);
+  if (found) { banner(""); drawn(found, found.spatial ? { bytes, name: file.name } : null); }
+}
+function check(doc) {
+  const flat = points => Array.isArray(points) && points.length >= 2 && points.length % 2 === 0 && points.every(Number.isFinite);
+  if (!flat(doc.page) || doc.page.length !== 4) throw new Error("page");
+  for (const key of ["strokes", "mask", "hints"]) if (!Array.isArray(doc[key])) throw new Error(key);
+  if (![...doc.strokes, ...doc.mask].every(each => each && flat(each.points))) throw new Error("points");
+}
+function give(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob); link.download = name; link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+}
+function save() {
+  give(new Blob([JSON.stringify(state.history.now)], { type: "application/json" }), `${state.doc.name}.studio.json`);
+  state.history.saved = state.history.now; status("saved");
+}
+async function download(what) {
+  const query = new URLSearchParams({ what, formulation: $("#formulation").value, format: $("#format").value });
+  status(`writing ${what} …`);
+  try {
+    const response = await ask(`download?${query}`, { method: "POST", body: JSON.stringify(state.doc) });
+    if (!response.ok) { banner(await trouble(response)); status(""); return; }
+    give(await response.blob(), /filename="(.*)"/.exec(response.headers.get("content-disposition"))[1]);
+    ready(`${what} written`);
+  } catch { /* the server is lost, which is shown */ }
+}
+function dialog(title, ...content) { $("#dialog h2").textContent = title; $("#dialog div").replaceChildren(...content); $("#dialog").showModal(); }
+const actions = {
+  undo: () => step(-1), redo: () => step(1), save, flip, prove, delete: remove, retry: request, dismiss: () => banner(""),
+  open: () => $("#file").click(), unhint: () => commit({ hints: [] }),
+  empty: () => { if (mayReplace()) start({ ...emptyDocument(), size: state.doc.size }); },
+  help: () => dialog("Help", $("#help").content.cloneNode(true)),
+  elsewhere: () => state.field ? dialog("The same without the page", element("p", "Download the drawing and the instance, then run in their folder:"),
+    element("pre", state.field.commands.join("\n").replace("milp-mccormick -F mps", `${$("#formulation").value} -F ${$("#format").value}`)), element("p", "Or in Python:"), element("pre", state.field.python.join("\n"))) : status("There is no field yet."),
+};
+const closeMenus = () => all(".menu[open]").forEach(each => { each.open = false; });
+document.addEventListener("click", event => {
+  const button = event.target.closest("button");
+  if (!event.target.closest(".menu") || button) closeMenus();
+  if (!button) return;
+  const { do: name, tool, mark: kind, download: what, sample } = button.dataset;
+  if (name) actions[name]();
+  if (tool) choose(tool);
+  if (kind) mark(kind);
+  if (what) download(what);
+  if (sample && mayReplace()) ask(`sample/${sample}`).then(response => response.json()).then(found => drawn(found, null)).catch(() => {});
+});
+$("#file").addEventListener("change", event => { open(event.target.files[0]).finally(() => { event.target.value = ""; }); });
+document.addEventListener("dragover", event => event.preventDefault());
+document.addEventListener("drop", event => { event.preventDefault(); open(event.dataTransfer.files[0]); });
+
+// Settings: a slider shows its field while it moves, and makes one step of the history.
+const settings = {
+  size: () => ({ size: Number($("#size").value) }), weight: () => ({ stroke_weight: Number((10 ** $("#weight").value).toPrecision(3)) }),
+  silhouette: () => ({ silhouette: $("#silhouette").checked ? "outer" : "none" }), name: () => ({ name: $("#name").value.slice(0, 32) || "drawing" }),
+};
+for (const [name, read_] of Object.entries(settings)) {
+  if (name === "size" || name === "weight") $(`#${name}`).addEventListener("input", () => show({ ...state.doc, ...read_() }));
+  $(`#${name}`).addEventListener("change", () => commit(read_()));
+}
+$("#brush").addEventListener("input", controls);
+$("#doubtful").addEventListener("change", () => refresh());
+all("input[name=field]").forEach(each => each.addEventListener("change", () => { state.mode = each.value; refresh(); if (each.value === "lines" && !state.lines) request(); }));
+all("input[name=surface]").forEach(each => each.addEventListener("change", () => { state.kind = each.value; refresh(false); }));
+
+// Keys.
+const keys = {
+  d: () => choose("draw"), v: () => choose("select"), e: () => choose("erase"), b: () => choose("paint"), n: () => choose("unpaint"), a: () => choose("area"), r: () => choose("turn"),
+  1: () => mark("line"), 2: () => mark("cut"), 3: () => mark("ignored"), f: flip, p: prove, q: () => next("field"), w: () => next("surface"),
+  delete: remove, backspace: remove, escape: () => { closeMenus(); state.live = state.arrow = null; select([]); }, "?": actions.help,
+  "+": () => { left.zoom(1.25); refresh(); }, "-": () => { left.zoom(0.8); refresh(); }, 0: () => { left.fit(pageBox(state.doc)); right.zoomed = false; right.resize(); refresh(); },
+  "ctrl+z": () => step(-1), "ctrl+shift+z": () => step(1), "ctrl+y": () => step(1), "ctrl+s": save, "ctrl+o": actions.open, "ctrl+a": () => select(state.doc.strokes.map((_, k) => k)),
+};
+document.addEventListener("keydown", event => {
+  const typing = event.target.closest("input:not([type=range],[type=radio],[type=checkbox]), select, dialog");
+  const control = event.ctrlKey || event.metaKey, key = event.key.toLowerCase();
+  const run = keys[control ? `ctrl+${event.shiftKey ? "shift+" : ""}${key}` : key];
+  if (!run || event.altKey || (typing && !(control && "so".includes(key)))) return;
+  event.preventDefault(); run();
+});
+
+// Pages do not share drawings; a second one says so.
+const others = new BroadcastChannel(KEPT);
+others.addEventListener("message", ({ data }) => {
+  if (data === "opened") others.postMessage("there");
+  if (data === "there" && !bannerKind) banner("This studio is open in another tab too. Each tab has its own drawing.", { kind: "tab" });
+});
+others.postMessage("opened");
+addEventListener("beforeunload", event => { if (state.history.saved !== state.history.now) event.preventDefault(); });
+
+// What this tab had before it was loaded again, or the drawing of the command line.
+async function begin() {
+  const kept = sessionStorage.getItem(KEPT), same = sessionStorage.getItem(`${KEPT}-at`) === location.pathname;
+  let found = null;
+  try { found = await (await ask("first")).json(); } catch { return; }
+  if (kept && (same || !found || confirm("This tab has a drawing of an earlier page. Keep it instead of the new one?"))) try { const doc = JSON.parse(kept); check(doc); start(doc); return; } catch { sessionStorage.removeItem(KEPT); }
+  if (found?.document) start({ ...emptyDocument(), ...found.document });
+  else found ? drawn(found, found.file ? { bytes: decoded.bytes(found.file.data), name: found.file.name } : null) : start(emptyDocument());
+}
+controls(); doubts(); begin();

@@ -1,0 +1,366 @@
+"""The page of the studio in a real browser, from the first stroke to a saved session."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from browsing import CONTRAST, find, show, sideways
+from studios import CONTRADICTING, PEBBLE, studio
+
+pytestmark = pytest.mark.slow
+
+READY = "return document.documentElement.dataset.state === 'ready'"
+BOX = "const r = document.querySelector(arguments[0]).getBoundingClientRect(); return [r.x, r.y]"
+HIDDEN = "#banner[hidden]"
+
+
+@pytest.fixture(scope="module")
+def page():
+    with studio() as found:
+        yield found
+
+
+@pytest.fixture
+def empty(browser, page):
+    """The browser on an empty page; what it leaves behind does not ask before it closes."""
+    yield opened(browser, page.address)
+    browser.execute_script(
+        "addEventListener('beforeunload', event => event.stopImmediatePropagation(), true);"
+        "sessionStorage.clear()"
+    )
+
+
+def opened(browser, address):
+    browser.get(address)
+    return settled(browser)
+
+
+def until(browser, holds):
+    """What a function of the browser returns as soon as it is true."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    return WebDriverWait(browser, 200, 0.05).until(holds)
+
+
+def settled(browser):
+    """The browser once all answers to the last edit have arrived."""
+    until(browser, lambda each: each.execute_script(READY))
+    return browser
+
+
+def document(browser):
+    return json.loads(browser.execute_script("return sessionStorage.getItem('crossfield-studio')"))
+
+
+def drag(browser, points, canvas="#drawing"):
+    """Press the mouse at the first of these points of a canvas, move along the others, and let go."""
+    x, y = browser.execute_script(BOX, canvas)
+
+    def send(kind, point, buttons):
+        place = {"x": x + point[0], "y": y + point[1]}
+        browser.execute_cdp_cmd(
+            "Input.dispatchMouseEvent",
+            {"type": kind, **place, "button": "left", "buttons": buttons, "clickCount": 1},
+        )
+
+    send("mousePressed", points[0], 1)
+    for point in points[1:]:
+        send("mouseMoved", point, 1)
+    send("mouseReleased", points[-1], 0)
+    return settled(browser)
+
+
+def circle(x, y, radius, count=40):
+    return [
+        (x + radius * math.cos(math.tau * k / count), y + radius * math.sin(math.tau * k / count))
+        for k in range(count + 1)
+    ]
+
+
+def tool(browser, name):
+    find(browser, f"[data-tool={name}]").click()
+
+
+def load(browser, path, content):
+    path.write_bytes(content if isinstance(content, bytes) else json.dumps(content).encode())
+    browser.execute_script("document.documentElement.dataset.state = 'loading'")
+    find(browser, "#file").send_keys(str(path))
+    return settled(browser)
+
+
+def pebble(browser, folder, **parts):
+    return load(browser, folder / "pebble.studio.json", PEBBLE | parts)
+
+
+def given(browser, folder, pressed):
+    """Name and content of the file that arrives when a button is pressed."""
+    browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(folder)})
+    pressed()
+    kept = until(
+        browser, lambda _: [path for path in folder.iterdir() if path.suffix not in {".crdownload", ".tmp"}]
+    )
+    return kept[0]
+
+
+def banner(browser):
+    return find(browser, "#banner span").text
+
+
+def pixels(browser):
+    return int(find(browser, "#numbers").text.split("Pixels\n")[1].split("\n")[0])
+
+
+def test_a_session_from_the_first_stroke_to_the_saved_file(empty, tmp_path):
+    browser = empty
+    find(browser, "[data-mark=cut]").click()
+    drag(browser, circle(240, 300, 150))
+    assert "curvature line" in find(browser, "#status").text
+    find(browser, "[data-mark=line]").click()
+    drag(browser, [(95, 300), (170, 340), (240, 350), (310, 340), (385, 300)])
+    drag(browser, [(240, 155), (225, 230), (225, 370), (240, 445)])
+    assert [stroke["mark"] for stroke in document(browser)["strokes"]] == ["cut", "line", "line"]
+    whole = pixels(browser)
+    assert "surface" in find(browser, "#times").text
+
+    tool(browser, "unpaint")
+    drag(browser, [(160, 220), (180, 220)])
+    assert pixels(browser) < whole
+    find(browser, "#undo").click()
+    assert pixels(settled(browser)) == whole
+
+    drag(browser, [(240, 300), (240, 240)], "#surface")
+    (hint,) = document(browser)["hints"]
+    assert hint["tilt"] == 90
+    find(browser, "#flip").click()
+    settled(browser)
+    assert (document(browser)["flip"], document(browser)["hints"][0]["tilt"]) == (True, -90)
+
+    tool(browser, "select")
+    drag(browser, [(240, 155), (240, 155)])
+    find(browser, "[data-mark=ignored]").click()
+    settled(browser)
+    assert "ignored" in {stroke["mark"] for stroke in document(browser)["strokes"]}
+    find(browser, "#undo").click()
+    settled(browser)
+    before = document(browser)
+
+    find(browser, "#download-menu summary").click()
+    field = given(browser, tmp_path, find(browser, "[data-download=field]").click)
+    assert field.name == "drawing.field.npz"
+    field.unlink()
+    saved = given(browser, tmp_path, find(browser, "[data-do=save]").click)
+    find(browser, "#open-menu summary").click()
+    find(browser, "[data-do=empty]").click()
+    assert document(settled(browser))["strokes"] == []
+    load(browser, tmp_path / "again.json", saved.read_bytes())
+    assert document(browser) == before
+
+
+def test_every_edit_is_undone_and_done_again(empty, tmp_path):
+    browser = pebble(empty, tmp_path)
+    states = [document(browser)]
+    tool(browser, "erase")
+    drag(browser, [(240, 300), (245, 330)])
+    find(browser, "#silhouette").click()
+    settled(browser)
+    tool(browser, "area")
+    drag(browser, [(120, 260), (120, 260)])
+    states.append(document(browser))
+    assert len(states[1]["mask"]) == 1
+    assert states[1]["silhouette"] == "outer"
+    while find(browser, "#undo").is_enabled():
+        find(browser, "#undo").click()
+    assert document(settled(browser)) == states[0]
+    while find(browser, "#redo").is_enabled():
+        find(browser, "#redo").click()
+    assert document(settled(browser)) == states[1]
+
+
+def test_a_lasso_selects_the_strokes_inside_of_it(empty, tmp_path):
+    browser = pebble(empty, tmp_path)
+    tool(browser, "select")
+    drag(browser, [(20, 290), (460, 290), (460, 400), (20, 400)])
+    assert find(browser, "#selected").text == "1 selected"
+    find(browser, "#delete").click()
+    assert len(document(settled(browser))["strokes"]) == 2
+
+
+def test_it_works_with_the_keyboard_alone(empty):
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    browser = empty
+    keys = ActionChains(browser)
+    browser.execute_script("document.querySelector('#name').focus()")
+    for _ in range(40):
+        keys.send_keys(Keys.TAB).perform()
+        if browser.execute_script("return document.activeElement.id") == "drawing":
+            break
+    assert browser.execute_script("return document.activeElement.id") == "drawing"
+    keys.send_keys("1", Keys.ARROW_LEFT * 10, Keys.SPACE, Keys.ARROW_RIGHT * 20, Keys.SPACE).perform()
+    keys.send_keys(
+        "2", Keys.ARROW_LEFT * 10, Keys.ARROW_UP * 10, Keys.SPACE, Keys.ARROW_DOWN * 20, Keys.SPACE
+    )
+    keys.perform()
+    settled(browser)
+    assert [stroke["mark"] for stroke in document(browser)["strokes"]] == ["line", "cut"]
+    keys.key_down(Keys.CONTROL).send_keys("a").key_up(Keys.CONTROL).send_keys("1").perform()
+    assert {stroke["mark"] for stroke in document(settled(browser))["strokes"]} == {"line"}
+    keys.key_down(Keys.CONTROL).send_keys("z").key_up(Keys.CONTROL).perform()
+    assert {stroke["mark"] for stroke in document(settled(browser))["strokes"]} == {"line", "cut"}
+    keys.send_keys("b").perform()
+    assert find(browser, "[data-tool=paint]").get_attribute("aria-pressed") == "true"
+    keys.send_keys("q").perform()
+    assert find(browser, "input[value=lines]").is_selected()
+    keys.send_keys("?").perform()
+    assert find(browser, "#dialog").is_displayed()
+
+
+def test_every_control_has_a_name(empty):
+    nameless = empty.execute_script(
+        "return [...document.querySelectorAll('button, input:not([hidden]), select, summary, canvas')]"
+        ".filter(each => !each.textContent.trim() && !each.ariaLabel && !each.labels?.length)"
+        ".map(each => each.outerHTML)"
+    )
+    assert nameless == []
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_and_can_be_read(empty, tmp_path, width, scheme):
+    browser = empty
+    show(browser, width=width, scheme=scheme)
+    pebble(browser, tmp_path)
+    find(browser, "#download-menu summary").click()
+    (window, wide), beyond = sideways(browser)
+    assert wide <= window == width
+    assert beyond == []
+    worst = browser.execute_script(CONTRAST)
+    assert [found for found in worst if found[0] < 4.5 and "disabled" not in found[1]] == []
+    assert browser.get_log("browser") == []
+
+
+def test_a_finger_draws_on_a_phone(empty):
+    show(empty, width=390)
+    x, y = empty.execute_script(BOX, "#drawing")
+
+    def touch(kind, *points):
+        places = [{"x": x + a, "y": y + b} for a, b in points]
+        empty.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+    touch("touchStart", (60, 100))
+    for step in range(1, 9):
+        touch("touchMove", (60 + 20 * step, 100 + 10 * step))
+    touch("touchEnd")
+    assert len(document(settled(empty))["strokes"]) == 1
+
+
+@pytest.mark.parametrize(
+    "name, content",
+    [
+        ("photo.png", b"\x89PNG\r\n\x1a\nnothing"),
+        ("empty.svg", b""),
+        ("notes.txt", b"some words"),
+        ("old.json", b'{"format": "crossfield-studio", "version": 1, "strokes": [{"points": ["x"]}]}'),
+    ],
+)
+def test_a_wrong_file_gets_a_message_and_nothing_is_lost(empty, tmp_path, name, content):
+    browser = pebble(empty, tmp_path)
+    path = tmp_path / name
+    path.write_bytes(content)
+    find(browser, "#file").send_keys(str(path))
+    until(browser, lambda _: name in banner(browser))
+    assert document(browser) == PEBBLE
+
+
+def test_a_lost_server_gets_a_message_and_nothing_is_lost(browser, tmp_path):
+    with studio() as page:
+        opened(browser, page.address)
+        pebble(browser, tmp_path)
+        page.stop()
+        find(browser, "#silhouette").click()
+        until(browser, lambda _: "does not answer" in banner(browser))
+        kept = document(browser)
+        assert kept == PEBBLE | {"silhouette": "outer"}
+        folder = tmp_path / "saved"
+        folder.mkdir()
+        saved = given(browser, folder, find(browser, "[data-do=save]").click)
+        with studio("--port", page.host.split(":")[1]) as another:
+            find(browser, "#retry").click()
+            until(browser, lambda _: "token" in banner(browser))
+            opened(browser, another.address)
+            assert document(browser) == kept
+        assert json.loads(saved.read_text()) == kept
+
+
+def test_a_second_tab_has_its_own_drawing_and_says_so(empty, page, tmp_path):
+    browser = pebble(empty, tmp_path)
+    first = browser.current_window_handle
+    browser.switch_to.new_window("tab")
+    opened(browser, page.address)
+    until(browser, lambda _: "another tab" in banner(browser))
+    assert document(browser)["strokes"] == []
+    browser.close()
+    browser.switch_to.window(first)
+    assert document(browser) == PEBBLE
+
+
+def test_a_page_that_is_loaded_again_keeps_its_drawing(empty, tmp_path):
+    browser = pebble(empty, tmp_path)
+    browser.refresh()
+    assert document(settled(browser)) == PEBBLE
+    assert pixels(browser) > 0
+
+
+def test_ten_thousand_strokes_are_drawn_and_edited(empty, tmp_path):
+    many = [
+        {
+            "points": [2 + k % 100, 2 + k // 100 * 0.9, 2.6 + k % 100, 2.4 + k // 100 * 0.9],
+            "mark": "line",
+            "weight": 1,
+        }
+        for k in range(10_000)
+    ]
+    browser = pebble(empty, tmp_path, strokes=many, size=48)
+    assert banner(browser) == ""
+    tool(browser, "draw")
+    drag(browser, [(100, 200), (200, 250), (300, 240)])
+    assert len(document(browser)["strokes"]) == 10_001
+    assert pixels(browser) > 0
+
+
+def test_a_drawing_in_space_is_turned_by_dragging(empty, tmp_path):
+    ring = [(math.cos(t / 5), math.sin(t / 5), 0.3 * math.sin(t / 2)) for t in range(32)]
+    lines = [f"v {len(ring)}", *(" ".join(f"{x:.4f}" for x in point) for point in ring)]
+    lines += ["v 2", "-1 0 0", "1 0 0.5", "v 2", "0 -1 0", "0 1 -0.5"]
+    browser = load(empty, tmp_path / "a.curves", "\n".join(lines).encode())
+    before = document(browser)
+    tool(browser, "turn")
+    drag(browser, [(200, 300), (230, 310), (280, 330), (300, 340)])
+    until(browser, lambda _: document(browser)["strokes"] != before["strokes"])
+    find(browser, "#undo").click()
+    assert document(settled(browser)) == before
+
+
+def test_a_doubt_is_followed_by_its_suggestion(empty, tmp_path):
+    browser = pebble(empty, tmp_path, strokes=CONTRADICTING, size=32)
+    assert "2 strokes do not fit" in find(browser, "#doubts").text
+    find(browser, "#doubts button:nth-of-type(2)").click()
+    marks = [stroke["mark"] for stroke in document(settled(browser))["strokes"]]
+    assert marks == ["cut", *["line"] * 7, "cut", "cut"]
+    assert "do not fit" not in find(browser, "#doubts").text
+
+
+def test_a_proof_runs_beside_the_drawing_and_ends_with_an_edit(empty, tmp_path):
+    browser = pebble(empty, tmp_path, size=16)
+    find(browser, "#prove").click()
+    proof = find(browser, "#proof")
+    until(browser, lambda _: "proven bound" in proof.text)
+    find(browser, "#prove").click()
+    pebble(browser, tmp_path, size=40)
+    find(browser, "#prove").click()
+    find(browser, "#silhouette").click()
+    assert "drawing has changed" in proof.text
+    assert find(settled(browser), "#prove").text == "Prove in the background"

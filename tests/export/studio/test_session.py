@@ -1,0 +1,291 @@
+"""Documents of the page: their checks, and their instances, fields, surfaces and files."""
+
+from __future__ import annotations
+
+import io
+import json
+import shlex
+import zipfile
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.studio.document import Document
+from crossfield.export.studio.files import DOWNLOADS, download
+from crossfield.export.studio.opening import opened
+from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, drawn, field_of, hints_of
+from crossfield.export.studio.views import field_step, lines_step, surface_step
+from crossfield.models.sketch.samples import sample_svg
+from PIL import Image, ImageDraw
+from studios import CONTRADICTING, PEBBLE, changed
+
+
+def document(**parts):
+    return Document.of_bytes(changed(**parts))
+
+
+def click(x, y, kind="toggle"):
+    return [{"kind": kind, "points": [x, y], "radius": 0}]
+
+
+@pytest.mark.parametrize(
+    "parts, place",
+    [
+        ({"format": "other"}, "not a session"),
+        ({"version": 2}, "version 2"),
+        ({"page": [0, 0, 0, 5]}, "page"),
+        ({"size": 10_000}, "size"),
+        ({"size": float("nan")}, "size"),
+        ({"size": True}, "size"),
+        ({"strokes": [{"points": [1, 2, 3], "mark": "line"}]}, "strokes, entry 1"),
+        ({"strokes": [{"points": [1, "x"], "mark": "line"}]}, "strokes, entry 1"),
+        ({"strokes": [{"points": [1, 1e300], "mark": "line"}]}, "strokes, entry 1"),
+        ({"strokes": [{"points": [1, 2], "mark": "dashed"}]}, "mark"),
+        ({"strokes": [7]}, "entry of strokes"),
+        ({"strokes": {}}, "strokes"),
+        ({"hints": [{"x": 1, "y": 1, "slant": 95, "tilt": 0}]}, "slant"),
+        ({"mask": [{"kind": "fill", "points": [1, 1]}]}, "kind"),
+    ],
+)
+def test_a_faulty_document_is_refused_with_its_place(parts, place):
+    with pytest.raises(cf.InputError, match=place):
+        document(**parts)
+
+
+@pytest.mark.parametrize("data", [b"", b"[]", b"\xff", b"[" * 100_000, b'{"format": "crossfield-studio"}'])
+def test_other_bytes_are_refused(data):
+    with pytest.raises(cf.InputError, match="session"):
+        Document.of_bytes(data)
+
+
+def test_a_drawing_without_a_curvature_line_asks_for_one():
+    cuts = [stroke | {"mark": "cut"} for stroke in PEBBLE["strokes"]]
+    with pytest.raises(cf.NoStrokeError, match="draw one"):
+        drawn(document(strokes=cuts))
+
+
+def test_the_instance_is_that_of_the_downloaded_drawing(tmp_path):
+    name, svg = download(changed(), "drawing")
+    (tmp_path / name).write_bytes(svg)
+    assert cf.read_sketch(tmp_path / name, size=16).sha256 == drawn(document()).instance.sha256
+
+
+def test_ignored_strokes_are_not_read():
+    more = {"points": [20, 20, 100, 80], "mark": "ignored", "weight": 1}
+    same = document(strokes=[*PEBBLE["strokes"], more])
+    assert drawn(same).instance.sha256 == drawn(document()).instance.sha256
+
+
+def test_the_weight_of_a_stroke_scales_its_reliability():
+    light = [stroke | {"weight": 0.5} for stroke in PEBBLE["strokes"]]
+    before, after = drawn(document()).instance, drawn(document(strokes=light)).instance
+    assert np.allclose(after.w, before.w / 2)
+
+
+def test_a_brush_changes_the_mask_where_it_passed():
+    path = {"points": [25, 25, 35, 25], "radius": 8}
+    before = drawn(document()).instance.mask
+    without = drawn(document(mask=[{"kind": "erase", **path}])).instance.mask
+    again = drawn(document(mask=[{"kind": "erase", **path}, {"kind": "paint", **path}])).instance.mask
+    assert 0 < (before & ~without).sum() < before.sum() / 3
+    assert not (without & ~before).any()
+    assert (again == before).all()
+
+
+def test_a_brush_never_covers_a_stroke_that_cuts():
+    over = drawn(document(mask=[{"kind": "paint", "points": [0, 10, 120, 10], "radius": 6}]))
+    assert (over.kinds == STROKE).any()
+    assert not (over.instance.mask & (over.kinds == STROKE)).any()
+
+
+def test_a_click_excludes_an_area_between_strokes_and_includes_it_again():
+    before = drawn(document())
+    without = drawn(document(mask=click(30, 25)))
+    gone = before.instance.mask & ~without.instance.mask
+    assert 0.1 < gone.sum() / before.instance.mask.sum() < 0.4
+    assert (without.kinds[gone] == LEFT_OUT).mean() > 0.9  # the rest is a stroke's corner
+    assert (before.kinds[gone] == IN).all()
+    assert drawn(document(mask=click(30, 25) * 2)).instance.sha256 == before.instance.sha256
+
+
+def test_a_click_outside_changes_nothing():
+    for x, y in ((2, 2), (-50, 500), (10, 50)):
+        assert drawn(document(mask=click(x, y))).instance.sha256 == drawn(document()).instance.sha256
+
+
+def test_an_enclosed_area_that_was_left_out_is_included_by_a_click():
+    ring = Document.of(
+        PEBBLE
+        | {
+            key: value
+            for key, value in opened(sample_svg("ring").encode(), "ring.svg").items()
+            if key in PEBBLE
+        }
+        | {"size": 32}
+    )
+    found = drawn(ring)
+    rows, columns = np.nonzero(found.kinds == LEFT_OUT)
+    assert len(rows)
+    x, y = found.instance.origin
+    pixel = found.instance.pixel_size
+    middle = len(rows) // 2
+    point = [x + pixel * (columns[middle] + 0.5), y + pixel * (rows[middle] + 0.5)]
+    edits = Document.of(PEBBLE | {
+        "size": 32, "page": list(ring.page), "mask": click(*point),
+        "strokes": [{"points": s.points.ravel().tolist(), "mark": s.mark} for s in ring.strokes],
+    })  # fmt: skip
+    assert drawn(edits).instance.mask.sum() > found.instance.mask.sum()
+
+
+OPEN = [
+    {"points": [56, 10, 10, 10, 10, 90, 110, 90, 110, 10, 64, 10], "mark": "line", "weight": 1},
+    {"points": [10, 40, 60, 55, 110, 40], "mark": "line", "weight": 1},
+    {"points": [60, 55, 60, 90], "mark": "line", "weight": 1},
+]
+"""An outline with a gap at the top."""
+
+
+def test_a_bridged_gap_is_opened_and_closed_by_a_click():
+    closed = drawn(document(strokes=OPEN, size=64))
+    ((ends, is_open),) = closed.gaps
+    assert not is_open
+    opened_ = drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap")))
+    assert [gap for _, gap in opened_.gaps] == [True]
+    instance = opened_.instance
+    above = int((30 - instance.origin[1]) / instance.pixel_size)
+    assert closed.instance.mask[:above].any()
+    assert not instance.mask[:above].any()
+    assert instance.mask[above:].any()
+    again = drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap") * 2))
+    assert again.instance.sha256 == closed.instance.sha256
+
+
+def test_hints_are_placed_on_pixels_and_those_outside_are_left_out():
+    hints = [{"x": 30, "y": 25, "slant": 40, "tilt": 90}, {"x": -9, "y": 500, "slant": 40, "tilt": 90}]
+    given = document(hints=hints)
+    instance = drawn(given).instance
+    (hint,) = hints_of(given, instance)
+    x, y = instance.origin
+    assert (hint.column, hint.row) == (
+        int((30 - x) / instance.pixel_size),
+        int((25 - y) / instance.pixel_size),
+    )
+
+
+def test_views_hold_arrays_of_the_grid():
+    data = changed()
+    view, found, field = field_step(data)
+    assert view["numbers"]["pixels"] == field.instance.grid.size
+    assert view["size"] == 16
+    families = lines_step(field)["families"]
+    assert all(len(line) % 2 == 0 and len(line) >= 4 for family in families for line in family)
+    surface = surface_step(data, found, field)
+    assert surface["width"] == surface["columns"] * 30
+    json.dumps([view, surface])
+
+
+def test_strokes_that_the_field_does_not_follow_are_suspects():
+    assert field_step(changed(strokes=CONTRADICTING, size=32))[0]["suspects"] == [8, 9]
+    assert field_step(changed(strokes=CONTRADICTING[:8], size=32))[0]["suspects"] == []
+
+
+@pytest.mark.parametrize("what", [name for name in DOWNLOADS if name != "solver"])
+def test_downloads_are_the_same_twice(what):
+    name, content = download(changed(), what)
+    assert name.startswith("pebble.")
+    assert content
+    assert download(changed(), what) == (name, content)
+
+
+def test_solver_files_come_with_their_manifest():
+    name, content = download(changed(size=8), "solver", "milp-mccormick", "mps")
+    assert name == "pebble.solver.zip"
+    names = zipfile.ZipFile(io.BytesIO(content)).namelist()
+    assert {each.split(".", 1)[1] for each in names} >= {
+        "instance.json", "milp-mccormick.manifest.json", "milp-mccormick.mps",
+    }  # fmt: skip
+
+
+def test_a_refused_pair_of_formulation_and_format_gives_the_reason():
+    with pytest.raises(cf.CrossfieldError, match="quartic"):
+        download(changed(size=8), "solver", "minlp-parity", "mps")
+    with pytest.raises(cf.CrossfieldError, match="formulation"):
+        download(changed(size=8), "solver", "nothing", "mps")
+
+
+@pytest.mark.slow
+def test_the_commands_of_the_menu_compute_the_same(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    hints = [{"x": 30, "y": 25, "slant": 40, "tilt": -90}]
+    data = changed(hints=hints, flip=True)
+    for what in ("drawing", "instance", "layers", "surface", "field"):
+        name, content = download(data, what)
+        (tmp_path / (f"page.{what}" if what in {"layers", "field"} else name)).write_bytes(content)
+    commands = field_step(data)[0]["commands"]
+    for command in commands[:3]:
+        assert invoke(shlex.split(command)[1:]) == 0, capsys.readouterr().err
+    assert (tmp_path / "pebble.layers.svg").read_bytes() == (tmp_path / "page.layers").read_bytes()
+    archive = zipfile.ZipFile(tmp_path / "pebble.surface.zip")
+    for name in ("surface.obj", "heights.npy", "shaded.png"):
+        assert archive.read(name) == (tmp_path / "surface" / name).read_bytes(), name
+
+
+@pytest.mark.slow
+def test_the_python_lines_of_the_menu_compute_the_same(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    data = changed(hints=[{"x": 30, "y": 25, "slant": 40, "tilt": -90}])
+    for what in ("drawing", "instance", "surface"):
+        name, content = download(data, what)
+        (tmp_path / name).write_bytes(content)
+    exec("\n".join(field_step(data)[0]["python"]), {})
+    archive = zipfile.ZipFile(tmp_path / "pebble.surface.zip")
+    assert archive.read("surface.obj") == (tmp_path / "surface" / "surface.obj").read_bytes()
+
+
+def test_a_sample_has_the_same_field_on_the_page():
+    found = opened(sample_svg("bottle").encode(), "bottle.svg")
+    given = Document.of(PEBBLE | {key: found[key] for key in ("name", "page", "strokes")} | {"size": 24})
+    own, other = field_of(given)[1], cf.sample("bottle", 24)
+    assert (own.instance.mask == other.mask).mean() > 0.98
+    assert {stroke["mark"] for stroke in found["strokes"]} == {"line", "cut"}
+
+
+def picture():
+    """A red line and a black circle on paper, as PNG."""
+    image = Image.new("RGB", (200, 160), "white")
+    pen = ImageDraw.Draw(image)
+    pen.line([20, 80, 180, 80], fill=(220, 0, 0), width=3)
+    pen.ellipse([120, 10, 170, 60], outline="black", width=3)
+    stream = io.BytesIO()
+    image.save(stream, "PNG")
+    return stream.getvalue()
+
+
+def test_a_picture_is_traced_to_strokes_with_marks():
+    found = opened(picture(), "photo.png")
+    assert found["page"] == [0, 0, 200, 160]
+    lines = [np.reshape(s["points"], (-1, 2)) for s in found["strokes"] if s["mark"] == "line"]
+    cuts = [np.reshape(s["points"], (-1, 2)) for s in found["strokes"] if s["mark"] == "cut"]
+    assert len(lines) == len(cuts) == 1
+    assert np.abs(lines[0][:, 1] - 80.5).max() < 2
+    assert np.ptp(lines[0][:, 0]) > 150
+    assert np.abs(np.hypot(*(cuts[0] - [145.5, 35.5]).T) - 24).max() < 3
+
+
+@pytest.mark.parametrize(
+    "data, name, words",
+    [
+        (b"", "a.svg", "empty"),
+        (b"<svg", "a.svg", "."),
+        (b"\x89PNG\r\n\x1a\nxx", "a.png", "picture"),
+        (b"v 1\n", "a.curves", "."),
+    ],
+)
+def test_files_that_are_no_drawing_are_refused(data, name, words):
+    with pytest.raises(cf.CrossfieldError, match=words):
+        opened(data, name)
+
+
+def test_the_name_of_a_file_is_no_path():
+    assert opened(sample_svg("skew").encode(), "../../etc/passwd.svg")["name"] == "etc_passwd"
