@@ -17,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import limits
 import page
 from crossfield.models.formulations.catalogue import FORMULATIONS
 
@@ -132,12 +133,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description="Measure export against its peers and write docs/performance.md."
     )
+    commands = parser.add_subparsers(dest="command")
+    limits.arguments(commands.add_parser("limits", help="wall time of every method under time limits"))
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "performance.md")
     parser.add_argument(
         "--smoke", action="store_true", help="sizes 4 and 8, one run each, in one process: shows that it runs"
     )
     parser.add_argument("--data", type=Path, help="write the measurements, or read them if the file is there")
     options = parser.parse_args()
+    if options.command == "limits":
+        limits.run(options)
+        return
     sizes, names, middle, pixels = (
         ((4, 8), ("minlp-quartic",), 8, 8) if options.smoke else (SIZES, tuple(FORMULATIONS), 128, 552)
     )
