@@ -176,7 +176,7 @@ LOG_READERS: Final = (
     LogReader(
         "highs",
         "HiGHS",
-        re.compile(r"^Running HiGHS ", re.MULTILINE),
+        re.compile(r"^(?:Running HiGHS |(?:LP|QP|MIP|MIQP)\b.* has \d+ rows; \d+ cols; )", re.MULTILINE),
         version=r"^Running HiGHS (\S+)",
         optimal=r"^ +Status +Optimal$",
         ended=r"^ +Status +\S",
@@ -184,7 +184,7 @@ LOG_READERS: Final = (
             "bound": (r"^ +Dual bound +(\S+)$",),
             "objective": (r"^ +Primal bound +(\S+)$",),
             "seconds": (r"^ +Timing +(\S+)",),
-            "threads": (r"^ +Thread count (\d+) ",),
+            "threads": (r"^ +Thread count (\d+) ", r"^ +Thread count: .* across (\d+) threads"),
             "columns": (r"^\S+ .*has \d+ rows; (\d+) cols;",),
             "rows": (r"^\S+ .*has (\d+) rows; \d+ cols;",),
         },

@@ -1,6 +1,6 @@
 """Solution files of HiGHS: style 0 (raw) and style 4 (sparse).
 
-Layout, as HiGHS 1.15.1 writes it (HighsModelUtils.cpp, writeModelSolution):
+Layout, as HiGHS 1.16.0 writes it (HighsModelUtils.cpp, writeModelSolution):
 
     Model status
     Time limit reached              words with blanks
@@ -8,7 +8,9 @@ Layout, as HiGHS 1.15.1 writes it (HighsModelUtils.cpp, writeModelSolution):
     # Primal solution values
     Feasible                        or Infeasible; or None, and then no point follows
     Objective -14.4                 with the constant of the objective
-    # Columns 5                     style 4: minus the number of columns that are not zero
+    Objective_bound -14.5           since 1.16, of problems with integers: the dual bound
+    MIP_rel_gap 0.007               likewise
+    # Columns 5                     style 4: `-3 sparse`, with the number of columns that are not zero
     x 10                            name and value; style 4: and the column's number
     ...
     # Rows 2                        only style 0; rows, dual values and a basis follow, not needed here
@@ -48,7 +50,7 @@ _STATUS: Final = {
     b"Interrupted by HiGHS": Status.LIMIT_WITH_POINT,
     b"Unknown": Status.LIMIT_WITH_POINT,
 }
-_COLUMNS = re.compile(rb"# Columns (-?)(\d{1,12})")
+_COLUMNS = re.compile(rb"# Columns (-?)(\d{1,12})( sparse)?")
 
 
 def parse(data: bytes) -> RawSolution:
@@ -68,9 +70,12 @@ def parse(data: bytes) -> RawSolution:
     if primal not in {b"Feasible", b"Infeasible"}:
         raise cursor.fault(f"{shown(primal)} is not Feasible, Infeasible or None")
     objective = cursor.number(cursor.after(b"Objective ", "the objective"))
+    bound = _optional(cursor, b"Objective_bound ")
+    _optional(cursor, b"MIP_rel_gap ")
     sparse, names, values = _columns(cursor)
     status = _status(words, feasible=primal == b"Feasible")
-    return RawSolution(status, one_line(words), objective, names, values, sparse, _rows(cursor))
+    rows = _rows(cursor)
+    return RawSolution(status, one_line(words), objective, names, values, sparse, rows, bound=bound)
 
 
 def _other_style(head: bytes) -> str | None:
@@ -84,6 +89,14 @@ def _words(cursor: Cursor) -> bytes:
     _expect(cursor, b"")
     _expect(cursor, b"# Primal solution values")
     return words
+
+
+def _optional(cursor: Cursor, head: bytes) -> float | None:
+    """The number on the next line, if that line begins with a head and the number is finite."""
+    if not cursor.data.startswith(head, cursor.position):
+        return None
+    value = cursor.number(cursor.after(head, "a number"))
+    return value if np.isfinite(value) else None
 
 
 def _expect(cursor: Cursor, expected: bytes) -> None:
@@ -113,7 +126,8 @@ def _columns(cursor: Cursor) -> tuple[bool, Bytes, Floats]:
     if found is None:
         raise cursor.fault(f"{shown(line)} is not the number of columns")
     count = int(found[2])
-    sparse = bool(found[1]) or count == 0  # a sparse file of the point 0 has `# Columns 0`
+    # Before 1.16, a sparse file of the point 0 had `# Columns 0` too.
+    sparse = bool(found[1] or found[3]) or count == 0
     start, data = cursor.position, cursor.data
     rows = data.find(b"\n# Rows ", start - 1) + 1
     stop = len(data) if rows == 0 else rows

@@ -76,6 +76,8 @@ def named(**values):
         ("highs-1.15.1_time_with_point_style0", "highs", "limit-with-point", [0.5, 1.25, 0, 0, 1], 2),
         ("highs-1.15.1_time_with_point_style4", "highs", "limit-with-point", [0.5, 1.25, 1], None),
         ("highs-1.15.1_time_without_point_style0", "highs", "limit-without-point", [], None),
+        ("highs-1.16.0_optimal_style0", "highs", "optimal-global", [10, -9.7, 1, 1, 0], 2),
+        ("highs-1.16.0_optimal_style4", "highs", "optimal-global", [10, -9.7, 1, 1], None),
         ("scip-10.0_optimal", "ampl-text", "optimal-global", OPTIMUM, 2),
         ("scip-10.0_infeasible", "ampl-text", "infeasible", [], 3),
         ("scip-10.0_unbounded", "ampl-text", "unbounded", [0, -100000, 1, 0, 0], 1),
@@ -94,8 +96,15 @@ def test_files_of_real_solvers(file, reader, status, values, rows):
 
 
 def test_every_good_file_is_in_the_table_above_and_every_reader_is_used():
-    assert len(GOOD) == 17
+    assert len(GOOD) == 19
     assert {read_raw(path).reader for path in GOOD} == {"highs", "ampl-text", "ampl-binary"}
+
+
+def test_the_bound_of_highs_is_read_where_the_file_has_one():
+    bounds = [
+        read_raw(HERE / f"highs-{version}_optimal_style0.sol").bound for version in ("1.15.1", "1.16.0")
+    ]
+    assert bounds == [None, -14.4]
 
 
 def test_both_styles_of_highs_give_the_same_values_by_name():
