@@ -7,6 +7,7 @@ direction changes little from one to the next.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -19,7 +20,7 @@ from ..instance.angles import wrap
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, QUARTER
 from ..processes.deadline import Over, Stop, stop_function
-from .systems import factored, one_thread
+from .systems import Solve, factored, one_thread, preconditioned
 
 _Places = NDArray[np.intp]
 
@@ -30,6 +31,7 @@ HOLD: Final = 0.25  # factor of the stroke weights; from 0.3 on, 3 degrees of no
 _LEAST_HARMONIC: Final = 0.01  # smallest deviation from clean strokes
 _SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size
 _ROUNDS: Final = 20  # 2 to 6 are usual
+_RESIDUAL: Final = 0.1  # relative, of the systems after the first round
 _FALL: Final = 1e-4  # least share of the energy that a round has to remove before another one
 
 
@@ -50,10 +52,11 @@ def bend_field(
     are fixed. The start therefore determines the singularities. The method `bend` starts from the PolyVector
     field with the hardest hold.
 
-    Each round fixes the unit vectors and minimises over the angles: one sparse system. Rounds end when the
+    Each round fixes the unit vectors and minimises over the angles: one sparse system. The system of the
+    first round is factored. Its factors precondition conjugate gradients in later rounds. Rounds end when the
     energy hardly decreases, and after 20 rounds at the latest; a round that increases it is discarded. Labels
-    are then moved into the windows of the instance, as by `CrossField.from_lines`.
-    Deterministic unless `stop` ends it.
+    are then moved into the windows of the instance, as by `CrossField.from_lines`. Deterministic unless
+    `stop` ends it.
 
     Parameters
     ----------
@@ -61,7 +64,7 @@ def bend_field(
         The field to begin with.
     harmonic
         Weight of plain smoothness, above 0. None measures the tremble of the strokes in the field of
-        `HARMONIC` and takes that weight times (tremble / TREMBLE)^2, from 0.01 to 0.05.
+        `HARMONIC`, takes that weight times (tremble / TREMBLE)^2, from 0.01 to 0.05, and goes on from there.
     hold
         Factor of the stroke weights, above 0.
     stop
@@ -77,11 +80,17 @@ def bend_field(
     over = stop_function(stop)
     if over():
         return start
+    solver = _Solver()
+    x = np.concatenate([start.u_angle, start.v_angle])
+    x = _Bend.of(start, HARMONIC if harmonic is None else harmonic, hold).least(x, solver, over)
+    field = CrossField.from_lines(start.instance, *np.split(x, 2))
     if harmonic is not None:
-        return _bent(start, harmonic, hold, over)
-    smooth = _bent(start, HARMONIC, hold, over)
-    wanted = max(HARMONIC * (tremble(smooth) / TREMBLE) ** 2, _LEAST_HARMONIC)
-    return smooth if wanted >= HARMONIC or over() else _bent(start, wanted, hold, over)
+        return field
+    wanted = max(HARMONIC * (tremble(field) / TREMBLE) ** 2, _LEAST_HARMONIC)
+    if wanted >= HARMONIC or over():
+        return field
+    x = _Bend.of(start, wanted, hold).least(x, solver, over)
+    return CrossField.from_lines(start.instance, *np.split(x, 2))
 
 
 def tremble(field: CrossField) -> float:
@@ -90,18 +99,18 @@ def tremble(field: CrossField) -> float:
     return _SIGMA * float(np.median(deviation)) if len(deviation) else 0.0
 
 
-def _bent(start: CrossField, harmonic: float, hold: float, over: Over) -> CrossField:
-    bend = _Bend.of(start, harmonic, hold)
-    x = np.concatenate([start.u_angle, start.v_angle])
-    energy = bend.energy(x)
-    for _ in range(_ROUNDS):
-        moved = bend.round(x)
-        fallen = energy - bend.energy(moved)
-        if fallen > 0:
-            x, energy = moved, energy - fallen
-        if fallen <= _FALL * energy or over():
-            break
-    return CrossField.from_lines(start.instance, *np.split(x, 2))
+class _Solver:
+    """Solves similar systems: the first exactly, later ones to a residual, preconditioned by its factors."""
+
+    def __init__(self) -> None:
+        self._factors: Solve | None = None
+
+    def solve(self, matrix: Callable[[], Any], product: Solve, right: Floats) -> Floats:
+        """The solution of a positive semidefinite system. matrix: returns it. product: times a vector."""
+        if self._factors is None:
+            self._factors = factored(matrix())
+            return self._factors(right)
+        return preconditioned(product, right, self._factors, _RESIDUAL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,19 +144,39 @@ class _Bend:
         goal = [even * offset, squared * theta, np.full(every.shape[0], -skew * QUARTER)]
         return cls(difference, offset, *_quadrants(start), sparse.vstack(rows).tocsr(), np.concatenate(goal))
 
-    def energy(self, x: Floats) -> float:
-        """The energy at x, with the unit vectors of x."""
-        bend = self._along(x) @ (self.difference @ x - self.offset)
-        return float(np.sum(bend**2) + np.sum((self.rows @ x - self.goal) ** 2))
+    def least(self, x: Floats, solver: _Solver, over: Over) -> Floats:
+        """Angles of low energy, in rounds that begin at x."""
+        energy, slope, along = self.at(x)
+        for _ in range(_ROUNDS):
+            moved = x - self._step(along, slope, solver)
+            there = self.at(moved)
+            fallen = energy - there[0]
+            if fallen > 0:
+                x, (energy, slope, along) = moved, there
+            if fallen <= _FALL * energy or over():
+                break
+        return x
 
-    def round(self, x: Floats) -> Floats:
-        """The angles of least energy for the unit vectors of x."""
+    def at(self, x: Floats) -> tuple[float, Floats, Any]:
+        """The energy at x, half its slope for fixed unit vectors, and the matrix of these."""
         along = self._along(x)
-        bend = along @ self.difference
-        slope = bend.T @ (along @ (self.difference @ x - self.offset))
-        slope += self.rows.T @ (self.rows @ x - self.goal)
-        step: Floats = factored(bend.T @ bend + self.rows.T @ self.rows)(slope)
-        return x - step
+        bend, linear = along @ (self.difference @ x - self.offset), self.rows @ x - self.goal
+        slope = self.difference.T @ (along.T @ bend) + self.rows.T @ linear
+        return float(np.sum(bend**2) + np.sum(linear**2)), slope, along
+
+    def _step(self, along: Any, slope: Floats, solver: _Solver) -> Floats:
+        """Minus the step to the least energy for fixed unit vectors."""
+
+        def matrix() -> Any:
+            bend = along @ self.difference
+            return bend.T @ bend + self.rows.T @ self.rows
+
+        def product(v: Floats) -> Floats:
+            bend = self.difference.T @ (along.T @ (along @ (self.difference @ v)))
+            found: Floats = bend + self.rows.T @ (self.rows @ v)
+            return found
+
+        return solver.solve(matrix, product, slope)
 
     def _along(self, x: Floats) -> Any:
         """The matrix (q, 2m) from differences to derivatives along the other line; a quadrant counts 1/4."""

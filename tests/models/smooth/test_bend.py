@@ -145,10 +145,12 @@ def test_the_field_is_near_the_true_curvature_lines(surface, tmp_path):
 def test_fields_are_as_smooth_as_the_strokes_tremble():
     """Clean strokes get the least plain smoothness, those with 8 degrees of noise the most."""
     clean = cf.analytic("wave_sheet", 48).instance
-    for degrees, harmonic in ((0, 0.01), (8, HARMONIC)):
+    for degrees, harmonic, other in ((0, 0.01, HARMONIC), (8, HARMONIC, 0.01)):
         start = polyvector_field(noisy(clean, degrees, seed=1), hold=max(HOLDS))
         field = bend_field(start)
-        assert (field.alpha == bend_field(start, harmonic=harmonic).alpha).all()
+        near, far = (bend_field(start, harmonic=each).alpha for each in (harmonic, other))
+        assert np.abs(field.alpha - near).max() < 1e-4
+        assert np.abs(field.alpha - far).max() > 1e-3
     starts = [polyvector_field(noisy(clean, 3, seed), hold=max(HOLDS)) for seed in range(4)]
     found = [tremble(bend_field(start, harmonic=HARMONIC)) for start in starts]
     assert np.mean(found) == pytest.approx(TREMBLE, rel=0.15)
@@ -190,9 +192,7 @@ def test_rounds_end_when_the_time_is_over():
         calls.clear()
         found = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: over(rounds))
         assert len(calls) == rounds + 1
-        energies.append(
-            _Bend.of(start, HARMONIC, HOLD).energy(np.concatenate([found.u_angle, found.v_angle]))
-        )
+        energies.append(_Bend.of(start, HARMONIC, HOLD).at(np.concatenate([found.u_angle, found.v_angle]))[0])
     assert energies == sorted(energies, reverse=True)
     whole = bend_field(start)
     assert np.array_equal(bend_field(start, stop=lambda: False).alpha, whole.alpha)
