@@ -15,14 +15,16 @@ from xml.etree.ElementTree import ParseError
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from ...models.errors import InputError, naming
-from ...models.instance.grid import Floats
+from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.bitmap import Picture, read_picture
 from ...models.sketch.choice import Choice, view_in
+from ...models.sketch.cover import Frame, covering_curves
 from ...models.sketch.curves import Curves, are_straight, bounding_box, runs
-from ...models.sketch.read import DEFAULT_SIZE, bytes_of, curves_in
+from ...models.sketch.read import DEFAULT_SIZE, bytes_of, curves_in, segments_of
 from ...models.sketch.samples import SAMPLES, sample_svg
 
 Box = tuple[float, float, float, float]
@@ -32,20 +34,21 @@ INK: Final = {"black": "#4a4a4a", "red": "#c23b33"}
 _LEVELS: Final = 16  # of ink
 _LENGTH: Final = re.compile(r"(\d{1,9}(?:\.\d{1,12})?)(px|pt|pc|mm|cm|in|Q)?")
 _LOOKS_RED: Final = 0.5
+_INK: Final = 0.2  # of a pixel that belongs to a stroke
+_SAME: Final = 0.8  # least share of the stroke pixels of a field that lie on its drawing
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
     """Curves or ink, in the drawing's own coordinates, y down.
 
-    page: x, y, width, height, larger where strokes lie beyond it. box: left, top, right, bottom of the
-    strokes. curves: unbroken runs by colours of INK, each (k, 4, 2) cubics or (k, 2, 2) straight pieces.
-    size: width and height with the units that the drawing declares, as `210mm`. ink: uint8 [h, w], numbers of
-    colours in `ink_colours`; None for curves. scale: side of a pixel of the ink.
+    page: x, y, width, height, larger where strokes lie beyond it. curves: unbroken runs by colours of INK,
+    each (k, 4, 2) cubics or (k, 2, 2) straight pieces. size: width and height with the units that the drawing
+    declares, as `210mm`. ink: uint8 [h, w], numbers of colours in `ink_colours`; None for curves. scale: side
+    of a pixel of the ink.
     """
 
     page: Box
-    box: Box
     curves: dict[str, list[Floats]]
     size: tuple[str, str]
     ink: NDArray[np.uint8] | None = None
@@ -62,24 +65,43 @@ def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
     data = sample_svg(str(what)).encode() if sampled else bytes_of(path)
     with naming(path):
         curves = curves_in(data, ".svg" if sampled else path.suffix.lower(), Choice(view=view_in(on.source)))
-        drawing = _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves, data)
-        (left, top), size = on.origin, on.pixel_size
-        right, bottom = left + size * on.grid.width, top + size * on.grid.height
-        if (
-            left >= drawing.box[2]
-            or top >= drawing.box[3]
-            or right <= drawing.box[0]
-            or bottom <= drawing.box[1]
-        ):
+        frame = Frame(*on.origin, on.pixel_size, *on.mask.shape)
+        if curves is None:
+            picture = read_picture(data, DEFAULT_SIZE)
+            drawing, drawn = _of_ink(picture), _inked(picture, frame)
+        else:
+            drawing, drawn = _of_curves(curves, data), _covered(curves, frame)
+        near = ndimage.binary_dilation(drawn, np.ones((3, 3), dtype=bool))
+        share = near[tuple(on.stroke_pixels.T)].mean()
+        if share < _SAME:
             raise InputError(
-                f"the drawing lies elsewhere than the field of {on.name}, which is at x {left:g} to "
-                f"{right:g}, y {top:g} to {bottom:g}; give the drawing that its instance was read from"
+                f"the drawing lies elsewhere than the field of {on.name}: {share:.0%} of the stroke pixels "
+                "are on its strokes; give the drawing that its instance was read from, from the same side"
             )
     return drawing
 
 
+def _covered(curves: Curves, frame: Frame) -> Bools:
+    """The pixels of a grid that a curve touches, shape (h, w)."""
+    segments, curve, _ = segments_of(curves, frame)
+    _, row, column = covering_curves(segments, curve, frame, 0.0)
+    drawn = np.zeros(frame.shape, dtype=bool)
+    drawn[row, column] = True
+    return drawn
+
+
+def _inked(picture: Picture, frame: Frame) -> Bools:
+    """The pixels of a grid with ink, shape (h, w)."""
+    at = (np.argwhere(picture.ink > _INK)[:, ::-1] + 0.5) * picture.reduced
+    column, row = np.floor((at - (frame.x, frame.y)) / frame.pixel).astype(int).T
+    on = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
+    drawn = np.zeros(frame.shape, dtype=bool)
+    drawn[row[on], column[on]] = True
+    return drawn
+
+
 def _of_curves(curves: Curves, data: bytes) -> Drawing:
-    left, top, right, bottom = box = bounding_box(curves.points)
+    left, top, right, bottom = bounding_box(curves.points)
     x, y, width, height = curves.canvas or (0.0, 0.0, 0.0, 0.0)
     left, top = min(left, x), min(top, y)
     page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
@@ -87,7 +109,7 @@ def _of_curves(curves: Curves, data: bytes) -> Drawing:
     found: dict[str, list[Floats]] = {name: [] for name in INK}
     for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):
         found["red" if red else "black"].append(run[:, [0, 3]] if are_straight(run) else run)
-    return Drawing(page, box, found, _size(data, curves.canvas, page))
+    return Drawing(page, found, _size(data, curves.canvas, page))
 
 
 def size_in_units(page: Box) -> tuple[str, str]:
@@ -116,7 +138,7 @@ def _of_ink(picture: Picture) -> Drawing:
     level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
     ink = (level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)).astype(np.uint8)
     page = (0.0, 0.0, float(picture.width), float(picture.height))
-    return Drawing(page, picture.box, {}, size_in_units(page), ink, float(picture.reduced))
+    return Drawing(page, {}, size_in_units(page), ink, float(picture.reduced))
 
 
 def ink_colours() -> Any:

@@ -33,6 +33,7 @@ def compiling() -> Iterator[None]:
 def _compile_in(child: Child) -> None:
     with suppress(CrossfieldError):  # the child was ended, or fails again when a proof needs the functions
         child.call(compile_all)
+        child.call(compile_clusters)
 
 
 def compile_proofs(folder: Path, deadline: Deadline) -> None:
@@ -63,8 +64,22 @@ def is_compiled() -> bool:
     return all_compiled()
 
 
+def compile_clusters() -> None:
+    """Compile the functions that only proofs with clusters call."""
+    from ...models.processes.compiled import crew
+    from ...models.proof.lattice import Lattice
+    from ...models.proof.sweep import Dual
+    from ...models.search.greedy import greedy_field
+    from ...models.sketch.samples import sample
+
+    with crew(1) as hands:
+        dual = Dual(Lattice.whole(greedy_field(sample("mouse", 4)), 2), hands)
+        dual.add_clusters(1)
+        dual.ascend(1)
+
+
 def compile_all() -> None:
-    """Compile the functions of proofs by a proof of a few pixels."""
+    """Compile the functions that all proofs call, by a proof of a few pixels."""
     from ...models.processes.compiled import place
     from ...models.proof.prove import prove
     from ...models.sketch.samples import sample

@@ -26,15 +26,21 @@ _MADE: Final[list[Any]] = []
 
 def compiled(work: _Work) -> _Work:
     """The function compiled on its first call, and cached on disk where a folder is writable."""
+    made = compiled_if_needed(work)
+    _MADE.append(made)
+    return made
+
+
+def compiled_if_needed(work: _Work) -> _Work:
+    """As `compiled`, for a function that most work does without, and that nobody waits for in advance."""
     made: Any = numba.njit(error_model="numpy", nogil=True)(work)
     with suppress(RuntimeError):  # no folder is writable
         made.enable_caching()
-    _MADE.append(made)
     return cast("_Work", made)
 
 
 def all_compiled() -> bool:
-    """Whether every imported function is cached on disk where possible, so that it only has to be loaded."""
+    """Whether each function of `compiled` is cached on disk where possible: it then only has to be loaded."""
     return all(map(_is_kept, _MADE))
 
 

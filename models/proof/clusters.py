@@ -19,18 +19,18 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..instance.grid import Floats, Grid
-from ..processes.compiled import compiled
+from ..processes.compiled import compiled_if_needed
 from .lattice import Lattice, starts
-from .products import alpha_costs, beta_costs, min_plus, over_beta, share_of
+from .products import alpha_costs, beta_costs, lower_by_product, over_beta, share_of
 from .state import Clusters, Indices, State
 
-Rows = tuple[Indices, Indices, Indices, Indices]
-"""The alphas that have an allowed label, at the pixels a, b, c, d of a quad: its pairs are ab, bc, dc, ad."""
+IndexTable = NDArray[np.int64]  # of two axes
 
-_ENDS: Final = ((0, 1), (1, 2), (3, 2), (0, 3))
-"""The first and second pixel of each pair, among a, b, c, d."""
+_ENDS: Final = np.array([[0, 1], [1, 2], [3, 2], [0, 3]])
+"""The first and the second pixel of each pair of a quad, among its pixels a, b, c, d."""
 
 
 def clusters_on(lattice: Lattice, quads: Indices) -> Clusters:
@@ -87,125 +87,176 @@ def cluster_fronts(grid: Grid, clusters: Clusters) -> list[Indices]:
     return [np.flatnonzero(colour == each) for each in (0, 1)]
 
 
-@compiled
+# Tables are named by one number, 4 * cluster + column: Numba would compile a function once for each literal
+# column.
+
+
+@compiled_if_needed
 def update_clusters(numbers: Indices, state: State) -> None:
     """Update some clusters, one after the other; their least values are then 0."""
     for number in numbers:
         rows = _rows(number, state)
-        f = (
-            _reduced(number, 0, rows, state),
-            _reduced(number, 1, rows, state),
-            _reduced(number, 2, rows, state),
-            _reduced(number, 3, rows, state),
-        )
-        upper, lower = min_plus(f[0], f[1]), min_plus(f[3], f[2])
-        _store(number, 0, rows, 0.25 * min_plus(lower, f[1].T.copy()) - 0.75 * f[0], state)
-        _store(number, 1, rows, 0.25 * min_plus(f[0].T.copy(), lower) - 0.75 * f[1], state)
-        _store(number, 2, rows, 0.25 * min_plus(f[3].T.copy(), upper) - 0.75 * f[2], state)
-        _store(number, 3, rows, 0.25 * min_plus(upper, f[2].T.copy()) - 0.75 * f[3], state)
+        table = 4 * number
+        f0, f1 = _reduced(table, rows, state), _reduced(table + 1, rows, state)
+        f2, f3 = _reduced(table + 2, rows, state), _reduced(table + 3, rows, state)
+        upper, lower = _min_plus(f0, f1), _min_plus(f3, f2)
+        _store(table, rows, state, f0, _min_plus(lower, _turned(f1)))
+        _store(table + 1, rows, state, f1, _min_plus(_turned(f0), lower))
+        _store(table + 2, rows, state, f2, _min_plus(_turned(f3), upper))
+        _store(table + 3, rows, state, f3, _min_plus(upper, _turned(f2)))
 
 
-@compiled
+@compiled_if_needed
 def least_of_clusters(begin: int, end: int, state: State, least: Floats) -> None:
     """Fill in the least of - sum lambda of some clusters over the allowed alphas."""
     for number in range(begin, end):
         rows = _rows(number, state)
-        upper = min_plus(_negative(number, 0, rows, state), _negative(number, 1, rows, state))
-        lower = min_plus(_negative(number, 3, rows, state), _negative(number, 2, rows, state))
-        least[number] = (upper + lower).min()
+        table = 4 * number
+        upper = _min_plus(_negative(table, rows, state), _negative(table + 1, rows, state))
+        lower = _min_plus(_negative(table + 3, rows, state), _negative(table + 2, rows, state))
+        found = np.inf
+        for x in range(upper.shape[0]):
+            for z in range(upper.shape[1]):
+                found = min(found, upper[x, z] + lower[x, z])
+        least[number] = found
 
 
-@compiled
-def _rows(number: int, state: State) -> Rows:
-    quad = state.clusters.quads[number]
-    return (
-        _allowed(state.first[quad[0]], state),
-        _allowed(state.second[quad[0]], state),
-        _allowed(state.second[quad[1]], state),
-        _allowed(state.first[quad[2]], state),
-    )
+@compiled_if_needed
+def _rows(number: int, state: State) -> IndexTable:
+    """The number of alphas with an allowed label at the pixels a, b, c, d of a quad, then these alphas."""
+    bottom, top = state.clusters.quads[number, 0], state.clusters.quads[number, 2]
+    most = 0
+    for place in range(4):
+        pair = bottom if place < 2 else top
+        i = state.first[pair] if place in (0, 3) else state.second[pair]
+        most = max(most, state.alpha_count[i])
+    found = np.empty((4, most + 1), np.int64)
+    for place in range(4):
+        pair = bottom if place < 2 else top
+        i = state.first[pair] if place in (0, 3) else state.second[pair]
+        _fill_allowed(i, state, found[place])
+    return found
 
 
-@compiled
-def _allowed(i: int, state: State) -> Indices:
-    """The alphas of a pixel that have an allowed label."""
-    unary = state.unary[state.start[i] : state.start[i + 1]].reshape(
-        (state.alpha_count[i], state.beta_count[i])
-    )
-    found = np.empty(unary.shape[0], np.int64)
-    count = 0
-    for row in range(unary.shape[0]):
-        if unary[row].min() < np.inf:
-            found[count] = row
-            count += 1
-    return found[:count]
+@compiled_if_needed
+def _fill_allowed(i: int, state: State, found: Indices) -> None:
+    """Fill in the number of alphas of a pixel that have an allowed label, and these alphas."""
+    columns, count = state.beta_count[i], 0
+    for row in range(state.alpha_count[i]):
+        for at in range(state.start[i] + row * columns, state.start[i] + (row + 1) * columns):
+            if state.unary[at] < np.inf:
+                count += 1
+                found[count] = row
+                break
+    found[0] = count
 
 
-@compiled
-def _reduced(number: int, column: int, rows: Rows, state: State) -> Floats:
-    """The least of a pair's cost - shares over betas and jumps, without this cluster's table; by alphas."""
-    pair = state.clusters.quads[number, column]
+@compiled_if_needed
+def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
+    """The least of a pair's cost - shares over betas and jumps, without this table; by allowed alphas."""
+    column = table % 4
+    pair = state.clusters.quads[table // 4, column]
     i, j = state.first[pair], state.second[pair]
-    mine, others = rows[_ENDS[column][0]], rows[_ENDS[column][1]]
+    mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     own, other = _given(pair, i, mine, state), _given(pair, j, others, state)
     in_alpha = np.empty((state.alpha_count[i], state.alpha_count[j]))
     in_beta = np.empty((other.shape[1], own.shape[1]))
-    half = np.empty((len(others), own.shape[1]))
-    best = np.full((len(mine), len(others)), np.inf)
+    half = np.empty((other.shape[0], own.shape[1]))
+    best = np.empty((own.shape[0], other.shape[0]))
+    best[:] = np.inf
+    least, most = _least(own) + _least(other), np.inf
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
         cheapest = alpha_costs(pair, i, state, odd, in_alpha)
         cheapest += beta_costs(state.beta[i], state.beta[j], state, odd, in_beta)
-        if cheapest + own.min() + other.min() >= best.max():
-            continue
-        over_beta(other, in_beta, half)
-        found = min_plus(own, half.T.copy())
-        for x in range(len(mine)):
-            for y in range(len(others)):
-                best[x, y] = min(best[x, y], found[x, y] + in_alpha[mine[x], others[y]])
-    if state.norm == 2:
-        best -= state.h * state.h
-    return best + _negative(number, column, rows, state)
+        if cheapest + least < most:
+            over_beta(other, in_beta, half)
+            most = _lower_to(best, _min_plus(own, _turned(half)), in_alpha, mine, others)
+    _add(best, _negative(table, rows, state), -state.h * state.h if state.norm == 2 else 0.0)
+    return best
 
 
-@compiled
+@compiled_if_needed
+def _least(matrix: Floats) -> float:
+    least = np.inf
+    for x in range(matrix.shape[0]):
+        for y in range(matrix.shape[1]):
+            least = min(least, matrix[x, y])
+    return least
+
+
+@compiled_if_needed
+def _lower_to(best: Floats, found: Floats, in_alpha: Floats, mine: Indices, others: Indices) -> float:
+    """Lower the sums to those of two tables, the second by all alphas; return the greatest that is left."""
+    most = -np.inf
+    for x in range(best.shape[0]):
+        for y in range(best.shape[1]):
+            best[x, y] = min(best[x, y], found[x, y] + in_alpha[mine[x + 1], others[y + 1]])
+            most = max(most, best[x, y])
+    return most
+
+
+@compiled_if_needed
+def _add(matrix: Floats, other: Floats, constant: float) -> None:
+    for x in range(matrix.shape[0]):
+        for y in range(matrix.shape[1]):
+            matrix[x, y] += other[x, y] + constant
+
+
+@compiled_if_needed
 def _given(pair: int, i: int, rows: Indices, state: State) -> Floats:
-    """Minus the shares of a pair at some alphas of its end i; inf at labels that are not allowed."""
+    """Minus the shares of a pair at the allowed alphas of its end i; inf at labels that are not allowed."""
     columns = state.beta_count[i]
     share, begin = share_of(pair, i, state), state.start[i]
-    given = np.empty((len(rows), columns))
-    for x in range(len(rows)):
+    given = np.empty((rows[0], columns))
+    for x in range(rows[0]):
         for y in range(columns):
-            at = rows[x] * columns + y
+            at = rows[x + 1] * columns + y
             given[x, y] = -share[at] if state.unary[begin + at] < np.inf else np.inf
     return given
 
 
-@compiled
-def _negative(number: int, column: int, rows: Rows, state: State) -> Floats:
+@compiled_if_needed
+def _negative(table: int, rows: IndexTable, state: State) -> Floats:
     """Minus a table of a cluster, at the allowed alphas."""
-    mine, others = rows[_ENDS[column][0]], rows[_ENDS[column][1]]
-    begin = state.clusters.start[4 * number + column]
-    wide = state.alpha_count[state.second[state.clusters.quads[number, column]]]
-    found = np.empty((len(mine), len(others)))
-    for x in range(len(mine)):
-        for y in range(len(others)):
-            found[x, y] = -state.clusters.tables[begin + mine[x] * wide + others[y]]
+    column = table % 4
+    mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
+    begin = state.clusters.start[table]
+    wide = state.alpha_count[state.second[state.clusters.quads[table // 4, column]]]
+    found = np.empty((mine[0], others[0]))
+    for x in range(mine[0]):
+        for y in range(others[0]):
+            found[x, y] = -state.clusters.tables[begin + mine[x + 1] * wide + others[y + 1]]
     return found
 
 
-@compiled
-def _store(
-    number: int,
-    column: int,
-    rows: Rows,
-    values: Floats,
-    state: State,
-) -> None:
-    """Set a table of a cluster at the allowed alphas."""
-    mine, others = rows[_ENDS[column][0]], rows[_ENDS[column][1]]
-    begin = state.clusters.start[4 * number + column]
-    wide = state.alpha_count[state.second[state.clusters.quads[number, column]]]
-    for x in range(len(mine)):
-        for y in range(len(others)):
-            state.clusters.tables[begin + mine[x] * wide + others[y]] = values[x, y]
+@compiled_if_needed
+def _store(table: int, rows: IndexTable, state: State, f: Floats, rest: Floats) -> None:
+    """Set a table to a quarter of the least of all four f, f + rest, less its own f, at allowed alphas."""
+    column = table % 4
+    mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
+    begin = state.clusters.start[table]
+    wide = state.alpha_count[state.second[state.clusters.quads[table // 4, column]]]
+    for x in range(f.shape[0]):
+        for y in range(f.shape[1]):
+            value = 0.25 * (f[x, y] + rest[x, y]) - f[x, y]
+            state.clusters.tables[begin + mine[x + 1] * wide + others[y + 1]] = value
+
+
+@compiled_if_needed
+def _min_plus(left: Floats, right: Floats) -> Floats:
+    """The (min,+) product of two matrices."""
+    out = np.empty((left.shape[0], right.shape[1]))
+    out[:] = np.inf
+    lower_by_product(left, right, out)
+    return out
+
+
+@compiled_if_needed
+def _turned(matrix: Floats) -> Floats:
+    """The transposed matrix, as rows one after the other."""
+    found = np.empty((matrix.shape[1], matrix.shape[0]))
+    for x in range(matrix.shape[0]):
+        for y in range(matrix.shape[1]):
+            found[y, x] = matrix[x, y]
+    return found

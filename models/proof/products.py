@@ -113,7 +113,7 @@ def product(pair: int, i: int, state: State, out: Floats) -> None:
         cheapest += beta_costs(state.beta[i], state.beta[j], state, odd, in_beta)
         if cheapest + least < reached:
             over_beta(given, in_beta, half)
-            _lower_by_product(in_alpha, half, found)
+            lower_by_product(in_alpha, half, found)
             reached = found.max()
     if state.norm == 2:
         out -= state.h * state.h
@@ -198,15 +198,7 @@ def over_beta(given: Floats, cost: Floats, half: Floats) -> None:
 
 
 @compiled
-def min_plus(left: Floats, right: Floats) -> Floats:
-    """The (min,+) product of two matrices."""
-    out = np.full((left.shape[0], right.shape[1]), np.inf)
-    _lower_by_product(left, right, out)
-    return out
-
-
-@compiled
-def _lower_by_product(left: Floats, right: Floats, out: Floats) -> None:
+def lower_by_product(left: Floats, right: Floats, out: Floats) -> None:
     """Lower `out` to the (min,+) product of two matrices, without terms that cannot lower it."""
     least, sums = np.empty(right.shape[0]), np.empty(right.shape[0])
     for y in range(right.shape[0]):

@@ -112,10 +112,12 @@ class Dual:
     def _take_clusters(self) -> None:
         self._before = []
         self._cluster_fronts = cluster_fronts(self.lattice.instance.grid, self.state.clusters)
-        self._of_clusters = self._minima(least_of_clusters, len(self.state.clusters.quads))
+        self._of_clusters = self._least_of_clusters()
 
     def update_clusters(self, way: int = 1) -> None:
         """Update all clusters; way: -1 for the reverse order."""
+        if not len(self._of_clusters):
+            return
         self._of_clusters[:] = 0.0
         for front in self._cluster_fronts[::way]:
             parts = [front[part] for part in self.crew.equal_parts(len(front))]
@@ -154,9 +156,13 @@ class Dual:
         """The bound that any shares prove, as `LevelRecord` defines it."""
         pixels = self._minima(_pixel_minima, self.lattice.instance.grid.size)
         pairs = self._minima(_pair_minima, len(self.state.first))
-        clusters = self._minima(least_of_clusters, len(self.state.clusters.quads))
+        clusters = self._least_of_clusters()
         error = _ROUNDING * (len(pixels) + len(pairs) + len(clusters)) * self._largest()
         return math.fsum([*pixels, *pairs, *clusters, -error])
+
+    def _least_of_clusters(self) -> Floats:
+        count = len(self.state.clusters.quads)
+        return self._minima(least_of_clusters, count) if count else np.zeros(0)
 
     def _minima(self, work: Callable[[int, int, State, Floats], None], many: int) -> Floats:
         found = np.zeros(many)
