@@ -4,10 +4,10 @@
                           [--work FOLDER]
 
 With --measure, parts are measured first, and their rows in docs/proofs.json replaced: `samples` (size 24),
-`fine` (size 48), `sketches` (drawings of a folder, size 24), `optima` (small instances, compared with other
-solvers), `solvers` (MIP solvers, cold and tightened), `settings` (of MIP solvers) and `pictures`. --names
-selects from a part, --seconds replaces its time limit. With --work, fields and certificates stay in that
-folder.
+`paper` (two of them under the weights of the paper), `middle` (two at size 32), `fine` (size 48), `large` (size
+128), `sketches` (drawings of a folder, size 24), `optima` (small instances, compared with other solvers),
+`solvers` (MIP solvers, cold and tightened) and `pictures`. --names selects from a part, --seconds replaces its
+time limit. With --work, fields and certificates stay in that folder.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -42,18 +42,24 @@ DOCS: Final = Path(__file__).resolve().parent
 KEPT: Final = DOCS / "proofs.json"
 TEMPLATE: Final = DOCS / "proofs.template"
 SIZE: Final = 24
+MIDDLE: Final = 32
 FINE: Final = 48
+LARGE: Final = 128
 AGREE: Final = 1e-6
 """Difference of equal optima, relative to 1 or the optimum if that is more."""
 WITHIN: Final = 1e-5
 """Greatest error of a solver within its tolerances."""
 PICTURED: Final = "mouse"
+HARDEST: Final = ("mouse", "singular")
+"""Samples of other sizes and weights."""
 MIP_SAMPLES: Final = ("bottle", "cylinder_bend", "mouse", "saddle", "singular")
 SECONDS: Final = {
-    "samples": 120.0, "fine": 600.0, "sketches": 120.0, "optima": 60.0, "solvers": 60.0, "pictures": 120.0,
+    "samples": 60.0, "paper": 60.0, "sketches": 60.0, "middle": 180.0, "fine": 300.0, "large": 1800.0,
+    "optima": 60.0, "solvers": 60.0, "pictures": 120.0,
 }  # fmt: skip
 Facts = dict[str, Any]
 Kept = dict[str, dict[str, Facts]]
+Measurement = Callable[["Request"], Iterator[tuple[str, Facts]]]
 
 
 @dataclass(frozen=True)
@@ -70,15 +76,17 @@ class Request:
         return not self.names or name in self.names
 
 
-def proven(sketch: Sketch, size: int, request: Request) -> Facts:
+def proven(sketch: Sketch, size: int, request: Request, weights: Sequence[str] = ()) -> Facts:
     """Result of `crossfield prove` for a sketch, size of its certificate, and seconds of its check."""
-    folder = request.work / f"{sketch.name}_{size}_proof"
+    folder = request.work / f"{sketch.name}_{size}{'_paper' if weights else ''}_proof"
     command = [
-        *("prove", *sketch.arguments, "--size", str(size), *sketch.weights(size)),
+        *("prove", *sketch.arguments, "--size", str(size), *weights),
         *("--time-limit", str(request.seconds)),
         *("--json", "-o", str(folder)),
     ]
+    begin = time.perf_counter()
     facts = answered(command, folder, sketch.name)
+    whole = time.perf_counter() - begin
     (certificate,) = folder.glob("*.certificate.npz")
     begin = time.perf_counter()
     check = [sys.executable, str(check_certificate.__file__), str(certificate)]
@@ -91,17 +99,25 @@ def proven(sketch: Sketch, size: int, request: Request) -> Facts:
         "bytes": certificate.stat().st_size,
         "check": time.perf_counter() - begin,
         "limit": request.seconds,
+        "whole": whole,
     }
 
 
-def samples(request: Request) -> Iterator[tuple[str, Facts]]:
-    """The samples at size 24."""
-    return ((name, proven(Sketch(name, name), SIZE, request)) for name in SAMPLES if request.wants(name))
+def samples_at(size: int, names: Iterable[str] = tuple(SAMPLES)) -> Measurement:
+    """The measurement of some samples at a size, under the default weights."""
+
+    def rows(request: Request) -> Iterator[tuple[str, Facts]]:
+        return ((name, proven(Sketch(name, name), size, request)) for name in names if request.wants(name))
+
+    return rows
 
 
-def fine(request: Request) -> Iterator[tuple[str, Facts]]:
-    """The samples at size 48."""
-    return ((name, proven(Sketch(name, name), FINE, request)) for name in SAMPLES if request.wants(name))
+def paper(request: Request) -> Iterator[tuple[str, Facts]]:
+    """The hardest samples at size 24 under the coefficients of the paper, 1 and 1e-6."""
+    for name in HARDEST:
+        if request.wants(name):
+            sketch = Sketch(name, name)
+            yield name, proven(sketch, SIZE, request, sketch.weights(SIZE))
 
 
 def drawings(request: Request) -> Iterator[tuple[str, Facts]]:
@@ -143,9 +159,12 @@ def pictures(request: Request) -> Iterator[tuple[str, Facts]]:
     yield PICTURED, {"levels": len(proof.levels), "status": proof.status, "pixels": pixels}
 
 
-PARTS: Final[dict[str, Callable[[Request], Iterator[tuple[str, Facts]]]]] = {
-    "samples": samples,
-    "fine": fine,
+PARTS: Final[dict[str, Measurement]] = {
+    "samples": samples_at(SIZE),
+    "paper": paper,
+    "middle": samples_at(MIDDLE, HARDEST),
+    "fine": samples_at(FINE),
+    "large": samples_at(LARGE),
     "sketches": drawings,
     "optima": optima,
     "solvers": solvers,

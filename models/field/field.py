@@ -15,7 +15,13 @@ from ..instance.instance import HALF, QUARTER, Instance, whole_numbers
 from ..previews import Pictured
 from .jumps import best_jumps, label_of, parity_sign, stepped
 
-Norm = Literal[1, 2]
+AbsoluteNorm = Literal[1, "mixed"]
+"""Norms in which pairs count with absolute values."""
+
+Norm = Literal[2, AbsoluteNorm]
+"""Squares throughout (2), absolute values throughout (1), or absolute values of the smoothness with squares
+of stroke and skew terms (mixed).
+"""
 
 DEGENERATE: Final = np.radians(2.5)  # lines closer than 5 degrees count as one: |beta| > pi/4 - DEGENERATE
 FAR: Final = np.radians(10)  # A stroke that deviates more than this from both lines counts as not followed
@@ -199,15 +205,17 @@ class CrossField(Pictured):
         return self.alpha[at] + self.beta[at] - self.instance.target
 
     def energy(self, norm: Norm = 2) -> Energy:
-        """The energy with squares (2) or absolute values (1) throughout, as three sums and their total.
+        """The energy in a norm, as three sums and their total.
 
-        The sums run over 2 (abs(A) + abs(B)) of each pair, w_strokes w abs(R) of each stroke pixel, and
-        w_beta abs(beta) of each pixel, or over all of these squared (docs/mathematics.md, 5).
+        The sums run over 2 (phi(A) + phi(B)) of each pair, w_strokes w phi(R) of each stroke pixel, and
+        w_beta phi(beta) of each pixel (docs/mathematics.md, 5). phi is the square (2), the absolute value
+        (1), or the absolute value at pairs and the square elsewhere (mixed).
         """
         instance = self.instance
+        of_pairs = np.square if norm == 2 else np.abs
         size = np.abs if norm == 1 else np.square
         return Energy(
-            smooth=2 * float(np.sum(size(self.residual_a)) + np.sum(size(self.residual_b))),
+            smooth=2 * float(np.sum(of_pairs(self.residual_a)) + np.sum(of_pairs(self.residual_b))),
             strokes=instance.stroke_coefficient * float(np.sum(instance.w * size(self.residual_r))),
             beta=instance.skew_coefficient * float(np.sum(size(self.beta))),
         )

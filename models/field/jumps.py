@@ -24,9 +24,13 @@ def label_of(u: Floats, v: Floats) -> tuple[Floats, Floats]:
     return (u + v) / 2 - QUARTER, (u - v) / 2 + QUARTER
 
 
-def best_jumps(instance: Instance, alpha: Floats, beta: Floats, norm: int = 2) -> Ints:
-    """The jump of least energy in [p_min, p_max] of each pair, (m,); ties go to the smaller jump."""
-    return _best(instance.grid, alpha, beta, (instance.p_min, instance.p_max), norm)[0]
+def best_jumps(instance: Instance, alpha: Floats, beta: Floats, *, absolute: bool = False) -> Ints:
+    """The jump of least energy in [p_min, p_max] of each pair, (m,); ties go to the smaller jump.
+
+    absolute: whether pairs count with absolute values instead of squares.
+    """
+    size = np.abs if absolute else np.square
+    return _best(instance.grid, alpha, beta, (instance.p_min, instance.p_max), size)[0]
 
 
 def free_jumps(grid: Grid, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
@@ -35,7 +39,11 @@ def free_jumps(grid: Grid, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
 
 
 def _best(
-    grid: Grid, alpha: Floats, beta: Floats, within: tuple[Ints, Ints] | None = None, norm: int = 2
+    grid: Grid,
+    alpha: Floats,
+    beta: Floats,
+    within: tuple[Ints, Ints] | None = None,
+    size: np.ufunc = np.square,
 ) -> tuple[Ints, Floats]:
     difference = alpha[grid.first] - alpha[grid.second]
     near = np.floor(-difference / HALF).astype(np.int32)
@@ -44,7 +52,6 @@ def _best(
     candidates = near + around if within is None else np.clip(np.clip(near, *within) + around, *within)
     a = difference + HALF * candidates
     b = parity_sign(candidates) * beta[grid.first] - beta[grid.second]
-    size = np.abs if norm == 1 else np.square
     cost = np.round(2 * (size(a) + size(b)), 12)  # rounding must not decide between equal costs
     at = (np.argmin(cost, axis=0), np.arange(len(difference)))
     return candidates[at], cost[at]

@@ -11,8 +11,8 @@ level, with the prefixes `level_0_`, `level_1_`, ...:
     scale       (m,)    of each pair's message
     wide        (m,)    whether its whole numbers are among steps_32 rather than steps_16
     steps_16, steps_32  the messages one after the other: what a pair gives to the labels of its earlier
-                        pixel, each number less the one before, which compresses well; sums are modulo 2^32
-
+                        pixel, each number less the one before, which compresses well; sums are modulo 2^32;
+                        in other norms than 2, steps_32 and steps_64, modulo 2^64
     quads       (q,)    clusters: the lower left pixels of their quads, ascending
     table_scale (4q,)   of each table
     table_steps         the tables of each cluster one after the other, as whole numbers of their scales, each
@@ -21,6 +21,11 @@ level, with the prefixes `level_0_`, `level_1_`, ...:
 The share of a pair's later pixel is not stored, because the best one follows from the earlier pixel's
 (models/proof/check_certificate.py, 3). So half of a level's shares are enough. They are whole numbers
 times a scale, and for any values of them the resulting bound is valid.
+
+In other norms than 2 there are also:
+
+    slopes      (n,)    of the stroke terms
+    multipliers (2m + 2n,)  of A, B, R and beta, which prove the least energy on the last boxes
 """
 
 from __future__ import annotations
@@ -35,7 +40,7 @@ import numpy as np
 
 from ..array_archive import Arrays, pack_arrays
 from ..errors import InputError, InstanceError, SolverError, naming
-from ..field.field import CrossField
+from ..field.field import CrossField, Norm
 from ..instance.file import arrays_of, of_arrays
 from ..instance.grid import Floats
 from ..instance.instance import Instance
@@ -50,6 +55,8 @@ from .record import Claim, LevelRecord, Proof, Status
 _PREFIX: Final = "instance_"
 _MOST_16: Final = 2**15 - 1
 _MOST_32: Final = 2**31 - 1
+_MOST_64: Final = 2**50  # more than any share has
+_KINDS: Final = {"steps_16": np.int16, "steps_32": np.int32, "steps_64": np.int64}
 _ADDITIONS: Final = 340_000.0  # of the checker, per unit of effort
 _LABELS: Final = 3_200.0  # compressed per unit of effort
 _SPARE_TIME: Final = 1.4  # factor for the rest of a check, and for a load that rises meanwhile
@@ -58,14 +65,14 @@ _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: ot
 
 @dataclass(frozen=True, eq=False)
 class Certificate(Claim):
-    """A checked claim: no field has a 2-norm energy below the bound.
+    """A checked claim: no field has an energy below the bound.
 
     Parameters
     ----------
     field
         The field. With status `optimal`, its energy is the minimum.
     energy
-        Its 2-norm energy.
+        Its energy in the norm.
     bound
         Proven lower bound of the energy of all fields.
     status
@@ -76,6 +83,11 @@ class Certificate(Claim):
     """
 
     verdict: Verdict
+
+    @property
+    def norm(self) -> Norm:
+        """The norm of the energy."""
+        return self.verdict.norm
 
     @property
     def forced(self) -> int:
@@ -91,7 +103,7 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
     Parameters
     ----------
     proof
-        A proof in the 2-norm.
+        The proof.
     path
         The file to write.
     stop
@@ -106,7 +118,7 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
     Raises
     ------
     InputError
-        For a proof that the checker refuses or that is in the 1-norm.
+        For a proof that the checker refuses.
     SolverError
         For a proof without levels, and when `stop` ends the check before the coarsest level is checked.
     OutputError
@@ -114,8 +126,6 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
 
     """
     path = Path(path)
-    if proof.norm != 2:
-        raise InputError("certificates are of the 2-norm; a proof in the 1-norm has none", file=path)
     if not proof.levels:
         raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
     arrays = _arrays(proof, "gap", 0.0)
@@ -204,6 +214,7 @@ def _arrays(proof: Proof, status: Status, bound: float) -> Arrays:
         "energy": proof.energy,
         "bound": bound,
         "levels": len(proof.levels),
+        "norm": proof.norm,
     }
     arrays: Arrays = {
         "head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8),
@@ -212,9 +223,24 @@ def _arrays(proof: Proof, status: Status, bound: float) -> Arrays:
         "p": field.p,
     }
     arrays |= {_PREFIX + name: array for name, array in arrays_of(field.instance).items()}
+    if proof.norm != 2:
+        arrays |= _slopes(proof)
     for number, level in enumerate(proof.levels):
         arrays |= {f"level_{number}_{name}": array for name, array in _of_level(level).items()}
     return arrays
+
+
+def _slopes(proof: Proof) -> Arrays:
+    """The slopes of strokes and the multipliers, by pairs and pixels; 0 for none."""
+    instance = proof.field.instance
+    n, m, s = instance.grid.size, len(proof.field.p), len(instance.theta)
+    slopes, multipliers = np.zeros(n), np.zeros(2 * m + 2 * n)
+    slopes[instance.stroke_index] = proof.levels[0].slopes
+    if (found := proof.multipliers) is not None:
+        multipliers[: 2 * m] = found[: 2 * m]
+        multipliers[2 * m + instance.stroke_index] = found[2 * m : 2 * m + s]
+        multipliers[2 * m + n :] = found[2 * m + s :]
+    return {"slopes": slopes, "multipliers": multipliers}
 
 
 def _of_level(level: LevelRecord) -> Arrays:
@@ -233,7 +259,7 @@ def _of_level(level: LevelRecord) -> Arrays:
 def _messages(level: LevelRecord) -> Arrays:
     """The messages from each pair to its earlier pixel, as whole numbers of its scale.
 
-    They are the level's own shares, unless too many of them fit into 32 bits.
+    They are the level's own shares, unless they take more bits than the certificate has.
     """
     grid = level.instance.grid
     early = np.minimum(grid.first, grid.second)
@@ -242,16 +268,18 @@ def _messages(level: LevelRecord) -> Arrays:
     flat = np.zeros(len(mine))
     flat[mine] = level.shares_first[np.repeat(is_first, level.count[grid.first])]
     flat[~mine] = level.shares_second[np.repeat(~is_first, level.count[grid.second])]
-    scale = np.maximum(level.quantum, _greatest(flat, begin) / _MOST_32)
+    few, many = (_MOST_16, _MOST_32) if level.norm == 2 else (_MOST_32, _MOST_64)
+    scale = np.maximum(level.quantum, _greatest(flat, begin) / many)
     whole = np.round(flat / np.repeat(scale, counts)).astype(np.int64)
     steps = _steps(whole, begin)
-    wide = _greatest(steps, begin) > _MOST_16
+    wide = _greatest(steps, begin) > few
     each = np.repeat(wide, counts)
+    narrow, broad = check_certificate.STEP_PARTS[level.norm]
     return {
         "scale": scale,
         "wide": wide,
-        "steps_16": steps[~each].astype(np.int16),
-        "steps_32": steps[each].astype(np.int32),  # modulo 2^32, because the checker adds them up so
+        narrow: steps[~each].astype(_KINDS[narrow]),
+        broad: steps[each].astype(_KINDS[broad]),  # modulo its range, because the checker adds them up so
     }
 
 

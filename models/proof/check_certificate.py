@@ -79,7 +79,34 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
    each piece, and G(y) >= G(x) + grad G(x) (y - x), whose least value over the y in a box is a sum of single
    terms.
 
-5. Rounding. Messages may be anything, so errors in them do no harm. What counts is how much an inequality
+5. Absolute values. In the norm 1 the terms of F are 2 (|A| + |B|), W |R| and w_beta |beta|. In the norm
+   "mixed" only those of pairs are; the others stay squares. The differences from 2 and 4 are these. There is
+   one lattice for all pixels: every alpha and beta of a label is a multiple of h, and so is pi/2. So A and B
+   of two labels are multiples of h at every jump, and |.| is linear between them: the expectation of
+
+       c = min over p of 2 (|A| + |B|)         w_beta |beta|    (mixed: w_beta (beta^2 - h^2/4))
+
+   is at most the term of F. A line's R takes the values x, x + h, x + 2 h, with the right mean r. For line u
+   and any slope l of the stroke (|l| <= 1 in the norm 1, |l| <= pi/2 and h <= pi/16 in the norm mixed) let
+
+       norm 1   d(R) = |R| where |R| >= 2 h,  else l R
+       mixed    d(R) = R^2 - h^2/2 where |R - l/2| >= 2 h,  else R^2 - (R - l/2)^2 = l R - l^2/4.
+
+   The mean of d is at most |r| or r^2. Where all three values are near, d is linear and nowhere above. In the
+   norm 1, if one is far, none has another sign, |.| is linear on them, and d <= |.|. In the norm mixed, if
+   one is far, the three values of (R - l/2)/h are y, y + 1, y + 2 with y >= 0, or the reverse. For y >= 1
+   each loses h^2/2 or more, which is at least the variance. For y < 1 they lose at least 0, h^2 and h^2/2, as with
+   s = 0 in 2. For line v, l = 0 in the norm 1, and all lose h^2/2 in the norm mixed. The least over lines and
+   turns is nowhere above any of them; as |l/2| + 2 h < pi/2, the nearest turn of a line has it.
+
+   Jumps: let g = min(|beta_i|, |beta_j|), negative where (-1)^p beta_i beta_j >= 0. With the other parity |B|
+   grows by -2 g, and one step further |A| is at least pi/2 - |A|. So p is a best jump where |A| <= pi/2 and
+   |A| + g <= pi/4. Strokes in the norm 1: at a = pi/4 + e and at -pi/4 - e, 0 <= e <= pi/4, the nearest line
+   is nearer than u by at most 2 e. The rest is linear: for any multiplier l, |r| >= l r if |l| <= 1, and
+   r^2 >= l r - l^2/4. The sum over all terms is linear in the angles, and its least value in the boxes is a sum of
+   single terms. The certificate holds the multipliers of A, B, R and beta. Boxes are not cut.
+
+6. Rounding. Messages may be anything, so errors in them do no harm. What counts is how much an inequality
    of 3. may fail at a pixel or a pair. That is below a small multiple (ROUNDING) of the machine's precision
    times the size of the numbers that enter; the sum over all of them is taken off every bound. Sums over
    pixels are made without rounding (math.fsum). Domains may fall short of what they should cover by SLIVER
@@ -118,14 +145,17 @@ MOST_LABELS = 1 << 28  # of a level
 MOST_ANGLE = 16.0
 MOST_JUMP = 64
 MOST_WEIGHT = 1e6
+MOST_WHOLE = 2.0**53  # of a message
 
 INSTANCE_PARTS = ("head", "origin", "mask", "stroke_pixels", "theta", "w")
 PARTS = ("head", "alpha", "beta", "p", *(f"instance_{part}" for part in INSTANCE_PARTS))
-LEVEL_PARTS = ("h", "alpha", "beta", "ranges", "allowed", "scale", "wide", "steps_16", "steps_32")
+LEVEL_PARTS = ("h", "alpha", "beta", "ranges", "allowed", "scale", "wide")
+STEP_PARTS = {2: ("steps_16", "steps_32"), 1: ("steps_32", "steps_64"), "mixed": ("steps_32", "steps_64")}
+ABSOLUTE_PARTS = ("slopes", "multipliers")  # unless the norm is 2
 CLUSTER_PARTS = ("quads", "table_scale", "table_steps")  # of a level, since version 2
 NAME = re.compile(rb"[a-z0-9_]+\.npy")
 HEAD = re.compile(
-    rb"\x93NUMPY\x01\x00\x76\x00\{'descr': '(\|[bu]1|<i[24]|<f8)', 'fortran_order': False, "
+    rb"\x93NUMPY\x01\x00\x76\x00\{'descr': '(\|[bu]1|<i[248]|<f8)', 'fortran_order': False, "
     rb"'shape': \(((?:[0-9]{1,10},)|(?:[0-9]{1,10}, [0-9]{1,10}))\), \} *\n"
 )  # of an array, as NumPy writes it: 128 bytes
 
@@ -150,12 +180,14 @@ class StoppedError(Exception):
 class Sketch:
     """The instance: pixels in order, pairs (upper or right neighbours), strokes, windows.
 
-    weight, target (n,): W and theta, 0 where there is no stroke. lower (n,): least alpha of the gauge. sharp
-    (n,): where the deduction of a stroke's line u depends on the label.
-    earlier, later: numbers of the pairs of each pixel to later, to earlier pixels.
+    norm: 1, 2 or "mixed". offset (n,): o. weight, target (n,): W and theta, 0 where there is no stroke. slope
+    (n,): l of 5. lower (n,): least alpha of the gauge. sharp (n,): where the deduction of a stroke's line u
+    depends on the label. earlier, later: numbers of the pairs of each pixel to later, to earlier pixels.
     """
 
-    black: Array
+    norm: Any
+    offset: Array
+    slope: Array
     sharp: Array
     first: Array
     second: Array
@@ -221,6 +253,7 @@ class Verdict:
     """
 
     status: str
+    norm: Any
     energy: float
     bound: float
     boxes: Array
@@ -339,8 +372,10 @@ def _array(name: str, packed: bytes, facts: list[int]) -> Array:
 def _need_names(arrays: dict[str, Array]) -> None:
     """Raise an error unless the arrays are exactly those of a certificate with that many levels."""
     head = head_of(arrays)
-    levels, parts = _levels(head), LEVEL_PARTS + (CLUSTER_PARTS if head["version"] > 1 else ())
-    names = set(PARTS) | {f"level_{number}_{part}" for number in range(levels) for part in parts}
+    norm = norm_of(head)
+    parts = LEVEL_PARTS + STEP_PARTS[norm] + (CLUSTER_PARTS if head["version"] > 1 else ())
+    levels, whole = _levels(head), PARTS + (() if norm == 2 else ABSOLUTE_PARTS)
+    names = set(whole) | {f"level_{number}_{part}" for number in range(levels) for part in parts}
     for name in sorted(names - set(arrays)):
         raise UnreadableError(f"has no array {name}")
     for name in sorted(set(arrays) - names):
@@ -354,6 +389,14 @@ def head_of(arrays: dict[str, Array]) -> dict[str, Any]:
     if head.get("format") != FORMAT or not known:
         raise UnreadableError(f"is no {FORMAT} of version {' or '.join(map(str, READABLE))}")
     return head
+
+
+def norm_of(head: dict[str, Any]) -> Any:
+    """The norm of the energy; version 1 has only the norm 2."""
+    norm = head.get("norm", 2 if head["version"] == 1 else None)
+    known = type(norm) in (int, str) and norm in STEP_PARTS and (norm == 2 or head["version"] > 1)
+    _require(known, "is of an unknown norm")
+    return norm
 
 
 def _text(arrays: dict[str, Array], name: str) -> dict[str, Any]:
@@ -432,9 +475,21 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
         later[min(i, j)].append(e)
         earlier[max(i, j)].append(e)
     w_beta = _number(head, "w_beta", 0.0, MOST_WEIGHT)
-    black = (rows + columns) % 2 == 0
-    sharp = black if head_of(arrays)["version"] == 1 else np.ones(n, bool)
-    return Sketch(black, sharp, first, second, weight, target, lower, w_beta, later, earlier)
+    claim = head_of(arrays)
+    norm, white = norm_of(claim), (rows + columns) % 2 == 1
+    offset = 0.5 * white if norm == 2 else np.zeros(n)
+    sharp = ~white if claim["version"] == 1 else np.ones(n, bool)
+    slope = _slopes(arrays, norm, n)
+    return Sketch(norm, offset, slope, sharp, first, second, weight, target, lower, w_beta, later, earlier)
+
+
+def _slopes(arrays: dict[str, Array], norm: Any, n: int) -> Array:
+    """The slope l of each pixel's stroke, shape (n,)."""
+    if norm == 2:
+        return np.zeros(n)
+    found = _given(arrays, "slopes", "<f8", n)
+    _need(np.abs(found) <= (1.0 if norm == 1 else HALF), "slopes", "is too steep")
+    return found
 
 
 def _strokes(
@@ -464,7 +519,7 @@ def _strokes(
 
 def field_of(arrays: dict[str, Array], sketch: Sketch) -> Field:
     """The angles alpha, beta (n,) and jumps p (m,) of the field, which must lie in the windows."""
-    n, m = len(sketch.black), len(sketch.first)
+    n, m = len(sketch.offset), len(sketch.first)
     alpha, beta = (_given(arrays, name, "<f8", n).astype(np.float64) for name in ("alpha", "beta"))
     p = _given(arrays, "p", "<i4", m).astype(np.int64)
     inside = (alpha >= sketch.lower - SLIVER) & (alpha <= sketch.lower + HALF + SLIVER)
@@ -485,17 +540,26 @@ def energy_of(sketch: Sketch, alpha: Array, beta: Array, p: Array) -> tuple[floa
     a = alpha[i] - alpha[j] + HALF * p
     b = sign(p) * beta[i] - beta[j]
     r = np.where(sketch.weight > 0, alpha + beta - sketch.target, 0.0)
-    total = math.fsum([*2 * a * a, *2 * b * b, *sketch.weight * r * r, *sketch.w_beta * beta * beta])
+    (size_a, of_a), (size_b, of_b) = (sized(each, sketch.norm == 2) for each in (a, b))
+    (size_r, of_r), (size_beta, _) = (sized(each, sketch.norm != 1) for each in (r, beta))
+    total = math.fsum([*2 * size_a, *2 * size_b, *sketch.weight * size_r, *sketch.w_beta * size_beta])
     size = np.abs(alpha[i]) + np.abs(alpha[j]) + HALF * np.abs(p) + 1
-    error = np.sum(8 * size * (np.abs(a) + np.abs(b))) + np.sum(sketch.weight * 16 * np.abs(r))
+    error = np.sum(4 * size * (of_a + of_b)) + np.sum(sketch.weight * 8 * of_r)
     return total, PRECISION * (float(error) + 8 * total)
+
+
+def sized(residual: Array, squared: bool) -> tuple[Array, Array]:
+    """The squares or absolute values of residuals, and the size of their slopes."""
+    if squared:
+        return residual * residual, 2 * np.abs(residual)
+    return np.abs(residual), np.ones_like(residual)
 
 
 def slack_of(sketch: Sketch, levels: int) -> float:
     """Greatest change of F when every angle moves by SLIVER at each level.
 
     At most four pairs with slopes of 4 |A| and 4 |B|, both at most pi / 2 at the best jumps, 2 W pi/2 and
-    2 w_beta pi/4.
+    2 w_beta pi/4. Those of absolute values are less.
     """
     slopes = 64.0 + 8.0 * sketch.weight + 4.0 * sketch.w_beta
     return 2 * (levels + 1) * SLIVER * float(np.sum(slopes))
@@ -506,13 +570,18 @@ def slack_of(sketch: Sketch, levels: int) -> float:
 
 def level_of(arrays: dict[str, Array], number: int, sketch: Sketch) -> Level:
     """Level `number` of the certificate."""
-    n = len(sketch.black)
+    n = len(sketch.offset)
     at = f"level_{number}_"
     h = float(_given(arrays, f"{at}h", "<f8", 1)[0])
     _need(1e-5 <= h <= QUARTER + SLIVER, f"{at}h", "is no spacing")
     alpha, beta = (_given(arrays, at + name, "<f8", n).astype(np.float64) for name in ("alpha", "beta"))
     _need(np.abs(alpha) <= MOST_ANGLE, f"{at}alpha", "is too large")
     _need(np.abs(beta) <= MOST_ANGLE, f"{at}beta", "is too large")
+    if sketch.norm != 2:
+        _need(h * round(HALF / h) == HALF, f"{at}h", "does not divide pi/2")
+        _need(sketch.norm == 1 or h <= HALF / 8, f"{at}h", "is too wide")
+        _need(alpha == h * np.round(alpha / h), f"{at}alpha", "is no multiple of the spacing")
+        _need(beta == 0, f"{at}beta", "is not 0")
     ranges = _given(arrays, f"{at}ranges", "<i4", n, 4).astype(np.int64)
     shapes = ranges[:, 1::2]
     _need(((shapes >= 2) & (shapes <= MOST_COUNT)).all(axis=1), f"{at}ranges", "has no cell, or too many")
@@ -557,11 +626,11 @@ def _clusters(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) 
     return found
 
 
-def _summed(steps: Array, counts: Array) -> Array:
-    """The whole numbers, modulo 2^32, of which blocks hold the first and then the differences."""
+def _summed(steps: Array, counts: Array, kind: Any = np.int32) -> Array:
+    """The whole numbers, modulo 2^32 or 2^64, of which blocks hold the first and then the differences."""
     total = np.cumsum(steps)
     before = np.repeat((total - steps)[np.cumsum(counts) - counts], counts)
-    return (total - before).astype(np.int32)
+    return (total - before).astype(kind)
 
 
 def _messages(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) -> list[Array]:
@@ -572,10 +641,13 @@ def _messages(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) 
     wide = _given(arrays, f"{at}wide", "|b1", len(counts))
     steps = np.zeros(int(counts.sum()), np.int64)
     each = np.repeat(wide, counts)
-    for chosen, name, kind in ((~each, f"{at}steps_16", "<i2"), (each, f"{at}steps_32", "<i4")):
-        steps[chosen] = _given(arrays, name, kind, int(chosen.sum()))
+    for chosen, name in zip((~each, each), STEP_PARTS[sketch.norm]):
+        kind = {"steps_16": "<i2", "steps_32": "<i4", "steps_64": "<i8"}[name]
+        steps[chosen] = _given(arrays, f"{at}{name}", kind, int(chosen.sum()))
     _need((scale >= 0) & (scale <= 1), f"{at}scale", "is not in [0, 1]")
-    return _cut(_summed(steps, counts) * np.repeat(scale, counts), receivers)
+    whole = _summed(steps, counts, np.int32 if sketch.norm == 2 else np.int64)
+    _need(np.abs(whole / MOST_WHOLE) <= 1, f"{at}steps", "lead too far")
+    return _cut(whole * np.repeat(scale, counts), receivers)
 
 
 def _cut(flat: Array, shapes: Array) -> list[Array]:
@@ -588,7 +660,7 @@ def _cut(flat: Array, shapes: Array) -> list[Array]:
 
 def positions(level: Level, sketch: Sketch, i: int) -> tuple[Array, Array]:
     """Alpha (a,) and beta (b,) of the labels of pixel i."""
-    o = 0.0 if sketch.black[i] else 0.5
+    o = sketch.offset[i]
     k, a, first, b = level.ranges[i].tolist()
     return (
         level.alpha[i] + level.h * (np.arange(k, k + a) + o),
@@ -600,7 +672,8 @@ def unary(level: Level, sketch: Sketch, i: int) -> tuple[Array, float]:
     """The cost D of each label of pixel i, inf for labels that are not allowed, and the size of its terms."""
     alpha, beta = positions(level, sketch, i)
     h, weight = level.h, float(sketch.weight[i])
-    cost = sketch.w_beta * (beta * beta - h * h / 4)[None, :] + np.zeros((len(alpha), 1))
+    skew = np.abs(beta) if sketch.norm == 1 else beta * beta - h * h / 4
+    cost = sketch.w_beta * skew[None, :] + np.zeros((len(alpha), 1))
     size = 2.0 + float(np.abs(alpha).max() + np.abs(beta).max())
     if weight > 0:
         cost = cost + weight * _misfit(level, sketch, i, alpha, beta)
@@ -608,19 +681,32 @@ def unary(level: Level, sketch: Sketch, i: int) -> tuple[Array, float]:
 
 
 def _misfit(level: Level, sketch: Sketch, i: int, alpha: Array, beta: Array) -> Array:
-    """The least over lines and turns of R^2 and its deduction, at each label of pixel i."""
+    """The least over lines and turns of R^2 and its deduction, or of d, at each label of pixel i."""
     theta, half = float(sketch.target[i]), level.h * level.h / 2
     own = round((float(level.alpha[i] + level.beta[i]) - theta) / math.pi)
     u = alpha[:, None] + beta[None, :] - theta
     v = alpha[:, None] + HALF - beta[None, :] - theta
+    if sketch.norm != 2:
+        u, v = (line - math.pi * np.round(line / math.pi) for line in (u, v))
+        return _near_slope(u, v, float(sketch.slope[i]), level.h, sketch.norm)
     turns = np.round(u / math.pi)
     nearest = np.abs(u - math.pi * turns)
     other = np.where(turns == own, math.pi - nearest, nearest)
     best = np.minimum(other, np.abs(v - math.pi * np.round(v / math.pi))) ** 2 - half
-    corner = level.ranges[i, 0] + level.ranges[i, 2] + (0 if sketch.black[i] else 1)
+    corner = level.ranges[i, 0] + level.ranges[i, 2] + int(2 * sketch.offset[i])
     steps = np.abs(corner + np.arange(len(alpha))[:, None] + np.arange(len(beta)))
     lost = np.where((steps <= 1) & sketch.sharp[i], 2 * half * steps, half)
     return np.minimum(best, (u - math.pi * own) ** 2 - lost)
+
+
+def _near_slope(u: Array, v: Array, slope: float, h: float, norm: Any) -> Array:
+    """The least of d for both lines, where rounding could put a value on either side the lesser one."""
+    near = 2 * h * (1 + 1e-12) + 1e-12
+    if norm == 1:
+        of_u = np.where(np.abs(u) < near, slope * u, np.abs(u))
+        return np.minimum(of_u, np.where(np.abs(v) < near, 0.0, np.abs(v)))
+    away = np.abs(u - slope / 2)
+    return np.minimum(u * u - np.where(away < near, away * away, h * h / 2), v * v - h * h / 2)
 
 
 def jumps(alpha_i: Array, alpha_j: Array) -> range:
@@ -643,13 +729,14 @@ class Pair:
         apart = alpha_i[:, None] - alpha_j[None, :]
         self.parts = []
         for parity in (0, 1):
-            a = [2 * (apart + HALF * p) ** 2 for p in span if p % 2 == parity]
-            b = 2 * ((1 - 2 * parity) * beta_i[:, None] - beta_j[None, :]) ** 2
+            squared = sketch.norm == 2
+            a = [2 * sized(apart + HALF * p, squared)[0] for p in span if p % 2 == parity]
+            b = 2 * sized((1 - 2 * parity) * beta_i[:, None] - beta_j[None, :], squared)[0]
             if a:
-                along = np.min(a, axis=0) - level.h * level.h + level.tables.get(e, 0.0)
+                along = np.min(a, axis=0) - squared * level.h * level.h + level.tables.get(e, 0.0)
                 self.parts.append((along, b) if i < j else (along.T, b.T))
         reach = [float(np.abs(each).max()) for each in (alpha_i, alpha_j, beta_i, beta_j)]
-        self.size = (sum(reach) + HALF * max(abs(p) for p in span)) ** 2
+        self.size = (1.0 + sum(reach) + HALF * max(abs(p) for p in span)) ** 2
         self.size += float(np.abs(level.tables.get(e, 0.0)).max())
         self._drop_idle()
 
@@ -690,7 +777,7 @@ class Pass:
 
     def __init__(self, level: Level, sketch: Sketch) -> None:
         self.level, self.sketch = level, sketch
-        self.costs = [unary(level, sketch, i) for i in range(len(sketch.black))]
+        self.costs = [unary(level, sketch, i) for i in range(len(sketch.offset))]
         self.before: list[Array] = [None] * len(level.messages)  # S
         self.after: list[Array] = [None] * len(level.messages)  # N
         self.errors: list[float] = []
@@ -832,8 +919,14 @@ def forced(sketch: Sketch, p: Array, boxes: Array) -> Array:
     i, j = boxes[sketch.first], boxes[sketch.second]
     a = np.maximum(np.abs(i[:, 0] - j[:, 1] + HALF * p), np.abs(i[:, 1] - j[:, 0] + HALF * p)) + 1e-12
     least = np.min([sign(p) * i[:, x] * j[:, y] for x in (2, 3) for y in (2, 3)], axis=0)
-    found: Array = (a <= HALF) & (math.pi * a - math.pi**2 / 4 <= 4 * least - 1e-12)
-    return found
+    if sketch.norm == 2:
+        found: Array = (a <= HALF) & (math.pi * a - math.pi**2 / 4 <= 4 * least - 1e-12)
+        return found
+    sizes = [np.abs(box[:, 2:]) for box in (i, j)]
+    nearest = [np.where(box[:, 2] * box[:, 3] > 0, size.min(axis=1), 0.0) for box, size in zip((i, j), sizes)]
+    smallest, largest = np.minimum(*nearest), np.minimum(*(size.max(axis=1) for size in sizes))
+    alike: Array = (a <= HALF) & (a + np.where(least >= 0, -smallest, largest) <= QUARTER)
+    return alike
 
 
 def beyond_windows(turned: Array, boxes: Array) -> Array:
@@ -965,8 +1058,41 @@ def relabelled(sketch: Sketch, field: Field, centres: Array) -> tuple[Field, Arr
     return (alpha, beta, p - steps[sketch.first] + steps[sketch.second]), turned
 
 
+def linear_bound(sketch: Sketch, p: Array, turned: Array, boxes: Array, multipliers: Array) -> float:
+    """A lower bound of F in the boxes by the multipliers of A and B (m,), R and beta (n,); see 5."""
+    i, j, n, m = sketch.first, sketch.second, len(turned), len(p)
+    of_a, of_b = np.clip(np.split(multipliers[: 2 * m], 2), -1.0, 1.0)
+    of_r, of_beta = np.split(multipliers[2 * m :], 2)
+    above, below = np.maximum(beyond_windows(turned, boxes), 0.0) * sketch.weight
+    if sketch.norm == 1:
+        of_r, of_beta = np.clip([of_r, of_beta], -1.0, 1.0)
+        lost, tilt = 2 * (above + below), np.zeros(n)
+    else:
+        lost = (sketch.weight * of_r * of_r + sketch.w_beta * of_beta * of_beta) / 4
+        lost += math.pi * (above + below)
+        tilt = 4 * (above - below)
+    along, upright = sketch.weight * of_r, sketch.w_beta * of_beta - tilt
+    slope = 2 * (np.bincount(i, of_a, n) - np.bincount(j, of_a, n)) + along
+    skew = 2 * (np.bincount(i, sign(p) * of_b, n) - np.bincount(j, of_b, n)) + along + upright
+    low, high = np.concatenate(boxes[:, ::2].T), np.concatenate(boxes[:, 1::2].T)
+    slopes = np.concatenate([slope, skew])
+    terms = [math.pi * of_a * p, -along * turned, -lost, np.minimum(slopes * low, slopes * high)]
+    # What may fail is below 16 roundings of every product that enters.
+    far = np.maximum(np.abs(low), np.abs(high))[:n]
+    size = np.sum(4 * np.abs(of_a) * (far[i] + far[j] + HALF * np.abs(p))) + 4.0 * m
+    size += np.sum(np.abs(along) * (far + 1 + np.abs(turned)) + np.abs(upright) + np.abs(lost))
+    return math.fsum(np.concatenate(terms)) - 16 * PRECISION * float(size)
+
+
 def lower_bound(
-    sketch: Sketch, field: Field, level: Level, boxes: Array, enough: float, *, over: Over
+    sketch: Sketch,
+    field: Field,
+    level: Level,
+    boxes: Array,
+    enough: float,
+    *,
+    multipliers: Array,
+    over: Over,
 ) -> tuple[float, Array]:
     """A lower bound of F in the boxes, -inf where a jump is not forced, and the pairs with forced jumps.
 
@@ -976,9 +1102,12 @@ def lower_bound(
     centres = np.stack([level.alpha, level.beta], axis=1)
     (alpha, beta, p), turned = relabelled(sketch, field, centres)
     held = forced(sketch, p, boxes)
-    far = (beyond_windows(turned, boxes) > HALF - 1e-9) & (sketch.weight > 0)
+    reach = QUARTER if sketch.norm == 1 else HALF
+    far = (beyond_windows(turned, boxes) > reach - 1e-9) & (sketch.weight > 0)
     if not held.all() or far.any():
         return -math.inf, held
+    if sketch.norm != 2:
+        return linear_bound(sketch, p, turned, boxes, multipliers), held
     waiting = [Piece(boxes, np.zeros(len(boxes)), -math.inf)]
     found = []
     for _ in range(MOST_PIECES):
@@ -1026,13 +1155,23 @@ def _check(arrays: dict[str, Array], over: Over) -> Verdict:
     bounds, boxes, level = _descend(arrays, sketch, count, energy + error + slack, over)
     bound = max(0.0, min(energy - error, max(bounds) - slack))
     enough = energy - error - OPTIMAL / 2 * max(1.0, energy)
-    convex, held = lower_bound(sketch, field, level, boxes, enough, over=over)
+    multipliers = _multipliers(arrays, sketch)
+    convex, held = lower_bound(sketch, field, level, boxes, enough, multipliers=multipliers, over=over)
     bound = max(bound, min(convex, energy - error))
     status = "optimal" if energy - bound <= OPTIMAL * max(1.0, energy) else "gap"
     centres = np.stack([level.alpha, level.beta], axis=1)
-    verdict = Verdict(status, energy, bound, boxes, centres, held, bounds)
+    verdict = Verdict(status, sketch.norm, energy, bound, boxes, centres, held, bounds)
     _compare(head, verdict, error)
     return verdict
+
+
+def _multipliers(arrays: dict[str, Array], sketch: Sketch) -> Array:
+    """The multipliers of A, B, R and beta, shape (2m + 2n,); none in the norm 2."""
+    if sketch.norm == 2:
+        return np.zeros(0)
+    found = _given(arrays, "multipliers", "<f8", 2 * (len(sketch.first) + len(sketch.offset)))
+    _need(np.abs(found) <= MOST_WEIGHT, "multipliers", "is too large")
+    return found
 
 
 def _descend(

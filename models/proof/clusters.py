@@ -172,7 +172,7 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
         if cheapest + least < most:
             over_beta(other, in_beta, half)
             most = _lower_to(best, _min_plus(own, _turned(half)), in_alpha, mine, others)
-    _add(best, _negative(table, rows, state), -state.h * state.h if state.norm == 2 else 0.0)
+    _add(best, _negative(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
     return best
 
 

@@ -12,7 +12,7 @@ there + the least of g (y - x) over y in the boxes.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -29,6 +29,18 @@ from .record import EXACT
 
 _MOST_PIECES: Final = 60
 _ROUNDING: Final = 1e-10  # deduction from a bound, relative to 1 + its value: float64 loses some 1e-12 in it
+
+
+class Least(NamedTuple):
+    """The least energy on the boxes: its field, and a bound.
+
+    multipliers: where pairs count with absolute values, the multipliers that prove it; see
+    models/search/absolute_fit.py.
+    """
+
+    field: CrossField
+    bound: float
+    multipliers: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +60,7 @@ class Forced:
         """Whether one convex quadratic bounds the energy on the boxes."""
         return bool(self.pairs.all() and self.strokes.all())
 
-    def least(self, energy: float, over: Over = never) -> tuple[CrossField, float]:
+    def least(self, energy: float, over: Over = never) -> Least:
         """The minimum of the lowest piece, and a bound of all; pieces with a bound of `energy` stay whole."""
         lines = np.zeros(len(self.strokes), dtype=np.int32)
         waiting = [(-np.inf, Piece(self.left, lines))]
@@ -63,7 +75,7 @@ class Forced:
             if not waiting or over():
                 break
         best = min(found, key=lambda pair: pair[0], default=(bound, field))
-        return best[1], min([best[0], *(bound for bound, _ in waiting)])
+        return Least(best[1], min([best[0], *(bound for bound, _ in waiting)]))
 
 
 @dataclass(frozen=True, eq=False)

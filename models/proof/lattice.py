@@ -6,20 +6,23 @@ checkerboard. So the differences of neighbours at that field lie in the middle b
 their labels, where a pair's discrete cost touches the true one. Rectangles of labels are stored one after
 the other, each pixel's alpha-major; `allowed` marks the labels that are left.
 
+Where pairs count with absolute values, the lattice is common to all pixels instead: every alpha and beta is a
+multiple of h, and pairs lose nothing.
+
 The discrete costs of the labels are in the mean at most the energy of the crosses that they represent.
-models/proof/check_certificate.py, 2, states and proves this.
+models/proof/check_certificate.py, 2 and 5, states and proves this.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..field.field import CrossField, Norm
+from ..field.field import AbsoluteNorm, CrossField, Norm
 from ..instance.angles import wrap
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import HALF, QUARTER, Instance
@@ -36,9 +39,11 @@ class Lattice:
     alpha_count, beta_first, beta_count (n,): the ranges k = first ... first + count - 1 and of l. allowed:
     bool, one for each label of each pixel's rectangle, alpha-major, pixels in the grid's order. A pixel's
     cross may be anywhere in a cell whose four vertices are all allowed.
+
+    norm: of the energy. slopes (s,): in other norms than 2, the slope of each stroke's term at the best known
+    angles: in [-1, 1] in the 1-norm, and in [-pi/2, pi/2] in the mixed norm.
     """
 
-    norm: ClassVar[Norm] = 2
     instance: Instance
     h: float
     alpha: Floats
@@ -49,6 +54,8 @@ class Lattice:
     beta_first: Ints
     beta_count: Ints
     allowed: Bools
+    norm: Norm = field(default=2, kw_only=True)
+    slopes: Floats = field(default_factory=lambda: np.zeros(0), kw_only=True)
 
     @classmethod
     def whole(cls, field: CrossField, steps: int) -> Lattice:
@@ -61,10 +68,21 @@ class Lattice:
         ranges = whole_ranges(field.instance, field.beta, h, offsets(field.instance.grid))
         return cls(field.instance, h, field.alpha, field.beta, field.p, **ranges)
 
+    @classmethod
+    def common(cls, field: CrossField, norm: AbsoluteNorm, slopes: Floats, steps: int) -> Lattice:
+        """As `whole`, common to all pixels: centres are the multiples of h nearest to alpha, and beta 0."""
+        h, beta = HALF / steps, np.zeros(field.instance.grid.size)
+        alpha = h * np.round(field.alpha * reached(field.instance) / h)
+        most = 1.0 if norm == 1 else HALF
+        ranges = whole_ranges(field.instance, beta, h, beta)
+        return cls(
+            field.instance, h, alpha, beta, field.p, **ranges, norm=norm, slopes=np.clip(slopes, -most, most)
+        )
+
     @cached_property
     def offset(self) -> Floats:
         """The offset o of each pixel in steps, 0 or 1/2; shape (n,)."""
-        return offsets(self.instance.grid)
+        return offsets(self.instance.grid) if self.norm == 2 else np.zeros(self.instance.grid.size)
 
     @cached_property
     def count(self) -> Ints:
@@ -117,20 +135,34 @@ class Lattice:
         return cost
 
     def _skew(self, beta: Floats) -> Floats:
-        return beta**2 - self.h * self.h / 4
+        return np.abs(beta) if self.norm == 1 else beta**2 - self.h * self.h / 4
 
     def _misfit(self, at: NDArray[np.int64], alpha: Floats, beta: Floats) -> Floats:
-        """The squared angle from the stroke to the nearer line, less its deduction, at some labels."""
-        pixel, square = self.pixel[at], self.h * self.h
-        k, l = (steps[at] for steps in self.steps)  # noqa: E741 - the letters of the equation
+        """The size of the angle from the stroke to the nearer line, less its deduction, at some labels."""
+        pixel, half = self.pixel[at], self.h * self.h / 2
         target = np.zeros(self.instance.grid.size)
         target[self.instance.stroke_index] = self.instance.target
-        own = wrap((self.alpha + self.beta - target)[pixel], -HALF, np.pi)
-        away = np.abs(k + l + 2 * self.offset[pixel])
-        lost = np.where((np.abs(own) < QUARTER) & (away <= 1), away, 0.5)
         u = wrap(alpha + beta - target[pixel], -HALF, np.pi)
         v = wrap(alpha + HALF - beta - target[pixel], -HALF, np.pi)
-        return np.minimum(u * u - lost * square, v * v - square / 2)
+        if self.norm == 2:
+            return np.minimum(u * u - self._lost(at, target), v * v - half)
+        slope = np.zeros(self.instance.grid.size)
+        slope[self.instance.stroke_index] = self.slopes
+        # A value that rounding could put on either side of 2 h takes the lesser cost, that of the near side.
+        near = 2 * self.h * (1 + 1e-12) + 1e-12
+        if self.norm == 1:
+            sizes = np.where(np.abs(u) < near, slope[pixel] * u, np.abs(u))
+            return np.minimum(sizes, np.where(np.abs(v) < near, 0.0, np.abs(v)))
+        away = np.abs(u - slope[pixel] / 2)
+        return np.minimum(u * u - np.where(away < near, away * away, half), v * v - half)
+
+    def _lost(self, at: NDArray[np.int64], target: Floats) -> Floats:
+        """The deduction of line u in the 2-norm, at some labels."""
+        pixel = self.pixel[at]
+        k, l = (steps[at] for steps in self.steps)  # noqa: E741 - the letters of the equation
+        own = wrap((self.alpha + self.beta - target)[pixel], -HALF, np.pi)
+        away = np.abs(k + l + 2 * self.offset[pixel])
+        return np.where((np.abs(own) < QUARTER) & (away <= 1), away, 0.5) * self.h * self.h
 
 
 def offsets(grid: Grid) -> Floats:
@@ -183,70 +215,3 @@ def strip(beta: Floats, h: float, offset: Floats) -> tuple[Ints, Ints]:
     """Least and greatest step l so that the cells round the centres cover [-pi/4, pi/4]; shapes (n,)."""
     lower, upper = (-QUARTER - beta) / h - offset, (QUARTER - beta) / h - offset
     return np.floor(lower).astype(np.int32), np.ceil(upper).astype(np.int32)
-
-
-@dataclass(frozen=True, eq=False)
-class CommonLattice(Lattice):
-    """The labels of one level in the 1-norm: a lattice common to all pixels, on which pairs lose nothing.
-
-    alpha and beta of every label are multiples of h, and h divides pi/4. So the differences A and B of two
-    labels are multiples of h too, at every jump. Round crosses by thresholds as in check_certificate.py, 2: A
-    and B each become one of two neighbouring multiples of h with the right mean. |.| is linear between them,
-    and so it is for beta. Hence
-
-        pair    c = min over p of 2 (|A| + |B|)        E[c] <= 2 (|a| + |b|)
-        skew    w_beta |beta|                          E[.] = w_beta |beta|
-
-    For strokes the line's misfit R = alpha + beta - theta is a sum of two that are rounded independently: it
-    becomes one of three values h apart, with the right mean. With any -1 <= l <= 1 let
-
-        stroke  w d(R),  d(R) = |R| where |R| >= 2h, else l R        E[.] <= w |r|
-
-    Either all three values are less than 2h in size. Then d is linear there, and its mean is l r <= |r|. Or
-    one of them is 2h or more in size: because they span 2h, none has another sign. Then |.| is linear on
-    them, d is nowhere more, and the mean of d is at most |r|. The same holds with R = alpha + pi/2 - beta -
-    theta for line v, with l = 0, and after any number of turns by pi. The least over lines and turns is
-    nowhere more than any of them.
-
-    So the local polytope of the discrete problem holds every field at no more than its 1-norm energy. At the
-    best angles for some jumps there is no loss if l is the multiplier of the stroke in the linear program for
-    them (models/search/box_lp.py): l R supports |R| at r, and the pairs hold it in balance.
-
-    slopes (s,): l of each stroke, in [-1, 1]. The centres of beta are 0.
-    """
-
-    norm: ClassVar[Norm] = 1
-    slopes: Floats
-
-    @classmethod
-    def near(cls, field: CrossField, slopes: Floats, steps: int) -> CommonLattice:
-        """The lattice of spacing pi / (2 steps) with every cross of the strip in a cell.
-
-        steps: an even number. alpha covers pi/2 round the multiple of h nearest to the field's alpha.
-        """
-        h, beta = HALF / steps, np.zeros(field.instance.grid.size)
-        alpha = h * np.round(field.alpha * reached(field.instance) / h)
-        ranges = whole_ranges(field.instance, beta, h, beta)
-        return cls(field.instance, h, alpha, beta, field.p, slopes=slopes, **ranges)
-
-    @cached_property
-    def offset(self) -> Floats:
-        """0 at every pixel, shape (n,)."""
-        return np.zeros(self.instance.grid.size)
-
-    def _skew(self, beta: Floats) -> Floats:
-        return np.abs(beta)
-
-    def _misfit(self, at: NDArray[np.int64], alpha: Floats, beta: Floats) -> Floats:
-        target, slope = np.zeros((2, self.instance.grid.size))
-        target[self.instance.stroke_index] = self.instance.target
-        slope[self.instance.stroke_index] = self.slopes
-        pixel = self.pixel[at]
-        u = self._away(alpha + beta - target[pixel], slope[pixel])
-        v = self._away(alpha + HALF - beta - target[pixel], np.zeros(len(at)))
-        return np.minimum(u, v)
-
-    def _away(self, r: Floats, slope: Floats) -> Floats:
-        """The cost d(R) of a line, slightly reduced where rounding could increase it."""
-        r = wrap(r, -HALF, np.pi)
-        return np.where(np.abs(r) >= 2 * self.h * (1 + 1e-12) + 1e-12, np.abs(r), slope * r)

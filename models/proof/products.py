@@ -115,14 +115,14 @@ def product(pair: int, i: int, state: State, out: Floats) -> None:
             over_beta(given, in_beta, half)
             lower_by_product(in_alpha, half, found)
             reached = found.max()
-    if state.norm == 2:
+    if state.power == 2:
         out -= state.h * state.h
 
 
 @compiled
-def sized(residual: float, norm: int) -> float:
+def sized(residual: float, power: int) -> float:
     """The square or the absolute value of a residual."""
-    return residual * residual if norm == 2 else abs(residual)
+    return residual * residual if power == 2 else abs(residual)
 
 
 @compiled
@@ -139,7 +139,7 @@ def alpha_costs(pair: int, i: int, state: State, odd: bool, cost: Floats) -> flo
         for y in range(cost.shape[1]):
             away = a + state.h * (x - y)
             away -= _PI * np.round(away / _PI)
-            cost[x, y] = 2 * sized(away, state.norm)
+            cost[x, y] = 2 * sized(away, state.power)
     for place in range(2):
         number = state.clusters.of_pair[pair, place]
         if number >= 0:
@@ -172,7 +172,7 @@ def beta_costs(x_first: float, y_first: float, state: State, odd: bool, cost: Fl
             other = -other
         for x in range(cost.shape[1]):
             away = x_first + state.h * x - other
-            cost[y, x] = 2 * sized(away, state.norm)
+            cost[y, x] = 2 * sized(away, state.power)
             least = min(least, cost[y, x])
     return least
 

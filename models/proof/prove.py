@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from typing import Final
 
 from ..errors import InputError
 from ..field.field import CrossField, Norm, relabelled
@@ -14,9 +15,12 @@ from ..processes.groups import interruptible
 from ..processes.limits import Limits
 from ..processes.side_by_side import checked
 from ..smooth.systems import one_thread
-from .prove_1norm import WorkIn1Norm
+from .prove_absolute import WorkIn1Norm, WorkInMixedNorm
 from .record import Proof
 from .work import Work, WorkLimits
+
+KINDS: Final[dict[Norm, type[Work]]] = {1: WorkIn1Norm, 2: Work, "mixed": WorkInMixedNorm}
+"""The work of a proof, by norm."""
 
 
 @one_thread()
@@ -45,8 +49,8 @@ def prove(
     instance
         The instance.
     norm
-        2, or 1 for the 1-norm energy, which `milp-mccormick` minimises. Proofs in the 1-norm have no
-        certificates.
+        2; 1 for absolute values, which `milp-mccormick` minimises; or `mixed` for absolute values of the
+        smoothness and squares of stroke and skew terms, which `miqp-mccormick` minimises.
     start
         A field to begin with where, improved, it is lower than the first field.
     limits
@@ -80,8 +84,8 @@ def prove(
         For a start on another instance.
 
     """
-    if norm not in (1, 2):
-        raise InputError(f"a proof is in the 1-norm or the 2-norm, not in norm {norm}")
+    if norm not in KINDS:
+        raise InputError(f"a proof is in the norm 1, 2 or 'mixed', not in {norm!r}")
     if start is not None:
         start.check_instance(instance)
         start = relabelled(instance.with_gauge("strokes"), start.alpha, start.beta, start.p)
@@ -95,10 +99,10 @@ def prove(
             given.deadline(),
             lambda: interrupted() or asked(),
             given.gap,
-            certified and norm == 2,
+            certified,
             work or math.inf,
         )
-        kind = Work if norm == 2 else WorkIn1Norm
+        kind = KINDS[norm]
         proving = kind(instance, kind.first(instance, start, own.over), own, hands, (seed, jobs), progress)
         ended = proving.run()
         return proving.proof(time.monotonic() - began, ended)

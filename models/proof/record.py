@@ -39,10 +39,10 @@ class LevelRecord(Lattice):
 
     shares_first, shares_second: flat over pairs in the grid's order, alpha-major: the shares of a pair at the
     labels of its first and of its second pixel; 0 at labels that are not allowed. Whole multiples of
-    `quantum`, a power of two, below 2^31 of them (2^49 in the 1-norm). clusters: the tables of quads, also in
-    whole multiples of `quantum`. bound: sum over pixels of min (D + shares) + sum over pairs of min (c +
-    tables - shares) + sum over clusters of min (- tables), over allowed labels, minus a bound of its rounding
-    error.
+    `quantum`, a power of two, below 2^31 of them (2^49 unless the norm is 2). clusters: the tables of quads,
+    also in whole multiples of `quantum`. bound: sum over pixels of min (D + shares) + sum over pairs of min
+    (c + tables - shares) + sum over clusters of min (- tables), over allowed labels, minus a bound of its
+    rounding error.
     energy: U when the level was pruned; fields outside the next level have more (models/proof/pruning.py).
     """
 
@@ -94,7 +94,10 @@ class Proof(Claim):
         `optimal`, `gap` (the requested one), `time`, `work`, `interrupted`, or `labels` if the next level
         would be too large.
     norm
-        1 or 2.
+        1, 2 or `mixed`.
+    multipliers
+        Where pairs count with absolute values and all jumps are forced: the multipliers that prove the least
+        energy on the last boxes, shape (2m + s + n,). See models/search/absolute_fit.py.
 
     """
 
@@ -103,3 +106,4 @@ class Proof(Claim):
     seconds: float
     ended: str
     norm: Norm = 2
+    multipliers: Floats | None = None

@@ -109,6 +109,6 @@ def _add_distance(i: int, state: State, alpha: float, beta: float, cost: Floats)
         odd -= _PI * np.round(odd / _PI)
         for column in range(columns):
             mine = state.beta[i] + state.h * column
-            same = sized(even, state.norm) + sized(mine - beta, state.norm)
-            other = sized(odd, state.norm) + sized(mine + beta, state.norm)
+            same = sized(even, state.power) + sized(mine - beta, state.power)
+            other = sized(odd, state.power) + sized(mine + beta, state.power)
             cost[row * columns + column] += 2 * min(same, other)

@@ -45,5 +45,5 @@ class State(NamedTuple):
     shares_second: Floats
     theta: Floats  # as the last pass found it at each pixel
     least: Floats  # of each pixel's theta
-    norm: int  # 1 or 2
+    power: int  # of the residuals of pairs: 1 or 2
     clusters: Clusters

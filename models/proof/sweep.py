@@ -210,7 +210,7 @@ def _state(lattice: Lattice, shares: tuple[Floats, Floats] | None, clusters: Clu
         second,
         unary.copy(),
         np.zeros(grid.size),
-        lattice.norm,
+        2 if lattice.norm == 2 else 1,
         clusters_on(lattice, np.zeros(0, np.int64)) if clusters is None else clusters,
     )
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from ..field.field import CrossField, Norm, relabelled
 from ..field.jumps import free_jumps
+from ..instance.grid import Floats
 from ..instance.instance import Instance
 from ..processes.compiled import Crew
 from ..processes.deadline import Deadline, Over, Progress, never
@@ -113,6 +114,7 @@ class _Chain:
     levels: list[LevelRecord] = field(default_factory=list)
     bound: float = 0.0
     forced: int = 0
+    multipliers: Floats | None = None
 
     @property
     def effort(self) -> float:
@@ -159,7 +161,7 @@ class Work:
         status: Status = "optimal" if self._exact(bound) else "gap"
         return Proof(
             self.best, energy, bound, status, self.proven.forced, tuple(self.proven.levels), seconds, ended,
-            self.norm,
+            self.norm, self.proven.multipliers,
         )  # fmt: skip
 
     def run(self) -> str:
@@ -309,7 +311,7 @@ class Work:
     def _fit(self, what: Forced) -> None:
         """Solve the convex problem that is left, if all is forced."""
         if what.everything:
-            found, least = what.least(self.energy(self.best), self.limits.over)
+            found, least, self.chain.multipliers = what.least(self.energy(self.best), self.limits.over)
             jumps = relabelled(self.instance, found.alpha, found.beta, found.p)
             self._offer(self.improved(jumps, self.limits.over))
             self.chain.bound = max(self.chain.bound, min(least, self.chain.levels[-1].energy))

@@ -1,0 +1,119 @@
+"""The work of a proof where pairs count with absolute values: in the 1-norm and in the mixed norm.
+
+As in models/proof/work.py, on a lattice common to all pixels. Once a level's boxes leave no choice of jumps,
+a linear or quadratic program gives the energy on them, except for strokes at the edges of their windows. Its
+multipliers prove its least value. models/proof/check_certificate.py, 5, states and proves the lemmas.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from ..field.field import AbsoluteNorm, CrossField
+from ..field.jumps import best_jumps
+from ..instance.grid import Floats
+from ..instance.instance import HALF, QUARTER, Instance
+from ..processes.deadline import Over, never
+from ..search.absolute_fit import absolute_fit, fitted_absolute, settled_absolute
+from ..search.box_qp import field_at
+from .forced import Forced, Least, at_pairs
+from .lattice import Lattice
+from .pruning import RemainingCells
+from .work import COARSEST, Work, first_of
+
+
+class ForcedAbsolute(Forced):
+    """Choices that the boxes force; then a program gives the energy on them."""
+
+    norm: ClassVar[AbsoluteNorm]
+
+    def least(self, energy: float, over: Over = never) -> Least:  # noqa: ARG002
+        """The field of least energy with u at all strokes, and a lower bound of the energy on the boxes."""
+        instance, p = self.left.lattice.instance, self.left.lattice.p
+        weight, (above, below) = instance.stroke_coefficient * instance.w, beyond(self.left)
+        tilt, constant = np.zeros(2 * instance.grid.size), 2 * float(weight @ (above + below))
+        if self.norm == "mixed":
+            tilt[instance.grid.size + instance.stroke_index] = 4 * weight * (above - below)
+            constant *= HALF
+        fit = absolute_fit(instance, p, self.norm, *self.left.bounds, tilt=tilt)
+        return Least(field_at(instance, fit.x, p), fit.bound - constant, fit.multipliers)
+
+
+class Forced1Norm(ForcedAbsolute):
+    """Choices that the boxes force in the 1-norm."""
+
+    norm = 1
+
+
+class ForcedMixed(ForcedAbsolute):
+    """Choices that the boxes force in the mixed norm."""
+
+    norm = "mixed"
+
+
+def forced_absolute(left: RemainingCells) -> ForcedAbsolute:
+    """Choices that are forced on the boxes that are left."""
+    kind, reach = (Forced1Norm, QUARTER) if left.lattice.norm == 1 else (ForcedMixed, HALF)
+    i, j = left.lattice.instance.grid.first, left.lattice.instance.grid.second
+    (most, products), sizes = at_pairs(left), np.abs([left.beta_low, left.beta_high])
+    least = np.where((left.beta_low <= 0) & (left.beta_high >= 0), 0.0, sizes.min(axis=0))
+    greatest, same = sizes.max(axis=0), products.min(axis=0) >= 0
+    given = np.where(same, -np.minimum(least[i], least[j]), np.minimum(greatest[i], greatest[j]))
+    pairs = (most <= HALF) & (most + given <= QUARTER)
+    return kind(left, pairs, np.maximum(*beyond(left)) <= reach)
+
+
+def beyond(left: RemainingCells) -> tuple[Floats, Floats]:
+    """Distances by which the boxes exceed the windows of the strokes, shapes (s,)."""
+    at, target = left.lattice.instance.stroke_index, left.lattice.instance.target
+    low, high = left.alpha_low[at] - target, left.alpha_high[at] - target
+    return np.maximum(high - QUARTER, 0.0), np.maximum(-QUARTER - low, 0.0)
+
+
+class WorkAbsolute(Work):
+    """State of a proof where pairs count with absolute values."""
+
+    norm: ClassVar[AbsoluteNorm]
+    forced = staticmethod(forced_absolute)
+
+    @classmethod
+    def first(cls, instance: Instance, given: CrossField | None, over: Over) -> CrossField:
+        """The better one of the 2-norm's first field and the user's field, both fitted."""
+        fields = [first_of(instance, None, over)] + ([] if given is None else [given])
+        settled = [settled_absolute(each, cls.norm, over) for each in fields]
+        return min(settled, key=lambda field: field.energy(cls.norm).total)
+
+    def level(self, centre: CrossField) -> Lattice:
+        """The first level round a field: its strokes have the slopes of the best angles for its jumps."""
+        instance = centre.instance
+        jumps = best_jumps(instance, centre.alpha, centre.beta, absolute=True)
+        around, slopes = fitted_absolute(CrossField(instance, centre.alpha, centre.beta, jumps), self.norm)
+        return Lattice.common(around, self.norm, slopes, COARSEST)
+
+    def improve(self, found: CrossField, best: CrossField, over: Over) -> CrossField:
+        """The better one of a best field and a new one, fitted."""
+        return min(best, settled_absolute(found, self.norm, over), key=self.energy)
+
+    def improved(self, field: CrossField, over: Over = never) -> CrossField:
+        """The field, fitted."""
+        return settled_absolute(field, self.norm, over)
+
+    def _search(self, share: float) -> None:
+        """Do nothing: rounding finds better fields than the search, which is for the 2-norm."""
+
+    def _found_more(self) -> bool:
+        return False
+
+
+class WorkIn1Norm(WorkAbsolute):
+    """State of a proof of the 1-norm."""
+
+    norm = 1
+
+
+class WorkInMixedNorm(WorkAbsolute):
+    """State of a proof of the mixed norm."""
+
+    norm = "mixed"

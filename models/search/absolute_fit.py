@@ -1,0 +1,204 @@
+"""The best angles for given jumps where pairs count with absolute values, and the bound from its multipliers.
+
+With x = (alpha, beta), shape (2n,), the energy at jumps p (docs/mathematics.md, 5) is sum k phi(Mx + c): two
+rows for each pair, A and B with k = 2, one for each stroke, R with k = w_strokes w, and one for each pixel,
+beta with k = w_beta. In the 1-norm phi is the absolute value, and the best angles solve a linear program. In
+the mixed norm phi is the square in rows of strokes and pixels, and they solve a quadratic program.
+
+For any number l, phi(r) >= l r - psi(l): with psi = 0 and -1 <= l <= 1 for the absolute value, and with
+psi = l^2 / 4 for the square. So the energy is at least the sum of k (l (Mx + c) - psi), which is linear. Its
+least value in a box is a lower bound there, for l from any source. At the multipliers of the program it is
+the least energy in the box.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy import sparse
+
+from ..errors import CrossfieldError
+from ..field.field import AbsoluteNorm, CrossField
+from ..field.jumps import best_jumps, parity_sign
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import HALF, Instance
+from ..processes.deadline import Over, never
+from ..smooth.systems import one_thread
+from .box_qp import bounds, field_at
+
+if TYPE_CHECKING:
+    import casadi
+
+_BETTER: Final = 1e-9  # relative: rounding is no improvement
+_IPOPT: Final = {
+    "print_level": 0, "sb": "yes", "tol": 1e-11, "mu_strategy": "adaptive", "hessian_constant": "yes",
+    "jac_d_constant": "yes",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """The residuals Mx + c of all terms at given jumps, and their weights k, shapes (r, 2n), (r,), (r,).
+
+    squared (r,): where phi is the square.
+    """
+
+    matrix: sparse.csr_array
+    constant: Floats
+    weight: Floats
+    squared: Bools
+
+    @classmethod
+    def at(cls, instance: Instance, p: Ints, norm: AbsoluteNorm) -> Residuals:
+        """Residuals at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels."""
+        n, first, second = instance.grid.size, instance.grid.first, instance.grid.second
+        unit, m, strokes = sparse.eye_array(n, format="csr"), len(first), instance.stroke_terms
+        nothing, at = sparse.csr_array((m, n)), unit[strokes.pixel]
+        a = sparse.hstack([unit[first] - unit[second], nothing])
+        b = sparse.hstack([nothing, sparse.diags_array(parity_sign(p)) @ unit[first] - unit[second]])
+        r = sparse.hstack([at, at])
+        skew = sparse.hstack([sparse.csr_array((n, n)), unit])
+        weight = np.concatenate([np.full(2 * m, 2.0), strokes.weight, np.full(n, instance.skew_coefficient)])
+        return cls(
+            sparse.vstack([a, b, r, skew], format="csr"),
+            np.concatenate([HALF * p, np.zeros(m), -strokes.goal, np.zeros(n)]),
+            weight,
+            (np.arange(len(weight)) >= 2 * m) & (norm == "mixed"),
+        )
+
+    def energy(self, x: Floats) -> float:
+        """The energy at angles x."""
+        sizes = np.abs(self.matrix @ x + self.constant)
+        return float(self.weight @ np.where(self.squared, sizes * sizes, sizes))
+
+    def bound(self, multipliers: Floats, lower: Floats, upper: Floats, tilt: Floats) -> float:
+        """A lower bound of the energy less tilt x, with lower <= x <= upper, from any multipliers (r,).
+
+        lower, upper, tilt: shapes (2n,).
+        """
+        l = np.where(self.squared, multipliers, np.clip(multipliers, -1.0, 1.0))  # noqa: E741 - of the equation
+        force = self.weight * l
+        slope = self.matrix.T @ force - tilt
+        terms = np.concatenate(
+            [
+                force * self.constant,
+                -self.weight * np.where(self.squared, l * l / 4, 0.0),
+                np.minimum(slope * lower, slope * upper),
+            ]
+        )
+        size = np.abs(force) @ (np.abs(self.matrix) @ np.maximum(np.abs(lower), np.abs(upper)))
+        return math.fsum(terms) - 2.0**-48 * float(size + np.abs(terms).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class AbsoluteFit:
+    """The best angles x (2n,) in a box, the multipliers (r,) of `Residuals`, and the bound that they give.
+
+    Multipliers are 0 where weights are 0.
+    """
+
+    x: Floats
+    multipliers: Floats
+    bound: float
+
+
+def absolute_fit(
+    instance: Instance,
+    p: Ints,
+    norm: AbsoluteNorm,
+    lower: Floats,
+    upper: Floats,
+    *,
+    tilt: Floats | None = None,
+) -> AbsoluteFit:
+    """The angles x of least energy at jumps p, less tilt x, with lower <= x <= upper, by HiGHS.
+
+    lower, upper, tilt: shapes (2n,). tilt: None for zeros. Raises CrossfieldError when HiGHS ends without a
+    solution, which a program of this kind has.
+    """
+    terms, tilt = Residuals.at(instance, p, norm), np.zeros(len(lower)) if tilt is None else tilt
+    x, multipliers = (_quadratic if norm == "mixed" else _linear)(terms, lower, upper, tilt)
+    multipliers = np.where(terms.squared, multipliers, np.clip(multipliers, -1.0, 1.0))
+    multipliers[terms.weight == 0] = 0.0
+    return AbsoluteFit(x, multipliers, terms.bound(multipliers, lower, upper, tilt))
+
+
+def _linear(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+    """The best angles and the multipliers of a linear program."""
+    from scipy.optimize import linprog
+
+    rows = terms.matrix.shape[0]
+    both = sparse.eye_array(rows)
+    found = linprog(
+        np.concatenate([-tilt, terms.weight, terms.weight]),
+        A_eq=sparse.hstack([terms.matrix, -both, both], format="csc"),
+        b_eq=-terms.constant,
+        bounds=np.stack([np.pad(lower, (0, 2 * rows)), np.append(upper, [np.inf] * (2 * rows))], axis=1),
+        method="highs",
+    )
+    if found.x is None:
+        raise CrossfieldError(f"HiGHS found no angles for given jumps: {found.message}")
+    return (
+        np.clip(found.x[: len(lower)], lower, upper),
+        -found.eqlin.marginals / np.maximum(terms.weight, 1e-300),
+    )
+
+
+def _quadratic(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+    """The best angles and the multipliers of a quadratic program, by Ipopt: some 1e-9 from the optimum."""
+    import casadi
+
+    pairs, rest = np.flatnonzero(~terms.squared), np.flatnonzero(terms.squared)
+    n, m = len(lower), len(pairs)
+    x, size = casadi.MX.sym("x", n), casadi.MX.sym("size", m)
+    r, other = (casadi.mtimes(_sparse(terms.matrix[at]), x) + terms.constant[at] for at in (pairs, rest))
+    cost = casadi.dot(terms.weight[pairs], size) + casadi.dot(terms.weight[rest], other * other)
+    program = {
+        "x": casadi.vertcat(x, size), "f": cost - casadi.dot(tilt, x), "g": casadi.vertcat(size - r, size + r)
+    }  # fmt: skip
+    solver = casadi.nlpsol("fit", "ipopt", program, {"print_time": False, "ipopt": _IPOPT})
+    free = np.full(m, np.inf)
+    found = solver(
+        x0=np.zeros(n + m), lbg=0.0, ubg=np.inf, lbx=np.append(lower, -free), ubx=np.append(upper, free)
+    )
+    if solver.stats()["return_status"] not in ("Solve_Succeeded", "Solved_To_Acceptable_Level"):
+        raise CrossfieldError(f"Ipopt found no angles for given jumps: {solver.stats()['return_status']}")
+    angles = np.clip(np.array(found["x"]).ravel()[:n], lower, upper)
+    multipliers = 2 * (terms.matrix @ angles + terms.constant)
+    above, below = np.split(np.array(found["lam_g"]).ravel(), 2)
+    multipliers[pairs] = (below - above) / terms.weight[pairs]
+    return angles, multipliers
+
+
+def _sparse(matrix: sparse.csr_array) -> casadi.DM:
+    """A matrix of CasADi."""
+    import casadi
+
+    by_column = matrix.tocsc()
+    pattern = casadi.Sparsity(*matrix.shape, by_column.indptr.tolist(), by_column.indices.tolist())
+    return casadi.DM(pattern, by_column.data)
+
+
+@one_thread()
+def fitted_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, Floats]:
+    """The field of least energy with the jumps of `field`, and its strokes' multipliers, (s,)."""
+    instance, m = field.instance, len(field.p)
+    fit = absolute_fit(instance, field.p, norm, *bounds(instance))
+    return field_at(instance, fit.x, field.p), fit.multipliers[2 * m : 2 * m + len(instance.theta)]
+
+
+@one_thread()
+def settled_absolute(field: CrossField, norm: AbsoluteNorm, over: Over = never) -> CrossField:
+    """The field after alternating best jumps and best angles, which lower its energy in that norm."""
+    best, least = field, field.energy(norm).total
+    while not over():
+        jumps = best_jumps(field.instance, best.alpha, best.beta, absolute=True)
+        found, _ = fitted_absolute(CrossField(field.instance, best.alpha, best.beta, jumps), norm)
+        energy = found.energy(norm).total
+        if energy >= least * (1 - _BETTER):
+            break
+        best, least = found, energy
+    return best
