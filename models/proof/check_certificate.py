@@ -92,19 +92,21 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
        norm 1   d(R) = |R| where |R| >= 2 h,  else l R
        mixed    d(R) = R^2 - h^2/2 where |R - l/2| >= 2 h,  else R^2 - (R - l/2)^2 = l R - l^2/4.
 
-   The mean of d is at most |r| or r^2. Where all three values are near, d is linear and nowhere above. In the
-   norm 1, if one is far, none has another sign, |.| is linear on them, and d <= |.|. In the norm mixed, if
-   one is far, the three values of (R - l/2)/h are y, y + 1, y + 2 with y >= 0, or the reverse. For y >= 1
-   each loses h^2/2 or more, which is at least the variance. For y < 1 they lose at least 0, h^2 and h^2/2, as with
-   s = 0 in 2. For line v, l = 0 in the norm 1, and all lose h^2/2 in the norm mixed. The least over lines and
-   turns is nowhere above any of them; as |l/2| + 2 h < pi/2, the nearest turn of a line has it.
+   The mean of d is at most |r| or r^2. Where all three values are near, d is linear and nowhere above. In
+   the norm 1, if one is far, none has another sign, |.| is linear on them, and d <= |.|. In the norm
+   mixed, if one is far, the three values of (R - l/2)/h are y, y + 1, y + 2 with y >= 0, or the reverse.
+   For y >= 1 each loses h^2/2 or more, which is at least the variance. For y < 1 they lose at least 0,
+   h^2 and h^2/2, as with s = 0 in 2. For line v, l = 0 in the norm 1, and all lose h^2/2 in the norm
+   mixed. The least over lines and turns is nowhere above any of them; as |l/2| + 2 h < pi/2, the nearest
+   turn of a line has it.
 
-   Jumps: let g = min(|beta_i|, |beta_j|), negative where (-1)^p beta_i beta_j >= 0. With the other parity |B|
-   grows by -2 g, and one step further |A| is at least pi/2 - |A|. So p is a best jump where |A| <= pi/2 and
-   |A| + g <= pi/4. Strokes in the norm 1: at a = pi/4 + e and at -pi/4 - e, 0 <= e <= pi/4, the nearest line
-   is nearer than u by at most 2 e. The rest is linear: for any multiplier l, |r| >= l r if |l| <= 1, and
-   r^2 >= l r - l^2/4. The sum over all terms is linear in the angles, and its least value in the boxes is a sum of
-   single terms. The certificate holds the multipliers of A, B, R and beta. Boxes are not cut.
+   Jumps: let g = min(|beta_i|, |beta_j|), negative where (-1)^p beta_i beta_j >= 0. With the other parity
+   |B| grows by -2 g, and one step further |A| is at least pi/2 - |A|. So p is a best jump where |A| <=
+   pi/2 and |A| + g <= pi/4. Strokes in the norm 1: at a = pi/4 + e and at -pi/4 - e, 0 <= e <= pi/4, the
+   nearest line is nearer than u by at most 2 e. The rest is linear: for any multiplier l, |r| >= l r if
+   |l| <= 1, and r^2 >= l r - l^2/4. The sum over all terms is linear in the angles, and its least value
+   in the boxes is a sum of single terms. The certificate holds the multipliers of A, B, R and beta. Boxes
+   are not cut.
 
 6. Rounding. Messages may be anything, so errors in them do no harm. What counts is how much an inequality
    of 3. may fail at a pixel or a pair. That is below a small multiple (ROUNDING) of the machine's precision
@@ -760,7 +762,10 @@ class Pair:
 
 
 def _min_plus(left: Array, right: Array) -> Array:
-    """The (min,+) product of two matrices."""
+    """The (min,+) product of two matrices; NumPy is quicker along the longer side."""
+    if left.shape[0] > right.shape[1]:
+        turned: Array = _min_plus(np.ascontiguousarray(right.T), np.ascontiguousarray(left.T)).T
+        return turned
     out = left[:, :1] + right[:1]
     work = np.empty_like(out)
     for k in range(1, right.shape[0]):

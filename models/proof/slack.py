@@ -1,53 +1,81 @@
-"""Where the bound of a level falls short of the energy of the field at its centre.
+"""Where the bound of a level falls short of the energy of the best known field.
 
-Rounding that field gives each pixel one or four labels of equal probability. In the mean over them, costs of
-pixels and pairs exceed the least values that the bound takes there. These slacks sum to the gap that the
-level leaves. At a vortex, a few pixels hold most of it.
+Rounding that field gives each pixel one of a few labels. In the mean over them, costs of pixels and pairs
+exceed the least values that the bound takes there. These slacks sum to the gap that the level leaves. At a
+vortex, a few pixels hold most of it.
 """
 
 from __future__ import annotations
 
 from itertools import product
+from typing import Final
 
 import numpy as np
 
+from ..field.field import CrossField
+from ..field.jumps import stepped
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF
 from .lattice import Lattice
 from .state import State
 
+_THRESHOLDS: Final = (0.25, 0.75)  # of the rounding on a common lattice
 
-def quad_slacks(lattice: Lattice, state: State) -> Floats:
+
+def quad_slacks(lattice: Lattice, state: State, field: CrossField) -> Floats:
     """The slack of the four pixels of each quad, and half of the slack of each of their pairs; shape (q,).
 
-    Pairs count as after a pass, when their least value is 0.
+    Pairs count as after a pass, when their least value is 0. Without a label near the field, a slack is 0.
     """
     grid = lattice.instance.grid
-    corners = [_Corner(lattice, *each) for each in product((0, -1), repeat=2)]
+    if lattice.norm == 2:
+        corners = _round_centre(lattice)
+        both = list(product(corners, repeat=2))
+    else:
+        corners = _round_field(lattice, field)
+        both = [(corner, corner) for corner in corners]
     theta = _all_taken(lattice, state)
     least = np.minimum.reduceat(theta, lattice.start[:-1])
     at_pixel = np.mean([theta[lattice.start[:-1] + corner.label] for corner in corners], axis=0) - least
-    at_pair = np.mean([_pairs(lattice, state, x, y) for x, y in product(corners, repeat=2)], axis=0) / 2
+    at_pair = np.mean([_pairs(lattice, state, x, y) for x, y in both], axis=0) / 2
     for ends in (grid.first, grid.second):
         np.add.at(at_pixel, ends, at_pair)
     bottom, _, top, _ = grid.quads.T
     pixels = (grid.first[bottom], grid.second[bottom], grid.first[top], grid.second[top])
     found: Floats = np.sum([at_pixel[each] for each in pixels], axis=0)
-    return found
+    return np.where(np.isfinite(found), found, 0.0)
 
 
 class _Corner:
-    """One of the labels round the centre of each pixel: on black pixels always the centre itself.
+    """A label of each pixel.
 
     label (n,): its number. row (n,): that of its alpha. alpha, beta (n,): its angles.
     """
 
-    def __init__(self, lattice: Lattice, k: int, l: int) -> None:  # noqa: E741 - the letter of the equation
-        white = lattice.offset > 0
-        self.row: Ints = k * white - lattice.alpha_first
-        self.label: Ints = self.row * lattice.beta_count + l * white - lattice.beta_first
-        self.alpha = lattice.alpha + lattice.h * (k * white + lattice.offset)
-        self.beta = lattice.beta + lattice.h * (l * white + lattice.offset)
+    def __init__(self, lattice: Lattice, k: Ints, l: Ints) -> None:  # noqa: E741 - the letter of the equation
+        self.row: Ints = np.clip(k - lattice.alpha_first, 0, lattice.alpha_count - 1)
+        column = np.clip(l - lattice.beta_first, 0, lattice.beta_count - 1)
+        self.label: Ints = self.row * lattice.beta_count + column
+        self.alpha = lattice.alpha + lattice.h * (self.row + lattice.alpha_first + lattice.offset)
+        self.beta = lattice.beta + lattice.h * (column + lattice.beta_first + lattice.offset)
+
+
+def _round_centre(lattice: Lattice) -> list[_Corner]:
+    """The labels round the centres, which are the field: on black pixels always the centre itself."""
+    white = (lattice.offset > 0).astype(np.int32)
+    return [_Corner(lattice, k * white, m * white) for k, m in product((0, -1), repeat=2)]
+
+
+def _round_field(lattice: Lattice, field: CrossField) -> list[_Corner]:
+    """The labels to which a few thresholds round a field."""
+    grid = lattice.instance.grid
+    steps = np.round((lattice.alpha - field.alpha) / HALF).astype(np.int32)
+    alpha, beta, _ = stepped(grid, field.alpha, field.beta, field.p, steps)
+    k, l = (alpha - lattice.alpha) / lattice.h, beta / lattice.h  # noqa: E741 - the letter of the equation
+    return [
+        _Corner(lattice, np.floor(k + s).astype(np.int32), np.floor(l + t).astype(np.int32))
+        for s, t in product(_THRESHOLDS, repeat=2)
+    ]
 
 
 def _all_taken(lattice: Lattice, state: State) -> Floats:

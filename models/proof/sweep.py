@@ -28,6 +28,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..field.field import CrossField
 from ..instance.grid import Floats, Grid
 from ..processes.compiled import Crew, compiled
 from ..processes.deadline import Over, never
@@ -99,11 +100,14 @@ class Dual:
             parts = [(values[at], before[at]) for at in self.crew.equal_parts(len(values))]
             self.crew.run(lambda each: _carry_on(*each, part), parts)
 
-    def add_clusters(self, count: int) -> None:
-        """Add clusters, with zero tables, on the quads that hold most of the gap. Before: a backward pass."""
+    def add_clusters(self, count: int, field: CrossField) -> None:
+        """Add clusters, with zero tables, on the quads that hold most of the gap to the energy of the field.
+
+        Before: a backward pass.
+        """
         old = self.state.clusters
         grid = self.lattice.instance.grid
-        slack = quad_slacks(self.lattice, self.state)
+        slack = quad_slacks(self.lattice, self.state, field)
         slack[np.isin(grid.quads[:, 0], old.quads[:, 0])] = np.inf
         quads = np.sort(np.argsort(-slack, kind="stable")[: len(old.quads) + count])
         self.state = self.state._replace(clusters=extended(old, clusters_on(self.lattice, quads)))

@@ -194,7 +194,7 @@ class Work:
         while True:
             if not patient and (count := self._wants_clusters()):
                 dual.ascend(1 if len(dual.state.clusters.quads) else _BEFORE, self._closing(dual))
-                dual.add_clusters(count)
+                dual.add_clusters(count, self.best)
             self._ascend(dual, _SLOW / 10 if patient else _SLOW)
             what = self._record(dual, again=patient)
             if (ended := self._ended()) or what is None:
