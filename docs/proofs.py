@@ -4,10 +4,10 @@
                           [--work FOLDER]
 
 With --measure, parts are measured first, and their rows in docs/proofs.json replaced: `samples` (size 24),
-`paper` (two of them under the weights of the paper), `middle` (two at size 32), `fine` (size 48), `large` (size
-128), `sketches` (drawings of a folder, size 24), `optima` (small instances, compared with other solvers),
-`solvers` (MIP solvers, cold and tightened) and `pictures`. --names selects from a part, --seconds replaces its
-time limit. With --work, fields and certificates stay in that folder.
+`paper` (two of them under the weights of the paper), `middle` (two at size 32), `fine` (size 48), `large`
+(size 128), `sketches` (drawings of a folder, size 24), `optima` (small instances, compared with other
+solvers), `solvers` (MIP solvers, cold and tightened) and `pictures`. --names selects from a part, --seconds
+replaces its time limit. With --work, fields and certificates stay in that folder.
 """
 
 from __future__ import annotations

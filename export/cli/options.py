@@ -241,12 +241,11 @@ ProofGap = Annotated[
     ),
 ]
 Norm = Annotated[
-    int,
+    Literal["1", "2", "mixed"],
     typer.Option(
         "--norm",
-        min=1,
-        max=2,
-        help="Norm of the energy; a proof in the 1-norm, which milp-mccormick minimises, has no certificate.",
+        help="Norm of the energy: squares (2), absolute values (1, as in milp-mccormick), or absolute values"
+        " of the smoothness with squares of the other terms (mixed, as in miqp-mccormick).",
     ),
 ]
 Tolerance = Annotated[

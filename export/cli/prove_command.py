@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from ...models.proof.certificate import Certificate
     from ...models.proof.record import Proof
 
+NORMS: Final[dict[str, NormOfField]] = {"1": 1, "2": 2, "mixed": "mixed"}
+"""Norms by their names on the command line."""
+
 UNPROVEN: Final = "unproven"
 """Status in the report of a proof without a bound."""
 
@@ -28,7 +31,7 @@ def prove_command(
     source: options.OptionalInput = None,
     output: options.ProofFolder = None,
     *,
-    norm: options.Norm = 2,
+    norm: options.Norm = "2",
     sketch: SketchOptions,
     start: options.Start = None,
     time_limit: options.SecondsOfProof = 60.0,
@@ -58,7 +61,7 @@ def prove_command(
         deadline = Deadline.after(time_limit)
         proof = prove(
             instance,
-            norm=cast("NormOfField", norm),
+            norm=NORMS[norm],
             start=read_start(start, instance),
             limits=Limits(time_limit, gap).until(deadline),
             certified=True,
@@ -78,7 +81,7 @@ def prove_command(
 
 
 def _write(proof: Proof, folder: Path, deadline: Deadline) -> dict[str, Any]:
-    """Write field, report and, in the 2-norm, certificate of a proof; return the report."""
+    """Write field, certificate and report of a proof; return the report."""
     from ...models.field.file import write_field
     from ...models.processes.groups import interruptible
     from ...models.storage import make_folder, write_bytes
@@ -91,7 +94,6 @@ def _write(proof: Proof, folder: Path, deadline: Deadline) -> dict[str, Any]:
     proven, bounds = _proven(proof, certificate)
     write_field(proof.field, folder / f"{stem}.field.npz")
     document = proven | {
-        "norm": proof.norm,
         "seconds": proof.seconds,
         "ended": proof.ended,
         "levels": [
@@ -107,8 +109,6 @@ def _proven(proof: Proof, certificate: Certificate | None) -> tuple[dict[str, An
     """Facts that are proven, and the bound of each level, as the checker confirms them."""
     if certificate is not None:
         return facts(certificate), certificate.verdict.levels
-    if proof.norm == 1 and not proof.bound <= 0 < proof.energy:
-        return facts(proof), [level.bound for level in proof.levels]
     return facts(proof) | {"status": UNPROVEN, "bound": 0.0, "gap": 1.0, "forced_jumps": 0}, []
 
 
@@ -117,6 +117,7 @@ def facts(source: Proof | Certificate) -> dict[str, Any]:
     return {
         "instance": source.field.instance.name,
         "sha256": source.field.instance.sha256,
+        "norm": source.norm,
         "status": source.status,
         "energy": source.energy,
         "bound": source.bound,
@@ -130,7 +131,7 @@ def _show(proof: Proof, document: dict[str, Any], folder: Path) -> None:
     """Print the report without its levels, and the folder of the files."""
     shown = {key: value for key, value in document.items() if key != "levels"}
     show_facts(proof.field.instance.summary, shown)
-    certificate = "certificate and " if proof.norm == 2 and document["status"] != UNPROVEN else ""
+    certificate = "" if document["status"] == UNPROVEN else "certificate and "
     print_line(f"field, {certificate}report: {folder}")
 
 

@@ -73,8 +73,9 @@ def compile_clusters() -> None:
     from ...models.sketch.samples import sample
 
     with crew(1) as hands:
-        dual = Dual(Lattice.whole(greedy_field(sample("mouse", 4)), 2), hands)
-        dual.add_clusters(1)
+        field = greedy_field(sample("mouse", 4))
+        dual = Dual(Lattice.whole(field, 2), hands)
+        dual.add_clusters(1, field)
         dual.ascend(1)
 
 

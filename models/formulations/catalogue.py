@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import sympy as sp
 
+from ..field.field import Norm
 from .declaration import (
     FORMULATIONS,
     S_C,
@@ -231,6 +232,15 @@ def declare(name: str, **chosen: Any) -> Formulation:
     return declaration_of(name).with_options(given)
 
 
+def norm_of(formulation: Formulation) -> Norm | None:
+    """The norm whose energy a formulation minimises with its options; None for another objective."""
+    if formulation.declaration.minimises in {TWO_NORM, AT_JUMPS}:
+        return 2
+    options = formulation.options
+    norms: dict[tuple[int, int], Norm] = {(1, 1): 1, (2, 2): "mixed"}
+    return norms.get((options.stroke_norm, options.beta_norm)) if options.facet == "hull" else None
+
+
 __all__ = [
     "AT_JUMPS",
     "CUBIC",
@@ -241,5 +251,6 @@ __all__ = [
     "declaration_of",
     "declare",
     "facets_of_z",
+    "norm_of",
     "short_names",
 ]

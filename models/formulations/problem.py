@@ -22,7 +22,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER, Instance, whole_numbers
 from ..previews import table_of
 from .arrays import ProblemArrays, arrays_of
-from .catalogue import AT_JUMPS, TWO_NORM, declare
+from .catalogue import declare, norm_of
 from .declaration import FORMULATIONS, Family, Formulation
 from .families import ANY_DEGREE, Block, Monomial, PlacedFamily, block_costs, symbol_name
 from .highs_model import check_highs, highs_of
@@ -165,9 +165,11 @@ class Problem:
         """How its windows were narrowed, one line; empty if they were not."""
         if self.windows is None:
             return ""
-        same = self.formulation.declaration.minimises in {TWO_NORM, AT_JUMPS}
+        norm = self.windows.norm
+        same = norm_of(self.formulation) == norm
         return (
-            "alpha, beta and jumps narrowed to what a proof leaves of all fields with a 2-norm energy up to "
+            "alpha, beta and jumps narrowed to what a proof leaves of all fields with a "
+            f"{'mixed-norm' if norm == 'mixed' else f'{norm}-norm'} energy up to "
             f"{self.windows.energy:.12g} ({self.windows.proof}); "
             + ("the optimum stays" if same else "in another norm the optimum may rise")
         )

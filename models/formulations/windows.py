@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InstanceError
+from ..field.field import Norm
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER, Instance, whole_numbers
 
@@ -17,11 +18,11 @@ _ARRAYS = ("alpha_lower", "alpha_upper", "beta_lower", "beta_upper", "p_min", "p
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Windows that hold the angles (n,) and jumps (m,) of every field with a 2-norm energy up to `energy`.
+    """Windows that hold the angles (n,) and jumps (m,) of every field with an energy up to `energy`.
 
     alpha_lower, alpha_upper, beta_lower, beta_upper: radians. p_min, p_max: whole numbers. Every end is
-    within the gauge's. proof: the source of the windows, one line of text. `check` raises InstanceError for
-    windows that do not fit an instance.
+    within the gauge's. proof: the source of the windows, one line of text. norm: of the energy. `check`
+    raises InstanceError for windows that do not fit an instance.
     """
 
     alpha_lower: Floats
@@ -32,6 +33,7 @@ class Windows:
     p_max: Ints
     energy: float
     proof: str
+    norm: Norm = 2
 
     def check(self, instance: Instance) -> None:
         """Raise InstanceError unless these windows lie within the instance's windows."""
@@ -66,7 +68,7 @@ class Windows:
         """All arrays as bytes, for a hash."""
         angles = np.concatenate([self.alpha_lower, self.alpha_upper, self.beta_lower, self.beta_upper])
         jumps = np.concatenate([self.p_min, self.p_max])
-        text = f"{self.energy!r} {self.proof}"
+        text = f"{self.energy!r} {self.proof}" + ("" if self.norm == 2 else f" {self.norm}")
         return angles.astype("<f8").tobytes() + jumps.astype("<i4").tobytes() + text.encode()
 
     def document(self) -> dict[str, Any]:
@@ -87,4 +89,5 @@ class Windows:
             whole_numbers(given["p_max"], "p_max"),
             float(document["energy"]),
             str(document["proof"]),
+            document.get("norm", 2),
         )

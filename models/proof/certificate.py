@@ -87,7 +87,8 @@ class Certificate(Claim):
     @property
     def norm(self) -> Norm:
         """The norm of the energy."""
-        return self.verdict.norm
+        found: Norm = self.verdict.norm
+        return found
 
     @property
     def forced(self) -> int:

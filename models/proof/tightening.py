@@ -49,4 +49,5 @@ def windows_left(certificate: Certificate) -> Windows:
         np.where(fixed, field.p, np.minimum(most, instance.p_max)).astype(np.int32),
         certificate.energy,
         f"certificate of {instance.name}, status {certificate.status}",
+        certificate.norm,
     )

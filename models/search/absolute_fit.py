@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from scipy import sparse
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     import casadi
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
-_IPOPT: Final = {
+_IPOPT: Final[dict[str, Any]] = {
     "print_level": 0, "sb": "yes", "tol": 1e-11, "mu_strategy": "adaptive", "hessian_constant": "yes",
-    "jac_d_constant": "yes",
+    "jac_d_constant": "yes", "bound_relax_factor": 0.0,
 }  # fmt: skip
 
 
@@ -156,10 +156,11 @@ def _quadratic(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> 
     x, size = casadi.MX.sym("x", n), casadi.MX.sym("size", m)
     r, other = (casadi.mtimes(_sparse(terms.matrix[at]), x) + terms.constant[at] for at in (pairs, rest))
     cost = casadi.dot(terms.weight[pairs], size) + casadi.dot(terms.weight[rest], other * other)
-    program = {
+    program: dict[str, Any] = {
         "x": casadi.vertcat(x, size), "f": cost - casadi.dot(tilt, x), "g": casadi.vertcat(size - r, size + r)
     }  # fmt: skip
-    solver = casadi.nlpsol("fit", "ipopt", program, {"print_time": False, "ipopt": _IPOPT})
+    options: dict[str, Any] = {"print_time": False, "ipopt": _IPOPT}
+    solver = casadi.nlpsol("fit", "ipopt", program, options)
     free = np.full(m, np.inf)
     found = solver(
         x0=np.zeros(n + m), lbg=0.0, ubg=np.inf, lbx=np.append(lower, -free), ubx=np.append(upper, free)
@@ -178,7 +179,8 @@ def _sparse(matrix: sparse.csr_array) -> casadi.DM:
     import casadi
 
     by_column = matrix.tocsc()
-    pattern = casadi.Sparsity(*matrix.shape, by_column.indptr.tolist(), by_column.indices.tolist())
+    rows, columns = matrix.shape
+    pattern = casadi.Sparsity(rows, columns, by_column.indptr.tolist(), by_column.indices.tolist())
     return casadi.DM(pattern, by_column.data)
 
 

@@ -13,7 +13,7 @@ import pytest
 PROGRAM = """
 import hashlib, json, time
 import crossfield as cf
-from crossfield.models.search.box_lp import fitted_1norm
+from crossfield.models.search.absolute_fit import fitted_absolute
 from crossfield.models.search.box_qp import FreeField, fitted
 from crossfield.models.search.energy import LinearSolver
 from crossfield.models.search.improvement import settle
@@ -32,7 +32,7 @@ methods = {
     "power": lambda: cf.power_field(instance), "polyvector": lambda: cf.polyvector_field(instance),
     "bend": lambda: cf.bend_field(power), "greedy": lambda: cf.greedy_field(instance),
     "improved": lambda: cf.improved_field(power), "fitted": lambda: fitted(power), "settled": settled,
-    "fitted_1norm": lambda: fitted_1norm(power)[0], "first": lambda: first_field(instance),
+    "fitted_1norm": lambda: fitted_absolute(power, 1)[0], "first": lambda: first_field(instance),
     "surface": lambda: cf.surface(power),
 }
 results = {}

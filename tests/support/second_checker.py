@@ -45,14 +45,18 @@ class Problem:
     alpha: np.ndarray  # [n]
     beta: np.ndarray  # [n]
     p: np.ndarray  # [m]
+    norm: object  # 1, 2 or "mixed"
+    slope: np.ndarray  # [n]: l of the stroke, unless the norm is 2
+    multipliers: np.ndarray  # [2m + 2n], unless the norm is 2
 
     def energy(self):
         """Energy U of the field."""
         (i, j), p = self.pairs.T, self.p
         a = self.alpha[i] - self.alpha[j] + PI / 2 * p
         b = (-1.0) ** p * self.beta[i] - self.beta[j]
-        strokes = self.weight @ (self.alpha + self.beta - self.theta) ** 2
-        return float(2 * (a @ a + b @ b) + strokes + self.w_beta * (self.beta @ self.beta))
+        phi, psi = (np.square if self.norm == 2 else abs), (abs if self.norm == 1 else np.square)
+        strokes = self.weight @ psi(self.alpha + self.beta - self.theta)
+        return float(2 * (phi(a) + phi(b)).sum() + strokes + self.w_beta * psi(self.beta).sum())
 
 
 @dataclass
@@ -66,6 +70,7 @@ class Level:
     allowed: list  # per pixel, bool[k, l]
     shares: list  # per pair, at the allowed labels of its earlier pixel
     quads: list  # pixels a, b, c, d and the tables of the pairs (a, b), (b, c), (d, c), (a, d)
+    absolute: bool  # whether pairs count with absolute values
     bound: float = 0.0
     left: list = field(default_factory=list)  # per pixel, remaining cells as rows (a0, a1, b0, b1)
 
@@ -133,7 +138,7 @@ def number(head, name, low, high):
     return x
 
 
-def problem_of(arrays):
+def problem_of(arrays, norm):
     """Instance and field."""
     head = head_of(arrays, "instance_head")
     need(head.get("gauge") in {"strokes", "box"}, "instance_head: unknown gauge")
@@ -166,7 +171,13 @@ def problem_of(arrays):
     need(not outside.any(), f"alpha, beta: outside the window at pixel {pixels[outside.argmax()]}")
     need((abs(p) <= 64).all(), "p: too large")
     pairs = np.array(pairs, int).reshape(-1, 2)
-    return Problem(pixels, pairs, theta, weight, number(head, "w_beta", 0, 1e6), alpha, beta, p)
+    slope, multipliers = np.zeros(n), np.zeros(2 * (len(pairs) + n))
+    if norm != 2:
+        slope = take(arrays, "slopes", "<f8", n)
+        need((abs(slope) <= (1 if norm == 1 else PI / 2)).all(), "slopes: too steep")
+        multipliers = take(arrays, "multipliers", "<f8", len(multipliers))
+    w_beta = number(head, "w_beta", 0, 1e6)
+    return Problem(pixels, pairs, theta, weight, w_beta, alpha, beta, p, norm, slope, multipliers)
 
 
 def quads_of(arrays, at, count, problem):
@@ -211,18 +222,25 @@ def level_of(arrays, number, problem, version):
     need(((scale >= 0) & (scale <= 1)).all(), f"{at}scale: outside [0, 1]")
     earlier = problem.pairs.min(axis=1)
     shares = [np.zeros(0)] * m
-    for narrow, name, kind in ((True, f"{at}steps_16", "<i2"), (False, f"{at}steps_32", "<i4")):
+    bits = (16, 32) if problem.norm == 2 else (32, 64)
+    for narrow, width in zip((True, False), bits, strict=True):
         chosen = np.flatnonzero(wide != narrow)
-        steps, used = take(arrays, name, kind, sizes[earlier[chosen]].sum()), 0
+        kind, used = f"<i{width // 8}", 0
+        steps = take(arrays, f"{at}steps_{width}", kind, sizes[earlier[chosen]].sum())
         for e in chosen:
             i = earlier[e]
-            sums = steps[used : used + sizes[i]].cumsum(dtype=np.int32)  # modulo 2^32
+            sums = steps[used : used + sizes[i]].cumsum(dtype=f"<i{bits[1] // 8}")  # modulo 2^32 or 2^64
             shares[e], used = scale[e] * sums[allowed[i].ravel()], used + sizes[i]
     offset = 0.5 * (problem.pixels.sum(axis=1) % 2)
+    if problem.norm != 2:
+        offset = 0 * offset
+        common = (centre == np.rint(centre / h) * h).all() and not centre[:, 1].any()
+        need(common and h * np.rint(PI / 2 / h) == PI / 2, f"{at}alpha, {at}beta: no common lattice")
+        need(problem.norm == 1 or h <= PI / 16, f"{at}h: too wide")
     k, low = (first + offset[:, None]).T
     steps = [(k[i] + np.arange(count[i, 0]), low[i] + np.arange(count[i, 1])) for i in range(n)]
     quads = quads_of(arrays, at, count, problem) if version > 1 else []
-    return Level(number, h, centre, steps, allowed, shares, quads)
+    return Level(number, h, centre, steps, allowed, shares, quads, problem.norm != 2)
 
 
 # Sections 3 to 5: bound and remaining cells of a level ------------------------------------------------------
@@ -232,9 +250,11 @@ def pixel_costs(problem, level, i, version):
     """D_i of the allowed labels."""
     alpha, beta, s = level.labels(i)
     theta, weight, h2 = problem.theta[i], problem.weight[i], level.h**2
-    cost = problem.w_beta * (beta**2 - h2 / 4)
+    cost = problem.w_beta * (abs(beta) if problem.norm == 1 else beta**2 - h2 / 4)
     if weight == 0:
         return cost
+    if problem.norm != 2:
+        return cost + weight * sloped_costs(problem, level, i)
     known = np.rint((level.centre[i].sum() - theta) / PI)  # the turn of u at the centre of the lattice
     sharp = np.choose(np.minimum(abs(s), 2).astype(int), [0, 1, 1 / 2])
     white = problem.pixels[i].sum() % 2 == 1
@@ -246,14 +266,31 @@ def pixel_costs(problem, level, i, version):
     return cost + weight * nearest
 
 
+def sloped_costs(problem, level, i):
+    """The least d of section 9 over both lines and all turns, at the allowed labels."""
+    (alpha, beta, _), h, slope = level.labels(i), level.h * (1 + 1e-12) + 1e-12, problem.slope[i]
+    nearest = np.full(len(alpha), np.inf)
+    for line, l in ((alpha + beta, slope), (alpha + PI / 2 - beta, None)):  # noqa: E741 - the page's letter
+        for turn in np.arange(-9, 10):
+            r = line - problem.theta[i] - PI * turn
+            if problem.norm == 1:
+                d = np.where(abs(r) < 2 * h, (l or 0) * r, abs(r))
+            elif l is None:
+                d = r**2 - level.h**2 / 2
+            else:
+                d = r**2 - np.where(abs(r - l / 2) < 2 * h, (r - l / 2) ** 2, level.h**2 / 2)
+            nearest = np.minimum(nearest, d)
+    return nearest
+
+
 def pair_costs(level, i, j):
     """c_ij with all tables, for allowed labels of i (rows) and j (columns); for (j, i) the transposed."""
     (a, b, _), (c, d, _) = level.labels(i), level.labels(j)
-    apart = a[:, None] - c
-    even = (apart - PI * np.rint(apart / PI)) ** 2 + (b[:, None] - d) ** 2
+    phi, apart = abs if level.absolute else np.square, a[:, None] - c
+    even = phi(apart - PI * np.rint(apart / PI)) + phi(b[:, None] - d)
     apart += PI / 2
-    odd = (apart - PI * np.rint(apart / PI)) ** 2 + (b[:, None] + d) ** 2
-    costs = 2 * np.minimum(even, odd) - level.h**2
+    odd = phi(apart - PI * np.rint(apart / PI)) + phi(b[:, None] + d)
+    costs = 2 * np.minimum(even, odd) - (0 if level.absolute else level.h**2)
     rows, columns = np.nonzero(level.allowed[i])[0], np.nonzero(level.allowed[j])[0]
     for (a, b, c, d), tables in level.quads:
         for ends, table in zip(((a, b), (b, c), (d, c), (a, d)), tables, strict=True):
@@ -363,6 +400,11 @@ def check_jumps(problem, boxes):
         most = max(abs(a0 - c1 + PI / 2 * p), abs(a1 - c0 + PI / 2 * p))
         least = min((-1.0) ** p * b * d for b in (b0, b1) for d in (d0, d1))
         forced = most <= PI / 2 and PI * most - PI**2 / 4 <= 4 * least
+        if problem.norm != 2:
+            sizes = [0 if low < 0 < high else min(abs(low), abs(high)) for low, high in ((b0, b1), (d0, d1))]
+            sizes += [max(abs(b0), abs(b1)), max(abs(d0), abs(d1))]
+            g = -min(sizes[:2]) if least >= 0 else min(sizes[2:])
+            forced = most <= PI / 2 and most + g <= PI / 4
         need(forced, f"p: another jump may be better at the pixels {problem.pixels[[i, j]].tolist()}")
 
 
@@ -388,6 +430,39 @@ def convex_bound(problem, boxes):
         inner[i, which] = outer[i, 1 - which] = sides[i] * PI / 4
         pieces += [(inner, side), (outer, sides)]
     return bound
+
+
+def multiplier_bound(problem, boxes):
+    """Lower bound of F on the boxes by the multipliers of section 9."""
+    n, m, (i, j) = len(boxes), len(problem.pairs), problem.pairs.T
+    theta = problem.theta + PI * np.rint((problem.alpha - problem.theta) / PI)
+    beyond = np.maximum([theta - PI / 4 - boxes[:, 0], boxes[:, 1] - theta - PI / 4], 0)  # e below and above
+    below, above = beyond * (problem.weight > 0)
+    absolute = problem.norm == 1
+    far = beyond[:, problem.weight > 0] > (PI / 4 if absolute else PI / 2)
+    need(not far.any(), "a box leads too far from its stroke")
+    rows = np.zeros((2 * m + 2 * n, 2 * n))
+    rows[np.arange(m), i], rows[np.arange(m), j] = 1, -1
+    rows[np.arange(m, 2 * m), n + i], rows[np.arange(m, 2 * m), n + j] = (-1.0) ** problem.p, -1
+    rows[2 * m : 2 * m + n] = np.concatenate([np.eye(n), np.eye(n)], axis=1)
+    rows[2 * m + n :, n:] = np.eye(n)
+    constant = np.concatenate([PI / 2 * problem.p, np.zeros(m), -theta, np.zeros(n)])
+    weights = np.concatenate([np.full(2 * m, 2.0), problem.weight, np.full(n, problem.w_beta)])
+    l, squared = problem.multipliers.copy(), np.arange(2 * m + 2 * n) >= 2 * m  # noqa: E741 - the page's letter
+    squared &= not absolute
+    l[~squared] = l[~squared].clip(-1, 1)
+    slope, lost = (weights * l) @ rows, (weights * l * l / 4)[squared].sum()
+    if absolute:
+        lost += 2 * problem.weight @ (below + above)
+    else:
+        slope[n:] -= 4 * problem.weight * (above - below)
+        lost += PI * problem.weight @ (below + above)
+    low, high = (boxes[:, ends].T.ravel() for ends in ([0, 2], [1, 3]))
+    terms = [weights * l * constant, np.minimum(slope * low, slope * high)]
+    size = sum(abs(each).sum() for each in terms) + (weights * abs(l)) @ (
+        abs(rows) @ np.maximum(abs(low), abs(high))
+    )
+    return sum(each.sum() for each in terms) - lost - 1e-14 * (size + lost)
 
 
 def piece_bound(problem, theta, boxes, side):
@@ -449,7 +524,11 @@ def check(arrays):
     known = head.get("format") == "crossfield-certificate" and type(version) is int and version in {1, 2}
     need(known, "head: no certificate of version 1 or 2")
     need(head.get("status") in {"optimal", "gap"}, "head: the status is neither optimal nor gap")
-    problem, count = problem_of(arrays), number(head, "levels", 1, 64)
+    norm = head.get("norm", 2 if version == 1 else None)
+    need(
+        type(norm) in {int, str} and norm in {1, 2, "mixed"} and (norm == 2 or version > 1), "head: the norm"
+    )
+    problem, count = problem_of(arrays, norm), number(head, "levels", 1, 64)
     energy, claimed = problem.energy(), number(head, "energy", 0, 1e300)
     need(count == int(count), f"head: {count} levels")
     need(abs(energy - claimed) <= 1e-12 * max(1, energy), f"head: the energy is {energy}, not {claimed}")
@@ -459,12 +538,13 @@ def check(arrays):
     boxes, field = boxes_of(problem, levels), relabelled(problem, levels[0])
     try:
         check_jumps(field, boxes)
-        bound = max(bound, float(min(convex_bound(field, boxes), energy)))
-    except Refused:
-        if head["status"] == "optimal":
-            raise
+        last = (convex_bound if norm == 2 else multiplier_bound)(field, boxes)
+        bound = max(bound, float(min(last, energy)))
+        why = f"with a bound of {bound}"
+    except Refused as refusal:  # the bound of a level may be enough
+        why = str(refusal)
     optimal = bound >= energy - TOLERANCE * max(1, energy)
-    need(optimal or head["status"] == "gap", f"head: not optimal, with a bound of {bound}")
+    need(optimal or head["status"] == "gap", f"head: not optimal, {why}")
     need(number(head, "bound", -1e300, 1e300) <= bound, f"head: the bound is {bound}, not {head['bound']}")
     return bound
 

@@ -74,7 +74,7 @@ def with_clusters(lattice, hands):
     """A dual with clusters on all quads, after two passes."""
     dual = Dual(lattice, hands)
     dual.ascend(1)
-    dual.add_clusters(len(lattice.instance.grid.quads))
+    dual.add_clusters(len(lattice.instance.grid.quads), first_field(lattice.instance))
     return dual
 
 
@@ -104,7 +104,7 @@ def test_no_update_of_clusters_lowers_the_bound():
         dual, bounds = Dual(Lattice.whole(best, 16), hands), []
         dual.ascend(60)
         passes = dual.bound()
-        dual.add_clusters(4)
+        dual.add_clusters(4, best)
         for _ in range(25):
             dual.update_clusters()
             bounds += [dual.bound(), dual.forward(), dual.backward()]
@@ -120,7 +120,7 @@ def test_threads_change_no_bit():
         with crew(count) as hands:
             dual = Dual(lattice, hands)
             dual.ascend(2)
-            dual.add_clusters(5)
+            dual.add_clusters(5, first_field(instance))
             state = dual.state
             found.append(
                 (dual.ascend(2), dual.bound(), state.shares_first.tobytes(), state.clusters.tables.tobytes())

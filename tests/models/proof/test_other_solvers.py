@@ -111,6 +111,6 @@ def test_toulbar2_finds_no_labels_below_the_bound_of_a_level():
     with crew(1) as hands:
         dual = Dual(lattice, hands)
         dual.ascend(20)
-        dual.add_clusters(2)
+        dual.add_clusters(2, first_field(instance))
         dual.ascend(20)
         assert least - 1e-3 <= dual.bound() <= least

@@ -1,0 +1,155 @@
+"""Proofs where pairs count with absolute values: the lemmas at random points, and optima of other solvers."""
+
+import math
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.models.instance.instance import HALF, Instance
+from crossfield.models.processes.compiled import crew
+from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.prove_absolute import forced_absolute
+from crossfield.models.proof.pruning import RemainingCells
+from crossfield.models.proof.sweep import Dual
+from crossfield.models.search.absolute_fit import Residuals, absolute_fit, fitted_absolute
+from crossfield.models.search.starts import first_field
+from exhaustive import random_instance
+from second_checker import arrays_of, check
+
+pytestmark = pytest.mark.numeric
+
+NORMS = pytest.mark.parametrize("norm", [1, "mixed"])
+SOLVED = pytest.mark.parametrize(
+    "norm, formulation, solver", [(1, "milp-mccormick", "highs"), ("mixed", "miqp-mccormick", "scip")]
+)
+
+
+@pytest.mark.slow
+@SOLVED
+def test_bound_and_energy_are_the_optimum_of_another_solver(norm, formulation, solver):
+    for seed in range(6):
+        instance = random_instance(seed, (2 + seed % 3,) * 2, strokes=(2 + seed % 3) ** 2)
+        proof = cf.prove(instance, norm=norm, jobs=1)
+        optimum = cf.solve(
+            cf.formulate(instance, formulation), solver, limits=cf.Limits(100, gap=1e-9)
+        ).objective
+        assert proof.bound <= optimum + 1e-6, seed
+        assert proof.energy >= optimum - 1e-6, seed
+        assert proof.energy == proof.field.energy(norm).total
+        assert proof.status == "optimal", seed
+
+
+@NORMS
+@pytest.mark.parametrize("seed, strokes", [(0, 4), (1, 1), (2, 4)])
+def test_certificates_are_confirmed_by_a_second_checker(norm, seed, strokes, tmp_path):
+    proof = cf.prove(random_instance(seed, (2, 2), strokes), norm=norm, jobs=1)
+    path = tmp_path / "it.npz"
+    written = write_certificate(proof, path)
+    assert written.status == proof.status == "optimal"
+    assert written.norm == norm
+    bound = check(arrays_of(path))
+    assert written.bound <= bound <= written.energy == proof.field.energy(norm).total
+    read = cf.read_certificate(path)
+    assert (read.norm, read.status, read.bound) == (norm, "optimal", written.bound)
+
+
+@NORMS
+def test_a_bound_without_forced_jumps_is_confirmed(norm, tmp_path):
+    proof = cf.prove(random_instance(5, (3, 3), 9), norm=norm, jobs=1, work=1)
+    written = write_certificate(proof, tmp_path / "it.npz")
+    assert written.status == "gap"
+    assert 0 < written.bound <= check(arrays_of(tmp_path / "it.npz")) <= written.energy
+
+
+@NORMS
+def test_levels_bound_any_field_from_any_slopes(norm):
+    """Levels round a bad field, with slopes of no meaning, are bounds below a good one."""
+    rng = np.random.default_rng(0)
+    for seed in range(6):
+        instance = random_instance(seed, (3, 3), strokes=9)
+        good = cf.prove(instance, norm=norm, jobs=1, limits=cf.Limits(math.inf, 0.01))
+        bad = cf.CrossField(instance, rng.uniform(0, 3, 9), rng.uniform(-0.7, 0.7, 9), np.zeros(12, int))
+        lattice = Lattice.common(bad, norm, rng.uniform(-2, 2, len(instance.theta)), 8)
+        assert lattice_bound(lattice) <= good.energy + 1e-12
+
+
+def lattice_bound(lattice):
+    with crew(1) as hands:
+        dual = Dual(lattice, hands)
+        dual.ascend(10)
+        dual.quantise()
+        return dual.bound()
+
+
+@NORMS
+def test_the_mean_cost_of_a_rounded_cross_is_at_most_its_own(norm):
+    """Stroke and skew at random crosses of one pixel; thresholds of alpha and beta are independent."""
+    rng = np.random.default_rng(1)
+    size = np.abs if norm == 1 else np.square
+    for _ in range(60):
+        theta, slope, skew_coefficient = (
+            rng.uniform(0, np.pi),
+            rng.choice([-1, 0, 1, rng.uniform(-1.6, 1.6)]),
+            rng.uniform(),
+        )
+        instance = Instance(
+            "one", np.ones((1, 1), bool), [[0, 0]], [theta], [1.0], skew_coefficient=skew_coefficient
+        )
+        field = cf.CrossField(instance, [rng.uniform(0, 3)], [0.0], [])
+        lattice = Lattice.common(field, norm, np.array([slope]), int(rng.choice([8, 10, 16])))
+        rows, columns = lattice.alpha_count[0], lattice.beta_count[0]
+        cost = lattice.unary_costs().reshape(rows, columns)
+        alpha, beta = (angle.reshape(rows, columns) for angle in lattice.angles)
+        x, y = rng.uniform(0, rows - 1, 300), rng.uniform(0, columns - 1, 300)
+        k, l = x.astype(int), y.astype(int)  # noqa: E741 - the letter of the equation
+        mean = sum(
+            np.abs(x - k - 1 + a) * np.abs(y - l - 1 + b) * cost[k + a, l + b] for a in (0, 1) for b in (0, 1)
+        )
+        at, skew = alpha[0, 0] + lattice.h * x, beta[0, 0] + lattice.h * y
+        turned = np.array([at + skew, at + HALF - skew]) - theta
+        misfit = np.abs(turned - np.pi * np.round(turned / np.pi)).min(axis=0)
+        assert (mean <= size(misfit) + skew_coefficient * size(skew) + 1e-12).all()
+
+
+@NORMS
+def test_any_multipliers_bound_the_energy_in_a_box(norm):
+    rng = np.random.default_rng(2)
+    instance = random_instance(3, (3, 4))
+    field = first_field(instance)
+    fitted, _ = fitted_absolute(field, norm)
+    assert fitted.energy(norm).total <= field.energy(norm).total
+    terms = Residuals.at(instance, field.p, norm)
+    lower = np.concatenate([fitted.alpha, fitted.beta]) - rng.uniform(0, 1, 24)
+    upper = lower + rng.uniform(0, 1, 24)
+    tilt = rng.normal(0, 0.1, 24)
+    best = absolute_fit(instance, field.p, norm, lower, upper, tilt=tilt)
+    for _ in range(50):
+        x = rng.uniform(lower, upper)
+        energy = cf.CrossField(instance, x[:12], x[12:], field.p).energy(norm).total
+        assert terms.energy(x) == pytest.approx(energy, rel=1e-12)
+        for multipliers in (best.multipliers, rng.uniform(-1.5, 1.5, len(terms.weight))):
+            assert terms.bound(multipliers, lower, upper, tilt) <= energy - tilt @ x
+    assert terms.energy(best.x) - tilt @ best.x == pytest.approx(best.bound, abs=1e-8)
+
+
+@NORMS
+def test_a_forced_jump_is_the_best_one_everywhere_in_its_boxes(norm):
+    rng = np.random.default_rng(3)
+    instance = Instance("two", np.ones((1, 2), bool), [[0, 0]], [1.0], [1.0])
+    found = 0
+    for _ in range(300):
+        p = rng.integers(-1, 2)
+        middle = np.array([[0.5, 0.5 + HALF * p], rng.uniform(-0.7, 0.7, 2)]) + rng.normal(0, 0.2, (2, 2))
+        low, high = middle - rng.uniform(0, 0.2, (2, 2)), middle + rng.uniform(0, 0.2, (2, 2))
+        field = cf.CrossField(instance, middle[0], middle[1], [p])
+        lattice = Lattice.common(field, norm, np.zeros(1), 4)
+        left = RemainingCells(lattice, lattice.allowed, low[0], high[0], low[1], high[1])
+        if not forced_absolute(left).pairs[0]:
+            continue
+        found += 1
+        alpha, beta = rng.uniform(low[..., None], high[..., None], (2, 2, 200))
+        jumps = np.arange(p - 4, p + 5)[:, None]
+        costs = np.abs(alpha[0] - alpha[1] + HALF * jumps) + np.abs((-1.0) ** jumps * beta[0] - beta[1])
+        assert (costs[4] <= costs.min(axis=0) + 1e-12).all()
+    assert found > 30
