@@ -16,6 +16,7 @@ from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.file import write_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate, tightened
+from crossfield.models.formulations.windows import Windows
 from crossfield.models.instance.file import write_instance
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.tightening import windows_left
@@ -69,6 +70,27 @@ def test_the_optimum_is_that_of_the_whole_problem(proof):
         assert cf.solve(problem, "bonmin").objective == pytest.approx(least, abs=1e-6)
     _, narrow = problems(certificate, "qp-fixed")
     assert cf.solve(narrow, "ipopt").objective == pytest.approx(least, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "norm, formulations",
+    [(1, ("milp-mccormick", "miqcp-bilinear-l1")), ("mixed", ("miqp-mccormick", "miqcp-bilinear"))],
+)
+def test_windows_of_another_norm_keep_the_optimum_of_its_formulations(norm, formulations, tmp_path):
+    found = cf.prove(random_instance(103, (2, 3), 9), norm=norm, jobs=1)
+    windows = windows_left(write_certificate(found, tmp_path / "it.npz"))
+    for name in FORMULATIONS:
+        problem = formulate(found.field.instance, name, p=found.field.p if FORMULATIONS[name].fixed else None)
+        narrow = tightened(problem, windows)
+        assert ("the optimum stays" in narrow.tightened) == (name in formulations)
+        assert narrow.violation(narrow.point(found.field)).worst < 1e-9
+        assert Windows.of_document(narrow.windows.document()).norm == norm
+    other = formulate(found.field.instance, "milp-mccormick", stroke_norm=2)
+    assert "may rise" in tightened(other, windows).tightened
+    if norm == 1:
+        plain = formulate(found.field.instance, "milp-mccormick")
+        for problem in (plain, tightened(plain, windows)):
+            assert cf.solve(problem, "highs").objective == pytest.approx(found.energy, abs=1e-6)
 
 
 @pytest.mark.parametrize("gauge, least", [("strokes", 4), ("box", 1)])
