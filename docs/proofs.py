@@ -333,7 +333,7 @@ def in_short(kept: Kept) -> str:
     here = sum(row["here"]["proven"] for row in large)
     seconds = max(row["seconds"] for row in exact)
     return (
-        f"At {SIZE} pixels and under the paper's coefficients, `crossfield prove` closes {len(closed)} of "
+        f"At {SIZE} pixels and under the default weights, `crossfield prove` closes {len(closed)} of "
         f"{len(rows)} samples, each within {max(row['seconds'] for row in closed):.0f} s on two threads"
         f"{rest}. Another solver proves the optimum of {len(known)} small instances; in {same} of them both "
         f"optima agree to {AGREE:g}. HiGHS and SCIP close {cold} of {len(large)} files of this size in "
@@ -354,17 +354,18 @@ def where(rows: dict[str, Facts]) -> str:
 
 def page(kept: Kept) -> str:
     """The text of docs/proofs.md."""
-    parts = {part: kept[part] for part in ("samples", "sketches", "fine", "solvers")}
+    tables = ("samples", "paper", "middle", "sketches", "fine")
+    parts = {part: kept[part] for part in (*tables, "solvers")}
     texts = {
         "generated": generated("python docs/proofs.py"),
         "short": in_short(kept),
         "most": f"{MOST_LABELS:,}",
         "optima": optima_table(kept["optima"]),
         "solvers": solvers_table(kept["solvers"]),
-        "fine_limit": f"{max(row['limit'] for row in kept['fine'].values()):g}",
+        **{f"{part}_limit": f"{max(row['limit'] for row in kept[part].values()):g}" for part in tables},
         "solvers_limit": f"{SECONDS['solvers']:g}",
     }
-    texts |= {part: proof_table(kept[part]) for part in ("samples", "sketches", "fine")}
+    texts |= {part: proof_table(kept[part]) for part in tables}
     texts |= {f"{part}_machine": where(rows) for part, rows in parts.items()}
     return re.sub(r"@(\w+)@", lambda match: texts[match[1]], TEMPLATE.read_text(encoding="utf-8"))
 
