@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from .models.search.greedy import greedy_field as greedy_field
     from .models.search.improvement import improved_field as improved_field
     from .models.search.search import Search as Search
+    from .models.sketch.random_strokes import random_instance as random_instance
     from .models.sketch.read import read_sketch as read_sketch
     from .models.sketch.samples import sample as sample
     from .models.sketch.samples import samples as samples
@@ -125,6 +126,7 @@ _HOME: Final = {
     "power_field": ".models.smooth.polyvector",
     "preview": ".export.pictures.draw",
     "prove": ".models.proof.prove",
+    "random_instance": ".models.sketch.random_strokes",
     "read_certificate": ".models.proof.certificate",
     "read_field": ".models.field.file",
     "read_instance": ".models.instance.file",

@@ -233,7 +233,7 @@ def _sidecar(
 ) -> dict[str, Any]:
     problem, about = best.problem, task.about
     inherited = {key: about[key] for key in ("family", "title", "rung", "generator", "source", "instance")}
-    inherited |= {key: about[key] for key in ("origin", "added") if key in about}
+    inherited |= {key: about[key] for key in ("origin", "added", "split") if key in about}
     facts = best.facts()
     named = {each["dialect"]: each["name"] for each in listed if each["format"] == "sol"}
     numbers = {key: facts.pop(key) for key in ("objective", "violation", "integrality")}
