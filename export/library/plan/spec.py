@@ -276,7 +276,7 @@ def _of_value(error: Any) -> str:
         case "uniqueItems":
             twice = next(each for n, each in enumerate(error.instance) if each in error.instance[:n])
             words = f"{shortened(twice)!r} is listed twice; list it once"
-        case "minimum" | "maximum":
+        case "minimum" | "maximum" if {"minimum", "maximum"} <= schema.keys():
             words = f"{value} is out of range; choose {schema['minimum']} to {schema['maximum']}"
         case "enum":
             words = f"there is no {value!r}; choose from {', '.join(schema['enum'])}"
