@@ -125,12 +125,16 @@ class Lattice:
         k, l = (steps[at] for steps in self.steps)  # noqa: E741 - the letters of the equation
         target = np.zeros(self.instance.grid.size)
         target[self.instance.stroke_index] = self.instance.target
-        own = wrap((self.alpha + self.beta - target)[pixel], -HALF, np.pi)
+        # One line and turn, u as at the centre, loses less: also where v is nearer, as the checker has it.
+        turn = np.round((self.alpha + self.beta - target) / np.pi)[pixel]
         away = np.abs(k + l + 2 * self.offset[pixel])
-        lost = np.where((np.abs(own) < QUARTER) & (away <= 1), away, 0.5)
-        u = wrap(alpha + beta - target[pixel], -HALF, np.pi)
+        lost = np.where(away <= 1, away, 0.5)
+        u = alpha + beta - target[pixel]
         v = wrap(alpha + HALF - beta - target[pixel], -HALF, np.pi)
-        return np.minimum(u * u - lost * square, v * v - square / 2)
+        turns = np.round(u / np.pi)
+        nearest = np.abs(u - np.pi * turns)
+        others = np.minimum(np.where(turns == turn, np.pi - nearest, nearest), np.abs(v))
+        return np.minimum((u - np.pi * turn) ** 2 - lost * square, others**2 - square / 2)
 
 
 def offsets(grid: Grid) -> Floats:
