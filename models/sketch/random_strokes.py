@@ -108,7 +108,7 @@ def random_instance(
     return Instance(
         name=name or f"rand_n{size:03}_s{seed}",
         mask=mask,
-        stroke_pixels=pixels.astype(np.int32),
+        stroke_pixels=pixels,
         theta=theta,
         w=w,
         gauge=gauge,
@@ -171,14 +171,15 @@ def _along_curves(
         if (weight >= LEAST_WEIGHT).sum() >= count:
             break
     kept = weight >= LEAST_WEIGHT
-    return np.argwhere(kept), line_of(direction[kept]), np.minimum(weight[kept], 1.0)
+    pixels = np.argwhere(kept).astype(np.int32)
+    return pixels, line_of(direction[kept]), np.minimum(weight[kept], 1.0)
 
 
 def _curve(rng: np.random.Generator, size: int, bend: float) -> Floats:
     """Control points (4, 2) of a random cubic whose ends are in the square; a line if it has no bend."""
     ends = rng.uniform(0.0, size, (2, 2))
     off = rng.uniform(-1.0, 1.0, (2, 2))
-    cubic = lines_as_cubics(ends[:1], ends[1:])[0]
+    cubic: Floats = lines_as_cubics(ends[:1], ends[1:])[0]
     cubic[1:3] += bend * size * off
     return cubic
 

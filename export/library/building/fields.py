@@ -27,10 +27,13 @@ def found_fields(instance: Instance, recipe: InstanceRecipe, sent: Certified | N
     if effort == "greedy":
         return baseline, [baseline], None
     if effort == "proven":
-        proven = _proof(baseline, recipe, sent)
-        return baseline, [baseline, *([proven.known] if proven else [])], proven
-    low, proven = _searched(instance, recipe, sent)
-    return baseline, low, proven
+        low, proven = _proof(baseline, recipe, sent)
+        return baseline, [baseline, *low], proven
+    searched = searched_field(instance)
+    low, proven = _proof(searched, recipe, sent)
+    found = better_in_1norm(searched.field, recipe.rung)
+    staged = [Known(pinned(each.field), ours("two stages")) for each in found]
+    return baseline, [searched, *low, *found, *staged], proven
 
 
 def given_fields(given: Given, instance: Instance, recipe: InstanceRecipe) -> Found:
@@ -45,18 +48,11 @@ def _nearest(instance: Instance) -> Known:
     return Known(CrossField.from_lines(instance, theta, theta + HALF), ours("nearest stroke"))
 
 
-def _searched(
-    instance: Instance, recipe: InstanceRecipe, sent: Certified | None
+def _proof(
+    start: Known, recipe: InstanceRecipe, sent: Certified | None
 ) -> tuple[list[Known], Certified | None]:
-    """Results of a search, of a proof unless one was submitted, and of HiGHS in the 1-norm."""
-    searched = searched_field(instance)
-    proven = _proof(searched, recipe, sent)
-    found = better_in_1norm(searched.field, recipe.rung)
-    staged = [Known(pinned(each.field), ours("two stages")) for each in found]
-    return [searched, *([proven.known] if proven else []), *found, *staged], proven
-
-
-def _proof(start: Known, recipe: InstanceRecipe, sent: Certified | None) -> Certified | None:
-    """The proof that starts from a field, if the recipe asks for one and none was submitted."""
-    asked = recipe.prove and sent is None
-    return certified(start.field, f"{recipe.name}.certificate.npz") if asked else None
+    """The field and the certificate of a proof, if the recipe asks for one and none was submitted."""
+    if not recipe.prove or sent is not None:
+        return [], None
+    found, proven = certified(start.field, f"{recipe.name}.certificate.npz")
+    return [found], proven

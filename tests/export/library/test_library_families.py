@@ -232,3 +232,13 @@ def test_an_interrupted_family_goes_on_where_it_was_with_the_same_bytes(built, t
     build(spec, tmp_path / "library", jobs=2, progress=made.append)
     assert not done & {line.split(": ")[1] for line in made[5:-1]}
     assert content(tmp_path / "library") == content(built.folder)
+
+
+@pytest.mark.slow
+def test_a_large_certificate_of_an_optimum_is_kept(tmp_path):
+    """It was left out with its field, although it proved the optimum."""
+    text = SMALL.replace('"3-5"', "[524]").replace("[3]", "[5]").replace("0.3", "0.2")
+    text = text.replace('"exact", "milp"', '"exact"').replace(', "box"', "").replace("split", "# split")
+    (entry,) = build(read_spec(written(tmp_path, text)), tmp_path / "library").entries
+    assert (entry["status"], entry["best"]["solver"]) == ("optimal", "crossfield (prove)")
+    assert (tmp_path / "library" / "cf_fam_n005_s524.certificate.npz").stat().st_size > 2_000_000
