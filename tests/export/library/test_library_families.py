@@ -5,6 +5,7 @@ import tomllib
 from dataclasses import replace
 
 import pytest
+from clusters import cluster
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.plan.recipe import plan
@@ -242,3 +243,11 @@ def test_a_large_certificate_of_an_optimum_is_kept(tmp_path):
     (entry,) = build(read_spec(written(tmp_path, text)), tmp_path / "library").entries
     assert (entry["status"], entry["best"]["solver"]) == ("optimal", "crossfield (prove)")
     assert (tmp_path / "library" / "cf_fam_n005_s524.certificate.npz").stat().st_size > 2_000_000
+
+
+@pytest.mark.slow
+@pytest.mark.needs("distributed")
+def test_dask_workers_make_the_same_bytes(built, tmp_path):
+    with cluster(tmp_path) as (address, _):
+        made = build(read_spec(written(tmp_path, SMALL)), tmp_path / "library", scheduler=address)
+    assert content(made.folder) == content(built.folder)
