@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from .export.bundle.manifest import write_problem as write_problem
     from .export.formats.pyomo_model import to_pyomo as to_pyomo
     from .export.formats.registry import write as write
+    from .export.library.building.named import LibraryEntry as LibraryEntry
+    from .export.library.building.named import entries as entries
+    from .export.library.building.named import entry as entry
     from .export.pictures.draw import draw as draw
     from .export.pictures.draw import preview as preview
     from .export.pictures.mask import write_mask as write_mask
@@ -74,6 +77,7 @@ if TYPE_CHECKING:
     from .models.search.greedy import greedy_field as greedy_field
     from .models.search.improvement import improved_field as improved_field
     from .models.search.search import Search as Search
+    from .models.sketch.random_strokes import random_instance as random_instance
     from .models.sketch.read import read_sketch as read_sketch
     from .models.sketch.samples import sample as sample
     from .models.sketch.samples import samples as samples
@@ -96,6 +100,7 @@ _HOME: Final = {
     "InputError": ".models.errors",
     "Instance": ".models.instance.instance",
     "InstanceError": ".models.errors",
+    "LibraryEntry": ".export.library.building.named",
     "Light": ".export.shading.colours",
     "Limits": ".models.processes.limits",
     "MissingSolverError": ".models.errors",
@@ -116,6 +121,8 @@ _HOME: Final = {
     "analytic": ".models.sketch.surfaces",
     "bend_field": ".models.smooth.bend",
     "draw": ".export.pictures.draw",
+    "entries": ".export.library.building.named",
+    "entry": ".export.library.building.named",
     "evaluate": ".export.solving.evaluate",
     "fit_angles": ".export.solving.two_stage",
     "formulate": ".models.formulations.problem",
@@ -125,6 +132,7 @@ _HOME: Final = {
     "power_field": ".models.smooth.polyvector",
     "preview": ".export.pictures.draw",
     "prove": ".models.proof.prove",
+    "random_instance": ".models.sketch.random_strokes",
     "read_certificate": ".models.proof.certificate",
     "read_field": ".models.field.file",
     "read_instance": ".models.instance.file",

@@ -52,6 +52,7 @@ NAMES: Final = {
         lambda light: [f"{math.degrees(light.azimuth):.0f},{math.degrees(light.elevation):.0f}"],
     ),
     "rungs": _of("..library.plan.spec", "RUNGS"),
+    "facts": _of("..library.building.table", "COLUMNS"),
 }
 """Words in braces in help texts, and the function that returns the names for each."""
 
@@ -67,6 +68,7 @@ PANELS: Final = {
     "Sketch": "size mask silhouette curvature view gauge stroke-weight skew-weight",
     "Formulation": "formulation facet stroke-norm beta-norm relax norm tightened",
     "Method and solver": "method solver start program solve curves search",
+    "Entries": "rung where",
     "Files": "format nl-form gzip manifest check on underlay",
     "Picture and surface": "kind title scale light flip hint port no-browser",
     "Limits and processes": "time-limit gap threads jobs tolerance up-to scheduler",
@@ -89,6 +91,7 @@ EXAMPLES: Final = {
     "list": "crossfield list",
     "samples": "crossfield samples",
     "library build": "crossfield library build small.toml -o library",
+    "library get": "crossfield library get cf_mouse_n004_exact -o models",
     "library solve": "crossfield library solve library --solver highs --time-limit 2",
     "library verify": "crossfield library verify library",
     "library release": "crossfield library release library -o library.tar.gz",

@@ -1,4 +1,4 @@
-"""The commands of `library`: build, solve, verify, release, submit, points, site."""
+"""The commands of `library`: build, get, solve, verify, release, submit, points, site."""
 
 from __future__ import annotations
 
@@ -80,6 +80,46 @@ def build_command(
             f" changed since: {', '.join(stale[:3])}{', ...' if stale[3:] else ''}; measure them again with"
             " `crossfield library solve`"
         )
+
+
+@command("get")
+def get_command(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="NAME...", help="Entries; by default all that are selected.")
+    ] = None,
+    *,
+    rung: Annotated[
+        str | None, typer.Option("--rung", metavar="RUNG", help="Only entries of this rung: {rungs}.")
+    ] = None,
+    where: Annotated[
+        str | None,
+        typer.Option(
+            "--where",
+            metavar="EXPRESSION",
+            help="Only entries whose facts obey this, as in \"status == 'open' and pairs < 500\";"
+            " facts: {facts}.",
+        ),
+    ] = None,
+    output: Folder,
+    printing: PrintOptions,
+) -> None:
+    """Write model files of the library that ships, without a build: the same bytes as a build.
+
+    Names, --rung and --where select entries together; at least one of them is needed.
+    """
+    from ...models.errors import InputError
+    from ..library.building.named import entries, entry, write_entries
+
+    if not names and rung is None and where is None:
+        raise InputError("no entry is selected; name entries, or select them with --rung or --where")
+    asked = {entry(name).name for name in names or []}
+    chosen = [each for each in entries(where=where, rung=rung) if not asked or each.name in asked]
+    if not chosen:
+        raise InputError("no entry of the library that ships is selected; relax --rung or --where")
+    with progress(quiet=printing.quiet) as show:
+        written = write_entries(output, chosen, progress=show)
+    number = sum(map(len, written.values()))
+    printing.show(written, lambda: print_line(f"{output}: {number} files of {len(written)} entries"))
 
 
 @command("solve")

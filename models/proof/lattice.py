@@ -142,11 +142,11 @@ class Lattice:
         pixel, half = self.pixel[at], self.h * self.h / 2
         target = np.zeros(self.instance.grid.size)
         target[self.instance.stroke_index] = self.instance.target
-        u = wrap(alpha + beta - target[pixel], -HALF, np.pi)
+        u = alpha + beta - target[pixel]
         v = wrap(alpha + HALF - beta - target[pixel], -HALF, np.pi)
         if self.norm == 2:
-            return np.minimum(u * u - self._lost(at, target), v * v - half)
-        slope = np.zeros(self.instance.grid.size)
+            return self._squares(at, u, v, target)
+        u, slope = wrap(u, -HALF, np.pi), np.zeros(self.instance.grid.size)
         slope[self.instance.stroke_index] = self.slopes
         # A value that rounding could put on either side of 2 h takes the lesser cost, that of the near side.
         near = 2 * self.h * (1 + 1e-12) + 1e-12
@@ -156,13 +156,17 @@ class Lattice:
         away = np.abs(u - slope[pixel] / 2)
         return np.minimum(u * u - np.where(away < near, away * away, half), v * v - half)
 
-    def _lost(self, at: NDArray[np.int64], target: Floats) -> Floats:
-        """The deduction of line u in the 2-norm, at some labels."""
-        pixel = self.pixel[at]
+    def _squares(self, at: NDArray[np.int64], u: Floats, v: Floats, target: Floats) -> Floats:
+        """In the 2-norm. One line and turn, u as at the centre, has its own deduction, even if v is near."""
+        pixel, square = self.pixel[at], self.h * self.h
         k, l = (steps[at] for steps in self.steps)  # noqa: E741 - the letters of the equation
-        own = wrap((self.alpha + self.beta - target)[pixel], -HALF, np.pi)
+        turn = np.round((self.alpha + self.beta - target) / np.pi)[pixel]
         away = np.abs(k + l + 2 * self.offset[pixel])
-        return np.where((np.abs(own) < QUARTER) & (away <= 1), away, 0.5) * self.h * self.h
+        lost = np.where(away <= 1, away, 0.5)
+        turns = np.round(u / np.pi)
+        nearest = np.abs(u - np.pi * turns)
+        others = np.minimum(np.where(turns == turn, np.pi - nearest, nearest), np.abs(v))
+        return np.minimum((u - np.pi * turn) ** 2 - lost * square, others**2 - square / 2)
 
 
 def offsets(grid: Grid) -> Floats:

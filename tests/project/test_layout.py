@@ -11,7 +11,7 @@ import pytest
 
 ROOT = places.ROOT
 PARTS = ("models", "export", "templates")
-DATA = (".svg", ".json", ".toml", ".npz", ".j2", ".css", ".js", ".typed")
+DATA = (".svg", ".csv", ".json", ".toml", ".npz", ".j2", ".css", ".js", ".typed")
 
 
 @pytest.fixture(scope="module")

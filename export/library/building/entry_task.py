@@ -83,8 +83,8 @@ def make_entry(task: Entry) -> Files:
     with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
         made = Path(temporary)
         instance, known = _read(task, made)
-        problem = _formulated(instance, task.recipe.formulation, task.recipe.facet, known["baseline"].field.p)
-        listed, refused = _models(problem, task.recipe, made)
+        problem = formulated(instance, task.recipe.formulation, task.recipe.facet, known["baseline"].field.p)
+        listed, refused = model_files(problem, task.recipe, made)
         best = best_point(problem, list(known.values()))
         records = _records(task, best, instance)
         bounds = _bounds(task, best, records)
@@ -111,16 +111,17 @@ def _read(task: Entry, folder: Path) -> tuple[Instance, dict[str, Known]]:
     return instance, known
 
 
-def _formulated(instance: Instance, formulation: str, facet: str, jumps: Ints) -> Problem:
+def formulated(instance: Instance, formulation: str, facet: str, jumps: Ints | None) -> Problem:
+    """Return the problem of an entry. jumps: fixed ones, which only `qp-fixed` has."""
     recipe = FORMULATIONS[formulation]
     options = {"facet": facet} if "facet" in recipe.settable else {}
     return formulate(instance, formulation, p=jumps if recipe.fixed else None, **options)
 
 
-def _models(
+def model_files(
     problem: Problem, recipe: EntryRecipe, folder: Path
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
-    """Facts of the model files written to the folder, and why the other formats are refused."""
+    """Write the model files of an entry; return their facts, and why the other formats are refused."""
     listed: list[dict[str, Any]] = []
     refused = {}
     for name in recipe.formats:
@@ -198,7 +199,7 @@ def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
     shas = {task.name: best.problem.sha256}
     for each in equivalent(task.recipe, task.relatives):
         if each["entry"] is not None:
-            other = _formulated(instance, each["formulation"], "hull", best.known.field.p)
+            other = formulated(instance, each["formulation"], "hull", best.known.field.p)
             shas[each["entry"]] = other.sha256
     return [each for each in task.records if shas.get(each.entry) == each.problem_sha256]
 
@@ -233,7 +234,7 @@ def _sidecar(
 ) -> dict[str, Any]:
     problem, about = best.problem, task.about
     inherited = {key: about[key] for key in ("family", "title", "rung", "generator", "source", "instance")}
-    inherited |= {key: about[key] for key in ("origin", "added") if key in about}
+    inherited |= {key: about[key] for key in ("origin", "added", "split") if key in about}
     facts = best.facts()
     named = {each["dialect"]: each["name"] for each in listed if each["format"] == "sol"}
     numbers = {key: facts.pop(key) for key in ("objective", "violation", "integrality")}

@@ -21,6 +21,7 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
 from ..plan.recipe import InstancePlan
 from ..plan.spec import RUNGS, Spec
+from .table import TABLE, table
 
 CHECKER: Final = "check_point.py"
 CERTIFICATES: Final = "check_certificate.py"
@@ -53,7 +54,7 @@ def write_index(folder: Path, spec: Spec, plans: Sequence[InstancePlan], skipped
 def general(
     folder: Path, spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, str]
 ) -> dict[str, bytes]:
-    """Return the files about the library as a whole, the index last. folder: holds the sidecars."""
+    """Return the files about the library as a whole, the index last. folder: holds all other files."""
     context = _context(spec, sidecars) | {"skipped": skipped}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
@@ -61,7 +62,8 @@ def general(
     if context["certified"]:
         checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
     index = _index(folder, spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
-    return texts | drawings | checkers | {SOLU: _optima(sidecars), INDEX: as_bytes(index)}
+    facts = {SOLU: _optima(sidecars), TABLE: table(folder, sidecars)}
+    return texts | drawings | checkers | facts | {INDEX: as_bytes(index)}
 
 
 def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:

@@ -14,25 +14,20 @@ from ....models.field.field import CrossField
 from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import to_json
 from ....models.instance.instance import Instance
-from ....models.search.greedy import greedy_field
-from ....models.search.pinned import pinned
+from ....models.sketch.random_strokes import STROKE_SHARE
 from ...formats.registry import generator
 from ..documents.documents import ABOUT_FORMAT, VERSION, about_file, as_bytes
 from ..documents.statistics import sizes
 from ..ledger.given import Given
 from ..ledger.points import (
-    Certified,
     Known,
     Provenance,
-    better_in_1norm,
-    certified,
     certified_by,
     least_energy,
-    ours,
-    searched_field,
 )
 from ..plan.recipe import InstanceRecipe, digest
-from ..plan.sources import RAGGED_SHARE, STROKE_SHARE, instance_from, kind_of
+from ..plan.sources import instance_from, kind_of
+from .fields import found_fields, given_fields
 
 Files = dict[str, bytes]  # by name, in the order of writing
 
@@ -87,10 +82,6 @@ class Preparation:
         return digest([generator(), self.recipe.document(), submitted, *given, *proof])
 
 
-_Found = tuple[Known, list[Known], Certified | None]
-"""The baseline, fields of low energy, and a certificate."""
-
-
 def prepared(task: Preparation) -> Files | NoStrokeError:
     """Return the files of an instance, its document last, or the error that its size is too small."""
     try:
@@ -102,7 +93,7 @@ def prepared(task: Preparation) -> Files | NoStrokeError:
     if evidence and evidence.instance_sha256 == instance.sha256:
         sent = certified_by(evidence.data, evidence.file, instance, evidence.provenance)
     baseline, low, proven = (
-        _given(given, instance, task.recipe) if given else _searched(instance, task.recipe, sent)
+        given_fields(given, instance, task.recipe) if given else found_fields(instance, task.recipe, sent)
     )
     submitted = [each.known() for each in task.submitted]
     every = [
@@ -137,23 +128,6 @@ def prepared(task: Preparation) -> Files | NoStrokeError:
     return files | {about_file(task.name): as_bytes(about)}
 
 
-def _searched(instance: Instance, recipe: InstanceRecipe, sent: Certified | None) -> _Found:
-    """Results of a search, of a proof unless one was submitted, and of HiGHS in the 1-norm."""
-    searched = searched_field(instance)
-    name = f"{recipe.name}.certificate.npz"
-    proven = certified(searched.field, name) if recipe.prove and sent is None else None
-    found = better_in_1norm(searched.field, recipe.rung)
-    staged = [Known(pinned(each.field), ours("two stages")) for each in found]
-    low = [searched, *([proven.known] if proven else []), *found, *staged]
-    return Known(pinned(greedy_field(instance)), ours("greedy")), low, proven
-
-
-def _given(given: Given, instance: Instance, recipe: InstanceRecipe) -> _Found:
-    """The given points, without any search; a certificate is checked."""
-    low = [given.field("least_2"), given.field("least_1")]
-    return given.field("baseline"), low, given.certificate(instance) if recipe.prove else None
-
-
 def _same(first: CrossField, second: CrossField) -> bool:
     pairs = ((first.alpha, second.alpha), (first.beta, second.beta), (first.p, second.p))
     return all(bool((one == other).all()) for one, other in pairs)
@@ -186,8 +160,8 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
 
 
 def stated_of(recipe: InstanceRecipe) -> dict[str, Any]:
-    """Return origin and day of addition as the specification states them."""
-    stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added}
+    """Return origin, day of addition and split as the specification states them."""
+    stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added, "split": recipe.split}
     return {key: value for key, value in stated.items() if value}
 
 
@@ -198,8 +172,11 @@ def source_of(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
         "w_beta": instance.skew_coefficient,
     }
     if recipe.sketch.kind == "random":
-        parameters |= {"generator": "NumPy PCG64", "mask": recipe.sketch.what, "stroke_share": STROKE_SHARE}
-        parameters |= {"ragged_share": RAGGED_SHARE} if recipe.sketch.what == "ragged" else {}
+        drawn = recipe.sketch.drawn
+        share = drawn.get("share", STROKE_SHARE)
+        parameters |= {"generator": "NumPy PCG64", "mask": recipe.sketch.what, "stroke_share": share}
+        parameters |= {"ragged_share": drawn["mask_share"]} if recipe.sketch.what == "ragged" else {}
+        parameters |= {key: drawn[key] for key in ("strokes", "noise") if key in drawn}
     return {
         "sketch": recipe.sketch.what,
         "kind": kind_of(recipe),

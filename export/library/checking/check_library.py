@@ -20,6 +20,7 @@ from ...formats.registry import generator
 from ..building.entry_task import Entry, Inputs
 from ..building.executor import executor
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
+from ..building.table import TABLE
 from ..documents.documents import (
     INDEX,
     Library,
@@ -73,7 +74,7 @@ class _Verification:
         self.folder, self.jobs, self.progress = folder, jobs, progress
         self.present: set[str] = set()
         self.damaged: set[str] = set()
-        self.known = {SUMS, INDEX, LEDGER, SOLU, CHECKER, *TEXTS}
+        self.known = {SUMS, INDEX, LEDGER, SOLU, TABLE, CHECKER, *TEXTS}
 
     def findings(self) -> Iterator[Finding]:
         """Yield all findings in the order of the checks."""
@@ -150,7 +151,7 @@ class _Verification:
             made = [each for each in plans if each.recipe.name not in library.skipped]
             if [entry.name for each in made for entry in each.entries] != names:
                 yield Finding(INDEX, "lists other entries than its specification asks for")
-        for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
+        for name in sorted({*TEXTS, SOLU, TABLE, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
 
     def _skipped(self, library: Library, plans: tuple[InstancePlan, ...]) -> Iterator[Finding]:

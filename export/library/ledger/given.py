@@ -64,14 +64,17 @@ NO_POINTS: Final[Points] = dict[str, Given]().get
 
 def read_points(path: str | Path) -> Points:
     """Read the points in a folder. Raises InputError, InstanceError for a damaged file."""
-    folder, found = folder_of(path), {}
-    for each in sorted(folder.glob("*.about.json")):
-        about = read_about(each)
-        name = about_file(about["name"])
-        if each.name != name:
-            raise InputError(f"is about {about['name']}; its name must be {name}", file=each)
-        found[about["name"]] = _given(folder, about)
-    return found.get
+    given = map(read_point, sorted(folder_of(path).glob("*.about.json")))
+    return {str(each.about["name"]): each for each in given}.get
+
+
+def read_point(path: Path) -> Given:
+    """Read the results whose document is a file. Raises InputError, InstanceError for a damaged file."""
+    about = read_about(path)
+    name = about_file(about["name"])
+    if path.name != name:
+        raise InputError(f"is about {about['name']}; its name must be {name}", file=path)
+    return _given(path.parent, about)
 
 
 def points_of(folder: Path) -> Points:

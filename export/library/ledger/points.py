@@ -32,7 +32,7 @@ _ROUNDS: Final = 8
 _NODES: Final = {"tiny": 1000, "small": 20}  # of the branch and bound in the 1-norm, by rung
 _LP_UP_TO: Final = 1000  # pixels up to which the angles are fitted in the 1-norm
 _MOST_WORK: Final = 20_000_000  # labels, counted at each rounding, after which a proof ends: some minutes
-_MOST_BYTES: Final = 2_000_000  # a larger certificate has a gap, and is omitted
+_MOST_BYTES: Final = 2_000_000  # of a certificate that leaves a gap; those of optima are kept
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,11 @@ class Certified:
         return cls(Known(found.field, provenance), file, data, facts)
 
 
-def certified(start: CrossField, file: str) -> Certified | None:
-    """Prove the 2-norm optimum from a field; None if the certificate is large. file: name in a library."""
+def certified(start: CrossField, file: str) -> tuple[Known, Certified | None]:
+    """Prove the 2-norm optimum from a field; return the best field and the certificate.
+
+    file: name in a library. The certificate is None if it is large and leaves a gap.
+    """
     from ....models.proof.prove import prove  # loads compiled functions
 
     found = prove(start.instance, start=start, work=_MOST_WORK, jobs=1)
@@ -128,7 +131,8 @@ def certified(start: CrossField, file: str) -> Certified | None:
         path = Path(folder) / "a.certificate.npz"
         claim = write_certificate(proof, path)
         data = path.read_bytes()
-    return None if len(data) > _MOST_BYTES else Certified.of(claim, file, data, ours(METHOD))
+    kept = claim.status == "optimal" or len(data) <= _MOST_BYTES
+    return Known(field, ours(METHOD)), Certified.of(claim, file, data, ours(METHOD)) if kept else None
 
 
 def certified_by(data: bytes, file: str, on: Instance, provenance: Provenance) -> Certified:

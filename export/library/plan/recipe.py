@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Final
 
 from ....models.errors import InputError
@@ -22,7 +22,7 @@ LONGEST: Final = 32  # characters of a name before its suffix
 class InstanceRecipe:
     """Recipe of an instance. seed: of random sketches; prove: whether to prove its 2-norm optimum.
 
-    added: the day of its addition to the library; empty if not stated.
+    added: the day of its addition to the library; split: train, validation or test; empty if not stated.
     """
 
     name: str
@@ -33,6 +33,7 @@ class InstanceRecipe:
     gauge: str
     prove: bool = False
     added: str = ""
+    split: str = ""
 
     def document(self) -> dict[str, Any]:
         """Return everything that determines its content, as JSON."""
@@ -43,8 +44,10 @@ class InstanceRecipe:
             "title": self.sketch.title,
             "sha256": hashes,
             "origin": self.sketch.origin.document(),
+            **self.sketch.settings(),
         }
-        return asdict(self) | {"sketch": sketch}
+        stated = {each.name: getattr(self, each.name) for each in fields(self)} | {"sketch": sketch}
+        return {key: value for key, value in stated.items() if (key, value) != ("split", "")}
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ def plan(spec: Spec) -> tuple[InstancePlan, ...]:
         for sketch in spec.sketches
         for rung in spec.rungs
         if rung.name in sketch.rungs
-        for recipe in _instances(sketch, rung, prove=two_norm and rung.prove)
+        for recipe in _instances(sketch, rung, prove=two_norm and sketch.proves(rung))
     )
     for name in (entry.name for each in found for entry in each.entries):
         if len(name) > LONGEST:
@@ -101,9 +104,10 @@ def _instances(sketch: Sketch, rung: Rung, *, prove: bool) -> list[InstanceRecip
             gauge,
             prove=prove and gauge == "strokes",  # bounds are weak under the gauge `box`
             added=max(sketch.added, rung.added),
+            split=split,
         )
         for size in sketch.sizes_on(rung)
-        for seed in sketch.seeds
+        for seed, split in zip(sketch.seeds, sketch.splits, strict=True)
         for gauge in rung.gauges
     ]
 

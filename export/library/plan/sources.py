@@ -5,28 +5,24 @@ from __future__ import annotations
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Final, cast
-
-import numpy as np
+from typing import cast
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.instance.instance import Gauge, Instance
-from ....models.sketch.outline import largest_part
-from ....models.sketch.read import LEAST_WEIGHT, instance_of
+from ....models.sketch.random_strokes import random_instance
+from ....models.sketch.read import instance_of
 from ....models.sketch.samples import SAMPLES, sample
 from .recipe import InstanceRecipe
-
-STROKE_SHARE: Final = 0.2  # of the pixels of a random instance
-RAGGED_SHARE: Final = 0.75  # of the square, for a ragged mask; its largest connected part is kept
 
 
 def instance_from(recipe: InstanceRecipe) -> Instance:
     """Return the instance of a recipe. Raises InputError; NoStrokeError if its size leaves no strokes."""
-    make = {"sample": _of_sample, "file": _of_file, "random": random_instance}[recipe.sketch.kind]
+    make = {"sample": _of_sample, "file": _of_file, "random": _of_random}[recipe.sketch.kind]
     try:
         # The coefficients of the paper, 1 and 1e-6, on every grid, so that published results apply.
         of_paper = {name: getattr(Instance, name) for name in ("stroke_coefficient", "skew_coefficient")}
-        return replace(make(recipe), name=recipe.name, **of_paper)
+        made = replace(make(recipe), name=recipe.name, **of_paper)
+        return made.with_weights(**recipe.sketch.weights)
     except NoStrokeError as error:
         raise NoStrokeError(f"{recipe.name}: {error}") from error
     except CrossfieldError as error:
@@ -58,25 +54,13 @@ def _of_file(recipe: InstanceRecipe) -> Instance:
         )
 
 
-def random_instance(recipe: InstanceRecipe) -> Instance:
-    """Return random strokes of a size and a seed, by NumPy's PCG64.
-
-    Drawn in this order: a ragged mask, the order of the pixels (the first fifth, at least one, are strokes),
-    theta uniform in [0, pi), w uniform in [0.1, 1].
-    """
-    rng = np.random.Generator(np.random.PCG64(recipe.seed))
-    mask = np.ones((recipe.size, recipe.size), dtype=bool)
-    if recipe.sketch.what == "ragged":
-        mask = largest_part(rng.random(mask.shape) < RAGGED_SHARE)
-    inside = np.argwhere(mask)
-    count = max(1, round(STROKE_SHARE * len(inside)))
-    chosen = np.sort(rng.permutation(len(inside))[:count])
-    return Instance(
-        name=recipe.name,
-        mask=mask,
-        stroke_pixels=inside[chosen].astype(np.int32),
-        theta=rng.uniform(0.0, np.pi, count),
-        w=rng.uniform(LEAST_WEIGHT, 1.0, count),
+def _of_random(recipe: InstanceRecipe) -> Instance:
+    assert recipe.seed is not None  # as the schema of specifications demands
+    # Weights are set later, because coefficients of the paper replace them by default.
+    return random_instance(
+        recipe.seed,
+        size=recipe.size,
         gauge=cast("Gauge", recipe.gauge),
-        source=f"random strokes on a {recipe.sketch.what} mask, seed {recipe.seed}",
+        name=recipe.name,
+        **recipe.sketch.drawn,
     )

@@ -6,31 +6,39 @@ names in tables, and combinations of keys. Files are relative to the folder of t
 
 from __future__ import annotations
 
+import hashlib
 import re
 import tomllib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
 from ....models.errors import InputError, naming, shortened
-from ....models.formulations.catalogue import FORMULATIONS, declaration_of, short_names
+from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM, declaration_of, short_names
 from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
 from ....models.instance.instance import GAUGES
 from ....models.sketch.published import published
+from ....models.sketch.random_strokes import RAGGED_SHARE
 from ....models.sketch.read import suffix_of_picture
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS
+from .splits import check_splits, seeds_document, seeds_of, split_document, splits_of
 
 FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
 RUNGS: Final = ("tiny", "small", "medium", "large")
 PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by default: most take a second
 Kind = Literal["sample", "file", "random"]
+Effort = Literal["search", "none", "greedy", "proven"]
+"""Work for the points of a sketch."""
+WEIGHTS: Final = ("stroke_weight", "skew_weight")
+RANDOM: Final = ("share", "mask_share", "strokes", "noise", *WEIGHTS)
+"""Keys of random sketches that are options of `random_instance`."""
 DEFAULT: Final = Path(__file__).with_name("default.toml")
 
 
@@ -103,7 +111,8 @@ class Sketch:
     """Source of instances: a sample, a file with its mask, or random strokes of some seeds.
 
     what: the sample, the file's own name, or the shape of a random mask. sizes: by rung, if they differ from
-    the rung's. drawing, mask: published bytes.
+    the rung's. splits: one per seed. points: a word of POINTS. random: options of `random_instance`.
+    drawing, mask: published bytes.
     """
 
     name: str
@@ -114,6 +123,9 @@ class Sketch:
     origin: Origin
     sizes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     seeds: tuple[int | None, ...] = (None,)
+    splits: tuple[str, ...] = ("",)
+    points: Effort = "search"
+    random: tuple[tuple[str, Any], ...] = ()
     drawing: bytes = b""
     suffix: str = ""
     mask: bytes = b""
@@ -123,6 +135,33 @@ class Sketch:
     def sizes_on(self, rung: Rung) -> tuple[int, ...]:
         """Return its sizes on a rung."""
         return dict(self.sizes).get(rung.name, rung.sizes)
+
+    def proves(self, rung: Rung) -> bool:
+        """Return whether the 2-norm optima of its instances on a rung are proven."""
+        return rung.prove if self.points == "search" else self.points == "proven"
+
+    @property
+    def drawn(self) -> dict[str, Any]:
+        """The options of random strokes, other than weights, by name."""
+        shape = {"mask_share": RAGGED_SHARE if self.what == "ragged" else 1.0}
+        return shape | {key: value for key, value in self.random if key not in WEIGHTS}
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """The stated weights by name; the coefficients of the paper replace a missing one."""
+        return {key: value for key, value in self.random if key in WEIGHTS}
+
+    def sources(self) -> Iterator[tuple[str, str, str]]:
+        """Yield each source that has a split, the split and its own name."""
+        drawn = hashlib.sha256(self.drawing).hexdigest()[:12] if self.drawing else self.what
+        for seed, split in zip(self.seeds, self.splits, strict=True):
+            if split:
+                yield (f"{self.kind} {drawn}" if seed is None else f"seed {seed}"), split, self.name
+
+    def settings(self) -> dict[str, Any]:
+        """Return the stated options of its instances that have a default, other than sizes."""
+        points = {} if self.points == "search" else {"points": self.points}
+        return dict(self.random) | points
 
     @property
     def files(self) -> dict[str, bytes]:
@@ -137,10 +176,11 @@ class Sketch:
         head: dict[str, Any] = {"name": self.name, "title": self.title, "rungs": list(self.rungs)}
         head["sizes"] = {rung: list(sizes) for rung, sizes in self.sizes}
         head |= self.origin.document() | ({"added": self.added} if self.added else {})
+        head |= self.settings() | split_document(self.seeds, self.splits)
         if self.kind == "sample":
             return head | {"sample": self.what}
         if self.kind == "random":
-            return head | {"random": self.what, "seeds": list(self.seeds)}
+            return head | {"random": self.what, "seeds": seeds_document(self.seeds)}
         drawing, *mask = self.files
         return head | {"file": drawing, "file_name": self.what} | ({"mask": mask[0]} if mask else {})
 
@@ -236,7 +276,7 @@ def _of_value(error: Any) -> str:
         case "uniqueItems":
             twice = next(each for n, each in enumerate(error.instance) if each in error.instance[:n])
             words = f"{shortened(twice)!r} is listed twice; list it once"
-        case "minimum" | "maximum":
+        case "minimum" | "maximum" if {"minimum", "maximum"} <= schema.keys():
             words = f"{value} is out of range; choose {schema['minimum']} to {schema['maximum']}"
         case "enum":
             words = f"there is no {value!r}; choose from {', '.join(schema['enum'])}"
@@ -270,6 +310,13 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
     if (name := _twice([sketch.name for sketch in sketches])) is not None:
         raise InputError(
             f"sketches[{name[0]}].name: {name[1]!r} is the name of two sketches; give each its own"
+        )
+    check_splits(each for sketch in sketches for each in sketch.sources())
+    proven = [sketch.name for sketch in sketches if sketch.points == "proven"]
+    if proven and not any(FORMULATIONS[each].minimises == TWO_NORM for each in formulations):
+        raise InputError(
+            f"formulations: {proven[0]} has proven points, and proofs are of 2-norm optima; "
+            "add miqp-exact, or choose other points"
         )
     ledger = folder / document["ledger"] if "ledger" in document else None
     if ledger is not None and not ledger.is_file():
@@ -327,7 +374,8 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
     elif kind == "random":
         shape = "full square" if word == "full" else "ragged part of a square"
         title = f"random strokes on a {shape}"
-        what = {"what": word, "title": title, "seeds": _whole(table["seeds"])}
+        what = {"what": word, "title": title, "seeds": seeds_of(table["seeds"], f"{place}seeds")}
+        what["random"] = _random(table, word, place)
     else:
         _check_known(word, SAMPLES, f"{place}sample", "sample ")
         what = {"what": word, "title": SAMPLES[word].description}
@@ -339,6 +387,8 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
         sizes=tuple((rung, _whole(sizes[rung])) for rung in wanted if rung in sizes),
         origin=Origin.of(table),
         added=day(table.get("added", ""), f"{place}added"),
+        splits=splits_of(table.get("split", ""), what.get("seeds", (None,)), f"{place}split"),
+        points=table.get("points", "search"),
         **what,
     )
     every = [size for rung in rungs if rung.name in wanted for size in sketch.sizes_on(rung)]
@@ -349,6 +399,15 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
                 "because names carry the size alone"
             )
     return sketch
+
+
+def _random(table: dict[str, Any], shape: str, place: str) -> tuple[tuple[str, Any], ...]:
+    """The stated options of random strokes, in order."""
+    if shape == "full" and "mask_share" in table:
+        raise InputError(f'{place}mask_share: goes with random = "ragged"; omit it, or change the shape')
+    if table.get("noise", 0) > 0 and table.get("strokes", "pixels") == "pixels":
+        raise InputError(f'{place}noise: goes with strokes = "straight" or "curved"; write one, or omit it')
+    return tuple((key, table[key]) for key in RANDOM if key in table)
 
 
 def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:

@@ -468,7 +468,9 @@ def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(written):
             boxes = np.stack([alpha - sides[0], alpha + sides[0], beta - sides[1], high], axis=1)
             level.alpha, level.beta, p = alpha, beta, np.zeros(len(sketch_.first), int)
             given = (alpha, beta, p)
-            bound, held = check_certificate.lower_bound(sketch_, given, level, boxes, np.inf, over=never)
+            bound, held = check_certificate.lower_bound(
+                sketch_, given, level, boxes, np.inf, multipliers=np.zeros(0), over=never
+            )
             if not held.all() or bound == -np.inf:
                 continue
             low, size = boxes[:, ::2], boxes[:, 1::2] - boxes[:, ::2]

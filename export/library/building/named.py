@@ -1,0 +1,256 @@
+"""Entries of the library that ships, by name: made on the spot from their recipes and the known points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any, Final
+
+from ....models.errors import InputError, InstanceError, shortened
+from ....models.field.field import CrossField
+from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
+from ....models.formulations.problem import Problem
+from ....models.instance.instance import Instance
+from ....models.processes.deadline import Progress, silent
+from ....models.proof.certificate import Certificate, read_certificate
+from ....models.storage import make_folder
+from ...formats.registry import Written, write
+from ..documents.documents import about_file
+from ..ledger.given import ROLES, Given, read_point
+from ..ledger.ledger import Ledger, read_ledger
+from ..ledger.points import Known, best_point, ours
+from ..plan.recipe import EntryRecipe, InstancePlan, plan
+from ..plan.sources import instance_from
+from ..plan.spec import DEFAULT, RUNGS, Spec, default_spec
+from .entry_task import formulated, model_files
+from .table import COLUMNS, TABLE, read_table
+from .where import condition
+
+SHIPPED: Final = DEFAULT.parent / "known" / TABLE
+_REMEDY: Final = "make the points again with `crossfield library points`"
+
+
+@dataclass(frozen=True, eq=False)
+class LibraryEntry:
+    """An entry of the library that ships, without a build and without a network.
+
+    Instance, problem and field are made when they are first used, and kept.
+
+    Parameters
+    ----------
+    facts
+        The entry's row of `entries.csv` by column, None for unknown values.
+
+    """
+
+    facts: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        return f"<LibraryEntry {self.name}: {self.status}, objective {self.objective:.6g}>"
+
+    @property
+    def name(self) -> str:
+        """Name of the entry."""
+        return str(self.facts["name"])
+
+    @property
+    def status(self) -> str:
+        """Status of the entry: `optimal`, `claimed` or `open`."""
+        return str(self.facts["status"])
+
+    @property
+    def objective(self) -> float:
+        """Objective of the best known point."""
+        return float(self.facts["objective"])
+
+    @property
+    def bound(self) -> float | None:
+        """Best dual bound, None without one."""
+        found: float | None = self.facts["bound"]
+        return found
+
+    @cached_property
+    def instance(self) -> Instance:
+        """The instance."""
+        return instance_from(_found(self.name)[0].recipe)
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The problem. Raises InputError, InstanceError for damaged points of a `qp` entry."""
+        recipe = self._recipe
+        jumps = self._given.field("baseline").field.p if FORMULATIONS[recipe.formulation].fixed else None
+        return formulated(self.instance, recipe.formulation, recipe.facet, jumps)
+
+    @cached_property
+    def field(self) -> CrossField:
+        """The field of the best known point. Raises InputError, InstanceError for damaged points."""
+        known = [self._given.field(role) for role in ROLES]
+        return best_point(self.problem, [*known, *self._submitted()]).known.field
+
+    @cached_property
+    def certificate(self) -> Certificate | None:
+        """The checked certificate of the instance; None without one, and in another norm than the 2-norm.
+
+        Raises InputError for a certificate that is refused.
+        """
+        about = self._given.about
+        if FORMULATIONS[self._recipe.formulation].minimises != TWO_NORM or "certificate" not in about:
+            return None
+        return read_certificate(_points() / about["certificate"]["file"], on=self.instance)
+
+    def write(self, path: str | Path) -> Written:
+        """Write the model file, with the same bytes as in a built library.
+
+        Parameters
+        ----------
+        path
+            File to write. Its suffix names the format, and a further `.gz` compresses it.
+
+        Returns
+        -------
+        Written
+            Format, dialect, the problem as the file holds it, and size and SHA-256 by file name.
+
+        Raises
+        ------
+        UnsupportedByFormatError
+            If the format cannot carry the problem.
+        InputError
+            For an unknown suffix.
+        OutputError
+            If a file cannot be written.
+
+        """
+        return write(self.problem, path)
+
+    def model_files(self, folder: Path) -> list[str]:
+        """Write the model files that a build writes; return their names. Raises OutputError."""
+        listed, _ = model_files(self.problem, self._recipe, folder)
+        return [each["name"] for each in listed]
+
+    @property
+    def _recipe(self) -> EntryRecipe:
+        return _found(self.name)[1]
+
+    @cached_property
+    def _given(self) -> Given:
+        """The points that ship for the instance. Raises InstanceError for points of another one."""
+        given = read_point(_points() / about_file(self.facts["instance"]))
+        if given.instance != self.instance.sha256:
+            raise InstanceError(f"holds points of another instance; {_REMEDY}", file=_points())
+        return given
+
+    def _submitted(self) -> Iterable[Known]:
+        """The fields of the ledger for the entries of the instance."""
+        ledger = _ledger()
+        for each in _found(self.name)[0].entries:
+            record = ledger.with_point(each.name)
+            if record is not None:
+                field = ledger.field(record)
+                if field.instance.sha256 == self.instance.sha256:
+                    yield Known(field, ours("ledger"))
+
+
+def entries(*, where: str | None = None, rung: str | None = None) -> list[LibraryEntry]:
+    """Entries of the library that ships, with their facts, in its order.
+
+    Parameters
+    ----------
+    where
+        Expression that selects entries by their facts, such as `status == 'open' and pairs < 500`. It may
+        have comparisons, `in` with a list, `and`, `or`, `not`, names of facts, numbers, text, True, False
+        and None.
+    rung
+        Only entries of this class of sizes: `tiny`, `small`, `medium` or `large`.
+
+    Returns
+    -------
+    list of LibraryEntry
+        The entries. `facts` of each has the columns of `entries.csv`.
+
+    Raises
+    ------
+    InputError
+        For an expression that cannot be read, with the names of all facts, and for an unknown rung.
+
+    """
+    if rung is not None and rung not in RUNGS:
+        raise InputError(f"there is no rung {shortened(rung)!r}; choose one of {', '.join(RUNGS)}")
+    kinds = {name: column.kind for name, column in COLUMNS.items()}
+    obeys = condition(where, kinds) if where is not None else lambda _: True
+    return [LibraryEntry(row) for row in _rows().values() if rung in (None, row["rung"]) and obeys(row)]
+
+
+def entry(name: str) -> LibraryEntry:
+    """Entry of the library that ships, by its name.
+
+    Parameters
+    ----------
+    name
+        Name of the entry, such as `cf_mouse_n012_exact`.
+
+    Returns
+    -------
+    LibraryEntry
+        The entry, with `instance`, `problem`, `field`, `bound`, `status`, `certificate` and `write`.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, with similar ones.
+
+    """
+    if name not in _rows():
+        near = get_close_matches(name, _rows(), 3)
+        asked = f"is it {' or '.join(near)}?" if near else "crossfield.entries() lists them"
+        raise InputError(f"the library that ships has no entry {shortened(name)!r}; {asked}")
+    return LibraryEntry(_rows()[name])
+
+
+def write_entries(
+    folder: str | Path, chosen: Sequence[LibraryEntry], *, progress: Progress = silent
+) -> dict[str, list[str]]:
+    """Write the model files of entries as a build does; return their names by entry. Raises OutputError."""
+    target, found = make_folder(folder), {}
+    for number, each in enumerate(chosen, 1):
+        progress(f"{number} of {len(chosen)} entries: {each.name}")
+        found[each.name] = each.model_files(target)
+    return found
+
+
+@cache
+def _rows() -> dict[str, dict[str, Any]]:
+    return {row["name"]: row for row in read_table(SHIPPED)}
+
+
+@cache
+def _spec() -> Spec:
+    return default_spec()
+
+
+@cache
+def _plans() -> dict[str, tuple[InstancePlan, EntryRecipe]]:
+    return {recipe.name: (each, recipe) for each in plan(_spec()) for recipe in each.entries}
+
+
+def _found(name: str) -> tuple[InstancePlan, EntryRecipe]:
+    """The plan of an entry. Raises InputError where the table has entries that the specification lacks."""
+    if name not in _plans():
+        raise InputError(f"{name} is not in the specification; build the library again", file=SHIPPED)
+    return _plans()[name]
+
+
+def _points() -> Path:
+    points = _spec().points
+    assert points is not None  # the specification that ships has points
+    return points
+
+
+@cache
+def _ledger() -> Ledger:
+    path = _spec().ledger
+    assert path is not None  # the specification that ships has a ledger
+    return read_ledger(path.parent, path.name)

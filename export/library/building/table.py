@@ -1,0 +1,154 @@
+"""The table of all entries of a library: features, labels and splits, one row per entry."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ....models.field.file import read_field
+from ....models.formulations.catalogue import FORMULATIONS
+from ....models.storage import read_bytes
+from ..documents.documents import about_file, read_about
+
+TABLE: Final = "entries.csv"
+OPEN: Final = "open"  # the status `best known` of a sidecar, in one word
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: the type of its values, its meaning, and its value from a sidecar. None: unknown."""
+
+    kind: type[str | int | float | bool]
+    meaning: str
+    value: Callable[[dict[str, Any]], Any]
+
+
+def _count(*keys: str) -> Callable[[dict[str, Any]], int]:
+    return lambda sidecar: sum(sidecar["counts"][key] for key in keys)
+
+
+def _at(*keys: str) -> Callable[[dict[str, Any]], Any]:
+    def value(sidecar: dict[str, Any]) -> Any:
+        found: Any = sidecar
+        for key in keys:
+            found = found.get(key) if isinstance(found, dict) else None
+        return found
+
+    return value
+
+
+def _proof_seconds(sidecar: dict[str, Any]) -> float | None:
+    """Seconds of the fastest run on this entry that proved its optimum."""
+    runs = [each.get("seconds") for each in sidecar["runs"] if each["status"] == "optimal"]
+    return min((each for each in runs if each is not None), default=None)
+
+
+def _instance(sidecar: dict[str, Any]) -> str:
+    return str(sidecar["instance"]["file"]).removesuffix(".instance.json")
+
+
+def _role(sidecar: dict[str, Any]) -> str:
+    """The role of the field that shows the jumps of an entry: of fixed jumps, else the least in its norm."""
+    if sidecar["jumps"] is not None:
+        return "baseline"
+    return "least_1" if "1-norm" in FORMULATIONS[sidecar["formulation"]].minimises else "least_2"
+
+
+def _status(sidecar: dict[str, Any]) -> str:
+    return OPEN if sidecar["status"] == "best known" else str(sidecar["status"])
+
+
+def _optimum(sidecar: dict[str, Any]) -> float | None:
+    return float(sidecar["best"]["objective"]) if sidecar["status"] == "optimal" else None
+
+
+COLUMNS: Final[Mapping[str, Column]] = {
+    "name": Column(str, "Name of the entry.", _at("name")),
+    "instance": Column(str, "Name of the instance.", _instance),
+    "family": Column(str, "Short name of the sketch.", _at("family")),
+    "rung": Column(str, "Class of sizes.", _at("rung")),
+    "split": Column(str, "Set for machine learning: train, validation or test.", _at("split")),
+    "gauge": Column(str, "Window of alpha: strokes or box.", _at("source", "gauge")),
+    "formulation": Column(str, "Formulation.", _at("formulation")),
+    "facet": Column(str, "Facet (26): hull or printed.", _at("options", "facet")),
+    "problem_class": Column(str, "Class of the problem, as MILP.", _at("class")),
+    "probtype": Column(str, "Three letters as in QPLIB.", _at("probtype")),
+    "convex": Column(bool, "Whether the continuous relaxation is convex.", _at("convex")),
+    "seed": Column(int, "Seed of a random sketch.", _at("source", "seed")),
+    "size": Column(int, "Pixels on the longer side.", _at("source", "size")),
+    "pixels": Column(int, "Pixels in the mask.", _at("instance", "pixels")),
+    "strokes": Column(int, "Pixels with a direction.", _at("instance", "strokes")),
+    "pairs": Column(int, "Pairs of neighbours.", _at("instance", "pairs")),
+    "density": Column(float, "Share of the pixels with a direction.", _at("density")),
+    "columns": Column(int, "Columns.", _count("variables")),
+    "rows": Column(int, "Rows.", _count("constraints")),
+    "integers": Column(int, "Integer columns, binary ones too.", _count("binary", "integer")),
+    "binaries": Column(int, "Binary columns.", _count("binary")),
+    "equalities": Column(int, "Rows that are equations.", _count("equalities")),
+    "nonzeros": Column(int, "Nonzeros of the rows.", _count("nonzeros")),
+    "nonlinear_nonzeros": Column(int, "Nonzeros in nonlinear terms.", _count("nonlinear_nonzeros")),
+    "quadratic_rows": Column(int, "Quadratic rows.", _count("quadratic_constraints")),
+    "nonlinear_rows": Column(
+        int, "Rows beyond quadratic ones.", _count("polynomial_constraints", "general_constraints")
+    ),
+    "linear_terms": Column(int, "Linear terms of the objective.", _count("objective_linear_terms")),
+    "quadratic_terms": Column(int, "Quadratic terms of the objective.", _count("objective_quadratic_terms")),
+    "nonlinear_terms": Column(
+        int,
+        "Terms of the objective beyond quadratic ones.",
+        _count("objective_higher_terms", "objective_general_terms"),
+    ),
+    "vortices": Column(int, "Singularities of the best known field in the entry's norm.", _at("vortices")),
+    "objective": Column(float, "Objective of the best known point.", _at("best", "objective")),
+    "optimum": Column(float, "The same if it is proven optimal.", _optimum),
+    "bound": Column(float, "Best dual bound.", _at("bound")),
+    "gap": Column(float, "Relative gap between both.", _at("gap")),
+    "status": Column(str, "Status: optimal, claimed or open.", _status),
+    "solved": Column(str, "Kind of proof: certificate, tangent or agreement.", _at("solved", "by")),
+    "difficulty": Column(str, "Grade: easy, hard or open.", _at("difficulty")),
+    "proof_seconds": Column(float, "Seconds of the fastest run that proved the optimum.", _proof_seconds),
+    "jumps_file": Column(str, "File of the field with the jumps of the best point.", _at("jumps_file")),
+    "licence": Column(str, "Licence.", _at("licence")),
+}
+"""The columns in order."""
+
+
+def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:
+    """Return the table of entries as CSV. folder: holds the documents and fields of their instances.
+
+    Raises InputError, InstanceError for a missing or damaged file.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    vortices: dict[str, int] = {}
+    for sidecar in sidecars:
+        about = read_about(folder / about_file(_instance(sidecar)))
+        file = about["fields"][_role(sidecar)]["file"]
+        if file not in vortices:
+            vortices[file] = len(read_field(folder / file).singularities.index)
+        known = sidecar | {"vortices": vortices[file], "jumps_file": file}
+        writer.writerow([_written(column.value(known)) for column in COLUMNS.values()])
+    return text.getvalue().encode()
+
+
+def read_table(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a table by column, None for unknown values. Raises InputError without the file."""
+    rows: Iterable[dict[str, str]] = csv.DictReader(io.StringIO(read_bytes(path).decode()))
+    return [{key: _read(row[key], column.kind) for key, column in COLUMNS.items()} for row in rows]
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return "" if value is None else repr(value) if isinstance(value, float) else str(value)
+
+
+def _read(text: str, kind: type[str | int | float | bool]) -> Any:
+    if not text:
+        return None
+    return text == "true" if kind is bool else kind(text)

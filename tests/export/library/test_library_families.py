@@ -1,0 +1,253 @@
+"""Families of random instances: seeds, splits and points of a specification, and their builds."""
+
+import json
+import tomllib
+from dataclasses import replace
+
+import pytest
+from clusters import cluster
+from crossfield.export.library.building.build import build
+from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.plan.recipe import plan
+from crossfield.export.library.plan.sources import instance_from
+from crossfield.export.library.plan.spec import default_spec, read_spec, spec_of
+from crossfield.export.library.plan.splits import seeds_document
+from crossfield.models.errors import InputError
+from crossfield.models.field.file import read_field
+from loops import for_each
+
+SPEC = """format = "crossfield-library-spec"
+version = 1
+title = "a family for tests"
+formulations = ["exact", "milp"]
+
+[rungs.tiny]
+sizes = [3]
+formats = ["nl", "mps"]
+gauges = ["strokes", "box"]
+
+[[sketches]]
+name = "fam"
+random = "full"
+seeds = "1-5"
+share = 0.3
+points = "proven"
+split = { train = "1-3", validation = [4], test = [5] }
+"""
+
+
+SMALL = SPEC.replace('"1-5"', '"3-5"').replace('"1-3"', "[3]")
+"""The same with fewer instances, for builds."""
+
+
+def written(folder, text=SPEC):
+    path = folder / "spec.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The library of the specification; not to be changed."""
+    folder = tmp_path_factory.mktemp("family")
+    return build(read_spec(written(folder, SMALL)), folder / "library")
+
+
+def content(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+# The specification
+
+
+def test_a_range_of_seeds_is_every_seed_in_it(tmp_path):
+    (sketch,) = read_spec(written(tmp_path)).sketches
+    assert sketch.seeds == (1, 2, 3, 4, 5)
+    assert sketch.splits == ("train", "train", "train", "validation", "test")
+
+
+def test_a_thousand_seeds_have_names_of_their_own(tmp_path):
+    text = SPEC.replace('"1-5"', '"1-1000"').replace('"1-3"', '"1-998"')
+    plans = plan(read_spec(written(tmp_path, text.replace("[4]", "[999]").replace("[5]", "[1000]"))))
+    assert len({entry.name for each in plans for entry in each.entries}) == 1000 * 2 * 2
+    assert plans[-1].recipe.name == "cf_fam_n003_s1000_box"
+
+
+@for_each(
+    "old, new",
+    [
+        ("", ""),
+        ('seeds = "1-5"', "seeds = [3, 1, 5, 4, 2]"),
+        ("share = 0.3", 'share = 0.3\nstrokes = "curved"\nnoise = 0.1\nskew_weight = 1e-3'),
+        ('{ train = "1-3", validation = [4], test = [5] }', '"test"'),
+        ('points = "proven"', 'points = "none"'),
+    ],
+)
+def test_the_document_of_a_specification_is_that_specification(tmp_path, old, new):
+    spec = read_spec(written(tmp_path, SPEC.replace(old, new)))
+    again = spec_of(json.loads(json.dumps(spec.document())), tmp_path / "library.json")
+    assert again == spec
+
+
+def test_a_run_of_seeds_is_written_as_a_range():
+    assert [seeds_document(each) for each in ((1, 2, 3), (1, 2, 3, 4), (4, 3, 2, 1), (None,))] == [
+        [1, 2, 3],
+        "1-4",
+        [4, 3, 2, 1],
+        [None],
+    ]
+
+
+SAMPLES = '[[sketches]]\nname = "{}"\nsample = "mouse"\nsplit = "{}"\n'
+OTHER = SPEC[SPEC.index("[[sketches]]") :].replace('"fam"', '"two"')
+BAD = {
+    "range that falls": ('"1-5"', '"5-1"', "sketches[0].seeds: '5-1' must rise"),
+    "range of words": ('"1-5"', '"all"', "sketches[0].seeds: 'all' is not allowed; write a list"),
+    "range too long": ('"1-5"', '"1-200000"', "by less than 100000"),
+    "seed twice": ("[4]", "[3]", "sketches[0].split: seed 3 is in train and in validation"),
+    "seed without a split": ("validation = [4], ", "", "sketches[0].split: seed 4 has no split"),
+    "split of another seed": ("[5]", "[5, 6]", "sketches[0].split: 6 is not in seeds"),
+    "unknown split": (
+        "validation",
+        "holdout",
+        "sketches[0].split.holdout: is unknown; the keys here are train",
+    ),
+    "unknown word": (SPEC[SPEC.index("split") :], 'split = "tset"', "there is no 'tset'; choose from train"),
+    "unknown points": ('"proven"', '"best"', "there is no 'best'; choose from search, none, greedy, proven"),
+    "proof in the 1-norm": ('"exact", ', "", "formulations: fam has proven points"),
+    "share of nothing": ("0.3", "0", "sketches[0].share: must be a number above 0"),
+    "share above one": ("0.3", "1.5", "sketches[0].share: must be a number above 0"),
+    "mask of a full square": ("share = 0.3", "mask_share = 0.5", "sketches[0].mask_share: goes with random"),
+    "noise of pixels": ("share = 0.3", "noise = 0.5", "sketches[0].noise: goes with strokes"),
+    "one seed in two splits": (
+        "",
+        OTHER.replace('"1-3"', "[1, 2, 4]").replace("[4], ", "[3], "),
+        "seed 3 is in train of fam and in validation of two",
+    ),
+    "one sample in two splits": (
+        "",
+        SAMPLES.format("a", "train") + SAMPLES.format("b", "test"),
+        "sample mouse is in train of a and in test of b",
+    ),
+    "a table of seeds of a sample": (
+        "",
+        SAMPLES.replace('"{}"\n', '"a"\n', 1).replace('"{}"', "{ train = [1] }"),
+        "sketches[1].split: a table of seeds goes with random",
+    ),
+    "share of a sample": ("", SAMPLES.format("a", "train") + "share = 0.5\n", "share: goes with random"),
+}
+
+
+@for_each("case", BAD)
+def test_a_bad_family_is_named_with_its_place_and_remedy(tmp_path, case):
+    old, new, words = BAD[case]
+    text = SPEC.replace(old, new) if old else f"{SPEC}\n{new}"
+    with pytest.raises(InputError) as error:
+        read_spec(written(tmp_path, text))
+    assert words in str(error.value)
+    assert "spec.toml" in str(error.value)
+
+
+def test_a_family_that_states_nothing_more_has_the_recipes_of_before():
+    """Digests of recipes are in every document, so a new key there would change files that exist."""
+    found = [each.recipe.document() for each in plan(default_spec())]
+    assert {key for document in found for key in document} == {
+        *("name", "sketch", "rung", "size", "seed", "gauge", "prove", "added")
+    }
+    assert {key for document in found for key in document["sketch"]} == {
+        *("kind", "what", "title", "sha256", "origin")
+    }
+    sketch = next(each for each in default_spec().document()["sketches"] if "random" in each)
+    assert sketch["seeds"] == [1, 2, 3]
+    assert sketch.keys() <= tomllib.loads(SPEC)["sketches"][0].keys() | {
+        *("title", "rungs", "sizes", "author", "license", "source", "added")
+    } - {"share", "points", "split"}
+
+
+def test_options_of_a_family_reach_its_instances(tmp_path):
+    text = SPEC.replace("share = 0.3", 'share = 0.5\nstrokes = "straight"\nnoise = 0.2\nstroke_weight = 3.0')
+    instance = instance_from(plan(read_spec(written(tmp_path, text)))[0].recipe)
+    assert instance.source.endswith("seed 1, strokes straight, share 0.5, noise 0.2")
+    assert instance.stroke_weight == 3.0
+    assert instance.skew_coefficient == 1e-6
+
+
+# The build
+
+
+def test_a_split_holds_all_formulations_and_gauges_of_a_seed(built):
+    found = {}
+    for entry in built.entries:
+        found.setdefault(entry["source"]["seed"], set()).add(entry["split"])
+    assert found == {3: {"train"}, 4: {"validation"}, 5: {"test"}}
+    assert len(built.entries) == 3 * 2 * 2
+
+
+def test_proven_points_are_optimal_under_the_gauge_strokes(built):
+    exact = [each for each in built.entries if each["formulation"] == "miqp-exact"]
+    assert {(each["source"]["gauge"], each["status"]) for each in exact} == {
+        ("strokes", "optimal"),
+        ("box", "best known"),
+    }
+    assert {each["solved"]["by"] for each in exact if each["status"] == "optimal"} == {"certificate"}
+
+
+@pytest.mark.slow
+def test_a_library_of_a_family_has_no_defects(built):
+    assert verify_library(built.folder) == []
+
+
+def test_less_work_gives_the_same_instances_and_points_of_no_lower_energy(built, tmp_path):
+    energies = {}
+    spec = read_spec(written(tmp_path, SMALL))
+    for points in ("none", "greedy"):
+        (sketch,) = spec.sketches
+        less = build(replace(spec, sketches=(replace(sketch, points=points),)), tmp_path / points)
+        assert {each["status"] for each in less.entries} == {"best known"}
+        assert {each["best"]["solver"] for each in less.entries} == {
+            {"none": "crossfield (nearest stroke)", "greedy": "crossfield (greedy)"}[points]
+        }
+        names = [f"cf_fam_n003_s{seed}" for seed in range(3, 6)]
+        for name in names:
+            file = f"{name}.instance.json"
+            assert (less.folder / file).read_bytes() == (built.folder / file).read_bytes()
+        energies[points] = [read_field(less.folder / f"{each}.field.json").energy().total for each in names]
+    proven = [read_field(built.folder / f"{each}.field.json").energy().total for each in names]
+    assert all(map(lambda *each: each[0] <= each[1] + 1e-12, proven, energies["greedy"]))
+    assert sum(energies["greedy"]) < sum(energies["none"])
+
+
+@pytest.mark.slow
+def test_an_interrupted_family_goes_on_where_it_was_with_the_same_bytes(built, tmp_path):
+    made = []
+
+    def stop_after_some(line):
+        made.append(line)
+        if len(made) == 5:
+            raise KeyboardInterrupt
+
+    spec = read_spec(written(tmp_path, SMALL))
+    with pytest.raises(KeyboardInterrupt):
+        build(spec, tmp_path / "library", progress=stop_after_some)
+    done = {line.split(": ")[1] for line in made}
+    build(spec, tmp_path / "library", jobs=2, progress=made.append)
+    assert not done & {line.split(": ")[1] for line in made[5:-1]}
+    assert content(tmp_path / "library") == content(built.folder)
+
+
+@pytest.mark.slow
+def test_a_large_certificate_of_an_optimum_is_kept(tmp_path):
+    """It was left out with its field, although it proved the optimum."""
+    text = SMALL.replace('"3-5"', "[524]").replace("[3]", "[5]").replace("0.3", "0.2")
+    text = text.replace('"exact", "milp"', '"exact"').replace(', "box"', "").replace("split", "# split")
+    (entry,) = build(read_spec(written(tmp_path, text)), tmp_path / "library").entries
+    assert (entry["status"], entry["best"]["solver"]) == ("optimal", "crossfield (prove)")
+    assert (tmp_path / "library" / "cf_fam_n005_s524.certificate.npz").stat().st_size > 2_000_000
+
+
+@pytest.mark.slow
+@pytest.mark.needs("distributed")
+def test_dask_workers_make_the_same_bytes(built, tmp_path):
+    with cluster(tmp_path) as (address, _):
+        made = build(read_spec(written(tmp_path, SMALL)), tmp_path / "library", scheduler=address)
+    assert content(made.folder) == content(built.folder)

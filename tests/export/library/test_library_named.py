@@ -1,0 +1,173 @@
+"""Entries of the library that ships, by name: the same as in a build, without one."""
+
+import json
+from dataclasses import replace
+
+import crossfield as cf
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.library.building.build import build
+from crossfield.export.library.building.named import SHIPPED, write_entries
+from crossfield.export.library.building.table import COLUMNS, TABLE, read_table
+from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.ledger.points import complete_point
+from crossfield.export.library.plan.recipe import plan
+from crossfield.export.library.plan.spec import default_spec
+from crossfield.models.errors import InputError
+from loops import for_each
+
+REMEDY = "build `default` and copy its entries.csv to export/library/plan/known/entries.csv"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A part of the library that ships, built; not to be changed."""
+    spec = default_spec()
+    sketches = tuple(each for each in spec.sketches if each.name == "cyl")
+    rungs = tuple(replace(each, gauges=("strokes",)) for each in spec.rungs if each.name == "tiny")
+    sketches = tuple(replace(each, rungs=("tiny",), sizes=each.sizes[:1]) for each in sketches)
+    return build(replace(spec, sketches=sketches, rungs=rungs), tmp_path_factory.mktemp("built") / "library")
+
+
+def models_of(sidecar):
+    return [file["name"] for file in sidecar["files"] if file["format"] != "sol"]
+
+
+# The table
+
+
+def test_the_table_that_ships_lists_the_entries_of_the_specification():
+    wanted = [entry.name for each in plan(default_spec()) for entry in each.entries]
+    assert [each.name for each in cf.entries()] == wanted, REMEDY
+
+
+def test_the_table_that_ships_has_the_rows_of_a_build(built):
+    rows = read_table(built.folder / TABLE)
+    assert [row["name"] for row in rows] == built.document["entries"]
+    for row in rows:
+        assert cf.entry(row["name"]).facts == row, REMEDY
+
+
+@pytest.mark.slow
+def test_the_table_that_ships_is_that_of_a_build(tmp_path):
+    made = build(default_spec(), tmp_path / "library", jobs=2)
+    assert (made.folder / TABLE).read_bytes() == SHIPPED.read_bytes(), REMEDY
+
+
+def test_the_facts_are_those_of_the_sidecars(built):
+    for sidecar in built.entries:
+        facts = cf.entry(sidecar["name"]).facts
+        assert facts.keys() == COLUMNS.keys()
+        assert facts["pairs"] == sidecar["instance"]["pairs"]
+        assert facts["columns"] == sidecar["counts"]["variables"]
+        assert facts["integers"] == sidecar["counts"]["binary"] + sidecar["counts"]["integer"]
+        assert (facts["optimum"] is None) == (sidecar["status"] != "optimal")
+        assert (facts["status"] == "open") == (facts["difficulty"] == "open")
+        assert (built.folder / facts["jumps_file"]).is_file()
+
+
+@pytest.mark.slow
+def test_verify_knows_the_table(built, tmp_path):
+    assert verify_library(built.folder) == []
+    table = built.folder / TABLE
+    data = table.read_bytes()
+    try:
+        table.write_bytes(data.replace(b"optimal", b"claimed", 1))
+        files = {finding.file for finding in verify_library(built.folder)}
+    finally:
+        table.write_bytes(data)
+    assert files == {TABLE}
+
+
+# Entries
+
+
+def test_model_files_have_the_bytes_of_a_build(built, tmp_path):
+    chosen = [cf.entry(name) for name in built.document["entries"]]
+    written = write_entries(tmp_path, chosen)
+    assert written == {each["name"]: models_of(each) for each in built.entries}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        name for names in written.values() for name in names
+    }
+    for path in tmp_path.iterdir():
+        assert path.read_bytes() == (built.folder / path.name).read_bytes()
+
+
+def test_an_entry_has_the_problem_and_the_point_of_its_sidecar(built):
+    for sidecar in built.entries:
+        entry = cf.entry(sidecar["name"])
+        assert entry.instance.sha256 == sidecar["instance"]["sha256"]
+        assert entry.problem.sha256 == sidecar["problem_sha256"]
+        point = complete_point(entry.problem, entry.field)
+        assert entry.problem.objective_value(point) == entry.objective == sidecar["best"]["objective"]
+        assert (entry.bound, entry.status) == (sidecar["bound"], entry.facts["status"])
+        assert f"{entry.name}: {entry.status}" in repr(entry)
+
+
+def test_only_entries_in_the_2_norm_have_the_certificate():
+    proven = cf.entry("cf_cyl_n005_exact")
+    assert proven.certificate.status == "optimal"
+    assert proven.certificate.bound <= proven.objective
+    assert cf.entry("cf_cyl_n005_milp").certificate is None
+    assert cf.entry("cf_cyl_n005_box_exact").certificate is None
+
+
+def test_an_entry_is_written_in_any_format_that_carries_it(built, tmp_path):
+    written = cf.entry("cf_cyl_n005_milp").write(tmp_path / "mine.mps")
+    assert list(written.files) == ["mine.mps"]
+    assert (tmp_path / "mine.mps").read_bytes() == (built.folder / "cf_cyl_n005_milp.mps").read_bytes()
+    with pytest.raises(cf.UnsupportedByFormatError):
+        cf.entry("cf_cyl_n005_parity").write(tmp_path / "mine.lp")
+
+
+def test_a_filter_and_a_rung_select_entries():
+    assert {each.facts["rung"] for each in cf.entries(rung="tiny")} == {"tiny"}
+    found = cf.entries(where="status == 'optimal' and formulation == 'miqp-exact' and pairs < 30")
+    assert found
+    for each in found:
+        assert each.status == "optimal"
+        assert each.facts["pairs"] < 30
+
+
+@for_each(
+    "name, near",
+    [
+        ("cf_mouse_n012_exact", "cf_mouse_n032_exact"),
+        ("cf_skew_n008_mlip", "cf_skew_n008_milp"),
+        ("x", "crossfield.entries() lists them"),
+    ],
+)
+def test_an_unknown_entry_suggests_near_names(name, near):
+    with pytest.raises(InputError, match=f"has no entry '{name}'") as error:
+        cf.entry(name)
+    assert near in str(error.value)
+
+
+# The command
+
+
+def test_the_command_writes_the_files_of_the_selected_entries(built, tmp_path, capsys):
+    names = ["cf_cyl_n005_exact", "cf_cyl_n005_milp"]
+    where = "formulation == 'milp-mccormick'"
+    assert invoke(["library", "get", *names, "--where", where, "-o", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {names[1]: models_of(built.entry(names[1]))}
+    assert {path.name for path in tmp_path.iterdir()} == set(models_of(built.entry(names[1])))
+
+
+BAD = {
+    "nothing": ([], "name entries, or select them with --rung or --where"),
+    "unknown": (["cf_cyl_n005_mlip"], "or cf_cyl_n005_milp"),
+    "rung": (["--rung", "huge"], "there is no rung 'huge'; choose one of tiny, small, medium, large"),
+    "filter": (["--where", "pair < 5"], "with these facts: name, instance, family"),
+    "none": (["--where", "pairs < 0"], "no entry of the library that ships is selected"),
+}
+
+
+@for_each("case", BAD)
+def test_a_bad_selection_is_one_line_and_writes_nothing(tmp_path, capfd, case):
+    arguments, words = BAD[case]
+    assert invoke(["library", "get", *arguments, "-o", str(tmp_path / "out")]) == 1
+    shown = capfd.readouterr()
+    assert shown.out == ""
+    assert words in " ".join(shown.err.split())
+    assert not (tmp_path / "out").exists()

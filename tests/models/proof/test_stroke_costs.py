@@ -1,0 +1,35 @@
+"""Costs of strokes on a lattice: the prover and the checker have the same."""
+
+import crossfield as cf
+import numpy as np
+from crossfield.models.field.field import CrossField
+from crossfield.models.processes.compiled import crew
+from crossfield.models.proof import check_certificate
+from crossfield.models.proof.certificate import _arrays
+from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.record import LevelRecord, Proof
+from crossfield.models.proof.sweep import Dual
+
+
+def test_a_centre_whose_other_line_carries_the_stroke_has_a_certificate(tmp_path):
+    """The prover pruned more than the checker there, and its certificate was refused."""
+    instance = cf.random_instance(978, size=5, stroke_weight=5 / 24, skew_weight=1e-6 * (5 / 24) ** 2)
+    proof = cf.prove(instance, jobs=1)
+    assert cf.write_certificate(proof, tmp_path / "it.npz").status == "optimal"
+
+
+def test_every_label_costs_what_the_checker_computes():
+    """At centres in any direction, beyond the windows of the strokes too."""
+    instance, rng = cf.random_instance(3, size=4, share=1.0), np.random.default_rng(3)
+    lines = rng.uniform(0, np.pi, (2, instance.grid.size))
+    field = CrossField.from_lines(instance, *lines)
+    with crew(1) as hands:
+        level = LevelRecord.of(Dual(Lattice.whole(field, 16), hands), field.energy().total)
+    proof = Proof(field, field.energy().total, 0.0, "gap", 0, (level,), 0.0, "labels")
+    arrays = _arrays(proof, "gap", 0.0)
+    sketch = check_certificate.sketch_of(arrays)
+    same = check_certificate.level_of(arrays, 0, sketch)
+    mine = np.split(level.unary_costs(), level.start[1:-1])
+    for i, cost in enumerate(mine):
+        checked, _ = check_certificate.unary(same, sketch, i)
+        assert np.allclose(cost, checked.ravel(), rtol=0, atol=1e-12)
