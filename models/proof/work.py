@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from statistics import median
 from typing import ClassVar, Final
 
 import numpy as np
@@ -52,6 +53,7 @@ _DECIMALS: Final = 7  # of centres, which need few: their last digits differ bet
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
 _MANY: Final = 4  # levels after which the field may cause the rest of the gap
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
+_MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
 _SEARCH: Final = 0.1  # share of the time for that search
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
@@ -62,7 +64,7 @@ class WorkLimits:
     """When to end: a deadline, a request to stop, a sufficient gap, enough work.
 
     whole: the deadline of proof and certificate. certified: whether to keep time for a certificate. work:
-    greatest number of labels; labels: those so far. pace: greatest measured seconds per unit of the
+    greatest number of labels; labels: those so far. pace: last measured seconds per unit of the
     certificate's effort. kept: the seconds that the certificate is expected to take.
     """
 
@@ -84,7 +86,7 @@ class WorkLimits:
         """Keep time for a certificate of that effort, unless it is too little even for the first level."""
         if not self.certified or self.whole.at == np.inf:
             return
-        self.pace = max(self.pace, checking_pace())
+        self.pace = median(checking_pace() for _ in range(_MEASURED))
         seconds = effort * self.pace
         self.certified = self.kept > 0 or self.whole.left() > seconds
         self.kept = seconds if self.certified else 0.0
