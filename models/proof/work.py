@@ -40,7 +40,8 @@ COARSEST: Final = 16  # steps in pi/2 of the first level
 _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
 _PASSES: Final = 3  # forwards and backwards between two roundings
 _BEFORE: Final = 9  # forwards and backwards before the gap shows where the first clusters are needed
-_SLOW: Final = 0.05  # share of the gap that passes must close for a level to go on; a tenth on the last one
+_SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on: the next one does more
+_SLOWEST: Final = 0.005  # the same on the last level
 _MOST_ROUNDS: Final = 40  # a level
 _CLUSTERS: Final = 12  # quads that become clusters first
 _MORE_CLUSTERS: Final = 6  # later
@@ -197,7 +198,7 @@ class Work:
             if not patient and (count := self._wants_clusters()):
                 dual.ascend(1 if len(dual.state.clusters.quads) else _BEFORE, self._closing(dual))
                 dual.add_clusters(count, self.best)
-            self._ascend(dual, _SLOW / 10 if patient else _SLOW)
+            self._ascend(dual, _SLOWEST if patient else _SLOW)
             what = self._record(dual, again=patient)
             if (ended := self._ended()) or what is None:
                 return ended or "labels"
