@@ -21,6 +21,7 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
 from ..plan.recipe import InstancePlan
 from ..plan.spec import RUNGS, Spec
+from .dataset import CROISSANT, PARQUET, croissant, parquet
 from .table import TABLE, table
 
 CHECKER: Final = "check_point.py"
@@ -39,6 +40,11 @@ def write_index(folder: Path, spec: Spec, plans: Sequence[InstancePlan], skipped
     """
     sidecars = [read_sidecar(folder / f"{entry.name}.json") for each in plans for entry in each.entries]
     written = general(folder, spec, sidecars, skipped)
+    packed = parquet(written[TABLE])
+    if packed is None:
+        (folder / PARQUET).unlink(missing_ok=True)  # of an earlier build
+    else:
+        written[PARQUET] = packed
     for name, data in written.items():
         write_bytes(folder / name, data)
     abouts = [about_file(each.recipe.name) for each in plans]
@@ -62,7 +68,8 @@ def general(
     if context["certified"]:
         checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
     index = _index(folder, spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
-    facts = {SOLU: _optima(sidecars), TABLE: table(folder, sidecars)}
+    rows = table(folder, sidecars)
+    facts = {SOLU: _optima(sidecars), TABLE: rows, CROISSANT: croissant(spec, rows)}
     return texts | drawings | checkers | facts | {INDEX: as_bytes(index)}
 
 

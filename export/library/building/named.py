@@ -29,7 +29,7 @@ from .entry_task import formulated, model_files
 from .table import COLUMNS, TABLE, read_table
 from .where import condition
 
-SHIPPED: Final = DEFAULT.parent / "known" / TABLE
+SHIPPED: Final = DEFAULT.with_name(TABLE)
 _REMEDY: Final = "make the points again with `crossfield library points`"
 
 

@@ -138,7 +138,12 @@ def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:
 
 def read_table(path: Path) -> list[dict[str, Any]]:
     """Return the rows of a table by column, None for unknown values. Raises InputError without the file."""
-    rows: Iterable[dict[str, str]] = csv.DictReader(io.StringIO(read_bytes(path).decode()))
+    return parsed(read_bytes(path))
+
+
+def parsed(data: bytes) -> list[dict[str, Any]]:
+    """Return the rows of the content of a table, as `read_table` does."""
+    rows: Iterable[dict[str, str]] = csv.DictReader(io.StringIO(data.decode()))
     return [{key: _read(row[key], column.kind) for key, column in COLUMNS.items()} for row in rows]
 
 

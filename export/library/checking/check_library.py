@@ -17,6 +17,7 @@ from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, sha256_of
 from ...formats.registry import generator
+from ..building.dataset import CROISSANT, PARQUET, same_rows
 from ..building.entry_task import Entry, Inputs
 from ..building.executor import executor
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
@@ -74,7 +75,7 @@ class _Verification:
         self.folder, self.jobs, self.progress = folder, jobs, progress
         self.present: set[str] = set()
         self.damaged: set[str] = set()
-        self.known = {SUMS, INDEX, LEDGER, SOLU, TABLE, CHECKER, *TEXTS}
+        self.known = {SUMS, INDEX, LEDGER, SOLU, TABLE, CROISSANT, PARQUET, CHECKER, *TEXTS}
 
     def findings(self) -> Iterator[Finding]:
         """Yield all findings in the order of the checks."""
@@ -151,7 +152,7 @@ class _Verification:
             made = [each for each in plans if each.recipe.name not in library.skipped]
             if [entry.name for each in made for entry in each.entries] != names:
                 yield Finding(INDEX, "lists other entries than its specification asks for")
-        for name in sorted({*TEXTS, SOLU, TABLE, CHECKER, LEDGER} - self.present):
+        for name in sorted({*TEXTS, SOLU, TABLE, CROISSANT, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
 
     def _skipped(self, library: Library, plans: tuple[InstancePlan, ...]) -> Iterator[Finding]:
@@ -208,6 +209,10 @@ class _Verification:
             return  # reported with the index
         if json.loads(made.pop(INDEX)) != library.document:
             yield Finding(INDEX, "is not what follows from the specification and the sidecars")
+        if PARQUET in self.present - self.damaged and not same_rows(
+            read_bytes(self.folder / PARQUET), made[TABLE]
+        ):
+            yield Finding(PARQUET, f"has other rows than {TABLE}")
         for name in sorted(made):
             if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
                 yield Finding(name, "is not what follows from the specification and the sidecars")

@@ -16,7 +16,7 @@ from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.errors import InputError
 from loops import for_each
 
-REMEDY = "build `default` and copy its entries.csv to export/library/plan/known/entries.csv"
+REMEDY = "build `default` and copy its entries.csv to export/library/plan/entries.csv"
 
 
 @pytest.fixture(scope="module")
