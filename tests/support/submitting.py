@@ -2,8 +2,7 @@
 
 import highspy
 from crossfield.export.formats.registry import write
-from crossfield.export.library.contributions.run_record import RunFacts
-from crossfield.export.library.contributions.submit import submit
+from crossfield.export.library.contributions.submit import RunFacts, submit
 from crossfield.export.library.documents.documents import problem_of, read_sidecar
 from crossfield.models.field.file import read_field
 from crossfield.models.formulations.problem import with_integers_fixed
