@@ -28,7 +28,7 @@ from ...writing.curvature import probtype
 from ...writing.records import number
 from ..documents.citation import REFERENCES
 from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
-from ..documents.statistics import counts, curvature, density, ranges, tangent_bound
+from ..documents.statistics import counts, curvature, density, tangent_bound
 from ..ledger.given import NO_POINTS, Points
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record
@@ -43,7 +43,7 @@ from ..ledger.standing import (
     runs_of,
     standing,
 )
-from ..plan.equivalence import equivalent, not_equivalent, notes_of
+from ..plan.equivalence import equivalent, notes_of
 from ..plan.recipe import EntryRecipe, InstancePlan, digest
 from .instance_task import Evidence, Files, Preparation, Submitted
 
@@ -252,7 +252,6 @@ def _sidecar(
         "convex": problem.convex,
         "counts": counts(problem),
         "curvature": curvature(problem),
-        "ranges": ranges(problem),
         "files": listed,
         "refused": refused,
         "best": {**numbers, "point": named["miplib"], "nl_point": named.get("ampl"), **facts},
@@ -264,7 +263,6 @@ def _context(task: Entry, problem: Problem) -> dict[str, Any]:
     return {
         "transformations": [f".{name}: {note}" for name in formats for note in notes_of(problem, name)],
         "equivalent": equivalent(task.recipe, task.relatives),
-        "not_equivalent": not_equivalent(task.recipe, task.relatives),
         "licence": task.about.get("origin", {}).get("license"),
         "references": list(REFERENCES),
         "recipe_sha256": task.sha256,

@@ -12,7 +12,7 @@ import os
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,12 +31,31 @@ from ..ledger.given import given_of
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record
 from ..ledger.points import METHOD, Provenance, complete_point, ours
-from ..ledger.standing import MAKERS
+from ..ledger.standing import FEASIBLE, MAKERS, close
 from ..plan.sources import instance_from
-from .finding import FEASIBLE, Finding, close, of_error
 
+BUILD: Final = "build the library again"
 _APART: Final = {"best", "files"}  # keys of a sidecar that are compared part by part
 _AGAIN: Final = "restore it, or submit the run again"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A defect of a library: file, description and remedy."""
+
+    file: str
+    what: str
+    remedy: str = BUILD
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.what}; {self.remedy}"
+
+
+def of_error(error: CrossfieldError, file: str) -> Finding:
+    """Return an error about a file as a finding; its message names defect and remedy."""
+    message = str(error).removeprefix(f"{error.file}: ")
+    what, _, remedy = message.partition("; ")
+    return Finding(file, what, remedy) if remedy and "; " not in remedy else Finding(file, message)
 
 
 def verify_entry(
@@ -151,8 +170,6 @@ def run_findings(ledger: Ledger, record: Record) -> Iterator[Finding]:
         yield Finding(LEDGER, f"states that {record.log} is of {record.solver}, and it is not", _AGAIN)
     if record.bound != stated.bound:
         yield Finding(LEDGER, f"states another bound than {record.log} does", _AGAIN)
-    if record.trace != stated.trace:
-        yield Finding(LEDGER, f"states another course of the run than {record.log} does", _AGAIN)
     if record.status == "optimal" and stated.ended == "limit":
         yield Finding(
             LEDGER, f"states that the run of {record.log} proved an optimum, and it did not", _AGAIN

@@ -33,8 +33,7 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.sources import instance_from
-from .check_entry import instance_findings, run_findings, verify_entry
-from .finding import BUILD, Finding, of_error
+from .check_entry import BUILD, Finding, instance_findings, of_error, run_findings, verify_entry
 
 FETCH: Final = "fetch it again, or build the library again"
 REMOVE: Final = "remove it"

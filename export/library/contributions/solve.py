@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import (
-    CrossfieldError,
     InputError,
     MissingSolverError,
     SolutionError,
@@ -25,13 +23,11 @@ from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
 from ....models.processes.deadline import Progress, silent
 from ....models.processes.limits import Limits
-from ...solutions.logs.registry import read_log
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, format_for
 from ..building.build import rebuild
-from ..checking.finding import is_better
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
 from ..ledger.ledger import (
@@ -44,12 +40,10 @@ from ..ledger.ledger import (
     write_ledger,
 )
 from ..ledger.points import complete_point, field_of
-from ..ledger.standing import contradicts
+from ..ledger.standing import contradicts, is_better
 from ..plan.spec import RUNGS
 
 GAP: Final = 1e-7  # relative gap of a search, smaller than the gap of a proof: points may be infeasible
-
-Trace = tuple[tuple[float | None, ...], ...]
 
 
 def solve_library(
@@ -169,7 +163,7 @@ class _Solving:
             time_limit=self.limit,
         )
         try:
-            found, trace = self._solve(document, problem, solver)
+            found = self._solve(document, problem, solver)
         except UnsupportedBySolverError:
             raise
         except (SolverError, SolutionError):
@@ -183,7 +177,6 @@ class _Solving:
             record,
             bound=None if bound is None or contradicts(bound, best) else bound,
             seconds=None if found.seconds is None else round(found.seconds, 3),
-            trace=trace,
         )
         if found.point is None:
             return record, None
@@ -193,20 +186,17 @@ class _Solving:
         status: RunStatus = "optimal" if proves else "feasible" if feasible else "limit"
         return replace(record, status=status, primal=primal), field if is_better(primal, best) else None
 
-    def _solve(self, document: dict[str, Any], problem: Problem, solver: str) -> tuple[Solution, Trace]:
-        """The solution of a solver and the trace in its log. Raises SolverError if no time was left."""
+    def _solve(self, document: dict[str, Any], problem: Problem, solver: str) -> Solution:
+        """The solution of a solver. Raises SolverError if no time was left to start it."""
         limits, start = Limits(self.limit, GAP, 1), None
         if SOLVERS[solver].bundled:
             known = read_solution(self.library.folder / document["best"]["point"], problem)
             start = None if known.point is None else field_of(known.problem, known.point)
         with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
             found = self.solvers.solve(problem, solver, folder=folder, limits=limits, start=start)
-            log = next(Path(folder).glob("*.log"), None)
-            if log is None and not found.interrupted:
+            if not found.interrupted and not list(Path(folder).glob("*.log")):
                 raise SolverError(f"the time limit of {self.limit:g} s left no time to start {solver}")
-            with suppress(CrossfieldError):
-                return found, read_log(log).trace if log else ()
-        return found, ()
+        return found
 
 
 def _proves(problem: Problem, solver: str, found: Solution) -> bool:

@@ -22,7 +22,7 @@ from ....models.errors import (
     naming,
 )
 from ....models.field.field import CrossField
-from ....models.field.file import field_of_json, read_field
+from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
 from ....models.formulations.problem import Problem, Violation
 from ....models.input_limits import MAX_LOG
@@ -38,13 +38,12 @@ from ...solutions.solution import read_solution
 from ...solvers_table import SOLVERS
 from ..building.build import rebuilt
 from ..building.index import SUMS
-from ..checking.finding import FEASIBLE, is_better
 from ..documents.documents import Library, about_file, folder_of, problem_of, read_about, read_library
 from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record, RunStatus, log_file, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
-from ..ledger.standing import MAKERS, best_of_each, contradicts
+from ..ledger.standing import FEASIBLE, MAKERS, best_of_each, contradicts, is_better
 from .sources import Source, sources_of
 
 Outcome = Literal["accepted", "not better", "refused", "skipped"]
@@ -309,7 +308,6 @@ class _Session:
                 time_limit=run.limit,
                 log=log_file(stated.entry, run.solver, digest),
                 log_sha256=digest,
-                trace=run.trace,
             )
             record.check()
         return record
@@ -379,7 +377,8 @@ class _Session:
 
     def _field(self, source: Source, path: Path) -> Submission:
         """Check a field on every entry of its instance."""
-        found = self._read_field(path)
+        name = self.entry or (self._by_file_name(path) if path.suffix.lower() == ".rawfield" else "")
+        found = read_field(path, on=self._problem(self.library.entry(name)).instance if name else None)
         checked = []
         for sidecar in self._on(path, "field", found.instance):
             objective = self._objective(path, sidecar, found)
@@ -402,20 +401,6 @@ class _Session:
             known=chosen[0][2],
             better_point=bool(improved),
         )
-
-    def _read_field(self, path: Path) -> CrossField:
-        name = self.entry or (self._by_file_name(path) if path.suffix.lower() == ".rawfield" else "")
-        on = self._problem(self.library.entry(name)).instance if name else None
-        if path.suffix.lower() in (".rawfield", ".npz"):
-            return read_field(path, on=on)
-        with naming(path):
-            data = read_bytes(path)
-            if data.startswith(b"PK"):
-                raise InputError("is an .npz by its content; let its name end in .npz")
-            found = field_of_json(data)
-            if on is not None:
-                found.check_instance(on)
-            return found
 
     def _on(self, path: Path, kind: str, instance: Instance) -> list[dict[str, Any]]:
         """The sidecars of an instance, or of the one entry that was named. Raises InputError without any."""

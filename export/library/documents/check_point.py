@@ -27,6 +27,7 @@ import re
 import sys
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any, NoReturn, Optional, TypeVar
 
@@ -80,25 +81,25 @@ class BadInputError(Exception):
     """A file or an argument that cannot be used; the message is one line."""
 
 
+@dataclass
 class Column:
     """A column: bounds, None where there is none, and whether it is integer."""
 
-    def __init__(self, name: str, *, integer: bool) -> None:
-        self.name = name
-        self.integer = integer
-        self.lower: Decimal | None = None
-        self.upper: Decimal | None = None
+    name: str
+    integer: bool
+    lower: Decimal | None = None
+    upper: Decimal | None = None
 
 
+@dataclass
 class Row:
     """A row or the objective: sense N, L, G or E, right side, linear entries, products."""
 
-    def __init__(self, name: str, sense: str) -> None:
-        self.name = name
-        self.sense = sense
-        self.side = ZERO
-        self.linear: list[Entry] = []
-        self.products: list[Product] = []
+    name: str
+    sense: str
+    side: Decimal = ZERO
+    linear: list[Entry] = field(default_factory=list)
+    products: list[Product] = field(default_factory=list)
 
     def value(self, point: Sequence[Decimal]) -> Decimal:
         """The exact value of its left side at a point."""
@@ -110,14 +111,14 @@ class Row:
         return None if self.sense == "L" else self.side, None if self.sense == "G" else self.side
 
 
+@dataclass
 class Model:
     """A model: columns and rows by name, and the objective."""
 
-    def __init__(self) -> None:
-        self.columns: list[Column] = []
-        self.number: dict[str, int] = {}
-        self.rows: dict[str, Row] = {}
-        self.objective: Row | None = None
+    columns: list[Column] = field(default_factory=list)
+    number: dict[str, int] = field(default_factory=dict)
+    rows: dict[str, Row] = field(default_factory=dict)
+    objective: Row | None = None
 
     def row(self, name: str) -> Row:
         """The row of that name, or the objective."""
@@ -139,6 +140,7 @@ class Model:
         return self.number[name]
 
 
+@dataclass
 class Finding:
     """Result of the check of a point.
 
@@ -146,18 +148,10 @@ class Finding:
     whether the file's own point has the objective that it claims, if it claims one that can be compared.
     """
 
-    def __init__(
-        self,
-        objective: Decimal,
-        lines: list[tuple[str, str]],
-        violations: dict[str, Place],
-        *,
-        agrees: bool = True,
-    ) -> None:
-        self.objective = objective
-        self.agrees = agrees
-        self.lines = lines
-        self.violations = violations
+    objective: Decimal
+    lines: list[tuple[str, str]]
+    violations: dict[str, Place]
+    agrees: bool = True
 
     @property
     def worst(self) -> Decimal:
@@ -281,7 +275,7 @@ class MpsReader:
         if name != self.current[0]:
             _require(name not in model.number, f"the entries of column {name[:40]} do not follow each other")
             model.number[name] = len(model.columns)
-            model.columns.append(Column(name, integer=self.integer))
+            model.columns.append(Column(name, self.integer))
             self.current = (name, set())
         for row, value in _pairs(words, 1):
             if row in self.current[1]:
@@ -363,12 +357,12 @@ def _products(section: str, matrix: Matrix) -> list[Product]:
     return [(i, j, HALF * value if triangle and i == j else value) for (i, j), value in matrix.items()]
 
 
+@dataclass
 class Point:
     """Values by name, and the objective that the file claims, if any."""
 
-    def __init__(self) -> None:
-        self.values: dict[str, Decimal] = {}
-        self.claimed: Decimal | None = None
+    values: dict[str, Decimal] = field(default_factory=dict)
+    claimed: Decimal | None = None
 
     def of(self, columns: Iterable[Column]) -> list[Decimal]:
         """The values of columns in order: 0 where one is left out, or what it is fixed to."""
@@ -496,15 +490,14 @@ class Pixel:
         self.stroke = (Decimal(theta), stroke[1])
 
 
+@dataclass
 class Instance:
     """An instance: pixels, pairs (place, first, second), and the weights of the energy."""
 
-    def __init__(
-        self, pixels: list[Pixel], pairs: list[tuple[str, int, int]], weights: tuple[Decimal, Decimal]
-    ) -> None:
-        self.pixels = pixels
-        self.pairs = pairs
-        self.w_strokes, self.w_beta = weights
+    pixels: list[Pixel]
+    pairs: list[tuple[str, int, int]]
+    w_strokes: Decimal
+    w_beta: Decimal
 
     def jumps(self, first: int, second: int) -> tuple[int, int]:
         """The least and the greatest useful jump of a pair of pixels."""
@@ -573,7 +566,7 @@ def _instance(document: dict[str, object]) -> Instance:
     weights = [
         Decimal(_real(document.get(*item), 0, MOST_WEIGHT)) for item in (("w_strokes", 1.0), ("w_beta", 1e-6))
     ]
-    return Instance(pixels, pairs, (weights[0], weights[1]))
+    return Instance(pixels, pairs, *weights)
 
 
 def _held(strokes: Any) -> dict[tuple[int, int], Stroke]:

@@ -27,7 +27,7 @@ FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
 FILE: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
-_LATER: Final = ("machine", "date", "log", "log_sha256", "trace")  # absent if empty
+_LATER: Final = ("machine", "date", "log", "log_sha256")  # absent if empty
 _LONGEST: Final = 200  # characters of a text
 _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 
@@ -37,8 +37,7 @@ class Record:
     """One run of a solver on an entry, or one submitted point.
 
     primal: recomputed objective of its point; bound: dual bound; by: who ran it; point, log: names of files;
-    date: as YYYY-MM-DD; log: None for a run that `library solve` measured; trace: seconds, dual bound and
-    best objective during the run.
+    date: as YYYY-MM-DD; log: None for a run that `library solve` measured.
     """
 
     entry: str
@@ -58,7 +57,6 @@ class Record:
     date: str | None = None
     log: str | None = None
     log_sha256: str | None = None
-    trace: tuple[tuple[float | None, ...], ...] = ()
 
     @property
     def rank(self) -> tuple[Any, ...]:
@@ -80,8 +78,7 @@ class Record:
             least, sign = (-math.inf, "") if name in ("primal", "bound") else (0, " that is not negative")
             if value is not None and not (least <= value and math.isfinite(value)):
                 raise InputError(f"{name.replace('_', ' ')} is {value}; give a finite number{sign}")
-        document = json.loads(json.dumps(Ledger(Path(), (self,)).document()))  # lists in place of tuples
-        error = schema_error(document, "library-ledger", documents.__name__)
+        error = schema_error(Ledger(Path(), (self,)).document(), "library-ledger", documents.__name__)
         if error is not None:
             place = error.json_path.removeprefix("$.records[0].")
             raise InputError(f"{place}: {shortened(error.message)}; a ledger cannot hold this record")
@@ -204,11 +201,7 @@ def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
     schema, remedy = documents.__name__, "give the ledger.json of a library"
     given = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)
     certificates = tuple(SubmittedCertificate(**each) for each in given.get("certificates", ()))
-    return Ledger(Path(folder), tuple(map(_record, given["records"])), certificates)
-
-
-def _record(given: dict[str, Any]) -> Record:
-    return Record(**given | {"trace": tuple(map(tuple, given.get("trace", ())))})
+    return Ledger(Path(folder), tuple(Record(**each) for each in given["records"]), certificates)
 
 
 def write_ledger(ledger: Ledger) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from .... import templates
-from ....models.errors import InputError, InstanceError, OutputError
+from ....models.errors import InputError, OutputError
 from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.instance.file import read_instance
@@ -91,7 +91,6 @@ def write_site(folder: str | Path, output: str | Path, progress: Progress = sile
         )
     sums = _sums(library.folder / SUMS)
     shown = _instances(library, sums)
-    _check_listed(library, shown, sums)
     with _replacing_folder(Path(output)) as stage:
         for name in FOLDERS:
             make_folder(stage / name)
@@ -134,18 +133,6 @@ def _sums(path: Path) -> dict[str, str]:
             )
         found[fields[2]] = fields[1]
     return found
-
-
-def _check_listed(library: Library, shown: list[Shown], sums: dict[str, str]) -> None:
-    """Raise InstanceError unless documents and SHA256SUMS agree about each file."""
-    for document in (each for one in shown for each in (one.about, *one.entries)):
-        for file in document["files"]:
-            if sums.get(file["name"]) != file["sha256"]:
-                raise InstanceError(
-                    f"SHA256SUMS and {document['name']} disagree about {file['name']}; "
-                    "build the library again",
-                    file=library.folder,
-                )
 
 
 def _place(folder: Path, sums: dict[str, str], target: Path) -> None:

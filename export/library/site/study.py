@@ -1,4 +1,4 @@
-"""Content of an entry's page beyond its sidecar: mathematics, structure, presolve, loading.
+"""Content of an entry's page beyond its sidecar: mathematics and structure.
 
 The structure is the sparsity of the matrix and of the Hessian of the Lagrangian, as in MINLPLib.
 """
@@ -13,7 +13,6 @@ from itertools import combinations, combinations_with_replacement
 from pathlib import Path
 from typing import Any, Final
 
-import highspy
 import numpy as np
 import sympy as sp
 from scipy.sparse import coo_array
@@ -24,12 +23,8 @@ from ....models.formulations.latex import latex
 from ....models.formulations.problem import Problem
 from ....models.storage import write_bytes
 from ...pictures.sparsity import Parts, Pattern, Places, sparsity_picture
-from ...programs.highs import loaded, version
-from ...programs.protocol import RefusedError
 from ..documents.documents import Library, problem_of
-from .loading import Way, ways
 
-LINEAR: Final = ("LP", "MILP")  # classes that HiGHS presolves
 _LABEL: Final = re.compile(r" \\quad \\text\{(.*)\}$")
 _HIGHEST: Final = 4  # the greatest degree of a polynomial in any formulation
 
@@ -39,7 +34,7 @@ class Study:
     """Results computed from an entry.
 
     latex: its formulation; lines: the same line by line; matrix, hessian: None if empty; blocks: number and
-    sizes of the sets of columns that no entry of the Hessian joins; presolved: sizes before and after.
+    sizes of the sets of columns that no entry of the Hessian joins.
     """
 
     latex: str
@@ -47,8 +42,6 @@ class Study:
     matrix: Pattern | None
     hessian: Pattern | None
     blocks: dict[str, float] | None
-    presolved: dict[str, Any] | None
-    ways: list[Way]
 
 
 def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
@@ -68,8 +61,6 @@ def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
         patterns.get("matrix"),
         patterns.get("hessian"),
         blocks(patterns["hessian"]) if "hessian" in patterns else None,
-        _presolved(library.folder, entry),
-        list(ways(entry, problem)),
     )
 
 
@@ -98,28 +89,6 @@ def _converted(formula: str) -> str:
 
     found = convert(formula, display="block") if formula else ""
     return found.replace(' display="block"', ' displaystyle="true"')
-
-
-def _presolved(folder: Path, entry: dict[str, Any]) -> dict[str, Any] | None:
-    """The size of an entry's .mps or .lp before and after presolve; None if HiGHS does not presolve it."""
-    files = [each["name"] for form in ("mps", "lp") for each in entry["files"] if each["format"] == form]
-    if entry["class"] not in LINEAR or not files:
-        return None
-    try:
-        highs = loaded(folder / files[0], threads=1)
-    except RefusedError:
-        return None
-    before = _counts(highs.getLp())
-    highs.presolve()
-    same = highs.getModelPresolveStatus() == highspy.HighsPresolveStatus.kNotReduced
-    after = before if same else _counts(highs.getPresolvedLp())
-    return {"file": files[0], "version": version(), "before": before, "after": after}
-
-
-def _counts(model: Any) -> dict[str, int]:
-    integer = sum(kind != highspy.HighsVarType.kContinuous for kind in model.integrality_)
-    nonzeros = len(model.a_matrix_.value_)
-    return {"columns": model.num_col_, "integer": integer, "rows": model.num_row_, "nonzeros": nonzeros}
 
 
 def matrix(problem: Problem) -> Pattern:

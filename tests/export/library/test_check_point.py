@@ -160,23 +160,6 @@ def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_pat
     assert float(label(found, "claimed").rsplit(" ", 1)[1].rstrip(")")) < 1e-6
 
 
-@pytest.mark.parametrize("name", ["milp-mccormick", "qp-fixed"])
-def test_highs_agrees_about_its_own_point(name, tmp_path):
-    highspy = pytest.importorskip("highspy")
-    field = make_field(make_instance("row"))
-    write(formulate(field.instance, name, p=field.p if name == "qp-fixed" else None), tmp_path / "m.mps")
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", False)
-    highs.readModel(str(tmp_path / "m.mps"))
-    highs.run()
-    values = zip(highs.getLp().col_names_, highs.getSolution().col_value, strict=True)
-    (tmp_path / "p.sol").write_text("".join(f"{column} {value!r}\n" for column, value in values))
-    found = check(str(tmp_path / "m.mps"), str(tmp_path / "p.sol"))
-    assert found.worst < 1e-6
-    said = highs.getInfo().objective_function_value
-    assert float(label(found, "objective")) == pytest.approx(said, rel=1e-12, abs=1e-12)
-
-
 BOUNDS = [
     "LO B x -2\n UP B x 7.5",
     "MI B x\n UP B x -3",

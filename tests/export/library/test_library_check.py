@@ -202,7 +202,6 @@ SEALED = {
     ),
     "other counts": (edit(MILP, counts__variables=lambda value: value + 1), MILP, "another counts"),
     "another class": (edit(MILP, **{"class": "MIQP"}), MILP, "another class"),
-    "other ranges": (edit(MIQP, ranges__matrix=[1.0, 2.0]), MIQP, "another ranges"),
     "other curvature": (edit(MIQP, curvature__objective="indefinite"), MIQP, "another curvature"),
     "an unknown formulation": (edit(MILP, formulation="nothing"), MILP, "no entry can have"),
     "a jump beyond all numbers": (edit(QP, jumps=[[0, 10**30]]), QP, "no entry can have"),
