@@ -26,7 +26,7 @@ from crossfield.models.field.file import read_field
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.formulations.latex import latex
 from crossfield.models.instance.file import read_instance
-from forging import seal
+from forging import change, seal
 from libraries import library_of
 from loops import for_each
 
@@ -105,16 +105,14 @@ def detailed(library, tmp_path_factory):
     folder = Path(shutil.copytree(library.folder, tmp_path_factory.mktemp("detailed") / "library"))
     path = folder / f"{ENTRY}.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | FACTS))
-    about = folder / f"{INSTANCE}.about.json"
-    about.write_text(json.dumps(json.loads(about.read_text()) | {"origin": FACTS["origin"]}))
-    solved = folder / f"{INSTANCE}_quartic.json"
+    for about in folder.glob("cf_mouse_*.about.json"):
+        change(about, origin=FACTS["origin"])
     programs = [{"solver": name, "version": "1"} for name in ("Gurobi", "SCIP")]
     programs += [{"solver": "Bonmin", "version": "2", "via": f"{INSTANCE}_cubic"}]
-    by = {"status": "optimal", "solved": {"by": "agreement", "programs": programs}}
-    solved.write_text(json.dumps(json.loads(solved.read_text()) | by))
-    index = json.loads((folder / "library.json").read_text())
+    solved = {"by": "agreement", "programs": programs}
+    change(folder / f"{INSTANCE}_quartic.json", status="optimal", solved=solved)
     release = {"version": "1.2", "date": "2026-11-22", "authors": ["the authors"], "title": "t"}
-    (folder / "library.json").write_text(json.dumps(index | {"release": release}))
+    change(folder / "library.json", release=release)
     seal(folder)
     write_site(folder, folder.parent / "site")
     return folder.parent / "site"
