@@ -3,6 +3,7 @@
 import gzip
 import json
 import shutil
+from dataclasses import replace
 from functools import partial
 
 import places
@@ -11,9 +12,12 @@ from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.library.building.build import rebuild
+from crossfield.export.library.building.instance_task import Preparation
+from crossfield.export.library.checking.check_entry import instance_findings
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.documents.documents import read_library
+from crossfield.export.library.documents.documents import read_about, read_library
 from crossfield.export.library.ledger.ledger import Record, add_record
+from crossfield.export.library.plan.recipe import plan
 from forging import change, seal
 from libraries import library_of
 from loops import for_each
@@ -302,6 +306,14 @@ def test_a_change_under_new_checksums_is_found(what, built, tmp_path):
     seal(lib)
     found = check_found(lib, file, words)
     assert not [finding for finding in found if "SHA-256" in finding.what and finding.file != "library.json"]
+
+
+def test_an_instance_of_another_recipe_is_found(built):
+    (planned,) = plan(read_library(built).spec)
+    task = Preparation(replace(planned.recipe, seed=2))
+    (finding,) = instance_findings(built, read_about(built / f"{STEM}.about.json"), task)
+    assert finding.file == f"{STEM}.instance.json"
+    assert finding.what == "is not the instance that follows from the specification"
 
 
 def test_sealing_alone_changes_nothing(lib):
