@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterable
 from importlib import import_module
-from typing import Any, Final, get_args
+from typing import Any, Final
 
 from rich.markup import escape
 from typer.core import TyperCommand
@@ -32,7 +32,6 @@ NAMES: Final = {
     "logs": _of(
         "..solutions.logs.registry", "LOG_READERS", lambda readers: sorted(each.title for each in readers)
     ),
-    "run statuses": _of("..library.ledger.ledger", "RunStatus", get_args),
     "programs": _of("..solvers_table", "PROGRAMS"),
     "answers": _of(  # a description begins with the name of the program
         "..solutions.readers.registry",
@@ -96,7 +95,6 @@ EXAMPLES: Final = {
     "library verify": "crossfield library verify library",
     "library release": "crossfield library release library -o library.tar.gz",
     "library submit": "crossfield library submit library proof",
-    "library points": "crossfield library points library -o points",
     "library site": "crossfield library site library -o site",
 }
 """An example of every command; each uses files that earlier examples write."""

@@ -1,4 +1,4 @@
-"""The commands of `library`: build, get, solve, verify, release, submit, points, site."""
+"""The commands of `library`: build, get, solve, verify, release, submit, site."""
 
 from __future__ import annotations
 
@@ -208,18 +208,14 @@ def release_command(
     from ..library.checking.release import release_library
 
     with progress(quiet=printing.quiet) as show:
-        frozen = release_library(folder, output, jobs=jobs, progress=show)
-    facts = {"file": str(frozen.file), "sha256": frozen.sha256, "files": frozen.files}
+        facts = release_library(folder, output, jobs=jobs, progress=show)
     printing.show(facts, lambda: print_line("{file}: {files} files, SHA-256 {sha256}".format_map(facts)))
 
 
 @command("submit")
 def submit_command(
     folder: Library,
-    files: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="FILE...", help="Files and folders; none with --entry and --bound."),
-    ] = None,
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Files and folders.")],
     *,
     entry: Annotated[
         str | None,
@@ -229,15 +225,6 @@ def submit_command(
         str | None, _fact("--solver", metavar="NAME", help="Solver that found the points.")
     ] = None,
     version: Annotated[str | None, _fact("--version", metavar="TEXT", help="Version of the solver.")] = None,
-    status: Annotated[str | None, _fact("--status", help="Result of the run: {run statuses}.")] = None,
-    bound: Annotated[
-        float | None, _fact("--bound", help="Dual bound of the run; by default the bound in its log.")
-    ] = None,
-    seconds: Annotated[float | None, _fact("--seconds", help="Duration of the run in seconds.")] = None,
-    threads: Annotated[int | None, _fact("--threads", help="Number of threads of the run.")] = None,
-    time_limit: Annotated[
-        float | None, _fact("--time-limit", help="Time limit of the run in seconds.")
-    ] = None,
     machine: Machine = None,
     by: Annotated[str | None, _fact("--by", metavar="TEXT", help="Name of the submitter.")] = None,
     date: Annotated[str | None, _fact("--date", metavar="YYYY-MM-DD", help="Day of the run.")] = None,
@@ -245,18 +232,17 @@ def submit_command(
 ) -> None:
     """Check files against a library, keep what improves it, and rebuild what depends on them once.
 
-    Accepted are solution files of {answers}; logs of {logs}; fields; certificates of `crossfield prove`; and
-    the ledger.json of another copy of the library. Their kind is detected from their content.
+    Accepted are solution files of {answers}; logs of {logs}; fields; and certificates of `crossfield prove`.
+    Their kind is detected from their content.
 
     A solution and a log whose names differ in the suffix alone are one run. The exit code is 1 if a file is
     refused; the others are kept.
     """
-    from ..library.contributions.run_record import RunFacts
-    from ..library.contributions.submit import submit
+    from ..library.contributions.submit import RunFacts, submit
 
-    facts = RunFacts(solver, version, status, bound, seconds, threads, time_limit, machine, by, date)  # type: ignore[arg-type]
+    facts = RunFacts(solver, version, machine, by, date)
     with progress(quiet=printing.quiet) as show:
-        found = submit(folder, files or [], entry=entry, facts=facts, progress=show)
+        found = submit(folder, files, entry=entry, facts=facts, progress=show)
     columns = ("file", "result", "entry", "now")
     printing.show(
         list(map(_submitted, found)), lambda: show_table(str(folder), columns, list(map(_row, found)))
@@ -287,24 +273,6 @@ def _row(result: Submission) -> list[str]:
         f"{result.entries[0]}{more}" if result.entries else "",
         result.status or "",
     ]
-
-
-@command("points")
-def points_command(
-    folder: Library,
-    output: Folder,
-    *,
-    quiet: Quiet = False,
-) -> None:
-    """Write the points of a library: a folder of fields and certificates for a specification.
-
-    A build of a specification that names it does not search, and its bytes are the same on every processor.
-    """
-    from ..library.ledger.given import write_points
-
-    number = write_points(folder, output)
-    if not quiet:
-        print_line(f"{output}: points of {number} instances")
 
 
 @command("site")

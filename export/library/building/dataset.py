@@ -7,7 +7,7 @@ import io
 from importlib.util import find_spec
 from typing import Any, Final
 
-from ..documents.citation import LICENCES, cited
+from ..documents.citation import LICENCES, citation_of
 from ..documents.documents import as_bytes
 from ..plan.spec import Spec
 from .table import COLUMNS, TABLE, parsed
@@ -58,7 +58,7 @@ def croissant(spec: Spec, rows: bytes) -> bytes:
             "name": spec.title,
             "description": _ABOUT,
             "conformsTo": "http://mlcommons.org/croissant/1.1",
-            "citeAs": cited(spec)["bibtex"],
+            "citeAs": citation_of(spec),
             **{key: value for key, value in stated.items() if value},
             "distribution": [
                 {
@@ -99,7 +99,7 @@ def _field(name: str) -> dict[str, Any]:
 def _licences(spec: Spec) -> list[str]:
     """The licences of all sketches: the address where it is known, else the identifier."""
     stated = dict.fromkeys(each.origin.license for each in spec.sketches if each.origin.license)
-    return [LICENCES[each][1] if each in LICENCES else each for each in stated]
+    return [f"https://spdx.org/licenses/{each}.html" if each in LICENCES else each for each in stated]
 
 
 def parquet(rows: bytes) -> bytes | None:

@@ -28,7 +28,7 @@ from ...writing.curvature import probtype
 from ...writing.records import number
 from ..documents.citation import REFERENCES
 from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
-from ..documents.statistics import counts, curvature, density, ranges, tangent_bound
+from ..documents.statistics import counts, curvature, density, tangent_bound
 from ..ledger.given import NO_POINTS, Points
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record
@@ -43,7 +43,7 @@ from ..ledger.standing import (
     runs_of,
     standing,
 )
-from ..plan.equivalence import equivalent, not_equivalent, notes_of
+from ..plan.equivalence import equivalent, notes_of
 from ..plan.recipe import EntryRecipe, InstancePlan, digest
 from .instance_task import Evidence, Files, Preparation, Submitted
 
@@ -55,7 +55,7 @@ _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for
 class Entry:
     """The task of an entry: its recipe, and the document and files of its instance.
 
-    records, submitted: of all entries of the instance in the ledger; relatives: entries that may be related.
+    records, submitted: of all entries of the instance in the ledger; relatives: all entries of the instance.
     """
 
     recipe: EntryRecipe
@@ -253,7 +253,6 @@ def _sidecar(
         "convex": problem.convex,
         "counts": counts(problem),
         "curvature": curvature(problem),
-        "ranges": ranges(problem),
         "files": listed,
         "refused": refused,
         "best": {**numbers, "point": named["miplib"], "nl_point": named.get("ampl"), **facts},
@@ -265,7 +264,6 @@ def _context(task: Entry, problem: Problem) -> dict[str, Any]:
     return {
         "transformations": [f".{name}: {note}" for name in formats for note in notes_of(problem, name)],
         "equivalent": equivalent(task.recipe, task.relatives),
-        "not_equivalent": not_equivalent(task.recipe, task.relatives),
         "licence": task.about.get("origin", {}).get("license"),
         "references": list(REFERENCES),
         "recipe_sha256": task.sha256,
@@ -277,9 +275,6 @@ class Inputs:
 
     def __init__(self, ledger: Ledger, plans: Iterable[InstancePlan], points: Points = NO_POINTS) -> None:
         self.ledger, self.plans, self.points = ledger, tuple(plans), points
-        self._relatives: dict[str, list[str]] = {}
-        for each in self.plans:
-            self._relatives.setdefault(_relation(each), []).extend(entry.name for entry in each.entries)
 
     def preparation(self, each: InstancePlan) -> Preparation:
         """Return the task of an instance. Raises InputError, InstanceError for a damaged file."""
@@ -289,11 +284,10 @@ class Inputs:
     def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
         """Yield the tasks of its entries. Raises as `preparation`, and InputError for a missing file."""
         files = {facts["name"]: read_bytes(folder / facts["name"]) for facts in about["files"]}
-        relatives, submitted = tuple(self._relatives[_relation(each)]), self._submitted(each)
-        names = {entry.name for entry in each.entries}
+        names, submitted = tuple(entry.name for entry in each.entries), self._submitted(each)
         records = tuple(record for record in self.ledger.records if record.entry in names)
         for recipe in each.entries:
-            yield Entry(recipe, about, files, records, submitted, relatives)
+            yield Entry(recipe, about, files, records, submitted, names)
 
     def _submitted(self, each: InstancePlan) -> tuple[Submitted, ...]:
         """The fields that the ledger keeps for the entries of an instance."""
@@ -312,8 +306,3 @@ class Inputs:
             return None
         data = self.ledger.content(kept.file, kept.sha256)
         return Evidence(kept.file, data, kept.instance_sha256, replace(ours(METHOD), by=kept.by))
-
-
-def _relation(each: InstancePlan) -> str:
-    """The name without the gauge, which instances with related entries share."""
-    return each.recipe.name.removesuffix("_box")

@@ -85,9 +85,13 @@ class Preparation:
 def prepared(task: Preparation) -> Files | NoStrokeError:
     """Return the files of an instance, its document last, or the error that its size is too small."""
     try:
-        instance = instance_from(task.recipe)
+        return files_of(task, instance_from(task.recipe))
     except NoStrokeError as error:
         return error
+
+
+def files_of(task: Preparation, instance: Instance) -> Files:
+    """Return the files of an instance that was made from the recipe of the task, its document last."""
     given = task.given if task.given and task.given.instance == instance.sha256 else None
     evidence, sent = task.evidence, None
     if evidence and evidence.instance_sha256 == instance.sha256:
@@ -135,6 +139,8 @@ def _same(first: CrossField, second: CrossField) -> bool:
 
 def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files: Files) -> dict[str, Any]:
     given = {} if task.given is None else {"given": task.given.sha256}
+    recipe = task.recipe
+    stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added, "split": recipe.split}
     return given | {
         "format": ABOUT_FORMAT,
         "version": VERSION,
@@ -143,8 +149,8 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
         "title": task.recipe.sketch.title,
         "rung": task.recipe.rung,
         "generator": generator(),
-        "source": source_of(instance, task.recipe),
-        **stated_of(task.recipe),
+        "source": _source(instance, task.recipe),
+        **{key: value for key, value in stated.items() if value},
         "instance": {
             "file": f"{task.name}.instance.json",
             "sha256": instance.sha256,
@@ -159,14 +165,8 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
     }
 
 
-def stated_of(recipe: InstanceRecipe) -> dict[str, Any]:
-    """Return origin, day of addition and split as the specification states them."""
-    stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added, "split": recipe.split}
-    return {key: value for key, value in stated.items() if value}
-
-
-def source_of(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
-    """Return the facts about the source of an instance."""
+def _source(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
+    """The facts about the source of an instance."""
     parameters: dict[str, Any] = {
         "w_strokes": instance.stroke_coefficient,
         "w_beta": instance.skew_coefficient,

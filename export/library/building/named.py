@@ -30,7 +30,7 @@ from .table import COLUMNS, TABLE, read_table
 from .where import condition
 
 SHIPPED: Final = DEFAULT.with_name(TABLE)
-_REMEDY: Final = "make the points again with `crossfield library points`"
+_REMEDY: Final = "make the points again with `crossfield library build --search`"
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,29 +12,50 @@ import os
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError
 from ....models.formulations.problem import Problem
-from ....models.instance.file import read_instance
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS, generator
 from ...solutions.logs.registry import parse_log
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
 from ..building.entry_task import Entry, make_entry
-from ..building.instance_task import Files, Preparation, source_of, stated_of
+from ..building.instance_task import Files, Preparation, files_of
 from ..documents.check_point import BadInputError, check
-from ..documents.documents import problem_of
+from ..documents.documents import about_file, problem_of
+from ..ledger.given import given_of
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record
 from ..ledger.points import METHOD, Provenance, complete_point, ours
-from ..ledger.standing import MAKERS
-from .finding import FEASIBLE, Finding, close, of_error
+from ..ledger.standing import FEASIBLE, MAKERS, close
+from ..plan.sources import instance_from
 
+BUILD: Final = "build the library again"
 _APART: Final = {"best", "files"}  # keys of a sidecar that are compared part by part
 _AGAIN: Final = "restore it, or submit the run again"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A defect of a library: file, description and remedy."""
+
+    file: str
+    what: str
+    remedy: str = BUILD
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.what}; {self.remedy}"
+
+
+def of_error(error: CrossfieldError, file: str) -> Finding:
+    """Return an error about a file as a finding; its message names defect and remedy."""
+    message = str(error).removeprefix(f"{error.file}: ")
+    what, _, remedy = message.partition("; ")
+    return Finding(file, what, remedy) if remedy and "; " not in remedy else Finding(file, message)
 
 
 def verify_entry(
@@ -139,24 +160,16 @@ def _kept(entry: str, problem: Problem, ledger: Ledger) -> Iterator[Finding]:
 def run_findings(ledger: Ledger, record: Record) -> Iterator[Finding]:
     """Yield findings about a run: its log is missing, damaged or contradicts the record."""
     if record.log is None:
-        if record.evidence == "log":
-            yield Finding(
-                LEDGER, f"states that a log shows a bound of {record.entry}, and names none", _AGAIN
-            )
         return
-    if record.evidence is None and record.bound is not None:
-        yield Finding(LEDGER, f"does not state whether {record.log} shows the bound of its run", _AGAIN)
     try:
-        stated = parse_log(ledger.log(record))
+        stated = parse_log(ledger.content(record.log, record.log_sha256))
     except CrossfieldError as error:
         yield of_error(error, record.log)
         return
     if MAKERS.get(record.solver) != SOLVERS[stated.solver].maker:
         yield Finding(LEDGER, f"states that {record.log} is of {record.solver}, and it is not", _AGAIN)
-    if record.evidence == "log" and record.bound != stated.bound:
+    if record.bound != stated.bound:
         yield Finding(LEDGER, f"states another bound than {record.log} does", _AGAIN)
-    if record.trace != stated.trace:
-        yield Finding(LEDGER, f"states another course of the run than {record.log} does", _AGAIN)
     if record.status == "optimal" and stated.ended == "limit":
         yield Finding(
             LEDGER, f"states that the run of {record.log} proved an optimum, and it did not", _AGAIN
@@ -227,23 +240,24 @@ def _known(task: Entry) -> set[Provenance]:
     return known | {each.provenance for each in task.submitted}
 
 
-def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Preparation) -> Iterator[Finding]:
-    """Yield statements about an instance that do not follow from its recipe, except fields."""
-    recipe = task.recipe
-    instance = read_instance(folder / about["instance"]["file"])
-    expected = {
-        "name": task.name,
-        "family": recipe.sketch.name,
-        "title": recipe.sketch.title,
-        "rung": recipe.rung,
-        "source": source_of(instance, recipe),
-        "recipe_sha256": task.sha256,
-        **dict.fromkeys(("origin", "added")),
-        **stated_of(recipe),
-    }
-    for key, value in expected.items():
-        if not same(about.get(key), value):
-            yield Finding(name, f"states another {key} than follows from the specification")
+def instance_findings(folder: Path, about: dict[str, Any], task: Preparation) -> Iterator[Finding]:
+    """Yield differences between the document of an instance and the one made from its recipe and fields.
+
+    Raises CrossfieldError for a damaged field or certificate.
+    """
+    name, instance = about_file(task.name), instance_from(task.recipe)
+    if about["instance"]["sha256"] != instance.sha256:
+        yield Finding(about["instance"]["file"], "is not the instance that follows from the specification")
+        return
+    own = task.given or given_of(folder, about)
+    made = json.loads(files_of(replace(task, given=own), instance)[name])
+    given = {} if task.given is None else {"given": task.given.sha256}
+    made |= {"recipe_sha256": task.sha256, "given": None} | given
+    for key in (
+        dict.fromkeys((*made, *about)) if about["generator"] == generator() else ("fields", "certificate")
+    ):
+        if not same(about.get(key), made.get(key)):
+            yield Finding(name, f"states another {key} than follows from the specification and its fields")
     if "given" in about:
         return
     known = {each.provenance for each in task.submitted}

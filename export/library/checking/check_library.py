@@ -12,11 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
-from ....models.field.file import read_field
 from ....models.processes.deadline import Progress, silent
-from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, sha256_of
-from ...formats.registry import generator
 from ..building.dataset import CROISSANT, PARQUET, same_rows
 from ..building.entry_task import Entry, Inputs
 from ..building.executor import executor
@@ -38,8 +35,7 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.sources import instance_from
-from .check_entry import instance_findings, run_findings, verify_entry
-from .finding import BUILD, Finding, close, of_error
+from .check_entry import BUILD, Finding, instance_findings, of_error, run_findings, verify_entry
 
 FETCH: Final = "fetch it again, or build the library again"
 REMOVE: Final = "remove it"
@@ -289,75 +285,27 @@ class _Verification:
     def _instances(self, sidecars: list[dict[str, Any]], inputs: Inputs) -> Iterator[Finding]:
         """Findings about each instance, its document and its fields."""
         self.progress("instances")
+        plans = {each.recipe.name: each for each in inputs.plans}
         wanted = {sidecar["instance"]["file"]: sidecar["instance"] for sidecar in sidecars}
         for file, instance in sorted(wanted.items()):
-            name = about_file(file.removesuffix(".instance.json"))
+            stem = file.removesuffix(".instance.json")
+            name = about_file(stem)
             self.known |= {name, file}
             try:
                 about = read_about(self.folder / name)
-            except CrossfieldError as error:
-                yield of_error(error, name)
-                continue
-            self.known |= {each["name"] for each in about["files"]}
-            lost = list(self._listed(name, about["files"]))
-            yield from lost
-            if about["instance"] != instance:
-                yield Finding(name, "is about another instance than the sidecars of its entries")
-            elif not lost:
-                yield from self._fields(name, about)
-                yield from self._certificate(name, about)
-                yield from self._recipe(name, about, inputs)
-
-    def _recipe(self, name: str, about: dict[str, Any], inputs: Inputs) -> Iterator[Finding]:
-        """Statements about an instance that do not follow from its recipe."""
-        planned = [each for each in inputs.plans if about_file(each.recipe.name) == name]
-        if about["generator"] == generator() and planned:
-            try:
-                yield from instance_findings(self.folder, name, about, inputs.preparation(planned[0]))
+                self.known |= {each["name"] for each in about["files"]}
+                lost = list(self._listed(name, about["files"]))
+                yield from lost
+                if "certificate" in about:
+                    self.known.add(CERTIFICATES)
+                    if CERTIFICATES not in self.present:
+                        yield Finding(CERTIFICATES, "is missing, which checks certificates", FETCH)
+                if about["instance"] != instance:
+                    yield Finding(name, "is about another instance than the sidecars of its entries")
+                elif not lost and stem in plans:
+                    yield from instance_findings(self.folder, about, inputs.preparation(plans[stem]))
             except CrossfieldError as error:
                 yield of_error(error, Path(error.file or name).name)
-
-    def _fields(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
-        """Fields on other instances or of other energies, and least fields that are not least."""
-        fields, listed = about["fields"], {each["name"] for each in about["files"]}
-        for role, facts in fields.items():
-            name_of_field = facts["file"]
-            try:
-                field = read_field(self.folder / name_of_field) if name_of_field in listed else None
-            except CrossfieldError as error:
-                yield of_error(error, name_of_field)
-                continue
-            stated = (facts["energy_2norm"], facts["energy_1norm"])
-            if field is None or field.instance.sha256 != about["instance"]["sha256"]:
-                yield Finding(name_of_field, f"is not a field of {about['name']}")
-            elif not all(map(close, stated, (field.energy(2).total, field.energy(1).total))):
-                yield Finding(name, f"states other energies of its field {role} than it has")
-        for role, energy in (("least_2", "energy_2norm"), ("least_1", "energy_1norm")):
-            if fields[role][energy] > min(facts[energy] for facts in fields.values()):
-                yield Finding(name, f"its field {role} is not the one of least energy")
-
-    def _certificate(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
-        """A certificate that is refused, of another instance, or of another claim than stated."""
-        stated = about.get("certificate")
-        if stated is None:
-            return
-        self.known.add(CERTIFICATES)
-        if CERTIFICATES not in self.present:
-            yield Finding(CERTIFICATES, f"is missing, which checks {stated['file']}", FETCH)
-        if stated["file"] not in {each["name"] for each in about["files"]}:
-            yield Finding(name, f"names {stated['file']} as its certificate and does not list it")
-            return
-        try:
-            found = read_certificate(self.folder / stated["file"])
-        except CrossfieldError as error:
-            yield of_error(error, stated["file"])
-            return
-        if found.field.instance.sha256 != about["instance"]["sha256"]:
-            yield Finding(stated["file"], f"is not a certificate of {about['name']}")
-        elif (stated["status"], stated["bound"]) != (found.status, found.bound) or not close(
-            stated["energy"], found.energy
-        ):
-            yield Finding(name, "states another status, bound or energy of its certificate than it shows")
 
 
 def _verified(folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry | None) -> list[Finding]:

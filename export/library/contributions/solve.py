@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import (
-    CrossfieldError,
     InputError,
     MissingSolverError,
     SolutionError,
@@ -25,13 +23,11 @@ from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
 from ....models.processes.deadline import Progress, silent
 from ....models.processes.limits import Limits
-from ...solutions.logs.registry import read_log
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, format_for
 from ..building.build import rebuild
-from ..checking.finding import is_better
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
 from ..ledger.ledger import (
@@ -44,7 +40,7 @@ from ..ledger.ledger import (
     write_ledger,
 )
 from ..ledger.points import complete_point, field_of
-from ..ledger.standing import contradicts
+from ..ledger.standing import contradicts, is_better
 from ..plan.spec import RUNGS
 
 GAP: Final = 1e-7  # relative gap of a search, smaller than the gap of a proof: points may be infeasible
@@ -66,16 +62,19 @@ def solve_library(
     is too large for the free edition of a program is skipped. Raises InputError for an unknown name,
     MissingSolverError for a named solver that is not installed.
     """
-    chosen = _chosen(solvers)
-    (last,) = _known([up_to or RUNGS[-1]], RUNGS, "rung")
+    rungs = RUNGS[: RUNGS.index(_known(up_to or RUNGS[-1], RUNGS, "rung")) + 1]
+    for name in solvers or ():
+        if missing := SOLVERS[_known(name, SOLVERS, "solver")].missing:
+            raise MissingSolverError(f"{name} is not installed; {missing}")
+    chosen = dict.fromkeys(solvers or [name for name, each in SOLVERS.items() if not each.missing])
     check_text("by", by)
     check_text("machine", machine)
     library, found = read_library(folder), []
     with Solvers() as at_work:
         work = _Solving(library, at_work, time_limit)
-        runs = list(work.runs(chosen, RUNGS[: RUNGS.index(last) + 1]))
-        for number, (document, solver) in enumerate(runs):
-            progress(f"{number + 1} of {len(runs)} runs: {solver} on {document['name']}")
+        runs = list(work.runs(list(chosen), rungs))
+        for number, (document, solver) in enumerate(runs, 1):
+            progress(f"{number} of {len(runs)} runs: {solver} on {document['name']}")
             try:
                 record, field = work.run(document, solver)
             except UnsupportedBySolverError as error:
@@ -90,21 +89,24 @@ def solve_library(
     return found
 
 
+def _known(name: str, table: Any, kind: str) -> str:
+    if name not in table:
+        raise InputError(f"there is no {kind} {name!r}; choose from {', '.join(table)}")
+    return name
+
+
 def drop_refuted(library: Library) -> None:
     """Remove measured bounds that a point found later refutes. The caller holds the lock."""
-    ledger, dropped = read_ledger(library.folder), {}
+    ledger = read_ledger(library.folder)
+    dropped: dict[Record, Record] = {}
     for document in library.entries:
-        measured = [
-            each
-            for each in ledger.of(document["name"], document["problem_sha256"])
-            if each.bound is not None and each.evidence is None
-        ]
+        records = ledger.of(document["name"], document["problem_sha256"])
+        measured = [each for each in records if each.bound is not None and each.log is None]
         best = _best(library, document, ledger) if measured else 0.0
-        for each in measured:
-            if contradicts(each.bound or 0.0, best):
-                dropped[each] = replace(each, bound=None)
-    if dropped:
-        write_ledger(replace(ledger, records=tuple(dropped.get(each, each) for each in ledger.records)))
+        dropped |= {
+            each: replace(each, bound=None) for each in measured if contradicts(each.bound or 0.0, best)
+        }
+    write_ledger(replace(ledger, records=tuple(dropped.get(each, each) for each in ledger.records)))
 
 
 def _best(library: Library, document: dict[str, Any], ledger: Ledger) -> float:
@@ -117,27 +119,13 @@ def _best(library: Library, document: dict[str, Any], ledger: Ledger) -> float:
     return float(min([document["best"]["objective"], *values]))
 
 
-def _chosen(solvers: Sequence[str] | None) -> list[str]:
-    if solvers is None:
-        return [name for name, solver in SOLVERS.items() if not solver.missing]
-    for name in (chosen := _known(solvers, SOLVERS, "solver")):
-        if SOLVERS[name].missing:
-            raise MissingSolverError(f"{name} is not installed; {SOLVERS[name].missing}")
-    return chosen
-
-
-def _known(names: Sequence[str], table: Any, kind: str) -> list[str]:
-    for name in names:
-        if name not in table:
-            raise InputError(f"there is no {kind} {name!r}; choose from {', '.join(table)}")
-    return list(dict.fromkeys(names))
-
-
+@dataclass
 class _Solving:
     """Runs on a library with a time limit each."""
 
-    def __init__(self, library: Library, solvers: Solvers, limit: float) -> None:
-        self.library, self.solvers, self.limit = library, solvers, limit
+    library: Library
+    solvers: Solvers
+    limit: float
 
     def runs(self, solvers: list[str], rungs: Sequence[str]) -> Iterator[tuple[dict[str, Any], str]]:
         """Yield sidecar and solver of each missing run that the solver supports."""
@@ -163,56 +151,52 @@ class _Solving:
 
         Raises UnsupportedBySolverError for a problem that is too large.
         """
-        problem = problem_of(self.library, document)
+        problem, best = problem_of(self.library, document), document["best"]["objective"]
+        title, version = SOLVERS[solver].title, self.solvers.version(solver)
         record = Record(
             document["name"],
             problem.sha256,
-            SOLVERS[solver].title,
-            self.solvers.version(solver),
+            title,
+            version,
             "no point",
             threads=1,
             time_limit=self.limit,
         )
         try:
-            found, trace = self._solve(document, problem, solver)
+            found = self._solve(document, problem, solver)
         except UnsupportedBySolverError:
             raise
         except (SolverError, SolutionError):
             return record, None
         if found.interrupted:
             raise KeyboardInterrupt
-        seconds = None if found.seconds is None else round(found.seconds, 3)
-        best = document["best"]["objective"]
-        record = replace(record, bound=_bound(problem, solver, found, best), seconds=seconds, trace=trace)
+        proves, bound = _proves(problem, solver, found), found.bound
+        if bound is None and found.objective is not None and proves:
+            bound = found.objective - GAP * abs(found.objective)
+        record = replace(
+            record,
+            bound=None if bound is None or contradicts(bound, best) else bound,
+            seconds=None if found.seconds is None else round(found.seconds, 3),
+        )
         if found.point is None:
             return record, None
         field = field_of(found.problem, found.point)
         primal = problem.objective_value(complete_point(problem, field))
-        record = replace(record, status=_run_status(problem, solver, found), primal=primal)
-        return record, field if is_better(primal, best) else None
+        feasible = found.status in {Status.OPTIMAL_LOCAL, Status.FEASIBLE}
+        status: RunStatus = "optimal" if proves else "feasible" if feasible else "limit"
+        return replace(record, status=status, primal=primal), field if is_better(primal, best) else None
 
-    def _solve(
-        self, document: dict[str, Any], problem: Problem, solver: str
-    ) -> tuple[Solution, tuple[tuple[float | None, ...], ...]]:
-        """The solution of a solver and the trace in its log. Raises SolverError if no time was left."""
+    def _solve(self, document: dict[str, Any], problem: Problem, solver: str) -> Solution:
+        """The solution of a solver. Raises SolverError if no time was left to start it."""
         limits, start = Limits(self.limit, GAP, 1), None
         if SOLVERS[solver].bundled:
             known = read_solution(self.library.folder / document["best"]["point"], problem)
             start = None if known.point is None else field_of(known.problem, known.point)
         with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
             found = self.solvers.solve(problem, solver, folder=folder, limits=limits, start=start)
-            log = next(Path(folder).glob("*.log"), None)
-            if log is None and not found.interrupted:
+            if not found.interrupted and not list(Path(folder).glob("*.log")):
                 raise SolverError(f"the time limit of {self.limit:g} s left no time to start {solver}")
-            with suppress(CrossfieldError):
-                return found, read_log(log).trace if log else ()
-        return found, ()
-
-
-def _run_status(problem: Problem, solver: str, found: Solution) -> RunStatus:
-    if _proves(problem, solver, found):
-        return "optimal"
-    return "feasible" if found.status in {Status.OPTIMAL_LOCAL, Status.FEASIBLE} else "limit"
+        return found
 
 
 def _proves(problem: Problem, solver: str, found: Solution) -> bool:
@@ -221,11 +205,3 @@ def _proves(problem: Problem, solver: str, found: Solution) -> bool:
         return False
     local = problem.convex and found.status == Status.OPTIMAL_LOCAL
     return SOLVERS[solver].proves != "local" and (found.status == Status.OPTIMAL_GLOBAL or local)
-
-
-def _bound(problem: Problem, solver: str, found: Solution, known: float) -> float | None:
-    """The reported dual bound, or a proven optimum less the gap, unless a feasible point contradicts it."""
-    bound = found.bound
-    if bound is None and found.objective is not None and _proves(problem, solver, found):
-        bound = found.objective - GAP * abs(found.objective)
-    return None if bound is None or contradicts(bound, known) else bound

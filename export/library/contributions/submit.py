@@ -1,4 +1,4 @@
-"""Submission of files to a library: solutions, fields, certificates, logs of runs and ledgers.
+"""Submission of files to a library: solutions, fields, certificates, and logs of runs.
 
 Each file is checked completely, and every improvement is added to the ledger in memory. Then the ledger is
 written, and one rebuild updates the library, SHA256SUMS last. If a submission is interrupted, the checksum
@@ -8,36 +8,68 @@ of ledger.json shows it, and the next submission or build completes it.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from ....models.errors import CrossfieldError, InputError, SolutionError, naming
+from ....models.errors import (
+    CrossfieldError,
+    InputError,
+    SolutionError,
+    UnsupportedByFormatError,
+    naming,
+)
 from ....models.field.field import CrossField
-from ....models.field.file import field_of_json, read_field
+from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
-from ....models.formulations.problem import Violation
+from ....models.formulations.problem import Problem, Violation
+from ....models.input_limits import MAX_LOG
 from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes
-from ...formats.registry import generator
+from ...formats.registry import FORMATS, carried, generator
+from ...solutions.logs.registry import parse_log
+from ...solutions.logs.run_log import RunLog
 from ...solutions.readers.registry import read_raw
 from ...solutions.solution import read_solution
+from ...solvers_table import SOLVERS
 from ..building.build import rebuilt
 from ..building.index import SUMS
-from ..checking.finding import FEASIBLE, is_better
-from ..documents.documents import Library, about_file, folder_of, read_about, read_library
+from ..documents.documents import Library, about_file, folder_of, problem_of, read_about, read_library
 from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import Ledger, Record, read_ledger, write_ledger
+from ..ledger.ledger import Record, RunStatus, log_file, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
-from ..ledger.standing import best_of_each, contradicts
-from .matching import Entries, Source, sources_of
-from .run_record import LogFile, RunFacts, run_record
+from ..ledger.standing import FEASIBLE, MAKERS, best_of_each, contradicts, is_better
+from .sources import Source, sources_of
 
 Outcome = Literal["accepted", "not better", "refused", "skipped"]
+
+_ENTRY: Final = re.compile(r"cf_[a-z0-9_]+")
+_ADDED: Final = 2  # columns that a program adds: for a constant, for an objective that is not linear
+
+
+@dataclass(frozen=True)
+class RunFacts:
+    """Facts that a submitter states, named as in a record; None if not stated. The log has all others."""
+
+    solver: str | None = None
+    version: str | None = None
+    machine: str | None = None
+    by: str | None = None
+    date: str | None = None
+
+    @property
+    def record(self) -> Record:
+        """A record of these facts alone."""
+        solver, version = self.solver or "unknown", self.version or "unknown"
+        return Record(
+            "cf_none", "0" * 64, solver, version, "feasible", by=self.by, machine=self.machine, date=self.date
+        )
+
 
 _NOTHING_STATED: Final = RunFacts()
 
@@ -46,9 +78,9 @@ _NOTHING_STATED: Final = RunFacts()
 class Submission:
     """Result of submitting a file, or the solution and the log of one run.
 
-    kind: `Kind`, `bound`, or empty if unknown. outcome: `skipped` for unknown files in a submitted folder.
-    entries: those that the file improves, or else all that it fits. objective, known: of its point and of the
-    best point before, for the first entry; status: of that entry afterwards.
+    kind: of `Source`. outcome: `skipped` for unknown files in a submitted folder. entries: those that the
+    file improves, or else all that it fits. objective, known: of its point and of the best point before, for
+    the first entry; status: of that entry afterwards.
     """
 
     files: tuple[Path, ...]
@@ -65,7 +97,7 @@ class Submission:
 
 def submit(
     folder: str | Path,
-    files: Sequence[str | Path] = (),
+    files: Sequence[str | Path],
     *,
     entry: str | None = None,
     facts: RunFacts = _NOTHING_STATED,
@@ -76,18 +108,22 @@ def submit(
     files: files and folders; a solution and a log whose names differ only in the suffix are one run. entry:
     the entry of all files; by default crossfield detects it from each file. A refused file changes nothing
     and does not stop the others. Raises InputError for an archive, another version's library, an unknown
-    entry, and for facts that do not fit the files; OutputError.
+    entry, no files, and facts that a ledger cannot hold; OutputError.
     """
-    library = _writable(folder)
+    facts.record.check()
+    library = read_library(folder_of(folder))
+    if library.document["generator"] != generator():
+        made = library.document["generator"]
+        raise InputError(f"was built by {made}; submit with that version, or build it again", file=folder)
     with locked(library.folder, "a submission", progress):
         library = _settled(library, progress)
         if entry is not None:
             library.entry(entry)
         session = _Session(library, entry, facts)
         found = []
-        for source in sources_of(files, facts):
-            progress(f"checking {source.name}")
-            found += session.results(source)
+        for source in sources_of(files):
+            progress(f"checking {' and '.join(each.name for each in source.files)}")
+            found.append(session.result(source))
         if any(each.outcome == "accepted" for each in found):
             write_ledger(session.ledger)
             library = rebuilt(library.folder, progress=progress)
@@ -97,20 +133,27 @@ def submit(
         ]
 
 
-def _writable(folder: str | Path) -> Library:
-    """The library in a folder. Raises InputError for an archive or a library of another version."""
-    library = read_library(folder_of(folder))
-    if library.document["generator"] != generator():
-        made = library.document["generator"]
-        raise InputError(f"was built by {made}; submit with that version, or build it again", file=folder)
-    return library
-
-
 def _settled(library: Library, progress: Progress) -> Library:
     """The library, rebuilt if an earlier submission was interrupted before its rebuild."""
     digest = hashlib.sha256(read_bytes(library.folder / LEDGER)).hexdigest()
     sums = read_bytes(library.folder / SUMS).decode("utf-8", "replace").splitlines()
     return library if f"{digest}  {LEDGER}" in sums else rebuilt(library.folder, progress=progress)
+
+
+@dataclass(frozen=True)
+class _Log:
+    """The log of a run: its path, its bytes, and the facts in it."""
+
+    path: Path
+    content: bytes
+    run: RunLog
+
+    @classmethod
+    def read(cls, path: Path) -> _Log:
+        """Read a log. Raises InputError, and SolutionError for a log without bound and objective."""
+        content = read_bytes(path, MAX_LOG, "give the part of the last run")
+        with naming(path):
+            return cls(path, content, parse_log(content))
 
 
 @dataclass
@@ -120,76 +163,90 @@ class _Session:
     library: Library
     entry: str | None
     facts: RunFacts
+    problems: dict[str, Problem] = field(default_factory=dict)
     fields: dict[str, list[CrossField]] = field(default_factory=dict)
     bounds: dict[str, float] = field(default_factory=dict)
     certified: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.ledger = read_ledger(self.library.folder)
-        self.entries = Entries(self.library)
 
-    def results(self, source: Source) -> list[Submission]:
+    def result(self, source: Source) -> Submission:
         """Check a source and add its improvements to the ledger."""
-        before = self.ledger
         try:
             if source.error is not None:
                 raise source.error
-            if not source.kind and source.listed:
-                what = "is no solution, field, certificate, log or ledger; give one of these"
+            if source.path and source.kind == "field":
+                return self._field(source, source.path)
+            if source.path and source.kind == "certificate":
+                return self._certificate(source, source.path)
+            if source.kind:
+                return self._run(source)
+            if source.listed:
+                what = "is no solution, field, certificate or log; give one of these"
                 raise InputError(what, file=source.path)
-            if not source.kind:
-                return [Submission(source.files, "", "skipped")]
-            if source.kind == "ledger":
-                return list(self._ledger(source))
-            check = {"field": self._field, "certificate": self._certificate}.get(source.kind, self._run)
-            return [check(source)]
         except CrossfieldError as error:
-            self.ledger = before
-            return [Submission(source.files, source.kind, "refused", error=error)]
+            return Submission(source.files, source.kind, "refused", error=error)
+        return Submission(source.files, "", "skipped")
 
-    def _run(self, source: Source) -> Submission:
-        """Check the solution, the log and the stated bound of a run."""
-        log = LogFile.read(source.log) if source.log else None
-        sidecar = self.library.entry(self.entry or self._name_of(source, log))
-        found = None if source.path is None else self._point(source.path, sidecar)
-        return self._kept(source, sidecar, self.facts, log, found)
+    def _problem(self, sidecar: dict[str, Any]) -> Problem:
+        """The problem of an entry, formulated once."""
+        name = sidecar["name"]
+        if name not in self.problems:
+            self.problems[name] = problem_of(self.library, sidecar)
+        return self.problems[name]
 
-    def _name_of(self, source: Source, log: LogFile | None) -> str:
-        name = self.entries.of_log(log.log, log.path) if log else ""
+    # the entry of a file
+
+    def _name_of(self, source: Source, log: _Log | None) -> str:
+        """The entry of a run by the stamp of its problem, a name in the log, or the name of a file."""
+        stamps = set(log.run.stamps) if log else set()
+        path = source.path or source.files[0]
         if source.path is not None:
             raw = read_raw(source.path)
             if not raw.has_point:
                 raise SolutionError(f"holds no point ({raw.status})", file=source.path)
-            return (name if not raw.stamp else "") or self.entries.of_solution(raw, source.path)
-        if not name:
-            raise InputError("the entry of the run is unknown; name the entry", file=source.log)
-        return name
+            stamps = {raw.stamp} if raw.stamp else stamps
+        stamped = {
+            each["name"] for each in self.library.entries if stamps and self._problem(each).stamp in stamps
+        }
+        for found in (stamped, self._named_in(log), {self._by_file_name(path)}):
+            if len(found) == 1 and any(found):
+                return found.pop()
+        raise InputError("does not show its entry; name the entry", file=path)
 
-    def _kept(
-        self,
-        source: Source,
-        sidecar: dict[str, Any],
-        facts: RunFacts,
-        log: LogFile | None,
-        found: CrossField | None,
-    ) -> Submission:
-        """Add a run to the ledger if it is the best of its solver or has a better point."""
-        name, problem = sidecar["name"], self.entries.problem(sidecar)
+    def _named_in(self, log: _Log | None) -> set[str]:
+        """The entries that a log names."""
+        names = _ENTRY.findall(log.run.text) if log else ()
+        return {name for name in names if name in self.library.document["sha256"]}
+
+    def _by_file_name(self, path: Path) -> str:
+        """The longest name of an entry with which the file's name begins; empty if there is none."""
+        names = self.library.document["entries"]
+        return max((each for each in names if re.match(rf"{each}([._-]|$)", path.name)), key=len, default="")
+
+    # runs
+
+    def _run(self, source: Source) -> Submission:
+        """Check the solution and the log of a run; keep the best run of its solver, and a better point."""
+        log = _Log.read(source.log) if source.log else None
+        sidecar = self.library.entry(self.entry or self._name_of(source, log))
+        name, problem = sidecar["name"], self._problem(sidecar)
+        found = None if source.path is None else self._point(source.path, sidecar)
         if log is not None:
-            log.check_entry(name, problem, self.entries.named_in(log.log.text))
-        known = self.known(sidecar)
+            self._check_log(log, name, problem)
+        known = self._known(sidecar)
         objective = None if found is None else problem.objective_value(complete_point(problem, found))
-        record = run_record(name, problem, facts, log, objective=objective, known=known)
+        record = self._record(sidecar, log, objective, known)
         better = objective is not None and is_better(objective, known)
-        is_run = log is not None or record.bound is not None
         have = self.ledger.of(name, problem.sha256)
-        is_best = is_run and record not in have and record in best_of_each([*have, record], name)
-        if better or is_best:
+        best = log is not None and record not in have and record in best_of_each([*have, record], name)
+        if better or best:
             self._add(record, sidecar, found if better else None, log)
         return Submission(
             source.files,
             source.kind,
-            "accepted" if better or is_best else "not better",
+            "accepted" if better or best else "not better",
             (name,),
             objective=objective,
             known=None if objective is None else known,
@@ -197,12 +254,70 @@ class _Session:
             better_point=better,
         )
 
+    def _check_log(self, log: _Log, entry: str, problem: Problem) -> None:
+        """Raise SolutionError if a log is about another problem."""
+        named = self._named_in(log)
+        others = sorted(named - {entry}) if entry not in named else []
+        if log.run.stamps - {problem.stamp}:
+            others = others or [f"a problem {min(log.run.stamps - {problem.stamp})}"]
+        if others:
+            raise SolutionError(f"is a log of {others[0]}, not of {entry}", file=log.path)
+        if "GAMS" not in log.run.text and not _has_size(log.run, problem):
+            raise SolutionError(
+                f"is a log of a model of {log.run.columns} columns and {log.run.rows} rows, "
+                f"and {entry} has other numbers",
+                file=log.path,
+            )
+
+    def _record(
+        self, sidecar: dict[str, Any], log: _Log | None, objective: float | None, known: float
+    ) -> Record:
+        """The record of a run. known: the least objective of the entry's feasible points.
+
+        Raises InputError for facts that the log denies or a ledger cannot hold, SolutionError for a bound
+        that a point refutes.
+        """
+        stated = replace(
+            self.facts.record,
+            entry=sidecar["name"],
+            problem_sha256=sidecar["problem_sha256"],
+            solver=_solver(self.facts.solver, log),
+            primal=objective,
+        )
+        if log is None:
+            return stated
+        run, digest = log.run, hashlib.sha256(log.content).hexdigest()
+        best = known if objective is None else min(known, objective)
+        with naming(log.path):
+            if run.bound is not None and contradicts(run.bound, best):
+                raise SolutionError(
+                    f"the bound {run.bound!r} lies above {best!r}, the objective of a feasible point of "
+                    f"{stated.entry}; run the solver with tighter tolerances"
+                )
+            without = objective is None and run.objective is None
+            if without and run.bound is None:
+                raise InputError("there is nothing to keep; give a log with a bound, or a solution file")
+            status: RunStatus = "optimal" if run.ended == "optimal" else "no point" if without else "limit"
+            record = replace(
+                stated,
+                version=self.facts.version or run.version or stated.version,
+                status=status,
+                bound=run.bound,
+                seconds=run.seconds,
+                threads=run.threads,
+                time_limit=run.limit,
+                log=log_file(stated.entry, run.solver, digest),
+                log_sha256=digest,
+            )
+            record.check()
+        return record
+
     def _add(
         self,
         record: Record,
         sidecar: dict[str, Any],
         found: CrossField | None = None,
-        log: LogFile | None = None,
+        log: _Log | None = None,
     ) -> None:
         self.ledger, _ = self.ledger.added(record, found, log.content if log else None)
         if found is not None:
@@ -215,16 +330,18 @@ class _Session:
         for name in names:
             self.bounds[name] = max(bound, self.bounds.get(name, bound))
 
-    def known(self, sidecar: dict[str, Any]) -> float:
-        """Return the least objective of an entry at its best point and at fields accepted in this call."""
-        problem = self.entries.problem(sidecar)
+    # points
+
+    def _known(self, sidecar: dict[str, Any]) -> float:
+        """The least objective of an entry at its best point and at fields accepted in this call."""
+        problem = self._problem(sidecar)
         accepted = self.fields.get(sidecar["instance"]["sha256"], [])
         values = [problem.objective_value(complete_point(problem, each)) for each in accepted]
         return float(min([sidecar["best"]["objective"], *values]))
 
     def _point(self, path: Path, sidecar: dict[str, Any]) -> CrossField:
         """The field of a solution. Raises SolutionError unless its angles and jumps are feasible."""
-        name, problem = sidecar["name"], self.entries.problem(sidecar)
+        name, problem = sidecar["name"], self._problem(sidecar)
         solution = read_solution(path, problem)
         if solution.point is None or solution.violation is None:
             raise SolutionError(f"holds no point ({solution.status})", file=path)
@@ -243,7 +360,7 @@ class _Session:
         self, path: Path, sidecar: dict[str, Any], found: CrossField, violation: Violation | None = None
     ) -> float:
         """The objective of a field. Raises SolutionError if it is not feasible or lies below a dual bound."""
-        problem = self.entries.problem(sidecar)
+        problem = self._problem(sidecar)
         point = complete_point(problem, found)
         _check_feasible(path, sidecar["name"], violation or problem.violation(point))
         objective = problem.objective_value(point)
@@ -258,26 +375,22 @@ class _Session:
             )
         return float(objective)
 
-    def _field(self, source: Source) -> Submission:
+    def _field(self, source: Source, path: Path) -> Submission:
         """Check a field on every entry of its instance."""
-        assert source.path is not None
-        found = self._read_field(source.path)
+        name = self.entry or (self._by_file_name(path) if path.suffix.lower() == ".rawfield" else "")
+        found = read_field(path, on=self._problem(self.library.entry(name)).instance if name else None)
         checked = []
-        for sidecar in self._on(source.path, "field", found.instance):
-            objective = self._objective(source.path, sidecar, found)
-            checked.append((sidecar, objective, self.known(sidecar)))
+        for sidecar in self._on(path, "field", found.instance):
+            objective = self._objective(path, sidecar, found)
+            checked.append((sidecar, objective, self._known(sidecar)))
         improved = [each for each in checked if is_better(each[1], each[2])]
         optima = set()
-        for sidecar, objective, _ in improved:
+        for sidecar, objective, known in improved:
             # One record per optimum, because a field counts for all entries of its instance.
             optimum = FORMULATIONS[sidecar["formulation"]].minimises, sidecar["options"]["facet"]
             if optimum not in optima:
                 optima.add(optimum)
-                problem, known = self.entries.problem(sidecar), self.known(sidecar)
-                record = run_record(
-                    sidecar["name"], problem, self.facts, None, objective=objective, known=known
-                )
-                self._add(record, sidecar, found)
+                self._add(self._record(sidecar, None, objective, known), sidecar, found)
         chosen = improved or checked
         return Submission(
             source.files,
@@ -288,20 +401,6 @@ class _Session:
             known=chosen[0][2],
             better_point=bool(improved),
         )
-
-    def _read_field(self, path: Path) -> CrossField:
-        name = self.entry or (self.entries.by_file_name(path) if path.suffix.lower() == ".rawfield" else "")
-        on = self.entries.problem(self.library.entry(name)).instance if name else None
-        if path.suffix.lower() in (".rawfield", ".npz"):
-            return read_field(path, on=on)
-        with naming(path):
-            data = read_bytes(path)
-            if data.startswith(b"PK"):
-                raise InputError("is an .npz by its content; let its name end in .npz")
-            found = field_of_json(data)
-            if on is not None:
-                found.check_instance(on)
-            return found
 
     def _on(self, path: Path, kind: str, instance: Instance) -> list[dict[str, Any]]:
         """The sidecars of an instance, or of the one entry that was named. Raises InputError without any."""
@@ -315,30 +414,29 @@ class _Session:
             raise InputError(what, file=path)
         return found
 
-    def _certificate(self, source: Source) -> Submission:
+    def _certificate(self, source: Source, path: Path) -> Submission:
         """Check a certificate and keep it if it proves more than the one before."""
-        assert source.path is not None
-        found = read_certificate(source.path)
+        found = read_certificate(path)
         instance = found.field.instance
         sidecars = [
             each
-            for each in self._on(source.path, "certificate", instance)
+            for each in self._on(path, "certificate", instance)
             if FORMULATIONS[each["formulation"]].minimises == TWO_NORM
         ]
         if not sidecars:
             raise InputError(
-                f"proves a bound of the 2-norm, which no entry of {instance.name} minimises", file=source.path
+                f"proves a bound of the 2-norm, which no entry of {instance.name} minimises", file=path
             )
         names = tuple(each["name"] for each in sidecars)
-        self._objective(source.path, sidecars[0], found.field)
+        self._objective(path, sidecars[0], found.field)
         stem = sidecars[0]["instance"]["file"].removesuffix(".instance.json")
-        known, before = self.known(sidecars[0]), self._certified_bound(stem)
+        known, before = self._known(sidecars[0]), self._certified_bound(stem)
         better_point = is_better(found.energy, known)
         improves = (
             before is None or is_better(-found.bound, -before) or (better_point and found.bound >= before)
         )
         if improves:
-            self.ledger = self.ledger.certified(stem, instance.sha256, read_bytes(source.path), self.facts.by)
+            self.ledger = self.ledger.certified(stem, instance.sha256, read_bytes(path), self.facts.by)
             self.certified[stem] = found.bound
             self.fields.setdefault(instance.sha256, []).append(found.field)
             self._raise_bounds(names, found.bound)
@@ -359,46 +457,31 @@ class _Session:
         stated: float | None = about.get("certificate", {}).get("bound")
         return self.certified.get(instance, stated)
 
-    def _ledger(self, source: Source) -> Iterator[Submission]:
-        """Check the runs, points and certificates of another ledger with their files."""
-        assert source.path is not None
-        other = read_ledger(source.path.parent, source.path.name)
-        found = 0
-        for record in other.records:
-            if record in self.ledger.records or (record.bound, record.point) == (None, None):
-                continue
-            found += 1
-            try:
-                yield self._of_ledger(source, record, other)
-            except CrossfieldError as error:
-                yield Submission(source.files, source.kind, "refused", error=error)
-        for each in other.certificates:
-            if each in self.ledger.certificates:
-                continue
-            found += 1
-            certificate = Source("certificate", other.folder / each.file)
-            try:
-                other.content(each.file, each.sha256)
-            except CrossfieldError as error:
-                certificate = replace(certificate, error=error)
-            yield from self.results(certificate)
-        if not found:
-            yield Submission(source.files, source.kind, "not better")
 
-    def _of_ledger(self, source: Source, record: Record, other: Ledger) -> Submission:
-        """Check a record of another ledger, whose bound counts as stated unless its log shows it."""
-        assert source.path is not None
-        sidecar = self.library.entry(record.entry)
-        problem = self.entries.problem(sidecar)
-        if record.problem_sha256 != problem.sha256:
-            raise InputError(f"has a record of {record.entry} about another problem", file=source.path)
-        log = LogFile.of(other.folder / str(record.log), other.log(record)) if record.log else None
-        found = other.field(record) if record.point else None
-        if found is not None:
-            found.check_instance(problem.instance)
-            self._objective(other.folder / str(record.point), sidecar, found)
-        facts = RunFacts(**{name: getattr(record, name) for name in RunFacts.__dataclass_fields__})
-        return self._kept(source, sidecar, facts, log, found)
+def _has_size(log: RunLog, problem: Problem) -> bool:
+    """Whether a log states no size, or the size of the problem in one of the formats."""
+    if log.columns is None:
+        return True
+    for each in FORMATS.values():
+        try:
+            held = carried(problem, each)
+        except UnsupportedByFormatError:
+            continue
+        if 0 <= log.columns - held.n_columns <= _ADDED and (log.rows or 0) <= held.n_rows + 1:
+            return True
+    return False
+
+
+def _solver(stated: str | None, log: _Log | None) -> str:
+    """The solver's title in the table of solvers, or its stated name. Raises InputError."""
+    titles = {name.lower(): each.title for each in SOLVERS.values() for name in (each.name, each.title)}
+    title = None if stated is None else titles.get(stated.lower(), stated)
+    if log is None:
+        return title or "unknown"
+    solver = SOLVERS[log.run.solver]
+    if title is not None and MAKERS.get(title) != solver.maker:
+        raise InputError(f"the solver is given as {title}, and the log is of {solver.title}; leave it out")
+    return title or solver.title
 
 
 def _check_feasible(path: Path, entry: str, found: Violation) -> None:

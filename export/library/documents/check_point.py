@@ -3,18 +3,17 @@
 One file, Python 3.9 or newer, nothing to install, no solver.
 
 MODEL   a .mps or .mps.gz of the library, or the .instance.json that its formulations share
-POINT   names and values, one pair a line: a MIPLIB .sol (`=obj=` first), a .sol of Gurobi or SCIP, or a plain
+POINT   names and values, one pair per line: a .sol of MIPLIB (`=obj=` first), Gurobi or SCIP, or a plain
         list; also .gz. A column that is left out is 0, or what it is fixed to.
 
-Against an MPS file the objective and the violations of bounds, rows and integrality are exact: every number
-is the decimal that stands in the files, and decimals are added and multiplied without rounding (Python's
-decimal, which would raise an error at the first rounding). Against an instance the energies of its cross
-field are computed from their definition; there the numbers are the doubles nearest to the decimals of the
-instance, and pi has 60 digits.
+With an MPS file, the objective and the violations of bounds, rows and integrality are exact: the numbers are
+the decimals in the files, and no sum or product is rounded. With an instance, the energies of the cross field
+are computed from their definition: the numbers are the doubles nearest to the decimals of the instance, and
+pi has 60 digits.
 
 Exit code 0: feasible within the tolerance; 1: not feasible, or the file claims another objective; 2: wrong
-usage or a file that cannot be used. An objective that a file claims is compared with that of an MPS file, to
-1e-5 of its size, or of 1: solvers state theirs to about 1e-6.
+usage or a file that cannot be used. A claimed objective is compared with that of an MPS file, within 1e-5 of
+its size, or of 1: solvers round theirs to about 1e-6.
 """
 
 from __future__ import annotations
@@ -28,8 +27,8 @@ import re
 import sys
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from decimal import Decimal
-from fractions import Fraction
 from typing import Any, NoReturn, Optional, TypeVar
 
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
@@ -49,10 +48,10 @@ LEAST_WEIGHT = 5e-324  # of a stroke, which must be above 0
 GREATEST_EXPONENT = 400
 
 BOUNDS = {
-    **dict.fromkeys(("LO", "LI"), (("lower",), True)),
-    **dict.fromkeys(("UP", "UI"), (("upper",), True)),
+    "LO": (("lower",), True),
+    "UP": (("upper",), True),
     "FX": (("lower", "upper"), True),
-    **dict.fromkeys(("FR", "BV"), (("lower", "upper"), False)),
+    "FR": (("lower", "upper"), False),
     "MI": (("lower",), False),
     "PL": (("upper",), False),
 }
@@ -82,27 +81,25 @@ class BadInputError(Exception):
     """A file or an argument that cannot be used; the message is one line."""
 
 
+@dataclass
 class Column:
     """A column: bounds, None where there is none, and whether it is integer."""
 
-    def __init__(self, name: str, *, integer: bool) -> None:
-        self.name = name
-        self.integer = integer
-        self.lower: Decimal | None = ZERO
-        self.upper: Decimal | None = None
-        self.bounded: set[str] = set()  # the ends that a record of BOUNDS names
+    name: str
+    integer: bool
+    lower: Decimal | None = None
+    upper: Decimal | None = None
 
 
+@dataclass
 class Row:
-    """A row or the objective: sense N, L, G or E, right side, range, linear entries, products."""
+    """A row or the objective: sense N, L, G or E, right side, linear entries, products."""
 
-    def __init__(self, name: str, sense: str) -> None:
-        self.name = name
-        self.sense = sense
-        self.side = ZERO
-        self.range: Decimal | None = None
-        self.linear: list[Entry] = []
-        self.products: list[Product] = []
+    name: str
+    sense: str
+    side: Decimal = ZERO
+    linear: list[Entry] = field(default_factory=list)
+    products: list[Product] = field(default_factory=list)
 
     def value(self, point: Sequence[Decimal]) -> Decimal:
         """The exact value of its left side at a point."""
@@ -111,32 +108,22 @@ class Row:
 
     def interval(self) -> Interval:
         """The least and the greatest value that its left side may take."""
-        side, length = self.side, self.range
-        if self.sense == "E":
-            lower = side if length is None else min(side, side + length)
-            return lower, side if length is None else max(side, side + length)
-        if self.sense == "L":
-            return None if length is None else side - abs(length), side
-        return side, None if length is None else side + abs(length)
+        return None if self.sense == "L" else self.side, None if self.sense == "G" else self.side
 
 
+@dataclass
 class Model:
-    """A model: columns and rows by name, the objective, and whether it is maximised."""
+    """A model: columns and rows by name, and the objective."""
 
-    def __init__(self) -> None:
-        self.columns: list[Column] = []
-        self.number: dict[str, int] = {}
-        self.rows: dict[str, Row] = {}
-        self.objective: Row | None = None
-        self.free: set[str] = set()  # further N rows
-        self.maximised = False
+    columns: list[Column] = field(default_factory=list)
+    number: dict[str, int] = field(default_factory=dict)
+    rows: dict[str, Row] = field(default_factory=dict)
+    objective: Row | None = None
 
-    def row(self, name: str) -> Row | None:
-        """The row of that name, the objective among them; None for a further N row."""
+    def row(self, name: str) -> Row:
+        """The row of that name, or the objective."""
         if self.objective is not None and name == self.objective.name:
             return self.objective
-        if name in self.free:
-            return None
         if name not in self.rows:
             raise BadInputError(f"there is no row {name[:40]}")
         return self.rows[name]
@@ -153,6 +140,7 @@ class Model:
         return self.number[name]
 
 
+@dataclass
 class Finding:
     """Result of the check of a point.
 
@@ -160,18 +148,10 @@ class Finding:
     whether the file's own point has the objective that it claims, if it claims one that can be compared.
     """
 
-    def __init__(
-        self,
-        objective: Decimal,
-        lines: list[tuple[str, str]],
-        violations: dict[str, Place],
-        *,
-        agrees: bool = True,
-    ) -> None:
-        self.objective = objective
-        self.agrees = agrees
-        self.lines = lines
-        self.violations = violations
+    objective: Decimal
+    lines: list[tuple[str, str]]
+    violations: dict[str, Place]
+    agrees: bool = True
 
     @property
     def worst(self) -> Decimal:
@@ -219,7 +199,7 @@ def lines_of(path: str) -> Iterator[tuple[int, str]]:
 
 
 class MpsReader:
-    """Reads free MPS section by section, ROWS to BOUNDS and the quadratic ones, until ENDATA."""
+    """Reads the free MPS of a library section by section: ROWS to BOUNDS, QUADOBJ, QCMATRIX, ENDATA."""
 
     def __init__(self) -> None:
         self.model = Model()
@@ -230,15 +210,11 @@ class MpsReader:
         self.matrices: dict[tuple[str, str], Matrix] = {}
         self.matrix: Matrix = {}
         self.readers = {
-            "OBJSENSE": self.sense,
             "ROWS": self.row,
             "COLUMNS": self.entries,
             "RHS": self.side,
-            "RANGES": self.range,
             "BOUNDS": self.bound,
             "QUADOBJ": self.product,
-            "QMATRIX": self.product,
-            "QSECTION": self.product,
             "QCMATRIX": self.product,
         }
 
@@ -264,9 +240,7 @@ class MpsReader:
 
     def begin(self, section: str, words: list[str]) -> None:
         """Begin a section, whose line may hold more words."""
-        if section == "OBJSENSE" and words:
-            self.sense(words)
-        elif section in ("QUADOBJ", "QMATRIX", "QSECTION", "QCMATRIX"):
+        if section in ("QUADOBJ", "QCMATRIX"):
             self.matrix = self.matrices.setdefault((section, words[0] if words else ""), {})
         elif section not in self.readers and section not in ("NAME", "ENDATA"):
             raise BadInputError(f"the section {section[:20]} is not known here")
@@ -277,26 +251,19 @@ class MpsReader:
             self.numbers[text] = number(text)
         return self.numbers[text]
 
-    def sense(self, words: list[str]) -> None:
-        """Read whether to minimise or maximise."""
-        known = ("MIN", "MINIMIZE", "MAX", "MAXIMIZE")
-        _require(words[0].upper() in known, f"{words[0][:20]} is neither MIN nor MAX")
-        self.model.maximised = words[0].upper().startswith("MAX")
-
     def row(self, words: list[str]) -> None:
-        """Read a row; the first N row is the objective."""
+        """Read a row; the N row is the objective."""
         if len(words) != 2 or words[0] not in ("N", "L", "G", "E"):
             raise BadInputError("a row needs a sense N, L, G or E and a name")
         sense, name = words
         model = self.model
-        if name in model.rows or name in model.free or (model.objective and model.objective.name == name):
+        if name in model.rows or (model.objective and model.objective.name == name):
             raise BadInputError(f"the row {name[:40]} is there twice")
         if sense != "N":
             model.rows[name] = Row(name, sense)
-        elif model.objective is None:
-            model.objective = Row(name, sense)
         else:
-            model.free.add(name)
+            _require(model.objective is None, "a model has one objective")
+            model.objective = Row(name, sense)
 
     def entries(self, words: list[str]) -> None:
         """Read entries of a column, or a marker of integer columns."""
@@ -308,35 +275,21 @@ class MpsReader:
         if name != self.current[0]:
             _require(name not in model.number, f"the entries of column {name[:40]} do not follow each other")
             model.number[name] = len(model.columns)
-            model.columns.append(Column(name, integer=self.integer))
+            model.columns.append(Column(name, self.integer))
             self.current = (name, set())
         for row, value in _pairs(words, 1):
             if row in self.current[1]:
                 raise BadInputError(f"column {name[:40]} has two entries in row {row[:40]}")
             self.current[1].add(row)
-            held = model.row(row)
-            if held is not None:
-                held.linear.append((len(model.columns) - 1, self.value(value)))
+            model.row(row).linear.append((len(model.columns) - 1, self.value(value)))
 
     def side(self, words: list[str]) -> None:
-        """Read right sides; that of the objective is minus its constant."""
-        for row, value in self.of_rows("RHS", words):
-            row.side = value
-
-    def range(self, words: list[str]) -> None:
-        """Read ranges of rows."""
-        for row, value in self.of_rows("RANGES", words):
-            row.range = value
-
-    def of_rows(self, section: str, words: list[str]) -> Iterator[tuple[Row, Decimal]]:
-        """Rows and values of a line that may begin with the name of a set; a row may have one value only."""
+        """Read right sides, after the name of their set; that of the objective is minus its constant."""
         for name, value in _pairs(words, len(words) % 2):
-            if (section, name) in self.given:
+            if ("RHS", name) in self.given:
                 raise BadInputError(f"{name[:40]} is there twice")
-            self.given.add((section, name))
-            held = self.model.row(name)
-            if held is not None:
-                yield held, self.value(value)
+            self.given.add(("RHS", name))
+            self.model.row(name).side = self.value(value)
 
     def bound(self, words: list[str]) -> None:
         """Read a bound: kind, name of the set, column, and a value where the kind has one."""
@@ -344,26 +297,23 @@ class MpsReader:
         if kind not in BOUNDS:
             raise BadInputError(f"the kind of bound {kind[:20]} is not known here")
         ends, valued = BOUNDS[kind]
-        fits = len(words) in ((3, 4) if valued else (2, 3, 4))
+        fits = len(words) == (4 if valued else 3)
         _require(fits, "a bound needs a kind, a set, a column, and a value where the kind has one")
-        name = words[-2] if valued else words[2] if len(words) > 2 else words[1]
+        name = words[2]
         column = self.model.columns[self.model.column(name)]
-        value = self.limit(words[-1], ends) if valued else None
+        value = self.limit(words[3], ends) if valued else None
         for end in ends:
             if (end, name) in self.given:
                 raise BadInputError(f"{name[:40]} has two {end} bounds")
             self.given.add((end, name))
-            column.bounded.add(end)
         if "lower" in ends:
-            column.lower = ZERO if kind == "BV" else value
+            column.lower = value
         if "upper" in ends:
-            column.upper = ONE if kind == "BV" else value
-        column.integer = column.integer or kind in ("LI", "UI", "BV")
+            column.upper = value
 
     def limit(self, text: str, ends: tuple[str, ...]) -> Decimal | None:
         """The value of a bound, None for an infinite one, which must leave the column free on its side."""
-        infinite = text.lower().lstrip("+-") in ("inf", "infinity")
-        value = INFINITE.copy_sign(ONE if text[0] != "-" else -ONE) if infinite else self.value(text)
+        value = self.value(text)
         if abs(value) < INFINITE:
             return value
         _require(ends == (("upper",) if value > 0 else ("lower",)), f"the bound {text[:20]} leaves no value")
@@ -378,19 +328,15 @@ class MpsReader:
         self.matrix[key] = self.value(words[2])
 
     def finished(self) -> Model:
-        """The model, once defaults are filled in and matrices belong to their rows."""
+        """The model, once every column is bounded and matrices belong to their rows."""
         _require(self.model.objective is not None, "holds no objective")
-        for column in self.model.columns:
-            if column.integer and not column.bounded:
-                column.upper = ONE
-            if column.bounded == {"upper"} and column.upper is not None and column.upper < 0:
-                raise BadInputError(
-                    f"solvers differ on the lower bound of {column.name[:40]}, as the upper one is below 0"
-                )
+        for column in self.model.columns:  # solvers differ on bounds that are left out
+            for end in ("lower", "upper"):
+                _require((end, column.name) in self.given, f"{column.name[:40]} has no {end} bound")
         for (section, name), matrix in self.matrices.items():
             held = self.model.row(name) if name else self.model.objective
-            if held is not None:
-                held.products += _products(section, matrix)
+            assert held is not None
+            held.products += _products(section, matrix)
         return self.model
 
 
@@ -401,24 +347,22 @@ def _pairs(words: list[str], start: int) -> Iterator[tuple[str, str]]:
 
 
 def _products(section: str, matrix: Matrix) -> list[Product]:
-    """The monomials of a matrix: QUADOBJ and QSECTION hold a triangle; only QCMATRIX has no 1/2."""
-    triangle = section in ("QUADOBJ", "QSECTION")
+    """The monomials of a matrix: QUADOBJ holds a triangle of twice the matrix, QCMATRIX the whole matrix."""
+    triangle = section == "QUADOBJ"
     for (i, j), value in matrix.items():
         fits = i == j or ((j, i) not in matrix if triangle else matrix.get((j, i)) == value)
         _require(
             fits, f"{section} must hold {'one triangle' if triangle else 'both triangles, which are equal'}"
         )
-    if triangle:
-        return [(i, j, value if i != j else HALF * value) for (i, j), value in matrix.items()]
-    return [(i, j, value if section == "QCMATRIX" else HALF * value) for (i, j), value in matrix.items()]
+    return [(i, j, HALF * value if triangle and i == j else value) for (i, j), value in matrix.items()]
 
 
+@dataclass
 class Point:
     """Values by name, and the objective that the file claims, if any."""
 
-    def __init__(self) -> None:
-        self.values: dict[str, Decimal] = {}
-        self.claimed: Decimal | None = None
+    values: dict[str, Decimal] = field(default_factory=dict)
+    claimed: Decimal | None = None
 
     def of(self, columns: Iterable[Column]) -> list[Decimal]:
         """The values of columns in order: 0 where one is left out, or what it is fixed to."""
@@ -466,20 +410,18 @@ def _value(point: Point, words: list[str]) -> None:
 # ------------------------------------------------------------------------------------------ MPS against point
 
 
-def check_model(model: Model, point: Point, *, rounded: bool) -> Finding:
+def check_model(model: Model, point: Point) -> Finding:
     """Check a point against a model without rounding errors."""
     foreign = [name for name in point.values if name not in model.number]
     _refuse_foreign([name for name in foreign if not ADDED.fullmatch(name)], len(point.values))
     values = point.of(model.columns)
-    agrees = point.claimed is None or _close(point.claimed, model.value(values))
-    if rounded:
-        values = [_nearest(v) if c.integer else v for c, v in zip(model.columns, values)]
     objective = model.value(values)
+    agrees = point.claimed is None or abs(point.claimed - objective) <= CLAIM * max(ONE, abs(objective))
     integers = [(c, v) for c, v in zip(model.columns, values) if c.integer]
     lines = [
         ("model", f"{len(model.columns)} columns ({len(integers)} integer), {len(model.rows)} rows"),
         ("point", _described(len(point.values) - len(foreign), len(model.columns), foreign)),
-        ("objective", _shown(objective) + (" (maximised)" if model.maximised else "")),
+        ("objective", _shown(objective)),
     ]
     if point.claimed is not None:
         lines.append(("claimed", f"{point.claimed} (differs by {_brief(abs(point.claimed - objective))})"))
@@ -492,11 +434,6 @@ def check_model(model: Model, point: Point, *, rounded: bool) -> Finding:
         "integers": _worst((abs(v - _nearest(v)), c.name) for c, v in integers),
     }
     return Finding(objective, lines, violations, agrees=agrees)
-
-
-def _close(claimed: Decimal, objective: Decimal) -> bool:
-    """Whether a claimed objective is that objective."""
-    return abs(claimed - objective) <= CLAIM * max(ONE, abs(objective))
 
 
 def _refuse_foreign(names: list[str], count: int) -> None:
@@ -553,15 +490,14 @@ class Pixel:
         self.stroke = (Decimal(theta), stroke[1])
 
 
+@dataclass
 class Instance:
     """An instance: pixels, pairs (place, first, second), and the weights of the energy."""
 
-    def __init__(
-        self, pixels: list[Pixel], pairs: list[tuple[str, int, int]], weights: tuple[Decimal, Decimal]
-    ) -> None:
-        self.pixels = pixels
-        self.pairs = pairs
-        self.w_strokes, self.w_beta = weights
+    pixels: list[Pixel]
+    pairs: list[tuple[str, int, int]]
+    w_strokes: Decimal
+    w_beta: Decimal
 
     def jumps(self, first: int, second: int) -> tuple[int, int]:
         """The least and the greatest useful jump of a pair of pixels."""
@@ -630,7 +566,7 @@ def _instance(document: dict[str, object]) -> Instance:
     weights = [
         Decimal(_real(document.get(*item), 0, MOST_WEIGHT)) for item in (("w_strokes", 1.0), ("w_beta", 1e-6))
     ]
-    return Instance(pixels, pairs, (weights[0], weights[1]))
+    return Instance(pixels, pairs, *weights)
 
 
 def _held(strokes: Any) -> dict[tuple[int, int], Stroke]:
@@ -645,7 +581,7 @@ def _held(strokes: Any) -> dict[tuple[int, int], Stroke]:
 
 
 class Field:
-    """The cross field of a point: angles, and each pair's jump and (-1)^p of its first skew."""
+    """The cross field of a point: angles, and the jump of each pair as p, or as p1 and p2."""
 
     def __init__(self, instance: Instance, point: Point) -> None:
         self.instance = instance
@@ -660,37 +596,14 @@ class Field:
         if not self.whole:
             self.p = [odd + TWO * even for odd, even in zip(self.p1, self.p2)]
 
-    def as_given(self) -> Iterator[Jump]:
-        """Jump and factor of each pair; a p1 that is not whole counts as it stands, p by cos(pi p)."""
+    def jump(self, pair: int) -> Jump:
+        """Jump of a pair and its factor (-1)^p; a p1 that is not whole counts as it is."""
+        p = self.p[pair]
         if not self.whole:
-            yield from ((p, ONE - TWO * odd) for p, odd in zip(self.p, self.p1))
-            return
-        for p in self.p:
-            yield p, _sign(_nearest(p)) * Decimal(math.cos(math.pi * float(p - _nearest(p))))
+            return p, ONE - TWO * self.p1[pair]
+        return p, ONE if _nearest(p) % 2 == 0 else -ONE
 
-    def rounded(self) -> Iterator[Jump]:
-        """Jump and factor of each pair, integers rounded."""
-        if self.whole:
-            yield from ((_nearest(p), _sign(_nearest(p))) for p in self.p)
-            return
-        for odd, even in zip(map(_nearest, self.p1), map(_nearest, self.p2)):
-            yield odd + TWO * even, ONE - TWO * odd
-
-    def best(self) -> Iterator[Jump]:
-        """Jump and factor of each pair with the least energy for these angles."""
-        for _, i, j in self.instance.pairs:
-            low, high = self.instance.jumps(i, j)
-            costs = []
-            for jump in ((Decimal(p), _sign(Decimal(p))) for p in range(low, high + 1)):
-                a, b = self.residuals(i, j, jump)
-                costs.append((a * a + b * b, jump))
-            yield min(costs)[1]
-
-    def residuals(self, i: int, j: int, jump: Jump) -> tuple[Decimal, Decimal]:
-        """Change of direction and of skew across a pair."""
-        return self.alpha[i] - self.alpha[j] + PI / 2 * jump[0], jump[1] * self.beta[i] - self.beta[j]
-
-    def energy(self, norm: int, jumps: Iterable[Jump]) -> Decimal:
+    def energy(self, norm: int) -> Decimal:
         """The energy with squares (2) or absolute values (1):
         2 sum (A, B) + w_strokes sum w R + w_beta sum beta.
         """
@@ -699,8 +612,10 @@ class Field:
             return abs(value) if norm == 1 else value * value
 
         smooth = strokes = skew = ZERO
-        for (_, i, j), jump in zip(self.instance.pairs, jumps):
-            smooth += sum(map(size, self.residuals(i, j, jump)), ZERO)
+        for pair, (_, i, j) in enumerate(self.instance.pairs):
+            p, factor = self.jump(pair)
+            smooth += size(self.alpha[i] - self.alpha[j] + PI / 2 * p)
+            smooth += size(factor * self.beta[i] - self.beta[j])
         for alpha, beta, pixel in zip(self.alpha, self.beta, self.instance.pixels):
             skew += size(beta)
             if pixel.stroke is not None:
@@ -724,10 +639,6 @@ class Field:
         return {"bounds": _worst(bounds), "integers": _worst(integers)}
 
 
-def _sign(p: Decimal) -> Decimal:
-    return ONE if p % 2 == 0 else -ONE
-
-
 def check_instance(instance: Instance, point: Point) -> Finding:
     """Check the cross field of a point on an instance."""
     places = {pixel.place for pixel in instance.pixels}, {name for name, _, _ in instance.pairs}
@@ -737,18 +648,16 @@ def check_instance(instance: Instance, point: Point) -> Finding:
     _require("p" not in tags or not tags & {"p1", "p2"}, "holds jumps both as p and as p1 and p2")
     field = Field(instance, point)
     strokes = sum(pixel.stroke is not None for pixel in instance.pixels)
-    given = field.energy(2, field.as_given())
+    energy = field.energy(2)
     lines = [
         ("instance", f"{len(instance.pixels)} pixels ({strokes} with strokes), {len(instance.pairs)} pairs"),
-        ("2-norm", f"{_shown(given)} with the jumps as they are"),
-        ("", f"{_shown(field.energy(2, field.rounded()))} with jumps rounded"),
-        ("", f"{_shown(field.energy(2, field.best()))} with the best jumps for these angles"),
-        ("1-norm", f"{_shown(field.energy(1, field.rounded()))} with jumps rounded"),
+        ("2-norm", _shown(energy)),
+        ("1-norm", _shown(field.energy(1))),
         ("pi", "60 digits; all else exact for the doubles of the instance"),
     ]
     if not tags & {"p", "p1", "p2"}:
         lines.append(("jumps", "none in the point: taken as 0; of qp-fixed they are data, see its .mps"))
-    return Finding(given, lines, field.violations())
+    return Finding(energy, lines, field.violations())
 
 
 def _is_of(name: str, places: tuple[set[str], set[str]]) -> bool:
@@ -769,15 +678,13 @@ def _brief(value: Decimal) -> str:
     return "0" if value == 0 else f"{float(value):.3g}"
 
 
-def check(model: str, point: str, *, rounded: bool = False) -> Finding:
+def check(model: str, point: str) -> Finding:
     """Check the point in a file against the model or the instance in another one."""
     with decimal.localcontext(EXACT):
         values = _of_file(point, read_point)
         if _of_file(model, _is_json):
             return _of_file(model, lambda path: check_instance(read_instance(path), values))
-        return _of_file(
-            model, lambda path: check_model(MpsReader().read(lines_of(path)), values, rounded=rounded)
-        )
+        return _of_file(model, lambda path: check_model(MpsReader().read(lines_of(path)), values))
 
 
 def _of_file(path: str, read: Callable[[str], Kind]) -> Kind:
@@ -796,12 +703,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Check a point and print a report; the exit code."""
     try:
         given = _arguments(arguments)
-        finding = check(given.model, given.point, rounded=given.round)
+        finding = check(given.model, given.point)
     except BadInputError as error:
         print(f"check_point: {error}", file=sys.stderr)
         return 2
-    if given.fraction:
-        finding.lines.append(("fraction", str(Fraction(finding.objective))))
     for label, text in finding.lines:
         print(f"{label:<10}{text}")
     for kind, (value, place) in finding.violations.items():
@@ -814,7 +719,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """Reports a wrong argument in one line."""
 
     def error(self, message: str) -> NoReturn:
         raise BadInputError(f"{message}; see check_point.py --help")
@@ -827,8 +732,6 @@ def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("model", metavar="MODEL", help=".mps, .mps.gz or .instance.json")
     parser.add_argument("point", metavar="POINT", help="names and values, may be .gz")
     parser.add_argument("--tolerance", default="1e-8", help="greatest violation of a feasible point (1e-8)")
-    parser.add_argument("--round", action="store_true", help="of an MPS file: round integer columns first")
-    parser.add_argument("--fraction", action="store_true", help="show the objective as a fraction too")
     given = parser.parse_args(arguments)
     given.tolerance = number(given.tolerance)
     _require(given.tolerance >= 0, "the tolerance must not be negative")

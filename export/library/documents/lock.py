@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Final
 
@@ -20,7 +20,6 @@ from ....models.processes.deadline import Progress, silent
 
 FILE: Final = ".lock"
 PATIENCE: Final = 600.0  # seconds that a process waits for another one to end
-_TICK: Final = 0.1  # seconds between two attempts
 
 
 @contextmanager
@@ -30,7 +29,7 @@ def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[N
     action: shown to processes that wait.
     """
     path = folder / FILE
-    lock = FileLock(path, timeout=PATIENCE, poll_interval=_TICK)
+    lock = FileLock(path, timeout=PATIENCE, poll_interval=0.1)
     try:
         try:
             lock.acquire(timeout=0)
@@ -58,16 +57,12 @@ def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[N
         lock.release()
 
 
-@contextmanager
-def unchanged(folder: Path, action: str, progress: Progress = silent) -> Iterator[None]:
+def unchanged(folder: Path, action: str, progress: Progress = silent) -> AbstractContextManager[None]:
     """Lock a folder for reading, unless it cannot be written."""
-    with locked(folder, action, progress) if os.access(folder, os.W_OK) else nullcontext():
-        yield
+    return locked(folder, action, progress) if os.access(folder, os.W_OK) else nullcontext()
 
 
 def _holder(path: Path) -> str:
-    try:
-        holder = path.read_bytes()[:300].decode("utf-8", "replace")
-    except OSError:
-        holder = ""
-    return shortened(holder, 200) or "another process"
+    with suppress(OSError):
+        return shortened(path.read_bytes()[:300].decode("utf-8", "replace"), 200) or "another process"
+    return "another process"

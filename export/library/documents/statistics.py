@@ -1,9 +1,9 @@
-"""Statistics of a problem: columns, rows and terms by kind as in MINLPLib, curvature, and ranges."""
+"""Statistics of a problem: columns, rows and terms by kind as in MINLPLib, and curvature."""
 
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,7 @@ from ....models.formulations.problem import Problem
 from ....models.instance.grid import Floats
 from ....models.instance.instance import Instance
 from ...writing.canonical import Canonical
-from ...writing.curvature import NEGLIGIBLE, of_objective, of_rows
-
-MOST_EIGEN: Final = 600  # variables in the quadratic objective up to which eigenvalues are computed
+from ...writing.curvature import of_objective, of_rows
 
 
 def sizes(instance: Instance) -> dict[str, int]:
@@ -84,55 +82,9 @@ def _terms(problem: Problem) -> dict[str, int]:
 
 
 def curvature(problem: Problem) -> dict[str, Any]:
-    """Return the curvature of objective and rows, and signs of the Hessian's eigenvalues or a reason."""
+    """Return the curvature of objective and rows, and the reason for the former."""
     objective, reason = of_objective(problem)
-    found = _eigenvalue_signs(problem) if problem.objective_degree == 2 else None
-    return {
-        "objective": objective,
-        "constraints": of_rows(problem),
-        "eigenvalues": found,
-        "reason": None if found else reason,
-    }
-
-
-def _eigenvalue_signs(problem: Problem) -> dict[str, int] | None:
-    """Numbers of eigenvalues of the Hessian by sign; None above MOST_EIGEN variables."""
-    index, value = problem.merged_objective(2)
-    used, place = np.unique(index, return_inverse=True)
-    if len(used) > MOST_EIGEN:
-        return None
-    place = place.reshape(-1, 2)
-    hessian = np.zeros((len(used), len(used)))
-    np.add.at(hessian, (place[:, 0], place[:, 1]), value)
-    np.add.at(hessian, (place[:, 1], place[:, 0]), value)
-    values = np.linalg.eigvalsh(hessian)
-    slack = NEGLIGIBLE * float(np.abs(values).max(initial=0.0))
-    negative, positive = int((values < -slack).sum()), int((values > slack).sum())
-    return {"negative": negative, "zero": problem.n_columns - negative - positive, "positive": positive}
-
-
-def ranges(problem: Problem) -> dict[str, list[float] | None]:
-    """Least and greatest size of nonzero coefficients, finite bounds and right sides, or None."""
-    degree = problem.objective_degree
-    costs = [problem.merged_objective(each)[1] for each in range(1, (degree if degree < 99 else 4) + 1)]
-    rows = [
-        np.broadcast_to(term.coefficient, (family.count,))
-        for family in problem.rows
-        for term in family.terms or ()
-        if term.degree > 0
-    ]
-    return {
-        "objective": _range(costs),
-        "matrix": _range(rows),
-        "bounds": _range([problem.lower, problem.upper]),
-        "right_sides": _range([family.limit for family in problem.rows]),
-    }
-
-
-def _range(arrays: list[Floats]) -> list[float] | None:
-    values = np.abs(np.concatenate([np.zeros(0), *arrays]))
-    values = values[np.isfinite(values) & (values > 0)]
-    return [float(values.min()), float(values.max())] if len(values) else None
+    return {"objective": objective, "constraints": of_rows(problem), "reason": reason}
 
 
 def tangent_bound(problem: Problem, point: Floats) -> float | None:

@@ -1,7 +1,7 @@
 """Given points of a specification: results for its instances, found once and kept.
 
-A folder holds the same files per instance as a library: INSTANCE.about.json, and the fields and the
-certificate that it lists. A build with them does not search, so its bytes do not depend on the processor.
+A folder holds the same files per instance as a library, or is one: INSTANCE.about.json, and the fields and
+the certificate that it lists. A build with them does not search, so its bytes do not depend on the processor.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from typing import Any, Final
 from ....models.errors import CrossfieldError, InputError
 from ....models.field.file import field_of_json
 from ....models.instance.instance import Instance
-from ....models.storage import make_folder, read_bytes, write_bytes
-from ..documents.documents import about_file, are_whole, folder_of, read_about, read_library
+from ....models.storage import read_bytes
+from ..documents.documents import about_file, are_whole, folder_of, read_about
 from ..plan.recipe import digest
 from .points import METHOD, Certified, Known, Provenance, certified_by, ours
 
 ROLES: Final = ("baseline", "least_1", "least_2")
 _SAME: Final = 1e-9  # processors round energies differently
+_REMEDY: Final = "make the points again with `crossfield library build --search`"
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,8 @@ class Given:
         found = certified_by(self.files[name], name, instance, ours(METHOD))
         same = (facts["status"], facts["bound"]) == (found.facts["status"], found.facts["bound"])
         if not same or not math.isclose(facts["energy"], found.facts["energy"], rel_tol=_SAME, abs_tol=_SAME):
-            raise InputError(
-                f"{about_file(self.about['name'])} states another status, bound or energy than {name}; "
-                "make the points again with `crossfield library points`"
-            )
+            what = f"states another status, bound or energy than {name}; {_REMEDY}"
+            raise InputError(what, file=about_file(self.about["name"]))
         return replace(found, file=f"{self.about['name']}.certificate.npz", facts=facts)
 
 
@@ -74,7 +73,7 @@ def read_point(path: Path) -> Given:
     name = about_file(about["name"])
     if path.name != name:
         raise InputError(f"is about {about['name']}; its name must be {name}", file=path)
-    return _given(path.parent, about)
+    return given_of(path.parent, about)
 
 
 def points_of(folder: Path) -> Points:
@@ -83,37 +82,22 @@ def points_of(folder: Path) -> Points:
     def of(instance: str) -> Given | None:
         try:
             about = read_about(folder / about_file(instance))
-            return _given(folder, about, about["given"]) if "given" in about else None
+            return given_of(folder, about, about["given"]) if "given" in about else None
         except CrossfieldError:  # to be made again
             return None
 
     return of
 
 
-def write_points(library: str | Path, folder: str | Path) -> int:
-    """Write the points of a library to a folder and return the number of instances."""
-    source = read_library(library).folder
-    abouts = sorted(source.glob("*.about.json"))
-    files = {each.name: read_bytes(each) for each in abouts}
-    for each in abouts:
-        files |= _given(source, read_about(each)).files
-    target = make_folder(folder)
-    for name, data in files.items():
-        write_bytes(target / name, data)
-    return len(abouts)
-
-
-def _given(folder: Path, about: dict[str, Any], sha256: str | None = None) -> Given:
-    """The results for an instance in a folder. Raises InputError for a missing or different file."""
-    remedy = "make the points again with `crossfield library points`"
+def given_of(folder: Path, about: dict[str, Any], sha256: str | None = None) -> Given:
+    """Return the results of a document and its files. Raises InputError for a missing or different file."""
+    path = folder / about_file(about["name"])
     listed = [each for each in about["files"] if each["name"] != about["instance"]["file"]]
     if lost := [each["name"] for each in listed if not are_whole(folder, [each])]:
-        what = f"{about_file(about['name'])} lists {lost[0]}, which is missing or another file; {remedy}"
-        raise InputError(what, file=folder)
+        raise InputError(f"lists {lost[0]}, which is missing or another file; {_REMEDY}", file=path)
     named = [*about["fields"].values(), *([about["certificate"]] if "certificate" in about else [])]
     if unlisted := {each["file"] for each in named} - {each["name"] for each in listed}:
-        what = f"{about_file(about['name'])} names {min(unlisted)} and does not list it; {remedy}"
-        raise InputError(what, file=folder)
+        raise InputError(f"names {min(unlisted)} and does not list it; {_REMEDY}", file=path)
     facts = [about[key] for key in ("name", "fields")] + [about.get("certificate"), listed]
     files = {each["name"]: read_bytes(folder / each["name"]) for each in listed}
     return Given(about, files, sha256 or digest([about["instance"]["sha256"], *facts]))

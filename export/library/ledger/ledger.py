@@ -12,9 +12,8 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from datetime import date
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal
 
 from ....models.errors import InputError, InstanceError, naming, shortened
 from ....models.field.field import CrossField
@@ -22,14 +21,13 @@ from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import read_document, schema_error
 from ....models.storage import read_bytes, write_bytes
 from .. import documents
+from ..plan.spec import day
 
 FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
 FILE: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
-Evidence = Literal["log", "word"]
-"""Evidence of a submitted bound: a log that the library keeps, or only the statement of its submitter."""
-_LATER: Final = ("machine", "date", "evidence", "log", "log_sha256", "trace")  # absent if empty
+_LATER: Final = ("machine", "date", "log", "log_sha256")  # absent if empty
 _LONGEST: Final = 200  # characters of a text
 _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 
@@ -39,8 +37,7 @@ class Record:
     """One run of a solver on an entry, or one submitted point.
 
     primal: recomputed objective of its point; bound: dual bound; by: who ran it; point, log: names of files;
-    date: as YYYY-MM-DD; evidence: None for a run that `library solve` measured; trace: seconds, dual bound
-    and best objective during the run.
+    date: as YYYY-MM-DD; log: None for a run that `library solve` measured.
     """
 
     entry: str
@@ -58,10 +55,8 @@ class Record:
     point_sha256: str | None = None
     machine: str | None = None
     date: str | None = None
-    evidence: Evidence | None = None
     log: str | None = None
     log_sha256: str | None = None
-    trace: tuple[tuple[float | None, ...], ...] = ()
 
     @property
     def rank(self) -> tuple[Any, ...]:
@@ -77,18 +72,13 @@ class Record:
                 f"version is {shortened(self.version)!r}; give at most 60 letters, digits, blanks and "
                 ". , _ + - ( ), beginning with a letter or a digit"
             )
-        if self.status not in get_args(RunStatus):
-            raise InputError(
-                f"status is {shortened(self.status)!r}; choose one of {', '.join(get_args(RunStatus))}"
-            )
-        if self.date is not None and not _is_date(self.date):
-            raise InputError(f"date is {shortened(self.date)!r}; give a day as YYYY-MM-DD")
+        day(self.date or "", "date")
         for name in ("primal", "bound", "seconds", "threads", "time_limit"):
             value = getattr(self, name)
             least, sign = (-math.inf, "") if name in ("primal", "bound") else (0, " that is not negative")
             if value is not None and not (least <= value and math.isfinite(value)):
                 raise InputError(f"{name.replace('_', ' ')} is {value}; give a finite number{sign}")
-        error = schema_error(_as_json(self), "library-ledger", documents.__name__)
+        error = schema_error(Ledger(Path(), (self,)).document(), "library-ledger", documents.__name__)
         if error is not None:
             place = error.json_path.removeprefix("$.records[0].")
             raise InputError(f"{place}: {shortened(error.message)}; a ledger cannot hold this record")
@@ -144,10 +134,6 @@ class Ledger:
         with naming(self.folder / str(record.point)):
             return field_of_json(data)
 
-    def log(self, record: Record) -> bytes:
-        """Return the log of a record. Raises as `content`."""
-        return self.content(str(record.log), record.log_sha256)
-
     def added(
         self, record: Record, field: CrossField | None = None, log: bytes | None = None
     ) -> tuple[Ledger, Record]:
@@ -180,7 +166,10 @@ class Ledger:
 
     def document(self) -> dict[str, Any]:
         """Return the ledger as JSON."""
-        certificates = [_without_none(asdict(each)) for each in self.certificates]
+        certificates = [
+            {key: value for key, value in asdict(each).items() if value is not None}
+            for each in self.certificates
+        ]
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -193,23 +182,6 @@ def check_text(name: str, text: str | None) -> None:
     """Raise InputError that names the text unless a ledger can hold it."""
     if text is not None and (not text.isprintable() or not 0 < len(text) <= _LONGEST):
         raise InputError(f"{name} must be one line of at most {_LONGEST} printable characters")
-
-
-def _is_date(text: str) -> bool:
-    try:
-        return date.fromisoformat(text).isoformat() == text
-    except ValueError:
-        return False
-
-
-def _as_json(record: Record) -> dict[str, Any]:
-    """A ledger of one record as its file has it: with lists in place of tuples."""
-    document: dict[str, Any] = json.loads(json.dumps(Ledger(Path(), (record,)).document()))
-    return document
-
-
-def _without_none(document: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in document.items() if value is not None}
 
 
 def _document(record: Record) -> dict[str, Any]:
@@ -229,11 +201,7 @@ def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
     schema, remedy = documents.__name__, "give the ledger.json of a library"
     given = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)
     certificates = tuple(SubmittedCertificate(**each) for each in given.get("certificates", ()))
-    return Ledger(Path(folder), tuple(map(_record, given["records"])), certificates)
-
-
-def _record(given: dict[str, Any]) -> Record:
-    return Record(**given | {"trace": tuple(map(tuple, given.get("trace", ())))})
+    return Ledger(Path(folder), tuple(Record(**each) for each in given["records"]), certificates)
 
 
 def write_ledger(ledger: Ledger) -> None:
@@ -246,11 +214,9 @@ def write_ledger(ledger: Ledger) -> None:
         write_bytes(path, data)
 
 
-def add_record(
-    folder: str | Path, record: Record, field: CrossField | None = None, log: bytes | None = None
-) -> Record:
+def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
     """Add a record as `Ledger.added` to the ledger of a folder whose lock the caller holds, and write it."""
-    ledger, record = read_ledger(folder).added(record, field, log)
+    ledger, record = read_ledger(folder).added(record, field)
     write_ledger(ledger)
     return record
 
@@ -285,7 +251,7 @@ def merged(folder: Path, other: Ledger, entries: Iterable[str], instances: Itera
         else:
             fresh.append(_without_point(record))
         if record.log is not None:
-            unwritten[record.log] = other.log(record)
+            unwritten[record.log] = other.content(record.log, record.log_sha256)
     missing = set(instances) - {each.instance for each in ledger.certificates}
     certificates = [each for each in other.certificates if each.instance in missing]
     unwritten |= {each.file: other.content(each.file, each.sha256) for each in certificates}

@@ -27,11 +27,13 @@ Difficulty = Literal["easy", "hard", "open"]
 
 EASY: Final = 60.0  # seconds
 PROVEN: Final = (1e-6, 1e-9)  # greatest gap of an optimal point: relative part, absolute part
+FEASIBLE: Final = 1e-8  # greatest violation of a point that a library accepts
+SAME: Final = 1e-9  # objectives this close, relative to their size or absolute, are the same
 AGREE: Final = 3  # programs of different makers that must agree
 MAKERS: Final = {solver.title: solver.maker for solver in SOLVERS.values()}  # by title
 
 _SHOWN: Final = {"objective": "primal", "limit": "time_limit"} | {
-    name: name for name in ("bound", "seconds", "threads", "machine", "by", "date", "evidence", "log")
+    name: name for name in ("bound", "seconds", "threads", "machine", "by", "date", "log")
 }
 """Keys of a run in a sidecar, and fields of a record."""
 
@@ -44,6 +46,19 @@ def slack(objective: float) -> float:
 def contradicts(bound: float, objective: float) -> bool:
     """Whether a bound lies so far above the objective of a feasible point that it cannot be a bound."""
     return bound - objective > slack(objective)
+
+
+def is_better(objective: float, known: float) -> bool:
+    """Whether an objective is lower than the best known one by more than rounding."""
+    return known - objective > SAME * max(abs(known), SAME)
+
+
+def close(first: float, second: float) -> bool:
+    """Whether two objectives are the same up to rounding."""
+    try:
+        return abs(first - second) <= SAME * max(1.0, abs(first), abs(second))
+    except OverflowError:  # JSON may hold whole numbers beyond all doubles
+        return False
 
 
 def cut(bound: float, objective: float) -> float:
@@ -83,8 +98,7 @@ def runs_of(records: Iterable[Record], entry: str, objective: float) -> list[dic
         if each.bound is not None:
             shown["bound"] = cut(each.bound, objective)
         known = {key: value for key, value in shown.items() if value is not None}
-        trace = {"trace": [list(step) for step in each.trace]} if each.trace else {}
-        found.append({"solver": each.solver, "version": each.version, "status": each.status} | known | trace)
+        found.append({"solver": each.solver, "version": each.version, "status": each.status} | known)
     return found
 
 
@@ -106,9 +120,7 @@ def standing(
         for each in records
         if each.bound is not None and is_proven(objective, cut(each.bound, objective))
     ]
-    # Agreement needs known programs, and evidence beyond a submitter's word.
-    counted = (each for each in claims if each.solver in MAKERS and each.evidence != "word")
-    sound = best_of_each(counted, entry)
+    sound = best_of_each((each for each in claims if each.solver in MAKERS), entry)
     if len({MAKERS[each.solver] for each in sound}) >= AGREE:
         return _solved("agreement", [_program(each, entry) for each in sound])
     if claims:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from .... import templates
-from ....models.errors import InputError, InstanceError, OutputError
+from ....models.errors import InputError, OutputError
 from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.instance.file import read_instance
@@ -30,7 +30,6 @@ from ...pictures.web import field_picture, instance_picture, thumbnail
 from ..building.index import SOLU, SUMS
 from ..documents.documents import Library, about_file, read_about, read_library
 from ..plan.spec import RUNGS
-from .mathematics import model
 from .study import study
 
 ASSETS: Final = ("site.css", "site.js", "icon.svg")  # copied from the templates
@@ -92,7 +91,6 @@ def write_site(folder: str | Path, output: str | Path, progress: Progress = sile
         )
     sums = _sums(library.folder / SUMS)
     shown = _instances(library, sums)
-    _check_listed(library, shown, sums)
     with _replacing_folder(Path(output)) as stage:
         for name in FOLDERS:
             make_folder(stage / name)
@@ -135,18 +133,6 @@ def _sums(path: Path) -> dict[str, str]:
             )
         found[fields[2]] = fields[1]
     return found
-
-
-def _check_listed(library: Library, shown: list[Shown], sums: dict[str, str]) -> None:
-    """Raise InstanceError unless documents and SHA256SUMS agree about each file."""
-    for document in (each for one in shown for each in (one.about, *one.entries)):
-        for file in document["files"]:
-            if sums.get(file["name"]) != file["sha256"]:
-                raise InstanceError(
-                    f"SHA256SUMS and {document['name']} disagree about {file['name']}; "
-                    "build the library again",
-                    file=library.folder,
-                )
 
 
 def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
@@ -203,7 +189,6 @@ def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], sta
         "families": families,
         "faces": {name: max(members, key=_detail) for name, members in families.items()},
         "tokens": {name: declared.short for name, declared in FORMULATIONS.items()},
-        "model": model,
         "sizes": {name: (library.folder / name).stat().st_size for name in (*sums, SUMS)},
         "sums": sums,
         "licences": sorted({entry["licence"] or "" for entry in library.entries}),
@@ -279,51 +264,29 @@ def size(number: int) -> str:
 
 @contextmanager
 def _replacing_folder(output: Path) -> Iterator[Path]:
-    """Yield an empty folder that replaces the output on success. Raises OutputError."""
+    """Yield an empty folder that replaces an earlier site on success. Raises OutputError."""
     output = output.resolve()
-    _check_replaceable(output)
-    make_folder(output.parent)
+    if output.exists() and not output.is_dir():
+        raise OutputError("is a file; name a folder for the site", file=output)
     try:
+        known = {*FOLDERS, *PAGES, *ASSETS}
+        strange = sorted({path.name for path in output.iterdir()} - known) if output.exists() else []
+        if strange:
+            raise OutputError(
+                f"holds {strange[0]!r}, which is no part of a site; choose another folder", file=output
+            )
+        make_folder(output.parent)
         remove_dead(output.parent)
         stage = neighbour(output)
         stage.mkdir()
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written: {error.strerror}; choose another folder", file=output
-        ) from error
-    try:
-        yield stage
-        _take_place(stage, output)
+        try:
+            yield stage
+            if output.exists():
+                shutil.rmtree(output)
+            stage.rename(output)
+        finally:
+            shutil.rmtree(stage, ignore_errors=True)
     except OSError as error:
         raise OutputError(
             f"cannot be written: {error.strerror}; free some space or choose another folder", file=output
         ) from error
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
-
-
-def _check_replaceable(output: Path) -> None:
-    if not output.exists():
-        return
-    if not output.is_dir():
-        raise OutputError("is a file; name a folder for the site", file=output)
-    known = {*FOLDERS, *PAGES, *ASSETS}
-    strange = sorted(path.name for path in output.iterdir() if path.name not in known)
-    if strange:
-        raise OutputError(
-            f"holds {strange[0]!r}, which is no part of a site; choose another folder", file=output
-        )
-
-
-def _take_place(stage: Path, output: Path) -> None:
-    """Rename the new folder to the old one's name; restore the old one if that fails."""
-    old = stage.with_suffix(".old")
-    if output.exists():
-        output.rename(old)
-    try:
-        stage.rename(output)
-    except OSError:
-        if old.exists():
-            old.rename(output)
-        raise
-    shutil.rmtree(old, ignore_errors=True)

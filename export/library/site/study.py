@@ -1,74 +1,47 @@
-"""Content of an entry's page beyond its sidecar: structure, presolve, loading.
+"""Content of an entry's page beyond its sidecar: mathematics and structure.
 
 The structure is the sparsity of the matrix and of the Hessian of the Lagrangian, as in MINLPLib.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations, combinations_with_replacement
 from pathlib import Path
 from typing import Any, Final
 
-import highspy
 import numpy as np
 import sympy as sp
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ....models.formulations.families import PlacedFamily
+from ....models.formulations.latex import latex
 from ....models.formulations.problem import Problem
 from ....models.storage import write_bytes
 from ...pictures.sparsity import Parts, Pattern, Places, sparsity_picture
-from ...programs.highs import loaded, version
-from ...programs.protocol import RefusedError
 from ..documents.documents import Library, problem_of
-from .loading import Way, ways
 
-LINEAR: Final = ("LP", "MILP")  # classes that HiGHS presolves
+_LABEL: Final = re.compile(r" \\quad \\text\{(.*)\}$")
 _HIGHEST: Final = 4  # the greatest degree of a polynomial in any formulation
 
 
 @dataclass(frozen=True)
-class Counts:
-    """Columns, integer ones among them, rows and nonzeros of a model."""
-
-    columns: int
-    integer: int
-    rows: int
-    nonzeros: int
-
-
-@dataclass(frozen=True)
-class Presolved:
-    """A model file before and after presolve, and the version of HiGHS that did it."""
-
-    file: str
-    before: Counts
-    after: Counts
-    version: str
-
-
-@dataclass(frozen=True)
-class Blocks:
-    """Number and sizes of the blocks of a Hessian: sets of columns that no entry joins."""
-
-    count: int
-    least: int
-    greatest: int
-    average: float
-
-
-@dataclass(frozen=True)
 class Study:
-    """Results computed from an entry. matrix, hessian: None if empty."""
+    """Results computed from an entry.
 
+    latex: its formulation; lines: the same line by line; matrix, hessian: None if empty; blocks: number and
+    sizes of the sets of columns that no entry of the Hessian joins.
+    """
+
+    latex: str
+    lines: tuple[dict[str, str], ...]
     matrix: Pattern | None
     hessian: Pattern | None
-    blocks: Blocks | None
-    presolved: Presolved | None
-    ways: list[Way]
+    blocks: dict[str, float] | None
 
 
 def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
@@ -81,55 +54,58 @@ def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
     }
     for kind, pattern in patterns.items():
         write_bytes(pictures / f"{entry['name']}.{kind}.svg", sparsity_picture(pattern))
+    source = latex(problem.formulation)
     return Study(
+        source,
+        lines_of(source),
         patterns.get("matrix"),
         patterns.get("hessian"),
         blocks(patterns["hessian"]) if "hessian" in patterns else None,
-        _presolved(library.folder, entry),
-        list(ways(entry, problem)),
     )
 
 
-def _presolved(folder: Path, entry: dict[str, Any]) -> Presolved | None:
-    """The size of an entry's .mps or .lp before and after presolve; None if HiGHS does not presolve it."""
-    files = [each["name"] for form in ("mps", "lp") for each in entry["files"] if each["format"] == form]
-    if entry["class"] not in LINEAR or not files:
-        return None
-    try:
-        highs = loaded(folder / files[0], threads=1)
-    except RefusedError:
-        return None
-    before = _counts(highs.getLp())
-    highs.presolve()
-    same = highs.getModelPresolveStatus() == highspy.HighsPresolveStatus.kNotReduced
-    return Presolved(files[0], before, before if same else _counts(highs.getPresolvedLp()), version())
+@cache
+def lines_of(source: str) -> tuple[dict[str, str], ...]:
+    """Return the lines of a model as role, formula, set and equation of the paper.
+
+    role: `minimise`, `subject to`, `where`, or empty as on the line before. Formula and set are MathML made
+    from our declarations alone.
+    """
+    last, found = "", []
+    for row in source.split("\n")[1:-1]:  # lead & formula && set, label; domains have no label
+        lead, formula, *rest = (part.strip() for part in row.removesuffix(r" \\").split("&", maxsplit=2))
+        over = rest[0].removeprefix("&").strip() if rest else ""
+        label = _LABEL.search(over)
+        role = "minimise" if lead or not rest else "subject to" if label else "where"
+        line = {"role": "" if role == last else role, "formula": _converted(formula)}
+        found.append(line | {"over": _converted(_LABEL.sub("", over)), "label": label[1] if label else ""})
+        last = role
+    return tuple(found)
 
 
-def _counts(model: Any) -> Counts:
-    kinds = [kind for kind in model.integrality_ if kind != highspy.HighsVarType.kContinuous]
-    return Counts(model.num_col_, len(kinds), model.num_row_, len(model.a_matrix_.value_))
+def _converted(formula: str) -> str:
+    """LaTeX of our own declarations, never of a file, as inline MathML in display style."""
+    from latex2mathml.converter import convert
+
+    found = convert(formula, display="block") if formula else ""
+    return found.replace(' display="block"', ' displaystyle="true"')
 
 
 def matrix(problem: Problem) -> Pattern:
     """Return the entries of the Jacobian of the rows by family, with nonlinear ones marked."""
-    rows, columns, curved, offset = [], [], [], 0
+    rows: list[Places] = [np.zeros(0, np.int64)]
+    columns: list[Places] = [np.zeros(0, np.int64)]
+    curved, offset = [np.zeros(0, bool)], 0
     for family in problem.rows:
         nonlinear = _nonlinear(family)
         for symbol in family.variables:
             rows.append(np.arange(family.count, dtype=np.int64) + offset)
-            columns.append(family.column_of(symbol))
+            columns.append(family.column_of(symbol).astype(np.int64))
             curved.append(np.full(family.count, symbol in nonlinear))
         offset += family.count
-    down = Parts(
-        tuple(family.family.tag for family in problem.rows), tuple(family.count for family in problem.rows)
-    )
-    return Pattern(
-        down,
-        _columns(problem),
-        np.concatenate([np.zeros(0, np.int64), *rows]),
-        np.concatenate([np.zeros(0, np.int64), *columns]),
-        np.concatenate([np.zeros(0, bool), *curved]),
-    )
+    families = [(family.family.tag, family.count) for family in problem.rows]
+    down = Parts(tuple(tag for tag, _ in families), tuple(count for _, count in families))
+    return Pattern(down, _columns(problem), *map(np.concatenate, (rows, columns, curved)))
 
 
 def hessian(problem: Problem) -> Pattern:
@@ -143,14 +119,15 @@ def hessian(problem: Problem) -> Pattern:
     )
 
 
-def blocks(pattern: Pattern) -> Blocks:
-    """Return the blocks of a Hessian among the columns of nonlinear terms."""
+def blocks(pattern: Pattern) -> dict[str, float]:
+    """Return number and sizes of the blocks of a Hessian among the columns of nonlinear terms."""
     used, place = np.unique(np.concatenate([pattern.rows, pattern.columns]), return_inverse=True)
     ends = place[: pattern.entries], place[pattern.entries :]
     graph = coo_array((np.ones(pattern.entries, bool), ends), shape=(len(used), len(used)))
     count, labels = connected_components(graph, directed=False)
     sizes = np.bincount(labels)
-    return Blocks(int(count), int(sizes.min()), int(sizes.max()), len(used) / int(count))
+    least, greatest = int(sizes.min()), int(sizes.max())
+    return {"count": int(count), "least": least, "greatest": greatest, "average": len(used) / int(count)}
 
 
 def _columns(problem: Problem) -> Parts:

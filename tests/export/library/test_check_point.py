@@ -94,11 +94,8 @@ def test_energies_of_an_instance_are_those_of_its_field(gauge, shape, tmp_path):
     for name in ("minlp-parity", "milp-mccormick"):
         problem = formulate(field.instance, name)
         found = check(str(tmp_path / "i.json"), save_point(tmp_path / "p.sol", problem, problem.point(field)))
-        said = [float(text.split()[0]) for kind, text in found.lines if kind in {"2-norm", "", "1-norm"}]
-        expected = [field.energy().total] * 2 + [
-            field.with_best_jumps().energy().total,
-            field.energy(1).total,
-        ]
+        said = [float(label(found, kind)) for kind in ("2-norm", "1-norm")]
+        expected = [field.energy().total, field.energy(1).total]
         assert said == pytest.approx(expected, rel=1e-12, abs=1e-12)
         assert found.worst < 1e-15
 
@@ -119,29 +116,20 @@ def test_what_breaks_an_instance_is_found_there(block, by, kind, tmp_path):
     assert place.endswith(names_of(column_names(problem))[problem.blocks[block].offset].split("_", 1)[1])
 
 
-def test_integers_that_are_not_quite_whole_count_as_they_are_or_rounded(tmp_path):
+def test_integers_that_are_not_quite_whole_count_as_they_are(tmp_path):
     field = make_field(make_instance("full"))
     problem = formulate(field.instance, "miqp-exact")
     write(problem, tmp_path / "m.mps")
     write_instance(field.instance, tmp_path / "i.json")
-    exact, point = problem.point(field), problem.point(field)
+    point = problem.point(field)
     point[problem.integer] += 1e-6
     file = save_point(tmp_path / "p.sol", problem, point)
     assert float(check(str(tmp_path / "m.mps"), file).violations["integers"][0]) == pytest.approx(1e-6)
-    rounded = check(str(tmp_path / "m.mps"), file, rounded=True)
-    assert rounded.worst < 1e-14
-    assert float(label(rounded, "objective")) == pytest.approx(problem.objective_value(exact), rel=1e-14)
     quartic = formulate(field.instance, "minlp-quartic")
     changed = np.concatenate([point[problem.blocks[name].slice] for name in quartic.blocks])
-    found = check(str(tmp_path / "i.json"), file)
-    given, whole = (
-        float(text.split()[0])
-        for kind, text in found.lines
-        if kind == "2-norm" or (not kind and text.endswith("rounded"))
-    )
+    given = float(label(check(str(tmp_path / "i.json"), file), "2-norm"))
     assert given == pytest.approx(quartic.objective_value(changed), rel=1e-12)
-    assert whole == pytest.approx(field.energy().total, rel=1e-12)
-    assert given != whole
+    assert given != field.energy().total
 
 
 # against real solvers
@@ -172,41 +160,13 @@ def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_pat
     assert float(label(found, "claimed").rsplit(" ", 1)[1].rstrip(")")) < 1e-6
 
 
-@pytest.mark.parametrize("name", ["milp-mccormick", "qp-fixed"])
-def test_highs_agrees_about_its_own_point(name, tmp_path):
-    highspy = pytest.importorskip("highspy")
-    field = make_field(make_instance("row"))
-    write(formulate(field.instance, name, p=field.p if name == "qp-fixed" else None), tmp_path / "m.mps")
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", False)
-    highs.readModel(str(tmp_path / "m.mps"))
-    highs.run()
-    values = zip(highs.getLp().col_names_, highs.getSolution().col_value, strict=True)
-    (tmp_path / "p.sol").write_text("".join(f"{column} {value!r}\n" for column, value in values))
-    found = check(str(tmp_path / "m.mps"), str(tmp_path / "p.sol"))
-    assert found.worst < 1e-6
-    said = highs.getInfo().objective_function_value
-    assert float(label(found, "objective")) == pytest.approx(said, rel=1e-12, abs=1e-12)
-
-
 BOUNDS = [
-    "",
-    "UP B x 4",
-    "UP B x 0",
-    "LO B x -2",
     "LO B x -2\n UP B x 7.5",
     "MI B x\n UP B x -3",
     "FR B x",
     "FX B x 2.5",
-    "PL B x",
     "LO B x 1\n PL B x",
-    "MI B x",
-    "BV B x",
-    "LI B x 2",
-    "UI B x 9",
-    "LI B x -4\n UI B x 4",
-    "LO B x -1e30",
-    "UP B x inf",
+    "LO B x -1e30\n UP B x 1e30",
 ]
 
 
@@ -226,24 +186,7 @@ def test_bounds_mean_what_they_mean_to_highs(bounds, integer, tmp_path):
     lower = -math.inf if column.lower is None else float(column.lower)
     upper = math.inf if column.upper is None else float(column.upper)
     assert (lower, upper) == (lp.col_lower_[0], lp.col_upper_[0])
-    assert column.integer == bool(
-        len(lp.integrality_) and lp.integrality_[0] == highspy.HighsVarType.kInteger
-    )
-
-
-@pytest.mark.parametrize("sense", ["L", "G", "E"])
-@pytest.mark.parametrize("length", [3, -3])
-def test_ranges_mean_what_they_mean_to_highs(sense, length, tmp_path):
-    highspy = pytest.importorskip("highspy")
-    (tmp_path / "m.mps").write_text(
-        f"NAME m\nROWS\n N obj\n {sense} c\nCOLUMNS\n x obj 1 c 1\nRHS\n R c 2\nRANGES\n G c "
-        f"{length}\nBOUNDS\n FR B x\nENDATA\n"
-    )
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", False)
-    assert highs.readModel(str(tmp_path / "m.mps")) == highspy.HighsStatus.kOk
-    row = check_point.MpsReader().read(check_point.lines_of(str(tmp_path / "m.mps"))).rows["c"]
-    assert tuple(map(float, row.interval())) == (highs.getLp().row_lower_[0], highs.getLp().row_upper_[0])
+    assert column.integer == integer
 
 
 # by hand
@@ -271,17 +214,13 @@ def test_two_pixels_by_hand(tmp_path):
 
 
 EVERYTHING = """* every section
-NAME everything
-OBJSENSE
-    MAX
+NAME everything FREE
 ROWS
  N obj
- N spare
  L c1
  E c2
 COLUMNS
  x obj 0.1 c1 1
- x spare 5
  M1 'MARKER' 'INTORG'
  k obj -3 c2 1
  M2 'MARKER' 'INTEND'
@@ -290,7 +229,9 @@ RHS
  R obj -7 c1 1
  R c2 2
 BOUNDS
+ LO B x 0
  UP B x 10
+ LO B k 0
  UP B k 9
  FR B y
 QUADOBJ
@@ -304,39 +245,35 @@ ENDATA
 """
 
 
-def test_every_section_by_hand_with_the_exact_fraction(tmp_path, capsys):
+def test_every_section_by_hand(tmp_path, capsys):
     """At x = 0.5, k = 2.25, y = -0.1: 0.05 - 6.75 + 7 + 2/4 - 0.5/20 = 0.775;
     c1 = 0.5 - 0.02 + 0.25 - 0.025 = 0.705.
     """
     (tmp_path / "m.mps").write_text(EVERYTHING)
     (tmp_path / "p.sol").write_text("=obj= 0.775\nx 0.5\nk 2.25\ny -0.1\n")
-    code, out, err = called(capsys, tmp_path / "m.mps", tmp_path / "p.sol", "--fraction")
+    code, out, err = called(capsys, tmp_path / "m.mps", tmp_path / "p.sol")
     lines = dict(line.split(None, 1) for line in out.splitlines() if " " in line)
-    assert code == 1
-    assert not err
-    assert lines["objective"] == "0.775 (maximised)"
-    assert lines["fraction"] == "31/40"
+    assert (code, err) == (1, "")
+    assert lines["objective"] == "0.775"
     assert lines["claimed"] == "0.775 (differs by 0)"
     assert lines["rows"] == "0.25 at c2"
     assert lines["integers"] == "0.25 at k"
     assert lines["bounds"] == "0"
     assert "NOT feasible" in out
     assert called(capsys, tmp_path / "m.mps", tmp_path / "p.sol", "--tolerance", "0.25")[0] == 0
-    assert called(capsys, tmp_path / "m.mps", tmp_path / "p.sol", "--round")[0] == 0
 
 
 @pytest.mark.parametrize(
     "section, entries, value",
     [
         ("QUADOBJ", "x x 4\n y x 3", 2 * 4 + 3 * 6),
-        ("QSECTION obj", "x x 4\n y x 3", 2 * 4 + 3 * 6),
-        ("QMATRIX", "x x 4\n y x 3\n x y 3", 2 * 4 + 3 * 6),
         ("QCMATRIX obj", "x x 4\n y x 3\n x y 3", 4 * 4 + 2 * 3 * 6),
     ],
 )
 def test_quadratic_sections_differ_in_triangles_and_one_half(section, entries, value, tmp_path):
     (tmp_path / "m.mps").write_text(
-        f"NAME q\nROWS\n N obj\nCOLUMNS\n x obj 0\n y obj 0\nRHS\nBOUNDS\n{section}\n {entries}\nENDATA\n"
+        f"NAME q\nROWS\n N obj\nCOLUMNS\n x obj 0\n y obj 0\nRHS\nBOUNDS\n FR B x\n FR B y\n"
+        f"{section}\n {entries}\nENDATA\n"
     )
     (tmp_path / "p").write_text("x 2\ny 3\n")
     assert check(str(tmp_path / "m.mps"), str(tmp_path / "p")).objective == value
@@ -348,7 +285,8 @@ def linear(entries="x obj 1 c 1", bounds="FR B x", extra=""):
 
 def test_nothing_is_lost_to_rounding(tmp_path):
     """1e16 + 1 - 1e16 is 1, and a row that is broken by 1e-40 is broken."""
-    (tmp_path / "m.mps").write_text(linear("x obj 1e16 c 1\n y obj 1\n z obj -1e16"))
+    columns = "x obj 1e16 c 1\n y obj 1\n z obj -1e16"
+    (tmp_path / "m.mps").write_text(linear(columns, "FR B x\n FR B y\n FR B z"))
     (tmp_path / "p").write_text("x 1.0000000000000000000000000000000000000001\ny 1\nz 1\n")
     found = check(str(tmp_path / "m.mps"), str(tmp_path / "p"))
     assert Fraction(found.objective) == 1 + Fraction(10**16, 10**40)
@@ -416,14 +354,14 @@ BAD_MODELS = {
     "empty": "",
     "no objective": "NAME m\nROWS\n L c\nCOLUMNS\n x c 1\nENDATA\n",
     "no MPS": "Minimize\n obj: x\nEnd\n",
-    "an unknown section": linear(extra="SOS\n S1 s1\n"),
+    "an unknown section": linear(extra="RANGES\n R c 1\n"),
     "an unknown row": linear("x obj 1 d 1"),
     "an unknown column": linear(bounds="FR B y"),
     "an unknown bound": linear(bounds="SC B x 4"),
     "a bound without a value": linear(bounds="UP x"),
     "two bounds": linear(bounds="UP B x 4\n UP B x 5"),
-    "an ambiguous bound": linear(bounds="UP B x -4"),
-    "an impossible bound": linear(bounds="LO B x inf"),
+    "no upper bound": linear(bounds="LO B x -4"),
+    "an impossible bound": linear(bounds="LO B x 1e20"),
     "an entry twice": linear("x obj 1 c 1\n x c 1"),
     "a column in two places": linear("x obj 1\n y obj 1\n x c 1"),
     "a right side twice": linear().replace(" R c 1", " R c 1\n R c 2"),
@@ -432,12 +370,12 @@ BAD_MODELS = {
     "an endless number": linear("x obj 1e999999999"),
     "a missing number": linear("x obj"),
     "an unknown marker": linear("M 'MARKER' 'INTBEG'"),
-    "both triangles in QUADOBJ": linear("x obj 1\n y obj 1", extra="QUADOBJ\n x y 1\n y x 1\n"),
-    "one triangle in QCMATRIX": linear("x obj 1\n y obj 1", extra="QCMATRIX c\n x y 1\n"),
-    "a matrix entry twice": linear("x obj 1\n y obj 1", extra="QUADOBJ\n x x 1\n x x 1\n"),
+    "both triangles in QUADOBJ": linear("x obj 1\n y obj 1", "FR B x\n FR B y", "QUADOBJ\n x y 1\n y x 1\n"),
+    "one triangle in QCMATRIX": linear("x obj 1\n y obj 1", "FR B x\n FR B y", "QCMATRIX c\n x y 1\n"),
+    "a matrix entry twice": linear("x obj 1\n y obj 1", "FR B x\n FR B y", "QUADOBJ\n x x 1\n x x 1\n"),
     "a row twice": linear().replace(" L c\n", " L c\n G c\n"),
     "an unknown sense": linear().replace(" L c\n", " X c\n"),
-    "an unknown direction": linear().replace("ROWS", "OBJSENSE\n UPWARDS\nROWS", 1),
+    "two objectives": linear().replace(" N obj", " N obj\n N spare"),
     "no text": "NAME \udcff\udcfe\n",
     "other JSON": "{}",
     "damaged JSON": '{"format": ',

@@ -6,25 +6,6 @@ import sys
 import pytest
 from crossfield.export.library.building.executor import BuildError, Tasks, executor
 
-SPEC = """format = "crossfield-library-spec"
-version = 1
-title = "one small instance"
-formulations = ["qp-fixed"]
-
-[rungs.tiny]
-sizes = [4]
-formats = ["nl"]
-
-[[sketches]]
-name = "skew"
-sample = "skew"
-"""
-BUILD = """from crossfield.export.library.building.build import build
-from crossfield.export.library.plan.spec import read_spec
-
-print("the script runs")
-build(read_spec("spec.toml"), "library", jobs=2)
-"""
 TASKS = """import math
 from crossfield.export.library.building.executor import Tasks, executor
 
@@ -48,13 +29,6 @@ def run_without_guard(script, folder):
 def test_a_script_without_a_guard_has_tasks_done_in_two_processes(tmp_path):
     run_without_guard(TASKS, tmp_path)
     assert {path.name for path in tmp_path.glob("root_*")} == {"root_4", "root_5"}
-
-
-@pytest.mark.slow
-def test_a_script_without_a_guard_builds_a_library_in_two_processes(tmp_path):
-    (tmp_path / "spec.toml").write_text(SPEC, "utf-8")
-    run_without_guard(BUILD, tmp_path)
-    assert (tmp_path / "library" / "cf_skew_n004_qp.nl").exists()
 
 
 def test_a_process_that_ends_early_ends_the_build_with_its_exit_code():

@@ -13,11 +13,9 @@ from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate
+from libraries import HEAD
 
-SPEC = """format = "crossfield-library-spec"
-version = 1
-title = "a library for tests"
-formulations = ["qp-fixed"]
+SPEC = """formulations = ["qp-fixed"]
 ledger = "ledger.json"
 
 [rungs.tiny]
@@ -34,7 +32,7 @@ sizes = { tiny = [6] }
 @pytest.mark.usefixtures("short_searches")
 @pytest.mark.parametrize("sha256, reported", [(None, False), ("0" * 64, True)])
 def test_a_build_reports_records_that_do_not_count(tmp_path, capsys, sha256, reported):
-    (tmp_path / "spec.toml").write_text(SPEC)
+    (tmp_path / "spec.toml").write_text(HEAD + SPEC)
     command = ["library", "build", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "out"), "--quiet"]
     write_ledger(read_ledger(tmp_path))
     assert invoke(command) == 0

@@ -8,22 +8,18 @@ from dataclasses import replace
 
 import crossfield as cf
 import pytest
-from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.ledger.given import read_points
 from crossfield.export.library.plan.recipe import plan
-from crossfield.export.library.plan.spec import default_spec, read_spec
+from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from forging import change, seal
+from libraries import library_of, spec_of
 
 pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
 
-SPEC = """
-format = "crossfield-library-spec"
-version = 1
-title = "A test"
-formulations = ["miqp-exact", "minlp-cubic", "milp-mccormick", "qp-fixed"]
+SPEC = """formulations = ["miqp-exact", "minlp-cubic", "milp-mccormick", "qp-fixed"]
 
 [rungs.tiny]
 sizes = [3]
@@ -42,9 +38,7 @@ CERTIFICATE = f"{STEM}.certificate.npz"
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """A library of small instances under both gauges; not to be changed."""
-    folder = tmp_path_factory.mktemp("certified")
-    (folder / "spec.toml").write_text(SPEC)
-    return build(read_spec(folder / "spec.toml"), folder / "lib").folder
+    return library_of(tmp_path_factory.mktemp("certified"), SPEC).folder
 
 
 @pytest.fixture
@@ -86,18 +80,21 @@ def test_it_lies_in_the_library_with_its_checksum_and_its_checker(built):
 
 @pytest.mark.slow
 def test_the_same_certificate_is_made_twice(built, tmp_path):
-    (tmp_path / "spec.toml").write_text(SPEC.replace("[1, 2]", "[1]"))
-    again = build(read_spec(tmp_path / "spec.toml"), tmp_path / "again").folder
+    again = library_of(tmp_path, SPEC.replace("[1, 2]", "[1]")).folder
     assert (again / CERTIFICATE).read_bytes() == (built / CERTIFICATE).read_bytes()
 
 
 @pytest.mark.parametrize(
     "key, value, words",
     [
-        ("bound", 99.0, "states another status, bound or energy of its certificate"),
-        ("status", "gap", "states another status, bound or energy of its certificate"),
-        ("energy", 99.0, "states another status, bound or energy of its certificate"),
-        ("file", "cf_rand_n003_s2.certificate.npz", "as its certificate and does not list it"),
+        ("bound", 99.0, "states another status, bound or energy than"),
+        ("status", "gap", "states another status, bound or energy than"),
+        ("energy", 99.0, "states another status, bound or energy than"),
+        (
+            "file",
+            "cf_rand_n003_s2.certificate.npz",
+            "s2.certificate.npz and does not list it",
+        ),
     ],
 )
 def test_a_forged_claim_is_found(lib, key, value, words):
@@ -111,7 +108,7 @@ def test_a_forged_certificate_is_found(lib):
     """The certificate of another instance, one of a worse field with the same claim, and changed bytes."""
     good, name = (lib / CERTIFICATE).read_bytes(), f"{STEM}.about.json"
     shutil.copy(lib / "cf_rand_n003_s2.certificate.npz", lib / CERTIFICATE)
-    assert found(lib)[CERTIFICATE] == f"is not a certificate of {STEM}"
+    assert "is a certificate of another instance" in found(lib)[CERTIFICATE]
     worse = cf.greedy_field(cf.read_instance(lib / f"{STEM}.instance.json"))
     proof = cf.prove(worse.instance, jobs=1)
     weak = replace(proof, field=worse, energy=worse.energy().total, levels=proof.levels[:1])
@@ -127,7 +124,7 @@ def test_points_that_claim_more_than_their_certificate_are_refused(lib, key, val
     instance = cf.read_instance(lib / f"{STEM}.instance.json")
     assert read_points(lib)(STEM).certificate(instance).facts["status"] == "optimal"
     change(lib / f"{STEM}.about.json", **{f"certificate__{key}": value})
-    with pytest.raises(InputError, match=f"{STEM}.about.json states another status, bound or energy"):
+    with pytest.raises(InputError, match=f"{STEM}.about.json: states another status, bound or energy"):
         read_points(lib)(STEM).certificate(instance)
 
 
@@ -162,8 +159,8 @@ def test_a_forged_or_missing_checker_is_found(lib):
 
 
 def test_a_rung_may_do_without(tmp_path):
-    (tmp_path / "spec.toml").write_text(SPEC.replace("[3]", "[3]\nprove = false"))
-    assert not any(each.recipe.prove for each in plan(read_spec(tmp_path / "spec.toml")))
+    spec = spec_of(tmp_path, SPEC.replace("[3]", "[3]\nprove = false"))
+    assert not any(each.recipe.prove for each in plan(spec))
     assert [each.recipe.name for each in plan(default_spec()) if each.recipe.prove] == [
         each.recipe.name
         for each in plan(default_spec())

@@ -1,8 +1,9 @@
-"""Checks of a library: findings of `verify`, and submission of points."""
+"""Checks of a library: every change and every forged value is found, also under new checksums."""
 
 import gzip
 import json
 import shutil
+from dataclasses import replace
 from functools import partial
 
 import places
@@ -10,33 +11,23 @@ import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.library.building.build import build
+from crossfield.export.library.building.build import rebuild
+from crossfield.export.library.building.instance_task import Preparation
+from crossfield.export.library.checking.check_entry import instance_findings
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.documents import check_point
-from crossfield.export.library.documents.documents import read_library
-from crossfield.export.library.ledger.given import read_points
-from crossfield.export.library.plan.spec import read_spec
-from crossfield.models.errors import CrossfieldError, InputError, SolutionError
+from crossfield.export.library.documents.documents import read_about, read_library
+from crossfield.export.library.ledger.ledger import Record, add_record
+from crossfield.export.library.plan.recipe import plan
 from forging import change, seal
+from libraries import library_of
 from loops import for_each
-from submitting import better_point, submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
 SOLUTIONS = places.SOLUTIONS
 
 
-def everything_below(folder):
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()
-    }
-
-
-SPEC = """
-format = "crossfield-library-spec"
-version = 1
-title = "a library for tests"
-formulations = ["milp-mccormick", "miqp-mccormick", "minlp-parity", "qp-fixed"]
+SPEC = """formulations = ["milp-mccormick", "miqp-mccormick", "minlp-parity", "qp-fixed"]
 [rungs.medium]
 sizes = [4]
 formats = ["nl", "mps"]
@@ -52,10 +43,20 @@ STEM = "cf_rand_n004_s1"
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """A library of one instance in four formulations; not to be changed."""
-    folder = tmp_path_factory.mktemp("built")
-    (folder / "spec.toml").write_text(SPEC)
-    build(read_spec(folder / "spec.toml"), folder / "lib")
-    return folder / "lib"
+    return library_of(tmp_path_factory.mktemp("built"), SPEC).folder
+
+
+@pytest.fixture(scope="module")
+def forged_run(built, tmp_path_factory):
+    """The library with a bound of a solver in its ledger; not to be changed."""
+    lib = shutil.copytree(built, tmp_path_factory.mktemp("run") / "lib")
+    sidecar = json.loads((lib / MILP).read_text())
+    bound = 0.5 * sidecar["best"]["objective"]
+    facts = {"bound": bound, "seconds": 1.5, "threads": 1, "time_limit": 2.0}
+    add_record(lib, Record(sidecar["name"], sidecar["problem_sha256"], "HiGHS", "1.0", "limit", **facts))
+    assert rebuild(lib).entry(sidecar["name"])["bound"] == bound
+    assert verify_library(lib) == []
+    return lib
 
 
 @pytest.fixture
@@ -205,7 +206,6 @@ SEALED = {
     ),
     "other counts": (edit(MILP, counts__variables=lambda value: value + 1), MILP, "another counts"),
     "another class": (edit(MILP, **{"class": "MIQP"}), MILP, "another class"),
-    "other ranges": (edit(MIQP, ranges__matrix=[1.0, 2.0]), MIQP, "another ranges"),
     "other curvature": (edit(MIQP, curvature__objective="indefinite"), MIQP, "another curvature"),
     "an unknown formulation": (edit(MILP, formulation="nothing"), MILP, "no entry can have"),
     "a jump beyond all numbers": (edit(QP, jumps=[[0, 10**30]]), QP, "no entry can have"),
@@ -254,11 +254,12 @@ SEALED = {
         "library.solu",
         "is not what follows",
     ),
+    "a text": (text("CITATION.cff", b"title", b"Title"), "CITATION.cff", "is not what follows"),
     "another checker": (text("check_point.py", b"1e-8", b"1e-1"), "check_point.py", "is not what follows"),
     "a field of another energy": (
         edit(f"{STEM}.about.json", fields__least_2__energy_2norm=0.0),
         f"{STEM}.about.json",
-        "other energies",
+        "another fields",
     ),
     "another instance": (
         edit(f"{STEM}.instance.json", w_beta=0.5),
@@ -307,6 +308,14 @@ def test_a_change_under_new_checksums_is_found(what, built, tmp_path):
     assert not [finding for finding in found if "SHA-256" in finding.what and finding.file != "library.json"]
 
 
+def test_an_instance_of_another_recipe_is_found(built):
+    (planned,) = plan(read_library(built).spec)
+    task = Preparation(replace(planned.recipe, seed=2))
+    (finding,) = instance_findings(built, read_about(built / f"{STEM}.about.json"), task)
+    assert finding.file == f"{STEM}.instance.json"
+    assert finding.what == "is not the instance that follows from the specification"
+
+
 def test_sealing_alone_changes_nothing(lib):
     seal(lib)
     assert verify_library(lib) == []
@@ -344,192 +353,56 @@ def test_another_file_than_a_library_is_one_line(path, tmp_path, capsys):
     assert complaints(said.err).startswith("crossfield: ")
 
 
-# submitting
+def forgeries(value, path=()):
+    """Copies of a document with one value changed to another of its type, and its place."""
+    if isinstance(value, dict):
+        for key, part in value.items():
+            for where, changed in forgeries(part, (*path, key)):
+                yield where, value | {key: changed}
+    elif isinstance(value, list):
+        for place, part in enumerate(value[:2]):
+            for where, changed in forgeries(part, (*path, place)):
+                yield where, [*value[:place], changed, *value[place + 1 :]]
+        if value:
+            yield (*path, "less"), value[:-1]
+    elif isinstance(value, bool):
+        yield path, not value
+    elif isinstance(value, int):
+        yield path, value + 1
+    elif isinstance(value, float):
+        yield path, value * 1.01 + 1e-3
+    elif isinstance(value, str):
+        yield path, ("0" if value[:1] != "0" else "1") + value[1:] if len(value) == 64 else value + "x"
+    else:
+        yield path, 1.5
 
 
-ENTRY = f"{STEM}_miqp"
-
-
-@pytest.fixture(scope="module")
-def solved(built, tmp_path_factory):
-    """HiGHS's better point of an entry, its objective, and the library after it was submitted;
-    not to be changed.
-    """
-    folder = tmp_path_factory.mktemp("solved")
-    objective = better_point(built, ENTRY, folder / "found.sol")
-    lib = shutil.copytree(built, folder / "lib")
-    return folder / "found.sol", objective, lib, submit(folder / "found.sol", lib)
-
-
-def submit(file, lib):
-    facts = {"solver": "HiGHS", "version": "1.15", "seconds": 0.5, "by": "A. Body"}
-    return submit_one(lib, file, entry=ENTRY, **facts)
-
-
-def test_a_better_point_is_kept_with_its_provenance(built, solved):
-    _, objective, lib, happened = solved
-    before = json.loads((built / f"{ENTRY}.json").read_text())["best"]
-    assert happened.better_point
-    assert happened.known == before["objective"]
-    assert happened.objective == pytest.approx(objective, rel=1e-9)
-    assert objective < before["objective"] * (1 - 1e-3)
-    best = json.loads((lib / f"{ENTRY}.json").read_text())["best"]
-    assert best["objective"] == happened.objective
-    assert [best[key] for key in ("solver", "version", "seconds", "by")] == ["HiGHS", "1.15", 0.5, "A. Body"]
-    found = check_point.check(str(lib / f"{ENTRY}.mps.gz"), str(lib / f"{ENTRY}.sol"))
-    assert float(found.objective) == pytest.approx(objective, rel=1e-9)
-    assert found.worst < 1e-12
-
-
-def test_a_library_verifies_after_a_submission(solved):
-    assert verify_library(solved[2]) == []
-
-
-def test_a_build_from_specification_and_ledger_gives_the_same_library(built, solved, tmp_path):
-    lib = solved[2]
-    (tmp_path / "spec.toml").write_text(SPEC.replace("title", 'ledger = "ledger.json"\ntitle', 1))
-    for path in (lib / "ledger.json", *lib.glob(f"{ENTRY}.field.json")):
-        shutil.copy(path, tmp_path)
-    build(read_spec(tmp_path / "spec.toml"), tmp_path / "lib")
-    assert everything_below(tmp_path / "lib") == everything_below(lib)
-    assert everything_below(lib) != everything_below(built)
-
-
-def test_a_point_that_is_no_better_changes_nothing(solved, tmp_path, capsys):
-    file, _, done, _ = solved
-    lib = shutil.copytree(done, tmp_path / "lib")
-    before = everything_below(lib)
-    shutil.copy(lib / f"{ENTRY}.sol", tmp_path / f"{ENTRY}.sol")
-    for path in (file, tmp_path / f"{ENTRY}.sol"):
-        assert invoke(["library", "submit", str(lib), str(path), "--entry", ENTRY]) == 0
-        assert "not better" in capsys.readouterr().out
-    assert everything_below(lib) == before
-
-
-def test_the_entry_is_found_by_the_name_of_the_file_or_by_its_columns(built, solved, tmp_path):
-    lib = solved[2]
-    for name in (f"{ENTRY}.sol", f"{ENTRY}.of-highs.sol", "anything.sol"):
-        shutil.copy(solved[0], tmp_path / name)
-        assert submit_one(lib, tmp_path / name).entries == (ENTRY,)
-
-
-def states(before, after):
-    """Files that a stopped submission has written: one by one, checksums last."""
-    changed = [name for name in after if after[name] != before.get(name)]
-    field, ledger, sums = f"{ENTRY}.field.json", "ledger.json", "SHA256SUMS"
-    rest = sorted(set(changed) - {field, ledger, sums})
-    assert {field, ledger, sums} <= set(changed)
-    sidecars = [name for name in rest if name.count(".") == 1 and name.startswith("cf_")]
-    others = [name for name in rest if name not in sidecars and name.startswith("cf_")]
-    return {
-        "field": [field],
-        "ledger": [field, ledger],
-        "half of the files": [field, ledger, *others[: len(others) // 2]],
-        "all but the sidecars": [field, ledger, *others],
-        "the sidecars too": [field, ledger, *others, *sidecars],
-        "all but the checksums": [field, ledger, *rest],
-    }
-
-
-@pytest.mark.parametrize(
-    "state",
-    [
-        "field",
-        "ledger",
-        "half of the files",
-        "all but the sidecars",
-        "the sidecars too",
-        "all but the checksums",
-    ],
-)
 @pytest.mark.slow
-def test_the_next_submission_completes_one_that_was_stopped(state, built, solved, tmp_path):
-    before, after = everything_below(built), everything_below(solved[2])
-    lib = shutil.copytree(built, tmp_path / "lib")
-    for name in states(before, after)[state]:
-        (lib / name).write_bytes(after[name])
-    assert verify_library(lib)
-    submit(solved[0], lib)
-    assert everything_below(lib) == after
+@pytest.mark.parametrize("name", [MILP, QP, f"{STEM}.about.json"])
+def test_every_forged_field_is_found(name, forged_run, tmp_path):
+    lib = shutil.copytree(forged_run, tmp_path / "lib")
+    original, unseen = json.loads((lib / name).read_text()), []
+    for where, document in forgeries(original):
+        if where[0] == "files" and where[-1] in {"bytes", "sha256"}:
+            continue  # `seal` sets these right again: the bytes themselves are compared
+        (lib / name).write_text(json.dumps(document))
+        seal(lib)
+        if not verify_library(lib):
+            unseen.append(where)
+    assert unseen == []
 
 
-def spoiled(solved, tmp_path, old, new):
-    """The point with another value of the first column of a name."""
-    lines = solved[0].read_text().splitlines()
-    at = next(number for number, line in enumerate(lines) if line.startswith(old))
-    lines[at] = new
-    (tmp_path / "spoiled.sol").write_text("\n".join(lines) + "\n")
-    return tmp_path / "spoiled.sol"
-
-
-@pytest.mark.parametrize(
-    "old, new, words",
-    [
-        ("alpha_00_00", "alpha_00_00 9.5", "not a feasible point"),
-        ("p1_01_00_u", "p1_01_00_u 0.4", "not a feasible point"),
-        ("alpha_00_00", "alpha_09_09 0.5", "another instance, formulation or option"),
-        ("alpha_00_00", "alpha_00_00 nan", "line"),
-    ],
-)
-def test_an_invalid_point_is_one_line_and_changes_nothing(old, new, words, solved, built, tmp_path, capsys):
-    lib = shutil.copytree(built, tmp_path / "lib")
-    before = everything_below(lib)
-    file = spoiled(solved, tmp_path, old, new)
-    assert invoke(["library", "submit", str(lib), str(file), "--entry", ENTRY]) == 1
-    said = capsys.readouterr()
-    assert complaints(said.err).startswith(f"crossfield: {file}: ")
-    assert words in said.err
-    assert complaints(said.err).count("\n") == 1
-    assert everything_below(lib) == before
-
-
-@pytest.mark.parametrize(
-    "options, words",
-    [
-        ({"entry": "../x"}, "no entry"),
-        ({"entry": "cf_more"}, "no entry"),
-        ({"entry": f"{STEM}_milp"}, "another instance, formulation or option"),
-        ({"entry": ENTRY, "solver": "x" * 300}, "at most 200"),
-    ],
-)
-def test_wrong_options_are_refused_before_anything_is_written(options, words, solved, built, tmp_path):
-    lib = shutil.copytree(built, tmp_path / "lib")
-    before = everything_below(lib)
-    with pytest.raises(CrossfieldError, match=words):
-        submit_one(lib, solved[0], **options)
-    assert everything_below(lib) == before
-
-
-def test_a_file_without_a_point_is_one_line(built, capsys):
-    file = SOLUTIONS / "highs-1.15.1_infeasible_style0.sol"
-    assert invoke(["library", "submit", str(built), str(file), "--entry", ENTRY]) == 1
-    assert "holds no point" in capsys.readouterr().err
-
-
-def test_a_point_of_another_instance_fits_no_entry(built, solved, tmp_path):
-    lines = [line.replace("_00_00", "_07_07") for line in solved[0].read_text().splitlines()]
-    (tmp_path / "other.sol").write_text("\n".join(lines) + "\n")
-    with pytest.raises(SolutionError, match="fits no entry"):
-        submit_one(built, tmp_path / "other.sol")
-
-
-def test_a_point_below_a_dual_bound_is_refused(solved, lib):
-    change(lib / f"{ENTRY}.json", **bound_of(solved[1] * 1.01))
-    with pytest.raises(SolutionError, match="that bound is wrong"):
-        submit(solved[0], lib)
-
-
-def test_a_library_of_another_version_takes_no_points(solved, lib):
-    change(lib / "library.json", generator="crossfield 0.0.1")
-    with pytest.raises(InputError, match="was built by crossfield"):
-        submit(solved[0], lib)
-
-
-def test_an_archive_is_refused_with_the_remedy(solved, built, tmp_path):
-    packed = shutil.make_archive(str(tmp_path / "a"), "gztar", built.parent, built.name)
-    for refused in (partial(submit, solved[0]), verify_library, read_points):
-        with pytest.raises(InputError, match=r"a\.tar\.gz: is a file; unpack it, as with `tar -xzf`"):
-            refused(packed)
+def test_a_forged_bound_does_not_pass_as_optimal(forged_run, tmp_path):
+    """Bounds, status, gap, library.solu and the checksums are forged consistently."""
+    lib = shutil.copytree(forged_run, tmp_path / "lib")
+    sidecar = json.loads((lib / MILP).read_text())
+    best, name = sidecar["best"]["objective"], sidecar["name"]
+    bounds = [each | {"bound": best} for each in sidecar["bounds"]]
+    solu = [line for line in (lib / "library.solu").read_text().splitlines() if name not in line]
+    (lib / "library.solu").write_text("\n".join([*solu, f"=opt= {name} {best!r}"]) + "\n")
+    change(lib / MILP, bounds=bounds, bound=best, status="optimal", gap=0.0)
+    seal(lib)
+    assert any("states another bounds than follows" in str(each) for each in verify_library(lib))
 
 
 @pytest.mark.slow
@@ -538,8 +411,7 @@ def test_all_formulations_and_formats_verify(tmp_path):
         'formulations = ["milp-mccormick", "miqp-mccormick", "minlp-parity", "qp-fixed"]\n', ""
     )
     text = text.replace('formats = ["nl", "mps"]\ncompress = true', 'facets = ["hull", "printed"]')
-    (tmp_path / "spec.toml").write_text(text)
-    library = build(read_spec(tmp_path / "spec.toml"), tmp_path / "lib")
+    library = library_of(tmp_path, text)
     assert len(library.entries) == 11
     for each in library.entries:
         assert {file["format"] for file in each["files"]} | set(each["refused"]) == {*FORMATS, "sol"}

@@ -7,7 +7,6 @@ import subprocess
 import sys
 
 import pytest
-from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.documents.documents import read_about, read_library
@@ -18,18 +17,13 @@ from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.models.errors import InputError
+from libraries import content, library_of, spec_of
 from processors import PROCESSORS
 from submitting import submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
-SPEC = """
-format = "crossfield-library-spec"
-version = 1
-title = "A test"
-{more}
-
-[rungs.tiny]
+SPEC = """[rungs.tiny]
 sizes = [3]
 gauges = ["strokes", "box"]
 facets = ["hull", "printed"]
@@ -43,13 +37,9 @@ seeds = [1]
 [[sketches]]
 name = "saddle"
 sample = "saddle"
-sizes = {{ tiny = [4] }}
+sizes = { tiny = [4] }
 """
-SEARCHED = """
-format = "crossfield-library-spec"
-version = 1
-title = "A test"
-formulations = ["qp-fixed", "miqp-exact"]
+SEARCHED = """formulations = ["qp-fixed", "miqp-exact"]
 
 [rungs.tiny]
 sizes = [4]
@@ -60,16 +50,6 @@ name = "saddle"
 sample = "saddle"
 """
 STEM, SADDLE = "cf_rand_n003_s1", "cf_saddle_n004_box"
-
-
-def write_spec(folder, more=""):
-    path = folder / "spec.toml"
-    path.write_text(SPEC.format(more=more))
-    return path
-
-
-def content(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 def worsened(path):
@@ -85,17 +65,15 @@ def worsened(path):
 @pytest.fixture(scope="module")
 def searched(tmp_path_factory):
     """A library whose points were searched for; not to be changed."""
-    folder = tmp_path_factory.mktemp("searched")
-    return build(read_spec(write_spec(folder)), folder / "lib").folder
+    return library_of(tmp_path_factory.mktemp("searched"), SPEC).folder
 
 
 @pytest.fixture(scope="module")
 def spec(searched, tmp_path_factory):
     """A specification with the points of that library."""
-    folder = tmp_path_factory.mktemp("points")
-    command = ["library", "points", str(searched), "-o", str(folder / "points"), "--quiet"]
-    assert invoke(command) == 0
-    return write_spec(folder, 'points = "points"')
+    folder = tmp_path_factory.mktemp("spec")
+    spec_of(folder, f'points = "{searched}"\n' + SPEC)
+    return folder / "spec.toml"
 
 
 def on(processor, *arguments):
@@ -118,8 +96,8 @@ def test_a_library_with_points_is_the_same_on_every_processor_and_verifies_there
 @pytest.mark.slow
 @pytest.mark.skipif(len(PROCESSORS) < 2, reason="this processor runs only one kind of OpenBLAS kernels")
 def test_a_library_without_points_is_the_same_under_other_kernels(tmp_path):
+    spec_of(tmp_path, SEARCHED)
     spec = tmp_path / "spec.toml"
-    spec.write_text(SEARCHED)
     found = []
     for number, processor in enumerate((PROCESSORS[0], PROCESSORS[-1])):
         folder = tmp_path / str(number)
@@ -153,7 +131,7 @@ def test_a_build_with_points_searches_for_nothing(searched, tmp_path):
     about = read_about(known / f"{STEM}.about.json")
     del about["certificate"]
     (known / f"{STEM}.about.json").write_text(json.dumps(about))
-    made = build(read_spec(write_spec(tmp_path, 'points = "known"')), tmp_path / "lib").folder
+    made = library_of(tmp_path, 'points = "known"\n' + SPEC).folder
     fields = read_about(made / f"{SADDLE}.about.json")["fields"]
     assert {each["energy_2norm"] for each in fields.values()} == {poor}
     assert read_library(made).entry(f"{STEM}_exact")["bounds"] == []
@@ -164,20 +142,20 @@ def test_a_submission_keeps_given_points_and_another_build_gives_the_same(search
     """A library of poor points accepts a better one, which a new build from the ledger reproduces."""
     known = shutil.copytree(searched, tmp_path / "known")
     worsened(known / f"{SADDLE}.about.json")
-    spec = write_spec(tmp_path, 'points = "known"')
-    made = build(read_spec(spec), tmp_path / "lib").folder
+    spec = spec_of(tmp_path, 'points = "known"\n' + SPEC)
+    made = build(spec, tmp_path / "lib").folder
     assert submit_one(made, searched / f"{SADDLE}_exact.sol").better_point
     assert verify_library(made) == []
     other = tmp_path / "other"
     other.mkdir()
     for path in (made / "ledger.json", *made.glob("cf_*_exact.field.json")):
         shutil.copy(path, other)
-    assert content(build(read_spec(spec), other).folder) == content(made)
+    assert content(build(spec, other).folder) == content(made)
 
 
 @pytest.mark.slow
-def test_points_of_another_instance_are_reported_and_do_not_count(spec, searched, tmp_path):
-    text = spec.read_text().replace("seeds = [1]", "seeds = [2]").replace('"points"', '"known"')
+def test_points_of_another_instance_are_reported_and_do_not_count(searched, tmp_path):
+    text = 'points = "known"\n' + SPEC.replace("seeds = [1]", "seeds = [2]")
     known = shutil.copytree(searched, tmp_path / "known")
     other = "cf_rand_n003_s2"
     for path in [*known.glob(f"{STEM}.*"), *known.glob(f"{STEM}_box.*")]:
@@ -185,9 +163,8 @@ def test_points_of_another_instance_are_reported_and_do_not_count(spec, searched
         if path.name.endswith(".about.json"):
             renamed = renamed.replace(STEM.encode(), other.encode())
         path.with_name(path.name.replace(STEM, other)).write_bytes(renamed)
-    (tmp_path / "spec.toml").write_text(text)
     lines = []
-    made = build(read_spec(tmp_path / "spec.toml"), tmp_path / "lib", progress=lines.append).folder
+    made = build(spec_of(tmp_path, text), tmp_path / "lib", progress=lines.append).folder
     assert [line for line in lines if "another instance" in line] == [
         f"{name}: the points given are of another instance; searched for others"
         for name in (f"{other}_box", other)
@@ -196,20 +173,13 @@ def test_points_of_another_instance_are_reported_and_do_not_count(spec, searched
 
 
 @pytest.mark.slow
-def test_points_that_are_missing_or_damaged_are_refused(searched, spec, tmp_path):
+def test_points_that_are_missing_or_damaged_are_refused(searched, tmp_path):
     with pytest.raises(InputError, match="points: there is no points"):
-        read_spec(write_spec(tmp_path, 'points = "points"'))
+        spec_of(tmp_path, 'points = "points"\n' + SPEC)
     known = shutil.copytree(searched, tmp_path / "known")
     (known / f"{STEM}.field.json").write_text("{}")
     with pytest.raises(InputError, match=rf"lists {STEM}\.field\.json, which is missing or another file"):
         read_points(known)
-
-
-@pytest.mark.slow
-def test_points_are_fields_certificates_and_facts_alone(spec):
-    names = {path.name for path in (spec.parent / "points").iterdir()}
-    assert {name.split(".", 1)[1] for name in names} >= {"about.json", "field.json", "certificate.npz"}
-    assert not [name for name in names if name.endswith((".instance.json", ".mps.gz"))]
 
 
 # The library that ships

@@ -1,8 +1,9 @@
-"""Releases: one archive with a checksum, the same bytes for the same library, and only of a sound one."""
+"""Origin, licence and citation of a library follow from its specification; releases are archives of it."""
 
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import tarfile
@@ -13,80 +14,222 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.checking.release import release_library
-from crossfield.export.library.plan.spec import read_spec
+from crossfield.export.library.documents.citation import REFERENCES, terms
+from crossfield.export.library.plan.recipe import plan
+from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.errors import InputError, OutputError
+from crossfield.models.sketch.samples import sample_svg
+from libraries import spec_of
 
-pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
+pytestmark = pytest.mark.usefixtures("short_searches")
 
-SPEC = """format = "crossfield-library-spec"
-version = 1
-title = "Tests, and more"
-formulations = ["qp"]
-[rungs.tiny]
-sizes = [3, 4]
+FORMULATION = 'formulations = ["qp"]\n'
+RELEASE = """[release]
+version = "1.2"
+date = "2026-03-01"
+authors = ["The testers", "A. Name"]
+"""
+RUNG = """[rungs.tiny]
+sizes = [4]
 formats = ["mps"]
 prove = false
-[[sketches]]
+"""
+OURS = """[[sketches]]
 name = "mouse"
 sample = "mouse"
+author = "The crossfield authors"
+license = "CC-BY-4.0"
+source = "a built-in sample"
+added = "2026-02-03"
 """
-RELEASE = '[release]\nversion = "1.2 beta"\ndate = "2026-03-01"\nauthors = ["The testers"]\n'
-TOP = "tests-and-more-1.2-beta"
+FOREIGN = """[[sketches]]
+name = "hers"
+file = "drawn by hand.svg"
+author = "A. Name"
+license = "CC-BY-NC-4.0"
+"""
+UNSTATED = """[[sketches]]
+name = "found"
+file = "drawn by hand.svg"
+"""
+TEXTS = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md")
+
+
+def drawn_spec(folder, *parts):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "drawn by hand.svg").write_text(sample_svg("mouse"))
+    return spec_of(folder, FORMULATION + "".join(parts))
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("release")
-    (folder / "spec.toml").write_text(SPEC + RELEASE)
-    return build(read_spec(folder / "spec.toml"), folder / "library").folder
+def mixed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("mixed")
+    return build(drawn_spec(folder, RELEASE, RUNG, OURS, FOREIGN, UNSTATED), folder / "library")
 
 
-def test_the_same_library_gives_the_same_archive_with_all_its_files(library, tmp_path, capfd):
+def texts(library):
+    return {name: (library.folder / name).read_text() for name in TEXTS}
+
+
+@pytest.mark.slow
+def test_every_sketch_keeps_its_own_licence(mixed):
+    origins = {each["family"]: each.get("origin") for each in mixed.entries}
+    assert origins == {
+        "mouse": {"author": "The crossfield authors", "license": "CC-BY-4.0", "source": "a built-in sample"},
+        "hers": {"author": "A. Name", "license": "CC-BY-NC-4.0"},
+        "found": None,
+    }
+    assert [each["licence"] for each in mixed.entries] == ["CC-BY-4.0", "CC-BY-NC-4.0", None]
+    assert [each.get("added") for each in mixed.entries] == ["2026-02-03", None, None]
+    about = json.loads((mixed.folder / "cf_hers_n004.about.json").read_text())
+    assert about["origin"] == origins["hers"]
+    assert all(each["references"] == list(REFERENCES) for each in mixed.entries)
+    licence = texts(mixed)["LICENSE"]
+    assert "- mouse: CC-BY-4.0; author: The crossfield authors; source: a built-in sample\n" in licence
+    assert "- hers: CC-BY-NC-4.0; author: A. Name\n" in licence
+    assert "- found: no licence is stated; ask its author" in licence
+    assert "SPDX-License-Identifier" not in licence
+    assert not re.search(r"^license:", texts(mixed)["CITATION.cff"], re.MULTILINE)
+    assert verify_library(mixed.folder) == []
+
+
+@pytest.mark.slow
+def test_without_a_licence_no_text_states_cc_by(tmp_path):
+    plain = build(drawn_spec(tmp_path, RUNG, UNSTATED), tmp_path / "library")
+    assert not [name for name, text in texts(plain).items() if re.search("CC.BY", text)]
+    assert not any("CC-BY" in path.read_text() for path in plain.folder.glob("*.json"))
+    assert set(plain.document["release"]) == {"title", "authors"}
+    assert plain.document["release"]["authors"] == []
+    ours = build(drawn_spec(tmp_path / "ours", RELEASE, RUNG, OURS), tmp_path / "other")
+    assert "SPDX-License-Identifier: CC-BY-4.0\n" in texts(ours)["LICENSE"]
+    assert "\nlicense: CC-BY-4.0\n" in texts(ours)["CITATION.cff"]
+    assert "Licence of everything in this folder: CC-BY-4.0, see" in texts(ours)["README.md"]
+
+
+@pytest.mark.slow
+def test_index_and_texts_state_the_release(mixed):
+    yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
+    release = mixed.document["release"]
+    assert {key: release[key] for key in ("title", "authors", "version", "date")} == {
+        "title": "a library for tests",
+        "authors": ["The testers", "A. Name"],
+        "version": "1.2",
+        "date": "2026-03-01",
+    }
+    shown = yaml.safe_load(texts(mixed)["CITATION.cff"])
+    assert [shown[key] for key in ("title", "version", "date-released")] == [
+        release[key] for key in ("title", "version", "date")
+    ]
+    assert [each["name"] for each in shown["authors"]] == release["authors"]
+    assert shown["references"][0]["doi"] == "10.1145/2710026"
+    assert "Extrapolating curvature lines" in shown["message"]
+    assert "## 1.2, 2026-03-01" in texts(mixed)["CHANGELOG.md"]
+
+
+def test_a_licence_of_the_library_is_known_and_that_of_all_sketches(tmp_path):
+    known = drawn_spec(tmp_path, RUNG, OURS)
+    other = OURS.replace("mouse", "saddle")
+    assert terms(known.sketches)["licence"] == "CC-BY-4.0"
+    for more in (FOREIGN, UNSTATED, other.replace("CC-BY-4.0", "mine")):
+        assert terms(drawn_spec(tmp_path, RUNG, OURS, more).sketches)["licence"] == ""
+    assert terms(drawn_spec(tmp_path, RUNG, OURS.replace("CC-BY-4.0", "all mine")).sketches)["licence"] == ""
+    assert terms(drawn_spec(tmp_path, RUNG, OURS, other).sketches)["licence"] == "CC-BY-4.0"
+
+
+@pytest.mark.slow
+def test_another_origin_makes_an_instance_again_and_a_forged_one_is_found(mixed, tmp_path):
+    folder = shutil.copytree(mixed.folder, tmp_path / "library")
+    stolen = FOREIGN.replace("A. Name", "B. Name")
+    again = build(drawn_spec(tmp_path, RELEASE, RUNG, OURS, stolen, UNSTATED), folder)
+    assert again.entry("cf_hers_n004_qp")["origin"]["author"] == "B. Name"
+    assert verify_library(folder) == []
+    for name in ("cf_found_n004_qp.json", "cf_found_n004.about.json"):
+        path = folder / name
+        whole = path.read_text()
+        path.write_text(json.dumps(json.loads(whole) | {"origin": {"license": "CC0-1.0"}}))
+        assert "states another origin" in " ".join(str(each) for each in verify_library(folder))
+        path.write_text(whole)
+    index = json.loads((folder / "library.json").read_text())
+    index["release"]["authors"] = ["M. Allory"]
+    (folder / "library.json").write_text(json.dumps(index))
+    assert "library.json: is not what follows from the specification" in " ".join(
+        str(each) for each in verify_library(folder)
+    )
+
+
+def test_an_invalid_origin_or_release_is_refused(tmp_path):
+    for text, words in (
+        (OURS.replace('"2026-02-03"', "2026-02-03"), r"sketches\[0\]\.added: must be a day in quotes"),
+        (OURS.replace("02-03", "02-30"), r"sketches\[0\]\.added: '2026-02-30' is no day"),
+        (OURS.replace('"CC-BY-4.0"', "4"), r"sketches\[0\]\.license: must be one line of text"),
+        (OURS + '[release]\nversion = "1"\n', "release.date: there is none; write a day in quotes"),
+    ):
+        with pytest.raises(InputError, match=words):
+            drawn_spec(tmp_path, RUNG, text)
+
+
+def test_the_shipped_library_states_release_and_origins():
+    spec = default_spec()
+    assert spec.release is not None
+    assert spec.release.authors == ("The crossfield authors",)
+    assert {each.origin.license for each in spec.sketches} == {"CC-BY-4.0"}
+    assert {each.origin.author for each in spec.sketches} == {"The crossfield authors"}
+    assert all(each.recipe.added for each in plan(spec))
+
+
+# releases
+
+
+@pytest.mark.slow
+def test_the_same_library_gives_the_same_archive_with_all_its_files(mixed, tmp_path, capfd):
     first = tmp_path / "first.tar.gz"
-    assert invoke(["library", "release", str(library), "-o", str(first), "--json"]) == 0
+    assert invoke(["library", "release", str(mixed.folder), "-o", str(first), "--json"]) == 0
     stated = json.loads(capfd.readouterr().out)
-    copy = Path(shutil.copytree(library, tmp_path / "copy"))
+    copy = Path(shutil.copytree(mixed.folder, tmp_path / "copy"))
     for path in copy.iterdir():
         os.utime(path, (1, 1))
         path.chmod(0o600)
     second = release_library(copy, tmp_path / "elsewhere" / "second.tar.gz", jobs=2)
-    assert first.read_bytes() == second.file.read_bytes()
-    assert stated["sha256"] == second.sha256 == hashlib.sha256(first.read_bytes()).hexdigest()
+    assert first.read_bytes() == Path(second["file"]).read_bytes()
+    assert stated["sha256"] == second["sha256"] == hashlib.sha256(first.read_bytes()).hexdigest()
     with tarfile.open(first) as archive:
         assert {(each.uid, each.uname, each.mode) for each in archive} == {(0, "", 0o644)}
         held = {each.name: archive.extractfile(each).read() for each in archive}
-    assert held == {f"{TOP}/{path.name}": path.read_bytes() for path in library.iterdir()}
+    assert held == {
+        f"a-library-for-tests-1.2/{path.name}": path.read_bytes() for path in mixed.folder.iterdir()
+    }
     assert list(held) == sorted(held)
     shutil.unpack_archive(first, tmp_path / "unpacked")
-    assert verify_library(tmp_path / "unpacked" / TOP) == []
-    assert not (library / ".lock").exists()
+    assert verify_library(tmp_path / "unpacked" / "a-library-for-tests-1.2") == []
+    assert not (mixed.folder / ".lock").exists()
 
 
-def test_the_system_checks_its_checksum(library, tmp_path):
+@pytest.mark.slow
+def test_the_system_checks_its_checksum(mixed, tmp_path):
     if shutil.which("sha256sum") is None:
         pytest.skip("sha256sum is not installed")
-    frozen = release_library(library, tmp_path / "it.tar.gz")
-    command = ["sha256sum", "--check", "--quiet", f"{frozen.file.name}.sha256"]
+    release_library(mixed.folder, tmp_path / "it.tar.gz")
+    command = ["sha256sum", "--check", "--quiet", "it.tar.gz.sha256"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-def test_a_library_without_version_or_with_defects_is_not_released(library, tmp_path, capfd):
-    copy = Path(shutil.copytree(library, tmp_path / "copy"))
+@pytest.mark.slow
+def test_a_library_without_version_or_with_defects_is_not_released(mixed, tmp_path, capfd):
+    copy = Path(shutil.copytree(mixed.folder, tmp_path / "copy"))
     (copy / "LICENSE").write_text("mine\n")
     (copy / "notes.txt").write_text("x")
     assert invoke(["library", "release", str(copy), "-o", str(tmp_path / "it.tar.gz")]) == 1
     shown = capfd.readouterr()
     assert shown.out == ""
     assert "does not verify, so it is not released: LICENSE: has another SHA-256" in shown.err
-    (tmp_path / "spec.toml").write_text(SPEC)
-    plain = build(read_spec(tmp_path / "spec.toml"), tmp_path / "plain").folder
+    plain = build(drawn_spec(tmp_path, RUNG, OURS), tmp_path / "plain").folder
     with pytest.raises(InputError, match=r"states no version and no day; write \[release\]"):
         release_library(plain, tmp_path / "it.tar.gz")
     with pytest.raises(InputError, match=r"it\.rar: is no name of a release; let it end in \.tar\.gz"):
-        release_library(library, tmp_path / "it.rar")
+        release_library(mixed.folder, tmp_path / "it.rar")
     with pytest.raises(OutputError, match="lies inside the library"):
-        release_library(library, library / "it.tar.gz")
+        release_library(mixed.folder, mixed.folder / "it.tar.gz")
     with pytest.raises(InputError, match="is no library"):
         release_library(tmp_path, tmp_path.with_name("it.tar.gz"))
     assert not list(tmp_path.glob("it.*"))

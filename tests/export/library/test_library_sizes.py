@@ -9,13 +9,11 @@ from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError
+from libraries import HEAD
 
 pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
 
-SPEC = """format = "crossfield-library-spec"
-version = 1
-title = "a library for tests"
-formulations = ["milp", "qp"]
+SPEC = """formulations = ["milp", "qp"]
 [rungs.tiny]
 sizes = [2, 3]
 formats = ["mps"]
@@ -33,7 +31,7 @@ COARSE = "its outline leaves no room for a curvature line on so coarse a grid; c
 @pytest.fixture
 def spec(tmp_path):
     path = tmp_path / "spec.toml"
-    path.write_text(SPEC + MOUSE)
+    path.write_text(HEAD + SPEC + MOUSE)
     return path
 
 
@@ -73,7 +71,7 @@ def test_an_instance_that_is_skipped_without_need_is_found(spec, tmp_path):
 
 
 def test_a_library_of_which_nothing_is_left_is_an_error(spec, tmp_path):
-    spec.write_text(SPEC)
+    spec.write_text(HEAD + SPEC)
     with pytest.raises(InputError, match="every grid is too coarse for its sketch; cf_bottle_n003"):
         build(read_spec(spec), tmp_path / "library")
     assert not (tmp_path / "library" / "library.json").exists()

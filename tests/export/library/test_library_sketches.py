@@ -3,14 +3,13 @@
 import shutil
 
 import pytest
-from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.plan.spec import read_spec
 from crossfield.export.library.site.site import write_site
 from crossfield.models.errors import InputError
 from crossfield.models.instance.file import read_instance
 from crossfield.models.sketch.read import instance_of
 from forging import seal
+from libraries import library_of
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -33,11 +32,7 @@ stroke-width="0.375" stroke-linecap="round" stroke-linejoin="round">
 <path stroke="#c8102e" d="M20 60L120 60M70 30L70 90"/>
 </svg>
 """
-SPEC = """
-format = "crossfield-library-spec"
-version = 1
-title = "sketches"
-formulations = ["qp-fixed"]
+SPEC = """formulations = ["qp-fixed"]
 [rungs.medium]
 sizes = [8]
 formats = ["lp"]
@@ -51,8 +46,7 @@ file = "evil.html"
 def built(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sketches")
     (folder / "evil.html").write_bytes(HOSTILE)
-    (folder / "spec.toml").write_text(SPEC)
-    return build(read_spec(folder / "spec.toml"), folder / "lib").folder
+    return library_of(folder, SPEC).folder
 
 
 @pytest.fixture

@@ -61,8 +61,8 @@ def test_blocks_are_the_columns_that_no_entry_joins():
         len(set(rows)) for rows in {tuple(np.flatnonzero(row)) for row in joined[held.any(axis=1)]}
     )
     found = blocks(hessian(problem))
-    assert (found.count, found.least, found.greatest) == (len(sizes), sizes[0], sizes[-1])
-    assert found.average == sum(sizes) / len(sizes)
+    assert found["average"] == sum(sizes) / len(sizes)
+    assert (found["count"], found["least"], found["greatest"]) == (len(sizes), sizes[0], sizes[-1])
     assert counts(problem)["nonlinear_variables"] == sum(sizes)
 
 

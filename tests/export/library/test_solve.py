@@ -1,0 +1,220 @@
+"""Runs of installed solvers on a library, and the status of entries that follows from runs."""
+
+import shutil
+from dataclasses import replace
+from itertools import combinations
+
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.cli.library_command import solve_command
+from crossfield.export.library.building.build import rebuild
+from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.contributions.solve import drop_refuted, solve_library
+from crossfield.export.library.documents.documents import read_library, read_sidecar
+from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
+from crossfield.export.library.ledger.standing import (
+    MAKERS,
+    contradicts,
+    cut,
+    is_proven,
+    relative_gap,
+    standing,
+)
+from crossfield.export.solvers_table import SOLVERS
+from crossfield.models.errors import CrossfieldError, InputError
+from libraries import OPEN, library_of
+
+MILP, BILINEAR = "cf_rand_n004_s6_milp", "cf_rand_n004_s6_bilin1"
+SMALL = """formulations = ["bilin1", "milp", "qp"]
+[rungs.tiny]
+sizes = [3]
+formats = ["mps"]
+[[sketches]]
+name = "a"
+sample = "mouse"
+"""
+
+
+@pytest.fixture(scope="module")
+def small(short_searches, tmp_path_factory):
+    """A library of one instance; not to be changed."""
+    return library_of(tmp_path_factory.mktemp("small"), SMALL).folder
+
+
+@pytest.fixture
+def copy(small, tmp_path):
+    return shutil.copytree(small, tmp_path / "copy")
+
+
+def record_of(lib, solver, name=MILP, **given):
+    sidecar = read_sidecar(lib / f"{name}.json")
+    facts = {"status": "optimal", "bound": sidecar["best"]["objective"]} | given
+    return Record(name, sidecar["problem_sha256"], solver, "1", **facts)
+
+
+# bounds and status
+
+
+def test_the_rule_of_bounds():
+    """A little above a feasible point a bound is cut to it; far above it is wrong."""
+    assert cut(8.4e-9, 1.3e-28) == 1.3e-28
+    assert not contradicts(8.4e-9, 1.3e-28)
+    assert contradicts(1e-3, 1.3e-28)
+    assert cut(0.4, 0.5) == 0.4
+    assert is_proven(1.3e-28, cut(8.4e-9, 1.3e-28))
+    assert relative_gap(1.3e-28, 1.3e-28) == 0.0
+
+
+def test_agreement_needs_three_makers_whatever_the_order():
+    """Every three programs of the table agree when, and only when, their makers differ."""
+    for chosen in combinations(SOLVERS.values(), 3):
+        records = [Record("cf_a", "0" * 64, each.title, "1", "optimal", bound=1.0) for each in chosen]
+        different = len({each.maker for each in chosen}) == 3
+        for given in (records, records[::-1]):
+            assert ("solved" in standing(1.0, [], given, "cf_a")) == different
+        assert "solved" not in standing(1.0, [], [replace(records[0], bound=0.9), *records[1:]], "cf_a")
+    assert MAKERS["CPLEX in GAMS"] == MAKERS["CPLEX"]
+
+
+def test_three_known_programs_of_different_makers_solve_an_entry_and_those_like_it(lib):
+    for solver in ("A", "B", "C", "CBC", "Bonmin", "HiGHS"):
+        add_record(lib, record_of(lib, solver))
+    rebuild(lib)
+    sidecar = read_sidecar(lib / f"{MILP}.json")
+    assert (sidecar["status"], len(sidecar["claimed"])) == ("claimed", 6)
+    add_record(lib, record_of(lib, "Gurobi", BILINEAR))
+    rebuild(lib)
+    sidecar = read_sidecar(lib / f"{MILP}.json")
+    assert (sidecar["status"], sidecar["solved"]["by"]) == ("optimal", "agreement")
+    programs = sidecar["solved"]["programs"]
+    assert [each["solver"] for each in programs] == ["Bonmin", "CBC", "Gurobi", "HiGHS"]
+    assert programs[2]["via"] == BILINEAR
+    assert f"=opt= {BILINEAR} " in (lib / "library.solu").read_text()
+    assert verify_library(lib) == []
+
+
+def test_a_bound_of_another_problem_is_never_taken(lib):
+    other = replace(record_of(lib, "Any"), problem_sha256="0" * 64)
+    for record in (other, record_of(lib, "Any", bound=0.001, status="limit")):
+        add_record(lib, record)
+    after = rebuild(lib).entry(MILP)
+    assert [each["bound"] for each in after["bounds"]] == [0.001]
+    assert after["status"] == "best known"
+    assert len(read_ledger(lib).records) == 2
+
+
+@pytest.mark.parametrize("above, error", [(4e-7, None), (1e-2, InputError)])
+def test_a_bound_above_the_point_is_cut_or_refused(above, error, lib):
+    best = read_sidecar(lib / f"{MILP}.json")["best"]["objective"]
+    add_record(lib, record_of(lib, "S", bound=best + above, status="limit"))
+    if error is not None:
+        with pytest.raises(error, match=r"ledger\.json: has the bound .* take its record out"):
+            rebuild(lib)
+        found = {finding.file: finding.what for finding in verify_library(lib)}
+        assert f"has the bound {best + above!r}" in found["ledger.json"]
+        return
+    again = rebuild(lib).entry(MILP)
+    assert again["bound"] == best == max(each["bound"] for each in again["bounds"])
+    assert (again["status"], again["gap"]) == ("claimed", 0.0)
+    assert again["claimed"] == [{"solver": "S", "version": "1"}]
+    assert verify_library(lib) == []
+
+
+def test_measured_bounds_above_a_point_found_later_are_dropped_and_others_stay(lib):
+    """The library can still be built after a solver has exceeded its tolerances."""
+    best = read_sidecar(lib / f"{MILP}.json")["best"]["objective"]
+    wrong = record_of(lib, "Xpress", bound=best + 1e-4)
+    name = f"{MILP}.scip.{'0' * 12}.log"
+    sent = record_of(lib, "SCIP", bound=best + 1e-4, log=name, log_sha256="0" * 64)
+    right = record_of(lib, "HiGHS", bound=0.9 * best)
+    for record in (wrong, sent, right):
+        add_record(lib, record)
+    drop_refuted(read_library(lib))
+    after = {each.solver: each.bound for each in read_ledger(lib).records}
+    assert after == {"Xpress": None, "SCIP": sent.bound, "HiGHS": right.bound}
+
+
+# solving
+
+
+@pytest.mark.slow
+def test_solving_proves_optima_and_equivalent_entries_share_their_bounds(copy):
+    assert "=opt= cf_a_n003_milp" not in (copy / "library.solu").read_text()
+    records = solve_library(copy, solvers=["highs"], time_limit=250.0)
+    assert [(each["entry"], each["status"]) for each in records] == [
+        ("cf_a_n003_milp", "optimal"),
+        ("cf_a_n003_qp", "optimal"),
+    ]
+    library = read_library(copy)
+    milp, bilinear = library.entry("cf_a_n003_milp"), library.entry("cf_a_n003_bilin1")
+    assert (milp["status"], bilinear["status"]) == ("claimed", "claimed")
+    assert bilinear["claimed"] == [milp["claimed"][0] | {"via": "cf_a_n003_milp"}]
+    assert milp["bounds"][0]["via"] is None
+    assert bilinear["bounds"][0]["via"] == "cf_a_n003_milp"
+    solu = (copy / "library.solu").read_text().splitlines()
+    tags = {"optimal": "=opt=", "claimed": "=best="}
+    optima = [
+        f"{tags[each['status']]} {each['name']} {each['best']['objective']!r}" for each in library.entries
+    ]
+    assert [line for line in solu if not line.startswith("=bestdual=")] == optima
+    assert solve_library(copy, solvers=["highs"], time_limit=250.0) == []
+
+
+@pytest.mark.slow
+def test_every_installed_program_solves_its_problems(opened, tmp_path):
+    entries = OPEN.replace('"bilin1", "miqp", "exact", "cubic", ', "").replace("[6, 7]", "[6]")
+    lib = library_of(tmp_path, f'points = "{opened}"\n{entries}').folder
+    names = [
+        name for name in ("gurobi", "cplex", "xpress", "scip", "cbc", "glpk") if not SOLVERS[name].missing
+    ]
+    records = solve_library(lib, solvers=[*names, "highs"], time_limit=60.0, machine="a machine")
+    best = read_sidecar(lib / f"{MILP}.json")["best"]["objective"]
+    mine = {each["solver"]: each for each in records if each["entry"] == MILP}
+    assert set(mine) == {SOLVERS[name].title for name in [*names, "highs"]}
+    for record in mine.values():
+        assert record["primal"] == pytest.approx(best, abs=2e-6)
+        assert record["bound"] is None or record["bound"] <= best + 1e-6
+        assert record["machine"] == "a machine"
+    if len({SOLVERS[name].maker for name in names}) > 3:
+        assert read_sidecar(lib / f"{MILP}.json")["solved"]["by"] == "agreement"
+    assert verify_library(lib) == []
+    assert solve_library(lib, solvers=names, time_limit=60.0) == []
+
+
+def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others_run(copy, capfd):
+    """Writing a model takes longer than a nanosecond, which the command line does not accept as a limit."""
+    solve_command(copy, solver=["highs"], time_limit=1e-9)
+    said = capfd.readouterr().out
+    assert said == f"{copy / 'ledger.json'}: 2 new records, 2 from runs without a point\n"
+    records = read_ledger(copy).records
+    assert {each.entry for each in records} == {"cf_a_n003_milp", "cf_a_n003_qp"}
+    assert {(each.status, each.seconds) for each in records} == {("no point", None)}
+
+
+def test_a_solver_that_is_not_installed_is_one_line(copy, monkeypatch, hidden):
+    hidden("glpsol")
+    with pytest.raises(CrossfieldError, match=r"^glpk is not installed; apt install glpk-utils$"):
+        solve_library(copy, solvers=["glpk"])
+    monkeypatch.setitem(SOLVERS, "highs", replace(SOLVERS["highs"], package="no_such_package"))
+    with pytest.raises(CrossfieldError, match=r"^highs is not installed; pip install no_such_package$"):
+        solve_library(copy, solvers=["highs"])
+    assert read_ledger(copy).records == ()
+
+
+def test_unknown_names_damaged_ledgers_and_folders_without_a_library_are_one_line(copy, tmp_path, capfd):
+    for arguments, words in (
+        (["solve", tmp_path], "is no library"),
+        (["solve", copy, "--solver", "magic"], "there is no solver 'magic'"),
+        (["solve", copy, "--up-to", "huge"], "there is no rung 'huge'"),
+        (["build", tmp_path / "gone.toml", "-o", tmp_path / "x"], "gone.toml: cannot be read"),
+        ("{", "ledger.json: is not valid JSON"),
+        ('{"format": "x"}', "is not a file of this kind"),
+        ('{"format": "crossfield-ledger", "version": 1, "records": [{}]}', "$.records[0]"),
+    ):
+        if isinstance(arguments, str):
+            (copy / "ledger.json").write_text(arguments)
+        command = ["solve", copy, "--quiet"] if isinstance(arguments, str) else arguments
+        assert invoke(["library", *map(str, command)]) == 1
+        shown = capfd.readouterr().err
+        assert len(shown.splitlines()) == 1
+        assert words in shown
