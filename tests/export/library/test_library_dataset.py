@@ -69,7 +69,7 @@ def test_the_metadata_describe_the_table(built):
     (records,) = found["recordSet"]
     assert found["conformsTo"] == "http://mlcommons.org/croissant/1.1"
     assert found["datePublished"] == "2026-11-22"
-    assert found["license"] == ["https://creativecommons.org/licenses/by/4.0/"]
+    assert found["license"] == ["https://spdx.org/licenses/CC-BY-4.0.html"]
     assert file["sha256"] == hashlib.sha256((built.folder / TABLE).read_bytes()).hexdigest()
     assert [each["source"]["extract"]["column"] for each in records["field"]] == list(COLUMNS)
 
