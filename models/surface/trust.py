@@ -48,7 +48,8 @@ def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
     unfit, spots = float(np.mean(off > OFF)), len(field.singularities.index)
     found = {
         f"{unfit:.0%} of the crosses are more than {np.degrees(OFF):g} degrees off right angles on it: "
-        "no one surface has all these curvature lines, as where hidden lines are drawn": unfit > UNFIT,
+        "no one surface has all these curvature lines. Probably some strokes are not curvature lines; "
+        "otherwise hidden lines are drawn": unfit > UNFIT,
         f"the crosses turn round {spots} singular spots, more than a smooth surface shows": spots > SPOTS,
         f"it is nearly flat, {np.degrees(slant.mean()):.1f} degrees on average: "
         "lines that cross at right angles everywhere do not determine a shape": slant.mean() < FLAT,

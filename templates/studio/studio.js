@@ -143,7 +143,7 @@ function doubts() {
   for (const text of field?.warnings ?? []) item(`Mask: ${text}.`, action("Areas and gaps", () => choose("area")), action("Paint the mask", () => choose("paint")));
   const some = [...new Set([...field?.suspects ?? [], ...surface?.suspects ?? []])].filter(k => state.doc.strokes[k]?.mark === "line");
   state.suspects = new Set(some);
-  if (some.length) item(`${some.length === 1 ? "1 stroke does" : `${some.length} strokes do`} not fit: they may not be curvature lines.`,
+  if (some.length) item(`${some.length === 1 ? "1 stroke does" : `${some.length} strokes do`} not fit. Probably they are not curvature lines; otherwise they may be hidden lines.`,
     action("Select them", () => select(some)), action("Mark as cuts", () => { select(some); mark("cut"); }));
   for (const text of surface?.doubts ?? []) item(`Surface: ${text}.`);
   for (const text of surface?.freedom ?? []) item(`Free: ${text}.`, ...text.startsWith("inside out") ? [action("Flip", flip)] : []);
