@@ -42,7 +42,7 @@ from ..documents.documents import Library, about_file, folder_of, problem_of, re
 from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record, RunStatus, log_file, read_ledger, write_ledger
-from ..ledger.points import complete_point, field_of
+from ..ledger.points import complete_point, field_of, need_two_norm
 from ..ledger.standing import FEASIBLE, MAKERS, best_of_each, contradicts, is_better
 from .sources import Source, sources_of
 
@@ -417,6 +417,7 @@ class _Session:
     def _certificate(self, source: Source, path: Path) -> Submission:
         """Check a certificate and keep it if it proves more than the one before."""
         found = read_certificate(path)
+        need_two_norm(found, path)
         instance = found.field.instance
         sidecars = [
             each

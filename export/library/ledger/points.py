@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ....models.errors import SolutionError
+from ....models.errors import InputError, SolutionError
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem, formulate, with_integers_fixed
 from ....models.instance.grid import Floats
@@ -112,9 +112,17 @@ class Certified:
 
     @classmethod
     def of(cls, found: Certificate, file: str, data: bytes, provenance: Provenance) -> Certified:
-        """Return it as the checker found it."""
+        """Return it as the checker found it. Raises InputError unless it is in the 2-norm."""
+        need_two_norm(found, file)
         facts = {"status": found.status, "energy": found.energy, "bound": found.bound}
         return cls(Known(found.field, provenance), file, data, facts)
+
+
+def need_two_norm(certificate: Certificate, file: str | Path) -> None:
+    """Raise InputError for a certificate in another norm: entries of a library take none of it."""
+    if certificate.norm != 2:
+        what = f"is in the norm {certificate.norm}; libraries take certificates in the norm 2 only"
+        raise InputError(what, file=file)
 
 
 def certified(start: CrossField, file: str) -> tuple[Known, Certified | None]:

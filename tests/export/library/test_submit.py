@@ -398,6 +398,16 @@ def test_a_certificate_needs_an_entry_of_its_norm(opened, sent, tmp_path):
         submit_one(lib, sent / "s6.npz")
 
 
+def test_a_certificate_in_another_norm_is_refused(lib, sent, tmp_path):
+    """It bounds another energy than that of the entries, which it would make optimal."""
+    instance = cf.read_certificate(sent / "s6.npz").field.instance
+    write_certificate(cf.prove(instance, norm=1, jobs=1), tmp_path / "it.npz")
+    before = content(lib)
+    with pytest.raises(InputError, match=r"it\.npz: is in the norm 1; libraries take .* the norm 2"):
+        submit_one(lib, tmp_path / "it.npz")
+    assert content(lib) == before
+
+
 def test_a_point_below_a_dual_bound_is_refused(lib, sent, solved):
     change(lib / f"{MILP}.json", bound=solved[1].objective * 1.01)
     with pytest.raises(SolutionError, match="that bound is wrong"):
