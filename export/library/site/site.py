@@ -281,12 +281,24 @@ def _replacing_folder(output: Path) -> Iterator[Path]:
         stage.mkdir()
         try:
             yield stage
-            if output.exists():
-                shutil.rmtree(output)
-            stage.rename(output)
+            _take_place(stage, output)
         finally:
             shutil.rmtree(stage, ignore_errors=True)
     except OSError as error:
         raise OutputError(
             f"cannot be written: {error.strerror}; free some space or choose another folder", file=output
         ) from error
+
+
+def _take_place(stage: Path, output: Path) -> None:
+    """Rename the new folder to the old one's name; restore the old one if that fails."""
+    old = neighbour(output)
+    if output.exists():
+        output.rename(old)
+    try:
+        stage.rename(output)
+    except OSError:
+        if old.exists():
+            old.rename(output)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
