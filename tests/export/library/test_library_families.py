@@ -8,7 +8,7 @@ import pytest
 from clusters import cluster
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.ledger import points
+from crossfield.export.library.ledger import points as points_made
 from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec, spec_of
@@ -239,7 +239,7 @@ def test_an_interrupted_family_goes_on_where_it_was_with_the_same_bytes(built, t
 @pytest.mark.slow
 def test_a_large_certificate_of_an_optimum_is_kept(tmp_path, monkeypatch):
     """It was left out with its field, although it proved the optimum."""
-    monkeypatch.setattr(points, "_MOST_BYTES", 1)  # which any certificate exceeds
+    monkeypatch.setattr(points_made, "_MOST_BYTES", 1)  # which any certificate exceeds
     text = SMALL.replace('"3-5"', "[524]").replace("[3]", "[5]").replace("0.3", "0.2")
     text = text.replace('"exact", "milp"', '"exact"').replace(', "box"', "").replace("split", "# split")
     (entry,) = build(read_spec(written(tmp_path, text)), tmp_path / "library").entries
