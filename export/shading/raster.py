@@ -25,6 +25,8 @@ _SLOPE: Final = 2 / 3  # change of the inside share from a pixel to the next acr
 _BLURRED_SLOPE: Final = 1 / (_BLUR * np.sqrt(2 * np.pi))
 _DRAWN: Final = 0.4  # pixels from the border to strokes on it, which pass through the middles of pixels
 _TIP: Final = 8  # most pixels of a tip; larger thin regions are parts
+_BUMP: Final = 2  # most pixels of a bump, one pixel wide, that smoothing may remove; longer ones are lines
+_RAISED: Final = 0.5  # added to the mask on lines: a diagonal one alone would reach one half only
 _REACH: Final = 2  # pixels of the grid to each side that a cubic B-spline has
 
 
@@ -53,11 +55,13 @@ def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Ras
     length = np.linalg.norm(summed, axis=-1, keepdims=True)
     viewer = np.array([0.0, 0.0, 1.0])
     unit = np.where(length > 1e-9, summed / np.maximum(length, 1e-9), viewer)
-    thin = spread(_thin(mask).astype(np.float64))
+    lines = _lines(mask)
+    thin = spread((_thin(mask) | ndimage.binary_dilation(lines, np.ones((3, 3)))).astype(np.float64))
     within = _DRAWN * drawn_border(instance) * (1 - thin)
     solid = mask.astype(np.float64)
     blurred = ndimage.gaussian_filter(solid, _BLUR, mode="constant")
-    narrow, wide = spread(solid) - _SLOPE * within, spread(blurred) - _BLURRED_SLOPE * within
+    narrow = spread(solid + _RAISED * lines) - _SLOPE * within
+    wide = spread(blurred) - _BLURRED_SLOPE * within
     most = _MOVED + thin * (_MOVED_THIN - _MOVED)
     # The part of each pixel inside of the outline, where the level is one half.
     depth = np.pad(narrow + np.clip(wide - narrow, -most, most) - 0.5, 1, mode="edge")
@@ -103,6 +107,15 @@ def _thin(mask: Bools) -> Bools:
     part, _ = ndimage.label(changed, block)
     long = np.bincount(part.ravel()) > _TIP
     return np.asarray(ndimage.binary_dilation(changed & long[part], block)[3:-3, 3:-3])
+
+
+def _lines(mask: Bools) -> Bools:
+    """Pixels of parts of the mask that are one pixel wide: in no block of 2 x 2, and longer than a bump."""
+    from scipy import ndimage
+
+    single = mask & ~ndimage.binary_opening(mask, np.ones((2, 2)))
+    part, _ = ndimage.label(single, np.ones((3, 3)))
+    return np.asarray(single & (np.bincount(part.ravel()) > _BUMP)[part])
 
 
 def drawn_border(instance: Instance) -> float:

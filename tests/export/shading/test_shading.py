@@ -79,6 +79,17 @@ def test_what_is_one_pixel_thin_stays_and_so_do_thin_gaps():
     assert gap[2 * 8 + 4, 8:-8].min() == 1
 
 
+@pytest.mark.parametrize("slope, length", [(0, 10), (1, 10), (-1, 5), (0, 4)])
+def test_a_line_of_single_pixels_stays(slope, length):
+    """Diagonal lines vanished, and short ones nearly."""
+    mask = np.zeros((30, 30), dtype=bool)
+    mask[8:22, 4:14] = True
+    line = (15 + slope * np.arange(length), 14 + np.arange(length))
+    mask[line] = True
+    opacity = outlined(mask)[4::8, 4::8]
+    assert opacity[line].min() == 1
+
+
 def test_strokes_at_the_border_are_the_border():
     mask = np.ones((16, 16), dtype=bool)
     surface = surface_of(mask, lambda x, _: 0 * x)
