@@ -165,14 +165,9 @@ class Problem:
         """How its windows were narrowed, one line; empty if they were not."""
         if self.windows is None:
             return ""
-        norm = self.windows.norm
-        same = norm_of(self.formulation) == norm
-        return (
-            "alpha, beta and jumps narrowed to what a proof leaves of all fields with a "
-            f"{'mixed-norm' if norm == 'mixed' else f'{norm}-norm'} energy up to "
-            f"{self.windows.energy:.12g} ({self.windows.proof}); "
-            + ("the optimum stays" if same else "in another norm the optimum may rise")
-        )
+        if norm_of(self.formulation) == self.windows.norm:
+            return f"{self.windows.summary}; the optimum stays"
+        return f"{self.windows.summary}; in another norm the optimum may rise"
 
     @cached_property
     def blocks(self) -> dict[str, Block]:

@@ -52,6 +52,14 @@ class Windows:
                 )
 
     @property
+    def summary(self) -> str:
+        """How the windows were narrowed, one line."""
+        return (
+            "alpha, beta and jumps narrowed to what a proof leaves of all fields with a "
+            f"{self.norm}-norm energy up to {self.energy:.12g} ({self.proof})"
+        )
+
+    @property
     def data(self) -> dict[str, Any]:
         """The arrays by the names of symbols."""
         return {
