@@ -40,7 +40,8 @@ def citation_of(spec: Spec) -> str:
     release = cited(spec)
     authors = f"{', '.join(release['authors'])}: " if release["authors"] else ""
     version = f", version {release['version']}" if "version" in release else ""
-    return authors + release["title"] + version + (f", {release['date']}" if "date" in release else "")
+    day = f", {release['date']}" if "date" in release else ""
+    return f"{authors}{spec.title}{version}{day}"
 
 
 def terms(sketches: Sequence[Sketch]) -> dict[str, Any]:
