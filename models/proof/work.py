@@ -13,6 +13,7 @@ level if the best field has a vortex, and on every level where the gap shrinks s
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from statistics import median
 from typing import ClassVar, Final
@@ -65,8 +66,8 @@ class WorkLimits:
     """When to end: a deadline, a request to stop, a sufficient gap, enough work.
 
     whole: the deadline of proof and certificate. certified: whether to keep time for a certificate. work:
-    greatest number of labels; labels: those so far. pace: last measured seconds per unit of the
-    certificate's effort. kept: the seconds that the certificate is expected to take.
+    greatest number of labels; labels: those so far. measured: measures the seconds per unit of the
+    certificate's effort; pace: the last of them. kept: the seconds that the certificate is expected to take.
     """
 
     whole: Deadline
@@ -77,6 +78,7 @@ class WorkLimits:
     labels: int = 0
     pace: float = 0.0
     kept: float = 0.0
+    measured: Callable[[], float] = checking_pace
 
     @property
     def deadline(self) -> Deadline:
@@ -87,7 +89,7 @@ class WorkLimits:
         """Keep time for a certificate of that effort, unless it is too little even for the first level."""
         if not self.certified or self.whole.at == np.inf:
             return
-        self.pace = median(checking_pace() for _ in range(_MEASURED))
+        self.pace = median(self.measured() for _ in range(_MEASURED))
         seconds = effort * self.pace
         self.certified = self.kept > 0 or self.whole.left() > seconds
         self.kept = seconds if self.certified else 0.0
