@@ -927,11 +927,17 @@ def forced(sketch: Sketch, p: Array, boxes: Array) -> Array:
     if sketch.norm == 2:
         found: Array = (a <= HALF) & (math.pi * a - math.pi**2 / 4 <= 4 * least - 1e-12)
         return found
-    sizes = [np.abs(box[:, 2:]) for box in (i, j)]
-    nearest = [np.where(box[:, 2] * box[:, 3] > 0, size.min(axis=1), 0.0) for box, size in zip((i, j), sizes)]
-    smallest, largest = np.minimum(*nearest), np.minimum(*(size.max(axis=1) for size in sizes))
-    alike: Array = (a <= HALF) & (a + np.where(least >= 0, -smallest, largest) <= QUARTER)
-    return alike
+    (above, below), (same, other) = sides(i[:, 2:]), sides(sign(p)[:, None] * j[:, 2:])
+    unlike = np.maximum(np.minimum(above, other), np.minimum(below, same))
+    alike = [np.where(box[:, 2] * box[:, 3] > 0, np.abs(box[:, 2:]).min(axis=1), 0.0) for box in (i, j)]
+    g = np.where(unlike > 0, unlike, -np.minimum(*alike))
+    best: Array = (a <= HALF) & (a + g <= QUARTER)
+    return best
+
+
+def sides(intervals: Array) -> tuple[Array, Array]:
+    """How far intervals, with their ends in any order, reach above and below 0; two arrays (m,)."""
+    return np.maximum(intervals.max(axis=1), 0.0), np.maximum(-intervals.min(axis=1), 0.0)
 
 
 def beyond_windows(turned: Array, boxes: Array) -> Array:

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..field.field import AbsoluteNorm, CrossField
-from ..field.jumps import best_jumps
+from ..field.jumps import best_jumps, parity_sign
 from ..instance.grid import Floats
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
@@ -57,10 +57,12 @@ def forced_absolute(left: RemainingCells) -> ForcedAbsolute:
     """Choices that are forced on the boxes that are left."""
     kind, reach = (Forced1Norm, QUARTER) if left.lattice.norm == 1 else (ForcedMixed, HALF)
     i, j = left.lattice.instance.grid.first, left.lattice.instance.grid.second
-    (most, products), sizes = at_pairs(left), np.abs([left.beta_low, left.beta_high])
-    least = np.where((left.beta_low <= 0) & (left.beta_high >= 0), 0.0, sizes.min(axis=0))
-    greatest, same = sizes.max(axis=0), products.min(axis=0) >= 0
-    given = np.where(same, -np.minimum(least[i], least[j]), np.minimum(greatest[i], greatest[j]))
+    most, even = at_pairs(left)[0], parity_sign(left.lattice.p) > 0
+    above, below = np.maximum(left.beta_high, 0.0), np.maximum(-left.beta_low, 0.0)
+    same, other = np.where(even, above[j], below[j]), np.where(even, below[j], above[j])
+    unlike = np.maximum(np.minimum(above[i], other), np.minimum(below[i], same))
+    least = np.maximum(np.maximum(left.beta_low, -left.beta_high), 0.0)
+    given = np.where(unlike > 0, unlike, -np.minimum(least[i], least[j]))
     pairs = (most <= HALF) & (most + given <= QUARTER)
     return kind(left, pairs, np.maximum(*beyond(left)) <= reach)
 

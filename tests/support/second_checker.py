@@ -401,9 +401,11 @@ def check_jumps(problem, boxes):
         least = min((-1.0) ** p * b * d for b in (b0, b1) for d in (d0, d1))
         forced = most <= PI / 2 and PI * most - PI**2 / 4 <= 4 * least
         if problem.norm != 2:
-            sizes = [0 if low < 0 < high else min(abs(low), abs(high)) for low, high in ((b0, b1), (d0, d1))]
-            sizes += [max(abs(b0), abs(b1)), max(abs(d0), abs(d1))]
-            g = -min(sizes[:2]) if least >= 0 else min(sizes[2:])
+            nearest = [
+                0 if low < 0 < high else min(abs(low), abs(high)) for low, high in ((b0, b1), (d0, d1))
+            ]
+            ends = [((-1.0) ** p * b, d) for b in (b0, b1) for d in (d0, d1)]
+            g = max([min(abs(b), abs(d)) for b, d in ends if b * d < 0], default=-min(nearest))
             forced = most <= PI / 2 and most + g <= PI / 4
         need(forced, f"p: another jump may be better at the pixels {problem.pixels[[i, j]].tolist()}")
 

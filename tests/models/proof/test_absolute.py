@@ -54,6 +54,15 @@ def test_certificates_are_confirmed_by_a_second_checker(norm, seed, strokes, tmp
     assert (read.norm, read.status, read.bound) == (norm, "optimal", written.bound)
 
 
+def test_boxes_that_reach_no_skew_of_one_sign_force_jumps_in_the_checker_too(tmp_path):
+    """The checker's boxes are wider by a margin, so their ends at 0 lie beyond it."""
+    instance = cf.entry("cf_rand_n006_s1_miqp").instance
+    assert (
+        write_certificate(cf.prove(instance, norm="mixed", jobs=1), tmp_path / "it.npz").status == "optimal"
+    )
+    assert check(arrays_of(tmp_path / "it.npz")) > 0
+
+
 @NORMS
 def test_a_bound_without_forced_jumps_is_confirmed(norm, tmp_path):
     proof = cf.prove(random_instance(5, (3, 3), 9), norm=norm, jobs=1, work=1)
