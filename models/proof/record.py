@@ -56,7 +56,7 @@ class LevelRecord(Lattice):
     @classmethod
     def of(cls, dual: Dual, energy: float) -> Self:
         """The record of a dual; its shares are first rounded to multiples of their quantum."""
-        quantum, state = dual.quantise(), dual.state
+        quantum, state = dual.quantise(energy - dual.bound()), dual.state
         shares = {name: getattr(state, name).copy() for name in ("shares_first", "shares_second")}
         clusters = state.clusters._replace(tables=state.clusters.tables.copy())
         return cls.on(

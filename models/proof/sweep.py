@@ -39,6 +39,7 @@ from .slack import quad_slacks
 from .state import Clusters, Indices, State
 
 _ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
+_LOST: Final = 0.02  # share of the gap that rounding shares may cost at most; a fifth of it is usual
 _ROUNDING: Final = 32 * 2.0**-53
 """Relative error of a term: eight numbers, with angles right to four units in the last place, squared."""
 
@@ -146,11 +147,18 @@ class Dual:
         """Expected seconds of a pass over another lattice, after one over this one."""
         return self.seconds * lattice.work / max(self.lattice.work, 1.0)
 
-    def quantise(self) -> float:
-        """Round the shares to whole multiples of a power of two, and return it; see `LevelRecord`."""
+    def quantise(self, gap: float = 0.0) -> float:
+        """Round the shares to whole multiples of a power of two, and return it; see `LevelRecord`.
+
+        Multiples of a greater power take less space in a certificate. gap: of the level's bound, of which
+        the rounding costs a small part at most.
+        """
         both = (self.state.shares_first, self.state.shares_second, self.state.clusters.tables)
         most = max(*(_most(shares) for shares in both), 2.0**-16)
-        quantum = 2.0 ** (math.ceil(math.log2(most)) - (30 if self.lattice.norm == 2 else 48))
+        least = 2.0 ** (math.ceil(math.log2(most)) - (30 if self.lattice.norm == 2 else 48))
+        # Shares and tables, wrong by half a quantum, enter the minima of pixels and pairs, or of clusters.
+        wrong = 2 * len(self.state.first) + 4 * len(self._of_clusters)
+        quantum = 2.0 ** math.floor(math.log2(max(_LOST * gap / max(wrong, 1), least)))
         for shares in both:
             np.round(shares / quantum, out=shares)
             np.multiply(shares, quantum, out=shares)

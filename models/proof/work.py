@@ -12,6 +12,7 @@ level if the best field has a vortex, and on every level where the gap shrinks s
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -46,6 +47,7 @@ _SLOWEST: Final = 0.005  # the same on the last level
 _MOST_ROUNDS: Final = 40  # a level
 _CLUSTERS: Final = 12  # quads that become clusters first
 _MORE_CLUSTERS: Final = 6  # later
+_QUADS: Final = 0.15  # share of all quads that may become clusters at once
 _STALLED: Final = 0.3  # share of the gap, left by half the spacing, above which there are more; 1/4 is usual
 _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
 MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
@@ -242,7 +244,8 @@ class Work:
         vortex = len(gaps) == 1 and len(self.best.singularities.index) > 0
         if not vortex and not (len(gaps) == 2 and gaps[1] > _STALLED * gaps[0]):
             return 0
-        return _MORE_CLUSTERS if len(self.chain.levels[-1].clusters.quads) else _CLUSTERS
+        most = _MORE_CLUSTERS if len(self.chain.levels[-1].clusters.quads) else _CLUSTERS
+        return min(most, math.ceil(_QUADS * len(self.instance.grid.quads)))
 
     def _ended(self) -> str:
         """The reason why the work ends; empty if it goes on."""
