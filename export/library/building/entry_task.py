@@ -14,7 +14,7 @@ from typing import Any
 
 from ....models.errors import InputError, UnsupportedByFormatError
 from ....models.field.file import read_field
-from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
+from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, formulate
 from ....models.instance.file import read_instance
 from ....models.instance.grid import Ints
@@ -44,7 +44,7 @@ from ..ledger.standing import (
     standing,
 )
 from ..plan.equivalence import equivalent, notes_of
-from ..plan.recipe import EntryRecipe, InstancePlan, digest
+from ..plan.recipe import EntryRecipe, InstancePlan, digest, norm_minimised
 from .instance_task import Evidence, Files, Preparation, Submitted
 
 _TANGENT = "tangent at the point"
@@ -176,10 +176,12 @@ def _bounds(task: Entry, best: Best, records: list[Record]) -> list[dict[str, An
     for record in best_of_each((each for each in records if each.bound is not None), name):
         via = None if record.entry == name else record.entry
         found.append({key: getattr(record, key) for key in stated} | {"via": via})
-    tangent, certificate = tangent_bound(best.problem, best.point), task.about.get("certificate")
+    tangent = tangent_bound(best.problem, best.point)
+    norm = norm_minimised(task.recipe.formulation, task.recipe.facet)
+    certificate = task.about.get("certificates", {}).get(str(norm))
     if tangent is not None:
         found.append(_computed(_TANGENT, tangent))
-    if certificate is not None and FORMULATIONS[task.recipe.formulation].minimises == TWO_NORM:
+    if certificate is not None:
         found.append(_computed(METHOD, certificate["bound"]) | {"certificate": certificate["file"]})
     for each in found:
         bound = float(each["bound"])
@@ -279,7 +281,7 @@ class Inputs:
     def preparation(self, each: InstancePlan) -> Preparation:
         """Return the task of an instance. Raises InputError, InstanceError for a damaged file."""
         name = each.recipe.name
-        return Preparation(each.recipe, self._submitted(each), self.points(name), self._certificate(name))
+        return Preparation(each.recipe, self._submitted(each), self.points(name), self._certificates(name))
 
     def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
         """Yield the tasks of its entries. Raises as `preparation`, and InputError for a missing file."""
@@ -299,10 +301,15 @@ class Inputs:
         provenance = Provenance(record.solver, record.version, record.seconds, record.by)
         return Submitted(self.ledger.content(str(record.point), record.point_sha256), provenance)
 
-    def _certificate(self, instance: str) -> Evidence | None:
-        """The certificate that the ledger keeps for an instance."""
-        kept = next((each for each in self.ledger.certificates if each.instance == instance), None)
-        if kept is None:
-            return None
-        data = self.ledger.content(kept.file, kept.sha256)
-        return Evidence(kept.file, data, kept.instance_sha256, replace(ours(METHOD), by=kept.by))
+    def _certificates(self, instance: str) -> tuple[Evidence, ...]:
+        """The certificates that the ledger keeps for an instance."""
+        return tuple(
+            Evidence(
+                kept.file,
+                self.ledger.content(kept.file, kept.sha256),
+                kept.instance_sha256,
+                replace(ours(METHOD), by=kept.by),
+            )
+            for kept in self.ledger.certificates
+            if kept.instance == instance
+        )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ....models.field.field import CrossField
@@ -10,22 +12,30 @@ from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
 from ....models.search.pinned import pinned
 from ..ledger.given import Given
-from ..ledger.points import Certified, Known, better_in_1norm, certified, ours, searched_field
-from ..plan.recipe import InstanceRecipe
+from ..ledger.points import (
+    Certified,
+    Known,
+    better_in_1norm,
+    certificate_file,
+    certified,
+    ours,
+    searched_field,
+)
+from ..plan.recipe import NORMS, InstanceRecipe
 
-Found = tuple[Known, list[Known], Certified | None]
-"""The baseline, fields of low energy, and a certificate."""
+Found = tuple[Known, list[Known], list[Certified]]
+"""The baseline, fields of low energy, and certificates."""
 
 
-def found_fields(instance: Instance, recipe: InstanceRecipe, sent: Certified | None) -> Found:
-    """Return the fields that the sketch of a recipe asks for. sent: a certificate that replaces a proof."""
+def found_fields(instance: Instance, recipe: InstanceRecipe, sent: Sequence[Certified]) -> Found:
+    """Return the fields that the sketch of a recipe asks for. sent: certificates that replace proofs."""
     effort = recipe.sketch.points
     if effort == "none":
         nearest = _nearest(instance)
-        return nearest, [nearest], None
+        return nearest, [nearest], []
     baseline = Known(pinned(greedy_field(instance)), ours("greedy"))
     if effort == "greedy":
-        return baseline, [baseline], None
+        return baseline, [baseline], []
     if effort == "proven":
         low, proven = _proof(baseline, recipe, sent)
         return baseline, [baseline, *low], proven
@@ -38,8 +48,8 @@ def found_fields(instance: Instance, recipe: InstanceRecipe, sent: Certified | N
 
 def given_fields(given: Given, instance: Instance, recipe: InstanceRecipe) -> Found:
     """Return the given points, without any search; a certificate is checked."""
-    low = [given.field("least_2"), given.field("least_1")]
-    return given.field("baseline"), low, given.certificate(instance) if recipe.prove else None
+    low = [given.field(f"least_{norm}") for norm in NORMS]
+    return given.field("baseline"), low, given.certificates(instance, recipe.prove)
 
 
 def _nearest(instance: Instance) -> Known:
@@ -49,10 +59,9 @@ def _nearest(instance: Instance) -> Known:
 
 
 def _proof(
-    start: Known, recipe: InstanceRecipe, sent: Certified | None
-) -> tuple[list[Known], Certified | None]:
-    """The field and the certificate of a proof, if the recipe asks for one and none was submitted."""
-    if not recipe.prove or sent is not None:
-        return [], None
-    found, proven = certified(start.field, f"{recipe.name}.certificate.npz")
-    return [found], proven
+    start: Known, recipe: InstanceRecipe, sent: Sequence[Certified]
+) -> tuple[list[Known], list[Certified]]:
+    """The fields and certificates of proofs in the norms of the recipe that no submitted one is in."""
+    norms = [norm for norm in recipe.prove if norm not in {each.norm for each in sent}]
+    found = [certified(start.field, certificate_file(recipe.name, norm), norm) for norm in norms]
+    return [known for known, _ in found], [each for _, each in found if each is not None]

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
+from ....models.formulations.catalogue import FORMULATIONS
 from ....models.proof import check_certificate
 from ....models.storage import read_bytes, sha256_of, write_bytes
 from ....templates import ENVIRONMENT
@@ -19,7 +19,7 @@ from ..documents.citation import PAPER, REFERENCES, cited, terms
 from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, about_file, as_bytes, read_about, read_sidecar
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
-from ..plan.recipe import InstancePlan
+from ..plan.recipe import NORMS, InstancePlan, norm_minimised
 from ..plan.spec import RUNGS, Spec
 from .dataset import CROISSANT, PARQUET, croissant, parquet
 from .table import TABLE, table
@@ -91,9 +91,15 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
         "formats": [entry for name, entry in FORMATS.items() if name in written],
         "packed": any(file["name"].endswith(".gz") for each in sidecars for file in each["files"]),
         "certified": any("certificate" in bound for each in sidecars for bound in each["bounds"]),
-        "two_norm": [each for each in spec.formulations if FORMULATIONS[each].minimises == TWO_NORM],
+        "proven_by": _minimising(spec),
         "example": sidecars[0],
     }
+
+
+def _minimising(spec: Spec) -> list[str]:
+    """The formulations of a specification by the norm that they minimise."""
+    found = {norm: [each for each in spec.formulations if norm_minimised(each) == norm] for norm in NORMS}
+    return [f"norm {norm}, {', '.join(names)}" for norm, names in found.items() if names]
 
 
 def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:

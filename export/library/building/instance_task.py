@@ -25,14 +25,19 @@ from ..ledger.points import (
     certified_by,
     least_energy,
 )
-from ..plan.recipe import InstanceRecipe, digest
+from ..plan.recipe import NORMS, InstanceRecipe, digest
 from ..plan.sources import instance_from, kind_of
 from .fields import found_fields, given_fields
 
 Files = dict[str, bytes]  # by name, in the order of writing
 
-ROLES: Final = {"baseline": ".baseline.field.json", "least_1": ".l1.field.json", "least_2": ".field.json"}
-"""Roles of fields and the suffixes of their files; equal fields share the last file."""
+SUFFIXES: Final = {
+    "baseline": ".baseline.field.json",
+    "least_mixed": ".mixed.field.json",
+    "least_1": ".l1.field.json",
+    "least_2": ".field.json",
+}
+"""Suffixes of the files of fields by role; equal fields share the last file."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class Submitted:
 
 @dataclass(frozen=True)
 class Evidence:
-    """The certificate of a ledger: name and bytes of its file, its instance and its submitter."""
+    """A certificate of a ledger: name and bytes of its file, its instance and its submitter."""
 
     file: str
     data: bytes
@@ -59,12 +64,12 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Preparation:
-    """The task of an instance: its recipe, fields and certificate of the ledger, and given points."""
+    """The task of an instance: its recipe, fields and certificates of the ledger, and given points."""
 
     recipe: InstanceRecipe
     submitted: tuple[Submitted, ...] = ()
     given: Given | None = None
-    evidence: Evidence | None = None
+    evidence: tuple[Evidence, ...] = ()
 
     @property
     def name(self) -> str:
@@ -78,8 +83,8 @@ class Preparation:
             [hashlib.sha256(each.data).hexdigest(), asdict(each.provenance)] for each in self.submitted
         ]
         given = [] if self.given is None else [self.given.sha256]
-        proof = [] if self.evidence is None else [[self.evidence.file, asdict(self.evidence.provenance)]]
-        return digest([generator(), self.recipe.document(), submitted, *given, *proof])
+        proofs = [[each.file, asdict(each.provenance)] for each in self.evidence]
+        return digest([generator(), self.recipe.document(), submitted, *given, *proofs])
 
 
 def prepared(task: Preparation) -> Files | NoStrokeError:
@@ -93,9 +98,11 @@ def prepared(task: Preparation) -> Files | NoStrokeError:
 def files_of(task: Preparation, instance: Instance) -> Files:
     """Return the files of an instance that was made from the recipe of the task, its document last."""
     given = task.given if task.given and task.given.instance == instance.sha256 else None
-    evidence, sent = task.evidence, None
-    if evidence and evidence.instance_sha256 == instance.sha256:
-        sent = certified_by(evidence.data, evidence.file, instance, evidence.provenance)
+    sent = [
+        certified_by(each.data, each.file, instance, each.provenance)
+        for each in task.evidence
+        if each.instance_sha256 == instance.sha256
+    ]
     baseline, low, proven = (
         given_fields(given, instance, task.recipe) if given else found_fields(instance, task.recipe, sent)
     )
@@ -104,31 +111,28 @@ def files_of(task: Preparation, instance: Instance) -> Files:
         baseline,
         *low,
         *(each for each in submitted if each.field.instance.sha256 == instance.sha256),
-        *([sent.known] if sent else []),  # last, so that an equal field that was submitted earlier stays
+        *(each.known for each in sent),  # last, so that an equal field that was submitted earlier stays
     ]
     # The ledger does not decide on the baseline, whose jumps are the data of `qp-fixed`.
-    chosen = {
-        "baseline": baseline,
-        "least_1": least_energy(every, 1),
-        "least_2": least_energy(every, 2),
-    }
+    chosen = {"baseline": baseline} | {f"least_{norm}": least_energy(every, norm) for norm in NORMS}
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
-    for role in reversed(ROLES):
+    for role in reversed(SUFFIXES):
         known = chosen[role]
         same = next((other for other in fields if _same(chosen[other].field, known.field)), None)
-        name = f"{task.name}{ROLES[same or role]}"
+        name = f"{task.name}{SUFFIXES[same or role]}"
         if same is None:
             files[name] = field_to_json(known.field)
-        energies = {f"energy_{norm}norm": known.field.energy(norm).total for norm in (2, 1)}
+        energies = {f"energy_{norm}norm": known.field.energy(norm).total for norm in NORMS}
         fields[role] = {"file": name, **asdict(known.provenance), **energies}
-    certificates = [each for each in (sent, proven) if each is not None]
-    certificate = {}
-    if certificates:
-        best = max(certificates, key=lambda each: each.facts["bound"])
-        files[best.file] = best.data
-        certificate = {"certificate": {"file": best.file, **best.facts}}
-    about = _about(instance, task, {role: fields[role] for role in ROLES}, files) | certificate
+    certificates = {}
+    for norm in NORMS:
+        if of_norm := [each for each in (*sent, *proven) if each.norm == norm]:
+            best = max(of_norm, key=lambda each: each.facts["bound"])
+            files[best.file] = best.data
+            certificates[str(norm)] = {"file": best.file, **best.facts}
+    about = _about(instance, task, {role: fields[role] for role in SUFFIXES}, files)
+    about |= {"certificates": certificates} if certificates else {}
     return files | {about_file(task.name): as_bytes(about)}
 
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from ....models.errors import InputError, InstanceError, shortened
 from ....models.field.field import CrossField
-from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
+from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem
 from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
@@ -22,7 +22,7 @@ from ..documents.documents import about_file
 from ..ledger.given import ROLES, Given, read_point
 from ..ledger.ledger import Ledger, read_ledger
 from ..ledger.points import Known, best_point, ours
-from ..plan.recipe import EntryRecipe, InstancePlan, plan
+from ..plan.recipe import EntryRecipe, InstancePlan, norm_minimised, plan
 from ..plan.sources import instance_from
 from ..plan.spec import DEFAULT, RUNGS, Spec, default_spec
 from .entry_task import formulated, model_files
@@ -92,14 +92,15 @@ class LibraryEntry:
 
     @cached_property
     def certificate(self) -> Certificate | None:
-        """The checked certificate of the instance; None without one, and in another norm than the 2-norm.
+        """The checked certificate of the instance in the norm that the entry minimises; None without one.
 
         Raises InputError for a certificate that is refused.
         """
-        about = self._given.about
-        if FORMULATIONS[self._recipe.formulation].minimises != TWO_NORM or "certificate" not in about:
+        norm = norm_minimised(self._recipe.formulation, self._recipe.facet)
+        stated = self._given.about.get("certificates", {}).get(str(norm))
+        if stated is None:
             return None
-        return read_certificate(_points() / about["certificate"]["file"], on=self.instance)
+        return read_certificate(_points() / stated["file"], on=self.instance)
 
     def write(self, path: str | Path) -> Written:
         """Write the model file, with the same bytes as in a built library.

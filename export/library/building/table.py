@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from ....models.field.file import read_field
-from ....models.formulations.catalogue import FORMULATIONS
 from ....models.storage import read_bytes
 from ..documents.documents import about_file, read_about
+from ..plan.recipe import norm_minimised
 
 TABLE: Final = "entries.csv"
 OPEN: Final = "open"  # the status `best known` of a sidecar, in one word
@@ -51,11 +51,11 @@ def _instance(sidecar: dict[str, Any]) -> str:
     return str(sidecar["instance"]["file"]).removesuffix(".instance.json")
 
 
-def _role(sidecar: dict[str, Any]) -> str:
-    """The role of the field that shows the jumps of an entry: of fixed jumps, else the least in its norm."""
+def role_of(sidecar: dict[str, Any]) -> str:
+    """Return the role of an entry's field: with its fixed jumps, or else the best in its norm."""
     if sidecar["jumps"] is not None:
         return "baseline"
-    return "least_1" if "1-norm" in FORMULATIONS[sidecar["formulation"]].minimises else "least_2"
+    return f"least_{norm_minimised(sidecar['formulation'])}"
 
 
 def _status(sidecar: dict[str, Any]) -> str:
@@ -128,7 +128,7 @@ def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:
     vortices: dict[str, int] = {}
     for sidecar in sidecars:
         about = read_about(folder / about_file(_instance(sidecar)))
-        file = about["fields"][_role(sidecar)]["file"]
+        file = about["fields"][role_of(sidecar)]["file"]
         if file not in vortices:
             vortices[file] = len(read_field(folder / file).singularities.index)
         known = sidecar | {"vortices": vortices[file], "jumps_file": file}

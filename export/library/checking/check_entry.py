@@ -254,14 +254,14 @@ def instance_findings(folder: Path, about: dict[str, Any], task: Preparation) ->
     given = {} if task.given is None else {"given": task.given.sha256}
     made |= {"recipe_sha256": task.sha256, "given": None} | given
     for key in (
-        dict.fromkeys((*made, *about)) if about["generator"] == generator() else ("fields", "certificate")
+        dict.fromkeys((*made, *about)) if about["generator"] == generator() else ("fields", "certificates")
     ):
         if not same(about.get(key), made.get(key)):
             yield Finding(name, f"states another {key} than follows from the specification and its fields")
     if "given" in about:
         return
     known = {each.provenance for each in task.submitted}
-    known |= {task.evidence.provenance} if task.evidence else set()
+    known |= {each.provenance for each in task.evidence}
     known |= set(map(ours, ("greedy", "search", "two stages", METHOD)))
     for role, facts in about["fields"].items():
         found = Provenance.of(facts)

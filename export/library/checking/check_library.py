@@ -296,7 +296,7 @@ class _Verification:
                 self.known |= {each["name"] for each in about["files"]}
                 lost = list(self._listed(name, about["files"]))
                 yield from lost
-                if "certificate" in about:
+                if "certificates" in about:
                     self.known.add(CERTIFICATES)
                     if CERTIFICATES not in self.present:
                         yield Finding(CERTIFICATES, "is missing, which checks certificates", FETCH)

@@ -21,9 +21,9 @@ from ....models.errors import (
     UnsupportedByFormatError,
     naming,
 )
-from ....models.field.field import CrossField
+from ....models.field.field import CrossField, Norm
 from ....models.field.file import read_field
-from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
+from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, Violation
 from ....models.input_limits import MAX_LOG
 from ....models.instance.instance import Instance
@@ -42,8 +42,9 @@ from ..documents.documents import Library, about_file, folder_of, problem_of, re
 from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record, RunStatus, log_file, read_ledger, write_ledger
-from ..ledger.points import complete_point, field_of, need_two_norm
+from ..ledger.points import complete_point, field_of
 from ..ledger.standing import FEASIBLE, MAKERS, best_of_each, contradicts, is_better
+from ..plan.recipe import norm_minimised
 from .sources import Source, sources_of
 
 Outcome = Literal["accepted", "not better", "refused", "skipped"]
@@ -166,7 +167,7 @@ class _Session:
     problems: dict[str, Problem] = field(default_factory=dict)
     fields: dict[str, list[CrossField]] = field(default_factory=dict)
     bounds: dict[str, float] = field(default_factory=dict)
-    certified: dict[str, float] = field(default_factory=dict)
+    certified: dict[tuple[str, Norm], float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.ledger = read_ledger(self.library.folder)
@@ -417,28 +418,26 @@ class _Session:
     def _certificate(self, source: Source, path: Path) -> Submission:
         """Check a certificate and keep it if it proves more than the one before."""
         found = read_certificate(path)
-        need_two_norm(found, path)
-        instance = found.field.instance
+        instance, norm = found.field.instance, found.norm
         sidecars = [
             each
             for each in self._on(path, "certificate", instance)
-            if FORMULATIONS[each["formulation"]].minimises == TWO_NORM
+            if norm_minimised(each["formulation"], each["options"]["facet"]) == norm
         ]
         if not sidecars:
-            raise InputError(
-                f"proves a bound of the 2-norm, which no entry of {instance.name} minimises", file=path
-            )
+            what = f"proves a bound in the norm {norm}, which no entry of {instance.name} minimises"
+            raise InputError(what, file=path)
         names = tuple(each["name"] for each in sidecars)
         self._objective(path, sidecars[0], found.field)
         stem = sidecars[0]["instance"]["file"].removesuffix(".instance.json")
-        known, before = self._known(sidecars[0]), self._certified_bound(stem)
+        known, before = self._known(sidecars[0]), self._certified_bound(stem, norm)
         better_point = is_better(found.energy, known)
         improves = (
             before is None or is_better(-found.bound, -before) or (better_point and found.bound >= before)
         )
         if improves:
-            self.ledger = self.ledger.certified(stem, instance.sha256, read_bytes(path), self.facts.by)
-            self.certified[stem] = found.bound
+            self.ledger = self.ledger.certified(stem, norm, instance.sha256, read_bytes(path), self.facts.by)
+            self.certified[stem, norm] = found.bound
             self.fields.setdefault(instance.sha256, []).append(found.field)
             self._raise_bounds(names, found.bound)
         return Submission(
@@ -452,11 +451,11 @@ class _Session:
             better_point=improves and better_point,
         )
 
-    def _certified_bound(self, instance: str) -> float | None:
-        """The bound of the certificate that the library has of an instance."""
+    def _certified_bound(self, instance: str, norm: Norm) -> float | None:
+        """The bound of the certificate that the library has of an instance in a norm."""
         about = read_about(self.library.folder / about_file(instance))
-        stated: float | None = about.get("certificate", {}).get("bound")
-        return self.certified.get(instance, stated)
+        stated: float | None = about.get("certificates", {}).get(str(norm), {}).get("bound")
+        return self.certified.get((instance, norm), stated)
 
 
 def _has_size(log: RunLog, problem: Problem) -> bool:

@@ -7,20 +7,21 @@ the certificate that it lists. A build with them does not search, so its bytes d
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
+from ....models.field.field import Norm
 from ....models.field.file import field_of_json
 from ....models.instance.instance import Instance
 from ....models.storage import read_bytes
 from ..documents.documents import about_file, are_whole, folder_of, read_about
 from ..plan.recipe import digest
-from .points import METHOD, Certified, Known, Provenance, certified_by, ours
+from .points import METHOD, Certified, Known, Provenance, certificate_file, certified_by, ours
 
-ROLES: Final = ("baseline", "least_1", "least_2")
+ROLES: Final = ("baseline", "least_mixed", "least_1", "least_2")
 _SAME: Final = 1e-9  # processors round energies differently
 _REMEDY: Final = "make the points again with `crossfield library build --search`"
 
@@ -43,18 +44,25 @@ class Given:
         facts = self.about["fields"][role]
         return Known(field_of_json(self.files[facts["file"]]), Provenance.of(facts))
 
-    def certificate(self, instance: Instance) -> Certified | None:
-        """Return the certificate, checked. Raises InputError if it is invalid or contradicts the document."""
-        facts = dict(self.about.get("certificate", {}))
-        if not facts:
-            return None
+    def certificates(self, instance: Instance, norms: Collection[Norm]) -> list[Certified]:
+        """Return the certificates in some norms, checked.
+
+        Raises InputError if one is invalid or contradicts the document.
+        """
+        stated = self.about.get("certificates", {})
+        return [self._certificate(instance, norm, stated[str(norm)]) for norm in norms if str(norm) in stated]
+
+    def _certificate(self, instance: Instance, norm: Norm, stated: dict[str, Any]) -> Certified:
+        facts = dict(stated)
         name = facts.pop("file")
         found = certified_by(self.files[name], name, instance, ours(METHOD))
-        same = (facts["status"], facts["bound"]) == (found.facts["status"], found.facts["bound"])
+        same = (norm, facts["status"], facts["bound"]) == (
+            found.norm, found.facts["status"], found.facts["bound"],
+        )  # fmt: skip
         if not same or not math.isclose(facts["energy"], found.facts["energy"], rel_tol=_SAME, abs_tol=_SAME):
-            what = f"states another status, bound or energy than {name}; {_REMEDY}"
+            what = f"states another norm, status, bound or energy than {name}; {_REMEDY}"
             raise InputError(what, file=about_file(self.about["name"]))
-        return replace(found, file=f"{self.about['name']}.certificate.npz", facts=facts)
+        return replace(found, file=certificate_file(self.about["name"], norm), facts=facts)
 
 
 Points = Callable[[str], Given | None]  # results by the name of an instance
@@ -95,9 +103,9 @@ def given_of(folder: Path, about: dict[str, Any], sha256: str | None = None) -> 
     listed = [each for each in about["files"] if each["name"] != about["instance"]["file"]]
     if lost := [each["name"] for each in listed if not are_whole(folder, [each])]:
         raise InputError(f"lists {lost[0]}, which is missing or another file; {_REMEDY}", file=path)
-    named = [*about["fields"].values(), *([about["certificate"]] if "certificate" in about else [])]
+    named = [*about["fields"].values(), *about.get("certificates", {}).values()]
     if unlisted := {each["file"] for each in named} - {each["name"] for each in listed}:
         raise InputError(f"names {min(unlisted)} and does not list it; {_REMEDY}", file=path)
-    facts = [about[key] for key in ("name", "fields")] + [about.get("certificate"), listed]
+    facts = [about[key] for key in ("name", "fields")] + [about.get("certificates"), listed]
     files = {each["name"]: read_bytes(folder / each["name"]) for each in listed}
     return Given(about, files, sha256 or digest([about["instance"]["sha256"], *facts]))

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from ....models.errors import InputError, InstanceError, naming, shortened
-from ....models.field.field import CrossField
+from ....models.field.field import CrossField, Norm
 from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import read_document, schema_error
 from ....models.storage import read_bytes, write_bytes
@@ -89,10 +89,16 @@ class SubmittedCertificate:
     """A submitted certificate. instance: its name; sha256: of the file; by: who submitted it."""
 
     instance: str
+    norm: Norm
     instance_sha256: str
     file: str
     sha256: str
     by: str | None = None
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """The name of the instance and the norm, of which a ledger has one certificate."""
+        return self.instance, str(self.norm)
 
 
 @dataclass(frozen=True)
@@ -154,14 +160,16 @@ class Ledger:
         records = sorted({*records, record}, key=lambda each: each.rank)
         return replace(self, records=tuple(records), unwritten=unwritten), record
 
-    def certified(self, instance: str, instance_sha256: str, data: bytes, by: str | None = None) -> Ledger:
-        """Return the ledger with a certificate that replaces the earlier one of the instance."""
+    def certified(
+        self, instance: str, norm: Norm, instance_sha256: str, data: bytes, by: str | None = None
+    ) -> Ledger:
+        """Return the ledger with a certificate that replaces the earlier one of the instance in the norm."""
         check_text("by", by)
         sha256 = hashlib.sha256(data).hexdigest()
         name = f"{instance}.{sha256[:12]}.certificate.npz"
-        new = SubmittedCertificate(instance, instance_sha256, name, sha256, by)
-        others = [each for each in self.certificates if each.instance != instance]
-        certificates = tuple(sorted([*others, new], key=lambda each: each.instance))
+        new = SubmittedCertificate(instance, norm, instance_sha256, name, sha256, by)
+        others = [each for each in self.certificates if each.key != new.key]
+        certificates = tuple(sorted([*others, new], key=lambda each: each.key))
         return replace(self, certificates=certificates, unwritten={**self.unwritten, name: data})
 
     def document(self) -> dict[str, Any]:
@@ -252,12 +260,14 @@ def merged(folder: Path, other: Ledger, entries: Iterable[str], instances: Itera
             fresh.append(_without_point(record))
         if record.log is not None:
             unwritten[record.log] = other.content(record.log, record.log_sha256)
-    missing = set(instances) - {each.instance for each in ledger.certificates}
-    certificates = [each for each in other.certificates if each.instance in missing]
+    wanted, present = set(instances), {each.key for each in ledger.certificates}
+    certificates = [
+        each for each in other.certificates if each.instance in wanted and each.key not in present
+    ]
     unwritten |= {each.file: other.content(each.file, each.sha256) for each in certificates}
     return replace(
         ledger,
         records=tuple(sorted({*ledger.records, *fresh}, key=lambda each: each.rank)),
-        certificates=tuple(sorted([*ledger.certificates, *certificates], key=lambda each: each.instance)),
+        certificates=tuple(sorted([*ledger.certificates, *certificates], key=lambda each: each.key)),
         unwritten=unwritten,
     )

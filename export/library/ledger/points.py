@@ -15,8 +15,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ....models.errors import InputError, SolutionError
-from ....models.field.field import CrossField
+from ....models.errors import SolutionError
+from ....models.field.field import CrossField, Norm
 from ....models.formulations.problem import Problem, formulate, with_integers_fixed
 from ....models.instance.grid import Floats
 from ....models.instance.instance import QUARTER, Instance
@@ -33,6 +33,7 @@ _NODES: Final = {"tiny": 1000, "small": 20}  # of the branch and bound in the 1-
 _LP_UP_TO: Final = 1000  # pixels up to which the angles are fitted in the 1-norm
 _MOST_WORK: Final = 20_000_000  # labels, counted at each rounding, after which a proof ends: some minutes
 _MOST_BYTES: Final = 2_000_000  # of a certificate that leaves a gap; those of optima are kept
+_SUFFIXES: Final[dict[Norm, str]] = {2: "", 1: ".l1", "mixed": ".mixed"}
 
 
 @dataclass(frozen=True)
@@ -103,8 +104,9 @@ def _solved(problem: Problem, start: CrossField | None = None, **options: int) -
 
 @dataclass(frozen=True, eq=False)
 class Certified:
-    """A checked certificate: its field, name and bytes of its file, and status, energy and bound."""
+    """A checked certificate: norm, field, name and bytes of its file, and status, energy and bound."""
 
+    norm: Norm
     known: Known
     file: str
     data: bytes
@@ -112,29 +114,26 @@ class Certified:
 
     @classmethod
     def of(cls, found: Certificate, file: str, data: bytes, provenance: Provenance) -> Certified:
-        """Return it as the checker found it. Raises InputError unless it is in the 2-norm."""
-        need_two_norm(found, file)
+        """Return it as the checker found it."""
         facts = {"status": found.status, "energy": found.energy, "bound": found.bound}
-        return cls(Known(found.field, provenance), file, data, facts)
+        return cls(found.norm, Known(found.field, provenance), file, data, facts)
 
 
-def need_two_norm(certificate: Certificate, file: str | Path) -> None:
-    """Raise InputError for a certificate in another norm: entries of a library take none of it."""
-    if certificate.norm != 2:
-        what = f"is in the norm {certificate.norm}; libraries take certificates in the norm 2 only"
-        raise InputError(what, file=file)
+def certificate_file(instance: str, norm: Norm) -> str:
+    """Return the name of the file of a certificate that a build made."""
+    return f"{instance}{_SUFFIXES[norm]}.certificate.npz"
 
 
-def certified(start: CrossField, file: str) -> tuple[Known, Certified | None]:
-    """Prove the 2-norm optimum from a field; return the best field and the certificate.
+def certified(start: CrossField, file: str, norm: Norm = 2) -> tuple[Known, Certified | None]:
+    """Prove the optimum in a norm from a field; return the best field and the certificate.
 
     file: name in a library. The certificate is None if it is large and leaves a gap.
     """
     from ....models.proof.prove import prove  # loads compiled functions
 
-    found = prove(start.instance, start=start, work=_MOST_WORK, jobs=1)
-    field = pinned(found.field)
-    proof = replace(found, field=field, energy=field.energy().total)
+    found = prove(start.instance, norm=norm, start=start, work=_MOST_WORK, jobs=1)
+    field = pinned(found.field) if norm == 2 else found.field
+    proof = replace(found, field=field, energy=field.energy(norm).total)
     with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
         path = Path(folder) / "a.certificate.npz"
         claim = write_certificate(proof, path)
@@ -151,9 +150,9 @@ def certified_by(data: bytes, file: str, on: Instance, provenance: Provenance) -
         return Certified.of(read_certificate(path, on=on), file, data, provenance)
 
 
-def least_energy(known: Sequence[Known], norm: int) -> Known:
+def least_energy(known: Sequence[Known], norm: Norm) -> Known:
     """Return the field whose energy in a norm is lowest, the first of equal ones."""
-    return min(known, key=lambda each: each.field.energy(2 if norm == 2 else 1).total)
+    return min(known, key=lambda each: each.field.energy(norm).total)
 
 
 def complete_point(problem: Problem, found: CrossField) -> Floats:

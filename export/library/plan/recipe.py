@@ -8,19 +8,22 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
 from ....models.errors import InputError
-from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
+from ....models.field.field import Norm
+from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, declare, norm_of
 from .spec import Rung, Sketch, Spec
 
 LONGEST: Final = 32  # characters of a name before its suffix
+NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
 
 
 @dataclass(frozen=True)
 class InstanceRecipe:
-    """Recipe of an instance. seed: of random sketches; prove: whether to prove its 2-norm optimum.
+    """Recipe of an instance. seed: of random sketches; prove: the norms in which to prove its optimum.
 
     added: the day of its addition to the library; split: train, validation or test; empty if not stated.
     """
@@ -31,7 +34,7 @@ class InstanceRecipe:
     size: int
     seed: int | None
     gauge: str
-    prove: bool = False
+    prove: tuple[Norm, ...] = ()
     added: str = ""
     split: str = ""
 
@@ -77,13 +80,12 @@ def entry_name(instance: str, formulation: str, facet: str) -> str:
 
 def plan(spec: Spec) -> tuple[InstancePlan, ...]:
     """Return every instance of a specification with its entries. Raises InputError for a long name."""
-    two_norm = any(FORMULATIONS[name].minimises == TWO_NORM for name in spec.formulations)
     found = tuple(
         InstancePlan(recipe, _entries(recipe, rung, spec.formulations))
         for sketch in spec.sketches
         for rung in spec.rungs
         if rung.name in sketch.rungs
-        for recipe in _instances(sketch, rung, prove=two_norm and sketch.proves(rung))
+        for recipe in _instances(sketch, rung, norms_of(spec.formulations) if sketch.proves(rung) else ())
     )
     for name in (entry.name for each in found for entry in each.entries):
         if len(name) > LONGEST:
@@ -93,7 +95,21 @@ def plan(spec: Spec) -> tuple[InstancePlan, ...]:
     return found
 
 
-def _instances(sketch: Sketch, rung: Rung, *, prove: bool) -> list[InstanceRecipe]:
+def norm_minimised(formulation: str, facet: str = "hull") -> Norm | None:
+    """Return the norm whose energy the entries of a formulation minimise over all jumps; None for others."""
+    declared = FORMULATIONS[formulation]
+    if declared.minimises == AT_JUMPS:
+        return None
+    return norm_of(declare(formulation, facet=facet if "facet" in declared.settable else None))
+
+
+def norms_of(formulations: Iterable[str]) -> tuple[Norm, ...]:
+    """Return the norms whose energies formulations minimise over all jumps."""
+    found = set(map(norm_minimised, formulations))
+    return tuple(norm for norm in NORMS if norm in found)
+
+
+def _instances(sketch: Sketch, rung: Rung, norms: tuple[Norm, ...]) -> list[InstanceRecipe]:
     return [
         InstanceRecipe(
             _instance_name(sketch.name, size, seed, gauge),
@@ -102,7 +118,7 @@ def _instances(sketch: Sketch, rung: Rung, *, prove: bool) -> list[InstanceRecip
             size,
             seed,
             gauge,
-            prove=prove and gauge == "strokes",  # bounds are weak under the gauge `box`
+            prove=norms if gauge == "strokes" else (),  # bounds are weak under the gauge `box`
             added=max(sketch.added, rung.added),
             split=split,
         )

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
 from ....models.errors import InputError, naming, shortened
-from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM, declaration_of, short_names
+from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, declaration_of, short_names
 from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
@@ -137,7 +137,7 @@ class Sketch:
         return dict(self.sizes).get(rung.name, rung.sizes)
 
     def proves(self, rung: Rung) -> bool:
-        """Return whether the 2-norm optima of its instances on a rung are proven."""
+        """Return whether the optima of its instances on a rung are proven."""
         return rung.prove if self.points == "search" else self.points == "proven"
 
     @property
@@ -313,9 +313,9 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         )
     check_splits(each for sketch in sketches for each in sketch.sources())
     proven = [sketch.name for sketch in sketches if sketch.points == "proven"]
-    if proven and not any(FORMULATIONS[each].minimises == TWO_NORM for each in formulations):
+    if proven and all(FORMULATIONS[each].minimises == AT_JUMPS for each in formulations):
         raise InputError(
-            f"formulations: {proven[0]} has proven points, and proofs are of 2-norm optima; "
+            f"formulations: {proven[0]} has proven points, and no formulation has jumps to prove; "
             "add miqp-exact, or choose other points"
         )
     ledger = folder / document["ledger"] if "ledger" in document else None

@@ -28,6 +28,7 @@ from ...formats.registry import FORMATS
 from ...pictures.draw import counted
 from ...pictures.web import field_picture, instance_picture, thumbnail
 from ..building.index import SOLU, SUMS
+from ..building.table import role_of
 from ..documents.documents import Library, about_file, read_about, read_library
 from ..plan.spec import RUNGS
 from .study import study
@@ -41,6 +42,7 @@ _SHOWN: Final = {".svg", ".png"}
 _ROLES: Final = {
     "least_2": "field of least known 2-norm energy",
     "least_1": "field of least known 1-norm energy",
+    "least_mixed": "field of least known energy in the mixed norm",
     "baseline": "baseline field, whose jumps are the data of qp-fixed",
 }
 
@@ -73,9 +75,7 @@ class Shown:
 
     def picture_of(self, entry: dict[str, Any]) -> Picture:
         """Return the field shown with an entry: the best in its norm, or the field with its jumps."""
-        meaning = FORMULATIONS[entry["formulation"]].minimises
-        role = "baseline" if entry["jumps"] is not None else "least_1" if "1-norm" in meaning else "least_2"
-        return next(each for each in self.pictures if role in each.roles)
+        return next(each for each in self.pictures if role_of(entry) in each.roles)
 
 
 def write_site(folder: str | Path, output: str | Path, progress: Progress = silent) -> list[Path]:

@@ -10,7 +10,7 @@ import crossfield as cf
 import pytest
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.ledger.given import read_points
-from crossfield.export.library.plan.recipe import plan
+from crossfield.export.library.plan.recipe import NORMS, plan
 from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.proof.certificate import read_certificate, write_certificate
@@ -87,9 +87,9 @@ def test_the_same_certificate_is_made_twice(built, tmp_path):
 @pytest.mark.parametrize(
     "key, value, words",
     [
-        ("bound", 99.0, "states another status, bound or energy than"),
-        ("status", "gap", "states another status, bound or energy than"),
-        ("energy", 99.0, "states another status, bound or energy than"),
+        ("bound", 99.0, "states another norm, status, bound or energy than"),
+        ("status", "gap", "states another norm, status, bound or energy than"),
+        ("energy", 99.0, "states another norm, status, bound or energy than"),
         (
             "file",
             "cf_rand_n003_s2.certificate.npz",
@@ -99,7 +99,7 @@ def test_the_same_certificate_is_made_twice(built, tmp_path):
 )
 def test_a_forged_claim_is_found(lib, key, value, words):
     about = document(lib, f"{STEM}.about")
-    about["certificate"][key] = value
+    about["certificates"]["2"][key] = value
     (lib / f"{STEM}.about.json").write_text(json.dumps(about))
     assert words in found(lib)[f"{STEM}.about.json"]
 
@@ -113,7 +113,7 @@ def test_a_forged_certificate_is_found(lib):
     proof = cf.prove(worse.instance, jobs=1)
     weak = replace(proof, field=worse, energy=worse.energy().total, levels=proof.levels[:1])
     assert write_certificate(weak, lib / CERTIFICATE).status == "gap"
-    assert "states another status, bound or energy" in found(lib)[name]
+    assert "states another norm, status, bound or energy" in found(lib)[name]
     half = len(good) // 2
     (lib / CERTIFICATE).write_bytes(good[:half] + bytes([good[half] ^ 1]) + good[half + 1 :])
     assert CERTIFICATE in found(lib)
@@ -122,17 +122,17 @@ def test_a_forged_certificate_is_found(lib):
 @pytest.mark.parametrize("key, value", [("bound", 99.0), ("status", "gap"), ("energy", 99.0)])
 def test_points_that_claim_more_than_their_certificate_are_refused(lib, key, value):
     instance = cf.read_instance(lib / f"{STEM}.instance.json")
-    assert read_points(lib)(STEM).certificate(instance).facts["status"] == "optimal"
-    change(lib / f"{STEM}.about.json", **{f"certificate__{key}": value})
-    with pytest.raises(InputError, match=f"{STEM}.about.json: states another status, bound or energy"):
-        read_points(lib)(STEM).certificate(instance)
+    assert read_points(lib)(STEM).certificates(instance, [2])[0].facts["status"] == "optimal"
+    change(lib / f"{STEM}.about.json", **{f"certificates__2__{key}": value})
+    with pytest.raises(InputError, match=f"{STEM}.about.json: states another norm, status, bound or energy"):
+        read_points(lib)(STEM).certificates(instance, [2])
 
 
 def test_points_with_a_certificate_of_another_instance_are_refused(lib):
     shutil.copy(lib / "cf_rand_n003_s2.certificate.npz", lib / CERTIFICATE)
     seal(lib)
     with pytest.raises(InputError, match="is a certificate of another instance"):
-        read_points(lib)(STEM).certificate(cf.read_instance(lib / f"{STEM}.instance.json"))
+        read_points(lib)(STEM).certificates(cf.read_instance(lib / f"{STEM}.instance.json"), [2])
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_points_with_a_certificate_of_another_instance_are_refused(lib):
         (lambda path: change(path, title="half \ud800"), "half of a surrogate pair"),
         (lambda path: change(path, fields__least_2__seconds=float("inf")), "a number that is not finite"),
         (lambda path: change(path, name="cf_other"), "is about cf_other; its name must be cf_other.about"),
-        (lambda path: change(path, certificate__file=f"{STEM}.another.npz"), "and does not list it"),
+        (lambda path: change(path, certificates__2__file=f"{STEM}.another.npz"), "and does not list it"),
         (lambda path: change(path, version=True), "has version True"),
     ],
 )
@@ -161,8 +161,5 @@ def test_a_forged_or_missing_checker_is_found(lib):
 def test_a_rung_may_do_without(tmp_path):
     spec = spec_of(tmp_path, SPEC.replace("[3]", "[3]\nprove = false"))
     assert not any(each.recipe.prove for each in plan(spec))
-    assert [each.recipe.name for each in plan(default_spec()) if each.recipe.prove] == [
-        each.recipe.name
-        for each in plan(default_spec())
-        if each.recipe.rung in {"tiny", "small"} and each.recipe.gauge == "strokes"
-    ]
+    for each in plan(default_spec()):
+        assert each.recipe.prove == (NORMS if each.recipe.gauge == "strokes" else ())

@@ -115,7 +115,7 @@ BAD = {
     ),
     "unknown word": (SPEC[SPEC.index("split") :], 'split = "tset"', "there is no 'tset'; choose from train"),
     "unknown points": ('"proven"', '"best"', "there is no 'best'; choose from search, none, greedy, proven"),
-    "proof in the 1-norm": ('"exact", ', "", "formulations: fam has proven points"),
+    "proof of fixed jumps": ('"exact", "milp"', '"qp"', "formulations: fam has proven points"),
     "share of nothing": ("0.3", "0", "sketches[0].share: must be a number above 0"),
     "share above one": ("0.3", "1.5", "sketches[0].share: must be a number above 0"),
     "mask of a full square": ("share = 0.3", "mask_share = 0.5", "sketches[0].mask_share: goes with random"),

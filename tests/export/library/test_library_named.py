@@ -104,12 +104,20 @@ def test_an_entry_has_the_problem_and_the_point_of_its_sidecar(built):
         assert f"{entry.name}: {entry.status}" in repr(entry)
 
 
-def test_only_entries_in_the_2_norm_have_the_certificate():
-    proven = cf.entry("cf_cyl_n005_exact")
-    assert proven.certificate.status == "optimal"
+@pytest.mark.parametrize(
+    "name, norm",
+    [("exact", 2), ("parity", 2), ("milp", 1), ("bilin1", 1), ("miqp", "mixed"), ("bilin", "mixed")],
+)
+def test_an_entry_has_the_certificate_of_its_norm(name, norm):
+    proven = cf.entry(f"cf_cyl_n005_{name}")
+    assert (proven.certificate.norm, proven.certificate.status) == (norm, "optimal")
     assert proven.certificate.bound <= proven.objective
-    assert cf.entry("cf_cyl_n005_milp").certificate is None
-    assert cf.entry("cf_cyl_n005_box_exact").certificate is None
+    assert proven.objective == pytest.approx(proven.certificate.energy, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["qp", "printed_milp", "box_exact"])
+def test_entries_that_minimise_no_energy_of_a_norm_have_no_certificate(name):
+    assert cf.entry(f"cf_cyl_n005_{name}").certificate is None
 
 
 def test_an_entry_is_written_in_any_format_that_carries_it(built, tmp_path):

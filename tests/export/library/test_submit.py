@@ -106,7 +106,7 @@ def test_a_damaged_or_unused_certificate_of_the_ledger_is_found(lib, sent):
     found = " ".join(map(str, verify_library(lib)))
     assert "has a certificate of cf_gone_n003, which is not in the library" in found
     assert "is another file than the one its ledger names" in found
-    assert f"{STEM}.about.json: states another certificate than follows" in found
+    assert f"{STEM}.about.json: states another certificates than follows" in found
 
 
 @pytest.mark.parametrize("suffix", ["field.npz", "json", "rawfield"])
@@ -394,18 +394,27 @@ def test_a_log_that_no_ledger_can_hold_is_refused_before_anything_is_written(lib
 def test_a_certificate_needs_an_entry_of_its_norm(opened, sent, tmp_path):
     spec = OPEN.replace('"milp", "bilin1", "miqp", "exact", "cubic", "qp"', '"qp"')
     lib = library_of(tmp_path, f'points = "{opened}"\n' + spec.replace("[6, 7]", "[6]")).folder
-    with pytest.raises(InputError, match=r"s6\.npz: proves a bound of the 2-norm, which no entry"):
+    with pytest.raises(InputError, match=r"s6\.npz: proves a bound in the norm 2, which no entry"):
         submit_one(lib, sent / "s6.npz")
 
 
-def test_a_certificate_in_another_norm_is_refused(lib, sent, tmp_path):
-    """It bounds another energy than that of the entries, which it would make optimal."""
+@pytest.mark.parametrize("norm, proven", [(1, {"milp", "bilin1"}), ("mixed", {"miqp"})])
+def test_a_certificate_counts_for_the_entries_of_its_norm_alone(lib, sent, tmp_path, norm, proven):
     instance = cf.read_certificate(sent / "s6.npz").field.instance
-    write_certificate(cf.prove(instance, norm=1, jobs=1), tmp_path / "it.npz")
-    before = content(lib)
-    with pytest.raises(InputError, match=r"it\.npz: is in the norm 1; libraries take .* the norm 2"):
-        submit_one(lib, tmp_path / "it.npz")
-    assert content(lib) == before
+    made = write_certificate(cf.prove(instance, norm=norm, jobs=1), tmp_path / "it.npz")
+    assert made.status == "optimal"
+    submit_one(lib, sent / "s6.npz")
+    result = submit_one(lib, tmp_path / "it.npz")
+    assert (result.outcome, set(result.entries)) == ("accepted", {f"{STEM}_{name}" for name in proven})
+    for name in proven:
+        entry = entry_of(lib, f"{STEM}_{name}")
+        assert (entry["status"], entry["solved"]["by"]) == ("optimal", "certificate")
+        assert entry["best"]["objective"] == pytest.approx(made.energy, abs=1e-9)
+    for name in ("exact", "cubic"):
+        (bound,) = entry_of(lib, f"{STEM}_{name}")["bounds"]
+        assert (lib / bound["certificate"]).read_bytes() == (sent / "s6.npz").read_bytes()
+    assert verify_library(lib) == []
+    assert submit_one(lib, tmp_path / "it.npz").outcome == "not better"
 
 
 def test_a_point_below_a_dual_bound_is_refused(lib, sent, solved):
