@@ -26,13 +26,13 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
        c = min over p of 2 (A^2 + B^2) - h^2     W (min of R^2 - h^2/2)     w_beta (beta^2 - h^2/4)
 
    are at most the terms of F. (Let s = k + l + 2 o. The line u at the turn it has at the centre may lose 0
-   where s = 0 and h^2 where |s| = 1 in place of h^2/2; certificates of version 1 do so on black pixels only.
-   With fractions f and g of the step the variance is h^2 (f (1 - f) + g (1 - g)). For a lower corner with
-   s = 0, (1 - f)(1 - g) 0 + (f + g - 2 f g) + f g/2 exceeds it, over h^2, by f^2 + g^2 - 3 f g/2; with
-   s = -1 by (1 - f - g)^2; with s = 1 by f^2 + g^2 + f g/2 - 3 (f + g)/2 + 1, which is at least 1/10; with
-   s = -2 and -3 by symmetry; elsewhere h^2/2 is enough.) The distribution of a
-   pixel's vertex is the same at all its pairs. Hence a sum of functions of single vertices and of pairs that
-   is below the discrete costs everywhere is, in the mean, below F.
+   where s = 0 and h^2 where |s| = 1 in place of h^2/2. With fractions f and g of the step the variance is
+   h^2 (f (1 - f) + g (1 - g)). For a lower corner with s = 0, (1 - f)(1 - g) 0 + (f + g - 2 f g) + f g/2
+   exceeds it, over h^2, by f^2 + g^2 - 3 f g/2; with s = -1 by (1 - f - g)^2; with s = 1 by
+   f^2 + g^2 + f g/2 - 3 (f + g)/2 + 1, which is at least 1/10; with s = -2 and -3 by symmetry; elsewhere
+   h^2/2 is enough.) The distribution of a pixel's vertex is the same at all its pairs. Hence a sum of
+   functions of single vertices and of pairs that is below the discrete costs everywhere is, in the mean,
+   below F.
 
    Tables move costs between pairs and quads (the pixels of 2 x 2). Let lambda_e be any numbers for the labels
    of alpha at the four pairs e of a quad. A pair then costs c + the sum of its lambda_e, and the quad costs
@@ -132,7 +132,6 @@ from typing import Any
 import numpy as np
 
 FORMAT, VERSION = "crossfield-certificate", 2
-READABLE = (1, 2)
 HALF, QUARTER = math.pi / 2, math.pi / 4
 OPTIMAL = 1e-8
 PRECISION = 2.0**-52
@@ -148,13 +147,14 @@ MOST_ANGLE = 16.0
 MOST_JUMP = 64
 MOST_WEIGHT = 1e6
 MOST_WHOLE = 2.0**53  # of a message
+BLOCK = 1 << 16  # numbers of a product that NumPy handles at once
 
 INSTANCE_PARTS = ("head", "origin", "mask", "stroke_pixels", "theta", "w")
 PARTS = ("head", "alpha", "beta", "p", *(f"instance_{part}" for part in INSTANCE_PARTS))
 LEVEL_PARTS = ("h", "alpha", "beta", "ranges", "allowed", "scale", "wide")
 STEP_PARTS = {2: ("steps_16", "steps_32"), 1: ("steps_32", "steps_64"), "mixed": ("steps_32", "steps_64")}
 ABSOLUTE_PARTS = ("slopes", "multipliers")  # unless the norm is 2
-CLUSTER_PARTS = ("quads", "table_scale", "table_steps")  # of a level, since version 2
+CLUSTER_PARTS = ("quads", "table_scale", "table_steps")  # of a level
 NAME = re.compile(rb"[a-z0-9_]+\.npy")
 HEAD = re.compile(
     rb"\x93NUMPY\x01\x00\x76\x00\{'descr': '(\|[bu]1|<i[248]|<f8)', 'fortran_order': False, "
@@ -183,14 +183,13 @@ class Sketch:
     """The instance: pixels in order, pairs (upper or right neighbours), strokes, windows.
 
     norm: 1, 2 or "mixed". offset (n,): o. weight, target (n,): W and theta, 0 where there is no stroke. slope
-    (n,): l of 5. lower (n,): least alpha of the gauge. sharp (n,): where the deduction of a stroke's line u
-    depends on the label. earlier, later: numbers of the pairs of each pixel to later, to earlier pixels.
+    (n,): l of 5. lower (n,): least alpha of the gauge. earlier, later: numbers of the pairs of each pixel to
+    later, to earlier pixels.
     """
 
     norm: Any
     offset: Array
     slope: Array
-    sharp: Array
     first: Array
     second: Array
     weight: Array
@@ -375,7 +374,7 @@ def _need_names(arrays: dict[str, Array]) -> None:
     """Raise an error unless the arrays are exactly those of a certificate with that many levels."""
     head = head_of(arrays)
     norm = norm_of(head)
-    parts = LEVEL_PARTS + STEP_PARTS[norm] + (CLUSTER_PARTS if head["version"] > 1 else ())
+    parts = LEVEL_PARTS + STEP_PARTS[norm] + CLUSTER_PARTS
     levels, whole = _levels(head), PARTS + (() if norm == 2 else ABSOLUTE_PARTS)
     names = set(whole) | {f"level_{number}_{part}" for number in range(levels) for part in parts}
     for name in sorted(names - set(arrays)):
@@ -387,16 +386,16 @@ def _need_names(arrays: dict[str, Array]) -> None:
 def head_of(arrays: dict[str, Array]) -> dict[str, Any]:
     """The text in the array `head`."""
     head = _text(arrays, "head")
-    known = type(head.get("version")) is int and head["version"] in READABLE
-    if head.get("format") != FORMAT or not known:
-        raise UnreadableError(f"is no {FORMAT} of version {' or '.join(map(str, READABLE))}")
+    version = head.get("version")
+    if head.get("format") != FORMAT or type(version) is not int or version != VERSION:
+        raise UnreadableError(f"is no {FORMAT} of version {VERSION}; make it again with crossfield prove")
     return head
 
 
 def norm_of(head: dict[str, Any]) -> Any:
-    """The norm of the energy; version 1 has only the norm 2."""
-    norm = head.get("norm", 2 if head["version"] == 1 else None)
-    known = type(norm) in (int, str) and norm in STEP_PARTS and (norm == 2 or head["version"] > 1)
+    """The norm of the energy."""
+    norm = head.get("norm")
+    known = type(norm) in (int, str) and norm in STEP_PARTS
     _require(known, "is of an unknown norm")
     return norm
 
@@ -480,9 +479,8 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
     claim = head_of(arrays)
     norm, white = norm_of(claim), (rows + columns) % 2 == 1
     offset = 0.5 * white if norm == 2 else np.zeros(n)
-    sharp = ~white if claim["version"] == 1 else np.ones(n, bool)
     slope = _slopes(arrays, norm, n)
-    return Sketch(norm, offset, slope, sharp, first, second, weight, target, lower, w_beta, later, earlier)
+    return Sketch(norm, offset, slope, first, second, weight, target, lower, w_beta, later, earlier)
 
 
 def _slopes(arrays: dict[str, Array], norm: Any, n: int) -> Array:
@@ -697,7 +695,7 @@ def _misfit(level: Level, sketch: Sketch, i: int, alpha: Array, beta: Array) -> 
     best = np.minimum(other, np.abs(v - math.pi * np.round(v / math.pi))) ** 2 - half
     corner = level.ranges[i, 0] + level.ranges[i, 2] + int(2 * sketch.offset[i])
     steps = np.abs(corner + np.arange(len(alpha))[:, None] + np.arange(len(beta)))
-    lost = np.where((steps <= 1) & sketch.sharp[i], 2 * half * steps, half)
+    lost = np.where(steps <= 1, 2 * half * steps, half)
     return np.minimum(best, (u - math.pi * own) ** 2 - lost)
 
 
@@ -762,15 +760,16 @@ class Pair:
 
 
 def _min_plus(left: Array, right: Array) -> Array:
-    """The (min,+) product of two matrices; NumPy is quicker along the longer side."""
+    """The (min,+) product of two matrices; NumPy is quicker along the longer side, and with few calls."""
     if left.shape[0] > right.shape[1]:
         turned: Array = _min_plus(np.ascontiguousarray(right.T), np.ascontiguousarray(left.T)).T
         return turned
-    out = left[:, :1] + right[:1]
-    work = np.empty_like(out)
-    for k in range(1, right.shape[0]):
-        np.add(left[:, k : k + 1], right[k], out=work)
-        np.minimum(out, work, out=out)
+    columns, many = np.ascontiguousarray(left.T)[:, :, None], max(1, BLOCK // (len(left) * right.shape[1]))
+    work = np.empty((min(many, len(right)), len(left), right.shape[1]))
+    out = np.full(work.shape[1:], np.inf)
+    for k in range(0, len(right), many):
+        sums = np.add(columns[k : k + many], right[k : k + many, None], out=work[: len(right) - k])
+        np.minimum(out, np.minimum.reduce(sums), out=out)
     return out
 
 

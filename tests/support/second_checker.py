@@ -201,7 +201,7 @@ def quads_of(arrays, at, count, problem):
     return [(q, tables[4 * k : 4 * k + 4]) for k, q in enumerate(pixels)]
 
 
-def level_of(arrays, number, problem, version):
+def level_of(arrays, number, problem):
     """One level of the certificate."""
     n, m, at = len(problem.pixels), len(problem.pairs), f"level_{number}_"
     h = float(take(arrays, f"{at}h", "<f8", 1)[0])
@@ -239,14 +239,14 @@ def level_of(arrays, number, problem, version):
         need(problem.norm == 1 or h <= PI / 16, f"{at}h: too wide")
     k, low = (first + offset[:, None]).T
     steps = [(k[i] + np.arange(count[i, 0]), low[i] + np.arange(count[i, 1])) for i in range(n)]
-    quads = quads_of(arrays, at, count, problem) if version > 1 else []
+    quads = quads_of(arrays, at, count, problem)
     return Level(number, h, centre, steps, allowed, shares, quads, problem.norm != 2)
 
 
 # Sections 3 to 5: bound and remaining cells of a level ------------------------------------------------------
 
 
-def pixel_costs(problem, level, i, version):
+def pixel_costs(problem, level, i):
     """D_i of the allowed labels."""
     alpha, beta, s = level.labels(i)
     theta, weight, h2 = problem.theta[i], problem.weight[i], level.h**2
@@ -257,11 +257,10 @@ def pixel_costs(problem, level, i, version):
         return cost + weight * sloped_costs(problem, level, i)
     known = np.rint((level.centre[i].sum() - theta) / PI)  # the turn of u at the centre of the lattice
     sharp = np.choose(np.minimum(abs(s), 2).astype(int), [0, 1, 1 / 2])
-    white = problem.pixels[i].sum() % 2 == 1
     nearest = np.full(len(s), np.inf)
     for name, line in (("u", alpha + beta - theta), ("v", alpha + PI / 2 - beta - theta)):
         for turn in np.arange(np.floor(line.min() / PI), np.ceil(line.max() / PI) + 1):
-            special = name == "u" and turn == known and not (version == 1 and white)
+            special = name == "u" and turn == known
             nearest = np.minimum(nearest, (line - PI * turn) ** 2 - h2 * (sharp if special else 1 / 2))
     return cost + weight * nearest
 
@@ -310,10 +309,10 @@ def quad_least(level, pixels, tables):
     return (over_b + over_d).min()
 
 
-def examine(problem, level, version, slack):
+def examine(problem, level, slack):
     """Bound of a level (lemma 2), and the cells that its forward pass leaves (lemma 3)."""
     n, pairs = len(problem.pixels), np.sort(problem.pairs, axis=1)
-    before = [pixel_costs(problem, level, i, version) for i in range(n)]
+    before = [pixel_costs(problem, level, i) for i in range(n)]
     for (i, _), a in zip(pairs, level.shares, strict=True):
         before[i] = before[i] + a
     quads = sum(quad_least(level, *quad) for quad in level.quads)
@@ -523,19 +522,17 @@ def check(arrays):
     arrays = dict(arrays)  # each reader below removes its array
     head = head_of(arrays, "head")
     version = head.get("version")
-    known = head.get("format") == "crossfield-certificate" and type(version) is int and version in {1, 2}
-    need(known, "head: no certificate of version 1 or 2")
+    known = head.get("format") == "crossfield-certificate" and type(version) is int and version == 2
+    need(known, "head: no certificate of version 2")
     need(head.get("status") in {"optimal", "gap"}, "head: the status is neither optimal nor gap")
-    norm = head.get("norm", 2 if version == 1 else None)
-    need(
-        type(norm) in {int, str} and norm in {1, 2, "mixed"} and (norm == 2 or version > 1), "head: the norm"
-    )
+    norm = head.get("norm")
+    need(type(norm) in {int, str} and norm in {1, 2, "mixed"}, "head: the norm")
     problem, count = problem_of(arrays, norm), number(head, "levels", 1, 64)
     energy, claimed = problem.energy(), number(head, "energy", 0, 1e300)
     need(count == int(count), f"head: {count} levels")
     need(abs(energy - claimed) <= 1e-12 * max(1, energy), f"head: the energy is {energy}, not {claimed}")
 
-    levels = levels_of(arrays, problem, int(count), version)
+    levels = levels_of(arrays, problem, int(count))
     bound = max(0.0, min(max(level.bound for level in levels), energy))
     boxes, field = boxes_of(problem, levels), relabelled(problem, levels[0])
     try:
@@ -551,16 +548,16 @@ def check(arrays):
     return bound
 
 
-def levels_of(arrays, problem, count, version):
+def levels_of(arrays, problem, count):
     """All levels, each with its bound and with the domain that it needs."""
     slack = 2 * (count + 1) * SLIVER * (64 + 8 * problem.weight + 4 * problem.w_beta).sum()
-    levels = [level_of(arrays, k, problem, version) for k in range(count)]
+    levels = [level_of(arrays, k, problem) for k in range(count)]
     need(not arrays, f"{next(iter(arrays), '')} belongs to no certificate with {count} levels")
     for level in levels:
         need(
             (level.centre == levels[0].centre).all(), f"level_{level.number}_alpha or beta: not as at level 0"
         )
-        examine(problem, level, version, slack)
+        examine(problem, level, slack)
     check_covers(problem, levels)
     return levels
 

@@ -55,14 +55,6 @@ def test_the_bound_of_a_certificate_with_a_gap_is_confirmed(gauge, seed, tmp_pat
     assert 0 < written.bound <= check(arrays_of(path)) <= written.bound + 1e-9
 
 
-@pytest.mark.parametrize("name", ["cf_cyl_n005", "cf_bottle_n014"])
-def test_certificates_of_version_1_are_confirmed(name):
-    arrays = arrays_of(SHIPPED / f"{name}.certificate.npz")
-    claimed = json.loads(arrays["head"].tobytes())
-    assert claimed["version"] == 1
-    assert claimed["bound"] <= check(arrays) <= claimed["energy"]
-
-
 @pytest.mark.slow
 def test_all_certificates_of_the_library_are_confirmed():
     for path in sorted(SHIPPED.glob("*.certificate.npz")):
