@@ -3,8 +3,8 @@
 One file, Python 3.9 or newer, nothing to install, no solver.
 
 MODEL   a .mps or .mps.gz of the library, or the .instance.json that its formulations share
-POINT   names and values, one pair per line: a .sol of MIPLIB (`=obj=` first), Gurobi or SCIP, or a plain
-        list; also .gz. A column that is left out is 0, or what it is fixed to.
+POINT   a solution file of MIPLIB (`=obj=` first), Gurobi, SCIP, HiGHS or CBC, or a plain list of names and
+        values, one pair per line; also .gz. A column that is left out is 0, or what it is fixed to.
 
 With an MPS file, the objective and the violations of bounds, rows and integrality are exact: the numbers are
 the decimals in the files, and no sum or product is rounded. With an instance, the energies of the cross field
@@ -57,6 +57,7 @@ BOUNDS = {
 }
 """Kinds of bounds: the ends that they set, and whether a value follows."""
 
+CBC_HEAD = re.compile(r"[A-Z].* - objective value +(\S+)\s*$")
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 CLAIM = Decimal("1e-5")  # how far the objective may be from a claimed one, as a part of its size, or of 1
 MARK = "\ufeff"  # a byte order mark, which some editors put before a text
@@ -376,16 +377,85 @@ class Point:
 
 def read_point(path: str) -> Point:
     """The point in a file."""
-    point = Point()
+    point, take = Point(), None
     for at, line in lines_of(path):
         words = line.split()
+        if not words:
+            continue
         try:
-            if words and not _said(point, line, words):
-                _value(point, words)
+            if take is None:
+                take = _taker(point, line)
+            take(line, words)
         except BadInputError as error:
             raise BadInputError(f"line {at}: {error}") from None
     _require(point.values or point.claimed is not None, "holds no point: neither a value nor an objective")
     return point
+
+
+def _taker(point: Point, first: str) -> Callable[[str, list[str]], None]:
+    """What takes the lines of a file into a point, by the first line."""
+    if first.strip() == "Model status":
+        return HighsSolution(point).take
+    if CBC_HEAD.match(first):
+        return CbcSolution(point).take
+    return PlainList(point).take
+
+
+@dataclass
+class HighsSolution:
+    """The lines of a solution file of HiGHS: values are between `# Columns` and `# Rows`."""
+
+    point: Point
+    section: str = ""
+
+    def take(self, line: str, words: list[str]) -> None:
+        """Take a line."""
+        if line.startswith("#"):
+            self.section = " ".join(words[1:3]) if words[1:2] != ["Columns"] else "Columns"
+        elif self.section == "Primal solution":
+            _require(words != ["None"], "the file holds no point")
+            if words[0] == "Objective":
+                self.point.claimed = number(words[-1])
+        elif self.section == "Columns":
+            _require(len(words) in (2, 3), "is not a name and a value")
+            _keep(self.point, *words[:2])
+
+
+@dataclass
+class CbcSolution:
+    """The lines of a solution file of CBC: number, name, value, reduced cost.
+
+    Rows come first if they were asked for; then the numbers begin again.
+    """
+
+    point: Point
+    last: int = -1
+
+    def take(self, line: str, words: list[str]) -> None:
+        """Take a line."""
+        head = CBC_HEAD.match(line)
+        if head:
+            _require("infeasible" not in line.lower() and "continuous" not in line, "the file holds no point")
+            self.point.claimed = number(head.group(1))
+            return
+        words = words[words[0] == "**" :]
+        _require(len(words) == 4 and words[0].isdecimal(), "is not number, name, value and reduced cost")
+        if int(words[0]) <= self.last:
+            self.point.values.clear()
+        self.last = int(words[0])
+        _keep(self.point, *words[1:3])
+
+
+@dataclass
+class PlainList:
+    """The lines of a list of names and values, as MIPLIB, Gurobi and SCIP have it."""
+
+    point: Point
+
+    def take(self, line: str, words: list[str]) -> None:
+        """Take a line."""
+        if not _said(self.point, line, words):
+            _value(self.point, words)
 
 
 def _said(point: Point, line: str, words: list[str]) -> bool:
@@ -401,10 +471,14 @@ def _said(point: Point, line: str, words: list[str]) -> bool:
 def _value(point: Point, words: list[str]) -> None:
     """Keep a name and its value; SCIP adds the objective coefficient in brackets."""
     fits = len(words) == 2 or (len(words) == 3 and words[2].startswith("(obj:"))
-    _require(fits, "is not a name and a value; give a MIPLIB .sol, one of Gurobi or SCIP, or a plain list")
-    if words[0] in point.values:
-        raise BadInputError(f"{words[0][:40]} is there twice")
-    point.values[words[0]] = number(words[1])
+    known = "MIPLIB, Gurobi, SCIP, HiGHS or CBC"
+    _require(fits, f"is not a name and a value; give a solution file of {known}, or a plain list")
+    _keep(point, words[0], words[1])
+
+
+def _keep(point: Point, name: str, value: str) -> None:
+    _require(name not in point.values, f"{name[:40]} is there twice")
+    point.values[name] = number(value)
 
 
 # ------------------------------------------------------------------------------------------ MPS against point
@@ -730,7 +804,7 @@ def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
         "check_point.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("model", metavar="MODEL", help=".mps, .mps.gz or .instance.json")
-    parser.add_argument("point", metavar="POINT", help="names and values, may be .gz")
+    parser.add_argument("point", metavar="POINT", help="a solution file, or names and values; may be .gz")
     parser.add_argument("--tolerance", default="1e-8", help="greatest violation of a feasible point (1e-8)")
     given = parser.parse_args(arguments)
     given.tolerance = number(given.tolerance)

@@ -12,6 +12,7 @@ import tracemalloc
 from fractions import Fraction
 from pathlib import Path
 
+import highspy
 import numpy as np
 import places
 import pytest
@@ -145,6 +146,8 @@ def test_integers_that_are_not_quite_whole_count_as_they_are(tmp_path):
         "scip-10.0_qp_optimal.sol",
         "scip-10.0_milp_zeros_without_status.sol",
         "miplib-by-layout_milp_optimal.sol",
+        "cbc-2.10.8_milp_optimal.sol",
+        "cbc-2.10.8_milp_optimal_all.sol",
     ],
 )
 def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_path):
@@ -158,6 +161,35 @@ def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_pat
     found = check(str(tmp_path / "m.mps"), str(SOLUTIONS / file))
     assert found.worst < 1e-5
     assert float(label(found, "claimed").rsplit(" ", 1)[1].rstrip(")")) < 1e-6
+
+
+@pytest.mark.parametrize("style", [0, 4])
+def test_a_solution_of_highs_is_read_in_both_styles(style, tmp_path):
+    model, answer = tmp_path / "m.mps", tmp_path / "a.sol"
+    write(formulate(make_instance(), "milp-mccormick"), model)
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.readModel(str(model))
+    highs.run()
+    highs.writeSolution(str(answer), style)
+    found = check(str(model), str(answer))
+    assert found.worst < 1e-5
+    assert float(found.objective) == pytest.approx(highs.getObjectiveValue(), rel=1e-9)
+    assert float(label(found, "claimed").rsplit(" ", 1)[1].rstrip(")")) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        "highs-1.15.1_infeasible_style0.sol",
+        "highs-1.15.1_time_without_point_style0.sol",
+        "tiny/cbc-2.10.8_milp_infeasible_all.sol",
+        "tiny/cbc-2.10.8_milp_time_without_point.sol",
+    ],
+)
+def test_solutions_without_a_point_are_refused(file):
+    with pytest.raises(BadInputError, match="holds no point"):
+        check_point.read_point(str(places.SOLUTIONS / file))
 
 
 BOUNDS = [
