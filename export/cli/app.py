@@ -18,7 +18,16 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from . import options
 from .evaluate_command import evaluate_command
-from .inputs import SAVED, drawing_of, field_or_instance, formulations_of, known, read_start, require_suffix
+from .inputs import (
+    SAVED,
+    described_problem,
+    drawing_of,
+    field_or_instance,
+    formulations_of,
+    known,
+    read_start,
+    require_suffix,
+)
 from .library_command import library
 from .option_groups import command as command_of
 from .output import (
@@ -210,15 +219,13 @@ def read_command(
     """
     from ...models.errors import SolutionError
     from ...models.field.file import write_field
-    from ..bundle.manifest import read_manifest
     from ..solutions.solution import read_solution
 
     require_suffix(output, SAVED)
     with progress(quiet=printing.quiet) as show:
         show("reading the solution")
-        described = read_manifest(manifest)
-        problem = described.problem()
-        found = read_solution(solution, problem, held=described.held(problem), tolerance=tolerance)
+        problem, held = described_problem(manifest)
+        found = read_solution(solution, problem, held=held, tolerance=tolerance)
         if found.point is None:
             raise InputError(
                 f"holds no point: {found.status}; {found.message or 'the solver gives no reason'}",

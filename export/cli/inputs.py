@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import CrossfieldError, InputError
+from ...models.storage import read_bytes
 
 if TYPE_CHECKING:
     from ...models.field.field import CrossField
+    from ...models.formulations.problem import Problem
     from ...models.instance.instance import Instance
 
 SAVED: Final = (".npz", ".json", ".rawfield")
@@ -21,6 +25,25 @@ def read_start(path: Path | None, instance: Instance) -> CrossField | None:
     from ...models.field.file import read_field
 
     return None if path is None else read_field(path, on=instance)
+
+
+def described_problem(path: Path) -> tuple[Problem, Mapping[str, Problem] | None]:
+    """Problem of a manifest, or of an entry of a library by its sidecar, and the problem in each format.
+
+    Raises InputError, InstanceError for a missing or damaged file.
+    """
+    from ..bundle.manifest import read_manifest
+    from ..library.documents.documents import FORMAT, problem_of, read_sidecar
+
+    kind = None
+    # What is no JSON object is left to read_manifest, which names the error.
+    with suppress(CrossfieldError, ValueError, AttributeError, RecursionError):
+        kind = json.loads(read_bytes(path)).get("format")
+    if kind == FORMAT:
+        return problem_of(path.parent, read_sidecar(path)), None
+    described = read_manifest(path)
+    problem = described.problem()
+    return problem, described.held(problem)
 
 
 def field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:

@@ -247,10 +247,10 @@ def submit_command(
     printing.show(
         list(map(_submitted, found)), lambda: show_table(str(folder), columns, list(map(_row, found)))
     )
-    refused = [each for each in found if each.error is not None]
-    for each in refused:
-        print_notice(str(each.error))
-    if refused:
+    for each in found:
+        if each.reason:
+            print_notice(each.reason)
+    if any(each.error is not None for each in found):
         raise typer.Exit(1)
 
 

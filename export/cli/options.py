@@ -70,7 +70,8 @@ Manifest = Annotated[
     typer.Option(
         "--manifest",
         metavar="FILE",
-        help="The .manifest.json file that `crossfield export` wrote next to the solved file.",
+        help="The .manifest.json file that `crossfield export` wrote next to the solved file, or the .json "
+        "file of a library's entry.",
     ),
 ]
 On = Annotated[

@@ -43,7 +43,7 @@ from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record, RunStatus, log_file, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
-from ..ledger.standing import FEASIBLE, MAKERS, best_of_each, contradicts, is_better
+from ..ledger.standing import FEASIBLE, MAKERS, SAME, best_of_each, contradicts, is_better
 from ..plan.recipe import norm_minimised
 from .sources import Source, sources_of
 
@@ -94,6 +94,19 @@ class Submission:
     better_point: bool = False
     status: str | None = None
     error: CrossfieldError | None = None
+
+    @property
+    def reason(self) -> str:
+        """Why nothing was kept, with the tolerance; empty for an accepted or skipped file."""
+        if self.error is not None:
+            return str(self.error)
+        if self.outcome != "not better":
+            return ""
+        names = " and ".join(path.name for path in self.files)
+        if self.objective is None or self.known is None:
+            return f"{names}: not better than the runs of {self.entries[0]} that the library has"
+        least = f"a better one is lower by more than {SAME:g} of it"
+        return f"{names}: not better: objective {self.objective!r}, and {self.known!r} is known; {least}"
 
 
 def submit(

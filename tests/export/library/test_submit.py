@@ -21,6 +21,7 @@ from crossfield.export.library.documents import check_point
 from crossfield.export.library.documents.documents import problem_of, read_sidecar
 from crossfield.export.library.ledger.given import read_points
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
+from crossfield.export.library.ledger.points import complete_point
 from crossfield.export.verify.comparison import names_of
 from crossfield.models.errors import CrossfieldError, InputError, InstanceError, SolutionError
 from crossfield.models.field.file import write_field
@@ -118,6 +119,25 @@ def test_a_better_field_counts_for_every_entry_of_its_instance(lib, sent, suffix
     assert result.objective < result.known
     assert verify_library(lib) == []
     assert submit_one(lib, sent / f"{STEM}_exact.{suffix}").outcome == "not better"
+
+
+def test_the_command_states_by_how_much_a_point_must_be_better(lib, sent, capsys):
+    submit_one(lib, sent / f"{STEM}_exact.json")
+    assert invoke(["library", "submit", str(lib), str(sent / f"{STEM}_exact.field.npz")]) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert re.search(r"not better: objective (\S+), and \1 is known; .* lower by more than 1e-09 of it", said)
+
+
+def test_an_entry_stands_for_a_manifest_when_its_answer_is_read(lib, sent, tmp_path):
+    """The field of the answer, which only the sidecar and the instance next to it describe."""
+    given = ["read", str(sent / f"{MILP}.sol"), "--manifest", str(lib / f"{MILP}.json")]
+    assert invoke([*given, "-o", str(tmp_path / "f.npz"), "--quiet"]) == 0
+    field = cf.read_field(tmp_path / "f.npz")
+    problem = problem_of(lib, entry_of(lib))
+    stated = re.search(r"^Objective (\S+)", (sent / f"{MILP}.sol").read_text(), re.MULTILINE)
+    objective = problem.objective_value(complete_point(problem, field))
+    assert objective == pytest.approx(float(stated[1]), rel=1e-6)
+    assert invoke(["read", str(sent / f"{MILP}.sol"), "--manifest", str(lib / "LICENSE"), "-o", "f.npz"]) == 1
 
 
 # many files
