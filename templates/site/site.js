@@ -124,9 +124,95 @@ function copyable(block) {
   block.before(button);
 }
 
+// The check sum that a zip archive asks for.
+const CRC = Uint32Array.from({ length: 256 }, (_, number) => {
+  for (let bit = 0; bit < 8; bit++) number = number & 1 ? 0xedb88320 ^ (number >>> 1) : number >>> 1;
+  return number;
+});
+
+function crc32(bytes) {
+  let found = 0xffffffff;
+  for (const byte of bytes) found = CRC[(found ^ byte) & 255] ^ (found >>> 8);
+  return ~found >>> 0;
+}
+
+function record(...numbers) { // pairs of bytes and value, little-endian
+  const bytes = new Uint8Array(numbers.reduce((sum, [width]) => sum + width, 0));
+  let place = 0;
+  for (const [width, number] of numbers) {
+    for (let each = 0; each < width; each++) bytes[place++] = (number / 256 ** each) & 255;
+  }
+  return bytes;
+}
+
+// A zip archive of files by name, as they are: the large ones are compressed already.
+function zipped(files) {
+  const parts = [], listed = [];
+  let offset = 0;
+  for (const [name, bytes] of files) {
+    const path = new TextEncoder().encode(name);
+    const facts = [[2, 20], [2, 0x800], [2, 0], [2, 0], [2, 33], [4, crc32(bytes)], [4, bytes.length], [4, bytes.length], [2, path.length], [2, 0]];
+    listed.push(record([4, 0x02014b50], [2, 20], ...facts, [2, 0], [2, 0], [2, 0], [4, 0], [4, offset]), path);
+    const head = record([4, 0x04034b50], ...facts);
+    parts.push(head, path, bytes);
+    offset += head.length + path.length + bytes.length;
+  }
+  const size = listed.reduce((sum, each) => sum + each.length, 0);
+  const end = record([4, 0x06054b50], [2, 0], [2, 0], [2, files.size], [2, files.size], [4, size], [4, offset], [2, 0]);
+  return new Blob([...parts, ...listed, end], { type: "application/zip" });
+}
+
+// A button that downloads the files of entries: of those that it names, or of all that the table shows.
+function archivable(block) {
+  const [button, told] = [block.querySelector("button"), block.querySelector("[role=status]")];
+  const folder = `${block.dataset.root}files/`;
+  const named = () => block.dataset.archive.split(" ").filter(Boolean);
+  const shown = () => [...document.querySelectorAll("#table tbody tr:not([hidden]) th a")].map((link) => link.href.match(/([^/]+)\.html$/)[1]);
+
+  async function fetched(name) {
+    const answer = await fetch(folder + name);
+    if (!answer.ok) throw new Error(`${name}: ${answer.status}`);
+    return new Uint8Array(await answer.arrayBuffer());
+  }
+
+  async function collect() {
+    if (location.protocol === "file:") throw new Error("browsers read no files next to a page in a folder");
+    const names = named().length ? named() : shown();
+    if (!names.length) throw new Error("no entry is shown");
+    const files = new Map();
+    for (const [place, name] of names.entries()) {
+      told.textContent = `${place + 1} of ${names.length} entries`;
+      const sidecar = await fetched(`${name}.json`);
+      files.set(`${name}.json`, sidecar);
+      const document = JSON.parse(new TextDecoder().decode(sidecar));
+      for (const file of [document.instance.file, ...document.files.map((each) => each.name)]) {
+        if (!files.has(file)) files.set(file, await fetched(file));
+      }
+    }
+    const link = window.document.createElement("a");
+    link.href = URL.createObjectURL(zipped(files));
+    link.download = `${names.length === 1 ? names[0] : `${names.length}_entries`}.zip`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+    told.textContent = `${link.download} has ${files.size} files`;
+  }
+
+  button.addEventListener("click", async () => {
+    button.disabled = true;
+    try {
+      await collect();
+    } catch (error) {
+      told.textContent = `No archive: ${error.message}. Serve the site over HTTP, or run: crossfield library get`;
+    }
+    button.disabled = false;
+  });
+  block.hidden = false;
+}
+
 const form = document.getElementById("filters");
 for (const table of document.querySelectorAll("table[data-sortable]")) {
   if (form && table.id === "table") filterable(table, form, document.getElementById("told"));
   else sortable(table, () => {});
 }
 document.querySelectorAll("[data-copy]").forEach(copyable);
+document.querySelectorAll("[data-archive]").forEach(archivable);

@@ -9,7 +9,8 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -36,6 +37,7 @@ from .study import study
 ASSETS: Final = ("site.css", "site.js", "icon.svg")  # copied from the templates
 FOLDERS: Final = ("entry", "files", "instance", "pictures")
 PAGES: Final = ("index.html", "about.html")
+STATUSES: Final = ("optimal", "claimed", "best known")
 
 _SUM: Final = re.compile(r"([0-9a-f]{64})  ([A-Za-z0-9_][A-Za-z0-9_.]*)")
 _SHOWN: Final = {".svg", ".png"}
@@ -210,6 +212,7 @@ def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], sta
         citation=read_bytes(library.folder / "CITATION.cff").decode(),
         licence=read_bytes(library.folder / "LICENSE").decode(),
         solu=SOLU,
+        statistics={"statuses": statuses(library.entries), "solvers": solvers(library.entries)},
     )
     for each in shown:
         write(f"instance/{each.name}.html", "instance", shown=each)
@@ -230,6 +233,39 @@ def _choices(entries: tuple[dict[str, Any], ...]) -> dict[str, list[str]]:
     keys = ("family", "rung", "formulation", "class", "difficulty", "status")
     found = {key: list(dict.fromkeys(entry[key] for entry in entries)) for key in keys}
     return found | {"rung": [name for name in RUNGS if name in found["rung"]]}
+
+
+@dataclass(frozen=True)
+class CrossTable:
+    """Cells as text, by name of the row, in the order of the columns."""
+
+    columns: tuple[str, ...]
+    rows: dict[str, list[str]]
+
+
+def statuses(entries: Sequence[dict[str, Any]]) -> CrossTable:
+    """Return the numbers of entries by rung and status."""
+    found = Counter((entry["rung"], entry["status"]) for entry in entries)
+    shown = [rung for rung in RUNGS if any(key[0] == rung for key in found)]
+    return CrossTable(STATUSES, {rung: [str(found[rung, status]) for status in STATUSES] for rung in shown})
+
+
+def solvers(entries: Sequence[dict[str, Any]]) -> CrossTable | None:
+    """Return how many entries of a formulation each solver solved, of those with a run; None without runs."""
+    solved, tried = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
+    for entry in entries:
+        for run in entry["runs"]:
+            key = entry["formulation"], run["solver"]
+            tried[key] += 1
+            solved[key] += run["status"] == "optimal"
+    if not tried:
+        return None
+    names = tuple(sorted({solver for _, solver in tried}))
+    rows = {
+        name: [f"{solved[name, each]} of {tried[name, each]}" if tried[name, each] else "" for each in names]
+        for name in dict.fromkeys(entry["formulation"] for entry in entries)
+    }
+    return CrossTable(names, rows)
 
 
 def count(number: int) -> str:

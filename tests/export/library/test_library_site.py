@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+import zipfile
 from html import escape
 from html.parser import HTMLParser
 from itertools import pairwise
@@ -17,7 +18,7 @@ import pytest
 from browsing import CONTRAST, find, served, show, sideways
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.documents.documents import problem_of
-from crossfield.export.library.site.site import count, percent, size, value, write_site
+from crossfield.export.library.site.site import count, percent, size, solvers, statuses, value, write_site
 from crossfield.export.library.site.study import lines_of
 from crossfield.export.pictures.draw import counted
 from crossfield.export.pictures.marks import FAMILIES, NEGATIVE, POSITIVE, STROKE
@@ -387,6 +388,27 @@ def test_an_entry_shows_its_sidecar(library, site, pages):
         assert {f"../files/{file['name']}" for file in entry["files"]} <= set(download)
 
 
+def test_statistics_count_entries_and_solved_runs():
+    entries = [
+        {"rung": rung, "status": status, "formulation": name, "runs": runs}
+        for rung, status, name, runs in (
+            (
+                "small",
+                "optimal",
+                "qp",
+                [{"solver": "A", "status": "optimal"}, {"solver": "B", "status": "limit"}],
+            ),
+            ("tiny", "claimed", "qp", [{"solver": "A", "status": "limit"}]),
+            ("tiny", "best known", "milp", []),
+            ("tiny", "best known", "milp", [{"solver": "B", "status": "optimal"}]),
+        )
+    ]
+    assert statuses(entries).rows == {"tiny": ["0", "1", "2"], "small": ["1", "0", "0"]}
+    found = solvers(entries)
+    assert (found.columns, found.rows) == (("A", "B"), {"qp": ["1 of 2", "0 of 1"], "milp": ["", "1 of 1"]})
+    assert solvers(entries[2:3]) is None
+
+
 def test_the_command_that_a_page_shows_checks_the_point(site, pages):
     for name in (f"entry/{ENTRY}.html", f"entry/{INSTANCE}_quartic.html", "about.html"):
         (command,) = {text for tag, text in pages[name].texts if text.startswith("python3 check_point.py")}
@@ -707,6 +729,40 @@ def test_filters_narrow_the_table_and_live_in_the_address(browser, address):
     assert find(browser, "#told").text == "12 of 12 entries"
 
 
+def downloaded(browser, folder, button):
+    """The files of the archive that a button offers, by name."""
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    behaviour = {"behavior": "allow", "downloadPath": str(folder)}
+    browser.execute_cdp_cmd("Browser.setDownloadBehavior", behaviour)
+    find(browser, button).click()
+    WebDriverWait(browser, 200).until(lambda _: list(folder.glob("*.zip")))
+    (path,) = folder.glob("*.zip")
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        return path.name, {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_the_filtered_entries_are_downloaded_as_one_archive(browser, address, library, tmp_path):
+    browser.get(f"{address}/index.html")
+    choose(browser, "class", "MILP")
+    choose(browser, "rung", "small")
+    name, files = downloaded(browser, tmp_path, ".archive button")
+    assert name == "2_entries.zip"
+    wanted = set()
+    for entry in ("cf_mouse_n006_milp", "cf_rand_n006_s1_milp"):
+        sidecar = library.entry(entry)
+        wanted |= {f"{entry}.json", sidecar["instance"]["file"], *(each["name"] for each in sidecar["files"])}
+    assert files == {each: (library.folder / each).read_bytes() for each in wanted}
+
+
+def test_an_entry_is_downloaded_as_an_archive(browser, address, tmp_path):
+    browser.get(f"{address}/entry/{ENTRY}.html")
+    name, files = downloaded(browser, tmp_path, ".archive button")
+    assert name == f"{ENTRY}.zip"
+    assert {f"{ENTRY}.json", f"{ENTRY}.mps"} <= files.keys()
+
+
 def test_it_works_from_a_folder_without_any_server(browser, site):
     browser.get((site / "index.html").as_uri())
     find(browser, "input[name=q]").send_keys("qp-fixed")
@@ -715,6 +771,8 @@ def test_it_works_from_a_folder_without_any_server(browser, site):
     assert len(held) == 4
     assert held == sorted(held)
     assert browser.current_url.endswith("index.html#q=qp-fixed&sort=variables")
+    find(browser, ".archive button").click()
+    assert find(browser, ".archive [role=status]").text.endswith("or run: crossfield library get")
     find(browser, f"a[href='instance/{INSTANCE}.html']").click()
     assert find(browser, "h1").text == INSTANCE
     find(browser, f"a[href='../entry/{ENTRY}.html']").click()
