@@ -11,8 +11,6 @@ import crossfield as cf
 import pytest
 from children import all_end, complaints, descendants, running
 from crossfield.export.cli.app import invoke
-from crossfield.export.library.building.build import build
-from crossfield.export.library.plan.spec import default_spec
 from crossfield.export.solving.methods import METHODS
 from crossfield.export.solving.run import PICTURES, plan
 from crossfield.models.processes.side_by_side import MOST
@@ -150,13 +148,3 @@ def test_too_many_threads_or_processes_are_refused_with_the_range(tmp_path, argu
     assert f"Invalid value for '{arguments[-1]}'" in output
     assert str(MOST) in output
     assert not (tmp_path / "out").exists()
-
-
-def test_too_many_jobs_are_refused_in_python_too(tmp_path):
-    for work in (
-        lambda: cf.write_all(cf.sample("skew", 4), tmp_path, jobs=100000),
-        lambda: build(default_spec(), tmp_path / "library", jobs=100000),
-        lambda: cf.search(cf.sample("mouse", 14), limits=cf.Limits(1), jobs=100000),
-    ):
-        with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
-            work()
