@@ -98,21 +98,6 @@ def test_ctrl_c_twice_ends_at_once_and_leaves_whole_files(tmp_path):
         assert "KeyboardInterrupt" in err
 
 
-@pytest.mark.slow
-def test_ctrl_c_before_there_is_a_field_leaves_none(tmp_path):
-    """At that size the greedy field takes longer than the signal.
-
-    Not while libraries load: there Python may drop a KeyboardInterrupt that comes inside a callback.
-    """
-    command = [sys.executable, "-m", "crossfield", "run", "mouse", "--size", "150"]
-    with started([*command, "-o", tmp_path / "out"]) as process:
-        while not (tmp_path / "out").exists():
-            assert process.poll() is None
-        assert press(process) == (1, "crossfield: interrupted; all written files are complete\n")
-    assert not list(tmp_path.rglob(".*.part"))
-    assert not (tmp_path / "out" / "report.json").exists()
-
-
 def test_the_plan_names_each_method_that_searches_and_the_sum():
     sentence = plan(cf.Limits(20))
     assert sentence.startswith("at most 60 s: search 20, two-stage 20, prove 20;")

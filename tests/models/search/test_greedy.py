@@ -64,18 +64,6 @@ def test_two_families_give_a_constant_skewed_field(first, between, skew_coeffici
     assert np.degrees(field.angle_between) == pytest.approx(min(between, 180 - between), abs=0.01)
 
 
-def test_one_pixel_in_the_box_of_the_paper():
-    field = greedy_field(Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0], gauge="box"))
-    assert field.alpha == pytest.approx([HALF])
-    assert field.beta == pytest.approx([np.pi / 6], abs=1e-5)
-    assert field.energy().total == pytest.approx(1e-6 * (np.pi / 6) ** 2, rel=1e-4)
-
-
-def test_one_pixel_under_the_gauge_of_strokes():
-    field = greedy_field(Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0]))
-    assert (field.alpha[0], field.beta[0]) == pytest.approx((2 * np.pi / 3, 0))
-
-
 @pytest.mark.parametrize("index", [0.25, -0.25])
 @SOLVERS
 def test_frame_of_strokes_round_one_singularity(solve, index):
