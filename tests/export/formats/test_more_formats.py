@@ -336,17 +336,6 @@ def scip_optimum(path: Path) -> float:
     return float(scip.getObjVal())
 
 
-@pytest.mark.slow
-@for_each("formulation", FORMULATIONS)
-def test_scip_finds_the_same_optimum_from_osil_as_from_nl(formulation: str, tmp_path: Path):
-    problem = make_problem(formulation, tiny())
-    for name in ("osil", "nl"):
-        write(problem, tmp_path / f"model.{name}")
-    found, expected = (scip_optimum(tmp_path / f"model.{name}") for name in ("osil", "nl"))
-    assert expected > 0.01
-    assert found == pytest.approx(expected, rel=2e-4)
-
-
 # QPLIB
 
 

@@ -105,18 +105,6 @@ def test_the_plan_names_each_method_that_searches_and_the_sum():
     assert timed == ["search", "two-stage", "prove"]
 
 
-def test_the_plan_is_the_first_thing_that_is_told(tmp_path):
-    class StoppedError(Exception):
-        pass
-
-    def show(line):
-        assert line == plan(cf.Limits(7))
-        raise StoppedError
-
-    with pytest.raises(StoppedError):
-        cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(7), progress=show)
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
