@@ -211,7 +211,7 @@ def main() -> None:
 - Objectives are recomputed from the declaration at the solver's point. Optima must agree to 1e-6.
 - Solvers are listed for the formulations that they [take](#solvers-and-formulations).
 
-`crossfield verify DIR --solve` makes the same checks for any folder, and writes `verify.html` there.""",
+`crossfield verify DIR --solve` makes the same checks for any folder, and writes `verify.json` there.""",
         "## Reading",
         readings(runs),
         "## The same problem in several formulations",

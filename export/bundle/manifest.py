@@ -31,13 +31,12 @@ from ...models.formulations.catalogue import FORMULATIONS, declaration_of
 from ...models.formulations.declaration import Declaration, Options
 from ...models.formulations.problem import Problem, formulate, lifted, tightened
 from ...models.formulations.windows import Windows
-from ...models.input_limits import MAX_BYTES
-from ...models.instance.file import check_schema, check_version, parse_json, read_instance, write_instance
+from ...models.instance.file import read_document, read_instance, write_instance
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Progress, silent
 from ...models.processes.side_by_side import checked
-from ...models.storage import make_folder, read_bytes, write_bytes
+from ...models.storage import make_folder, write_bytes
 from ..formats.registry import DEFAULTS, FORMATS, Written, generator, write
 from ..solvers_table import smallest, takers
 from ..writing.canonical import Canonical
@@ -140,14 +139,9 @@ def read_manifest(path: str | Path) -> Manifest:
         If it breaks its schema.
 
     """
-    try:
-        document = parse_json(read_bytes(path, MAX_BYTES).decode())
-        check_version(document, FORMAT, VERSION)
-        return Manifest(check_schema(document, "manifest", __package__), Path(path))
-    except UnicodeDecodeError as error:
-        raise InstanceError("is not JSON; give the .manifest.json that export wrote", file=path) from error
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
+    remedy = "give the .manifest.json that export wrote"
+    document = read_document(Path(path), FORMAT, VERSION, "manifest", __package__, remedy=remedy)
+    return Manifest(document, Path(path))
 
 
 def write_problem(

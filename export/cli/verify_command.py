@@ -24,8 +24,8 @@ def verify_command(
 ) -> None:
     """Read every exported file with every installed solver, and compare the result with the problem.
 
-    Writes verify.html, a page with the matrix of files and programs, and verify.json with all numbers. The
-    exit code is 1 if any file differs.
+    Prints the number of files by program and result, and every fault. Writes verify.json with the reasons
+    and numbers of all checks. The exit code is 1 if any file differs.
     """
     from ..solvers_table import PROGRAMS
     from ..verify.verify import verify
@@ -51,4 +51,4 @@ def _show(found: Verification) -> None:
     show_table(f"files in {found.folder}", columns, rows, numbers=columns[2:])
     for name, how in found.absent.items():
         print_line(f"absent: {name}; {how}")
-    print_line(f"reasons and numbers: {found.folder / 'verify.html'} and verify.json")
+    print_line(f"reasons and numbers: {found.folder / 'verify.json'}")

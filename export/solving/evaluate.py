@@ -19,7 +19,7 @@ from ...models.processes.limits import Limits
 from ...models.sketch.choice import Choice
 from ...models.sketch.tracing import curves_of, has_curves
 from ..formats.registry import generator
-from .methods import METHODS, Request
+from .methods import METHODS, Request, instance_facts
 
 DEFAULT_METHODS: Final = ("greedy", "search")
 CURVES: Final = 8
@@ -80,17 +80,7 @@ class Evaluation:
             "format": "crossfield-evaluation",
             "version": 1,
             "generator": generator(),
-            "instance": {
-                "name": self.instance.name,
-                "source": self.instance.source,
-                "sha256": self.instance.sha256,
-                "pixels": self.instance.grid.size,
-                "stroke_pixels": len(self.instance.theta),
-                "w_strokes": self.instance.stroke_coefficient,
-                "w_beta": self.instance.skew_coefficient,
-                "stroke_weight": self.instance.stroke_weight,
-                "skew_weight": self.instance.skew_weight,
-            },
+            "instance": instance_facts(self.instance),
             "seconds_per_field": self.limits.time_limit,
             "curves_of": "sketch" if self.drawn else "chains",
             "methods": {method: _facts(self.summary(method)) for method in self.methods},

@@ -59,6 +59,27 @@ class Candidate:
         return facts if self.solution is None else facts | solution_facts(self.solution)
 
 
+def instance_facts(instance: Instance) -> dict[str, Any]:
+    """Facts about an instance in every report."""
+    return {
+        "name": instance.name,
+        "source": instance.source,
+        "gauge": instance.gauge,
+        "sha256": instance.sha256,
+        "height": instance.grid.height,
+        "width": instance.grid.width,
+        "pixels": instance.grid.size,
+        "pairs": len(instance.grid.first),
+        "stroke_pixels": len(instance.theta),
+        "parts": instance.grid.parts,
+        "pixel_size": instance.pixel_size,
+        "w_strokes": instance.stroke_coefficient,
+        "w_beta": instance.skew_coefficient,
+        "stroke_weight": instance.stroke_weight,
+        "skew_weight": instance.skew_weight,
+    }
+
+
 def field_facts(field: CrossField) -> dict[str, Any]:
     """Facts about a field in every report: energies, singularities, skew, and its shape."""
     shape = field.shape

@@ -24,7 +24,7 @@ from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.mask import has_mask, write_mask
 from ..surfaces.files import SHADED, surface_facts, write_shaded
 from .compiling import compiling
-from .methods import METHODS, Candidate, Request
+from .methods import METHODS, Candidate, Request, instance_facts
 from .proven import Proven
 from .run_page import PAGE, write_page
 
@@ -121,23 +121,7 @@ class Report:
             "format": "crossfield-report",
             "version": 1,
             "generator": generator(),
-            "instance": {
-                "name": instance.name,
-                "source": instance.source,
-                "gauge": instance.gauge,
-                "sha256": instance.sha256,
-                "height": instance.grid.height,
-                "width": instance.grid.width,
-                "pixels": instance.grid.size,
-                "pairs": len(instance.grid.first),
-                "stroke_pixels": len(instance.theta),
-                "parts": instance.grid.parts,
-                "pixel_size": instance.pixel_size,
-                "w_strokes": instance.stroke_coefficient,
-                "w_beta": instance.skew_coefficient,
-                "stroke_weight": instance.stroke_weight,
-                "skew_weight": instance.skew_weight,
-            },
+            "instance": instance_facts(instance),
             "warnings": list(instance.reading.warnings if instance.reading else ()),
             "kept": self.kept.method,
             "best": self.best.method,

@@ -39,7 +39,6 @@ from ..solving.local import Files, Solvers
 from .checks import Check, Verdict, Verification
 from .comparison import difference, evaluation_difference, names_of
 from .leeway import saved
-from .page import write_page
 
 RESULT: Final = "verify.json"
 SEED: Final = 1
@@ -88,9 +87,9 @@ def verify(
 ) -> Verification:
     """Check all the files in a folder with all installed programs.
 
-    Also writes verify.json and the page verify.html there. seconds: for each solve; None: nothing is solved.
-    programs: names, all by default. progress: called with each file and program. Raises InputError when the
-    folder holds no manifest, and the errors of reading manifests.
+    Also writes verify.json there. seconds: for each solve; None: nothing is solved. programs: names, all by
+    default. progress: called with each file and program. Raises InputError when the folder holds no manifest,
+    and the errors of reading manifests.
     """
     folder = Path(folder)
     wanted = [PROGRAMS[name] for name in programs or PROGRAMS]
@@ -111,7 +110,6 @@ def verify(
                     found.checks.extend(bench.checks(subject))
     found.checks[:] = compared(found.checks)
     write_bytes(folder / RESULT, (json.dumps(found.document(), indent=1) + "\n").encode())
-    write_page(found)
     return found
 
 

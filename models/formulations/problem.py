@@ -21,11 +21,10 @@ from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER, Instance, whole_numbers
 from ..previews import table_of
-from .arrays import ProblemArrays, arrays_of
+from .arrays import ProblemArrays, arrays_of, check_highs, highs_of
 from .catalogue import declare, norm_of
 from .declaration import FORMULATIONS, Family, Formulation
 from .families import ANY_DEGREE, Block, Monomial, PlacedFamily, block_costs, symbol_name
-from .highs_model import check_highs, highs_of
 from .lifting import lift_products
 from .monomials import merged, ordered
 from .symbols import NARROWED, SLOTS, VARIABLES, Variable, elements, numeric, way

@@ -338,15 +338,13 @@ class Instance(Pictured):
         side, power = max(self.mask.shape), _POWERS[term]
         return in_digits(getattr(self, f"{term}_coefficient") * side**power / REFERENCE**power)
 
-    def with_strokes(self, kept: Bools, mask: Bools | None = None) -> Instance:
+    def with_strokes(self, kept: Bools) -> Instance:
         """Return the same instance with a part of its strokes.
 
         Parameters
         ----------
         kept
             Stroke pixels to keep, bool (s,).
-        mask
-            Another mask; by default the same.
 
         Returns
         -------
@@ -355,17 +353,11 @@ class Instance(Pictured):
 
         Raises
         ------
-        InstanceError
-            If no stroke is left, or one lies outside the mask.
+        NoStrokeError
+            If no stroke is left.
 
         """
-        return replace(
-            self,
-            mask=self.mask if mask is None else mask,
-            stroke_pixels=self.stroke_pixels[kept],
-            theta=self.theta[kept],
-            w=self.w[kept],
-        )
+        return replace(self, stroke_pixels=self.stroke_pixels[kept], theta=self.theta[kept], w=self.w[kept])
 
     def turned(self) -> Instance:
         """The instance of the sketch turned by a quarter counter-clockwise."""

@@ -1,4 +1,4 @@
-"""Ctrl-C, and child processes in groups of their own: starting, interrupting and killing them on each system.
+"""Ctrl-C, and child processes in groups of their own: starting and killing them on each system.
 
 Ctrl-C on a terminal reaches the group in the foreground. A child in another group is controlled by the
 process that started it. On Windows, `kill` ends the child but not its children.
@@ -24,21 +24,6 @@ def start(command: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
     if sys.platform == "win32":
         return subprocess.Popen(command, creationflags=subprocess.CREATE_NEW_PROCESS_GROUP, **options)
     return subprocess.Popen(command, start_new_session=True, **options)
-
-
-def interrupt(child: subprocess.Popen[Any]) -> None:
-    """Send a child of `start` the signal of Ctrl-C; the child handles it with `on_interrupt`."""
-    if sys.platform == "win32":
-        child.send_signal(signal.CTRL_BREAK_EVENT)
-    else:
-        child.send_signal(signal.SIGINT)
-
-
-def on_interrupt(handler: Callable[..., object]) -> None:
-    """Call the handler with a number and a frame for each interrupt; only in the main thread."""
-    signal.signal(signal.SIGINT, handler)
-    if sys.platform == "win32":
-        signal.signal(signal.SIGBREAK, handler)
 
 
 def kill(child: subprocess.Popen[Any]) -> None:

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import limits
 import page
 from crossfield.models.formulations.catalogue import FORMULATIONS
 
@@ -116,34 +113,17 @@ def ours(bench: Bench, sizes: tuple[int, ...], pixels: int) -> None:
         bench.run("solution", pixels, MILP, suffix)
 
 
-def help_time() -> float:
-    """Seconds of `crossfield --help`, median of five."""
-    times = []
-    for _ in range(5):
-        start = time.perf_counter()
-        subprocess.run(
-            [sys.executable, "-m", "crossfield", "--help"], stdout=subprocess.DEVNULL, check=True, cwd=HERE
-        )
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
-
-
 def main() -> None:
     """Measure and write the page."""
     parser = argparse.ArgumentParser(
         description="Measure export against its peers and write docs/performance.md."
     )
-    commands = parser.add_subparsers(dest="command")
-    limits.arguments(commands.add_parser("limits", help="wall time of every method under time limits"))
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "performance.md")
     parser.add_argument(
         "--smoke", action="store_true", help="sizes 4 and 8, one run each, in one process: shows that it runs"
     )
     parser.add_argument("--data", type=Path, help="write the measurements, or read them if the file is there")
     options = parser.parse_args()
-    if options.command == "limits":
-        limits.run(options)
-        return
     sizes, names, middle, pixels = (
         ((4, 8), ("minlp-quartic",), 8, 8) if options.smoke else (SIZES, tuple(FORMULATIONS), 128, 552)
     )
@@ -155,7 +135,7 @@ def main() -> None:
             ours(bench, sizes, pixels)
             writers(bench, sizes)
             formulations(bench, middle, names)
-        document = {"found": bench.found, "help": help_time(), "machine": page.machine()}
+        document = {"found": bench.found, "machine": page.machine()}
     if options.data:
         options.data.write_text(json.dumps(document, indent=1))
     options.output.write_text(page.page(document, sizes, names, middle, pixels))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import operator
 import os
 import platform
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -18,13 +17,6 @@ NAMES = {
     "copied": "one write",
     "highs": "HiGHS",
     "pyomo": "Pyomo",
-}
-WHAT = {"seconds": "seconds", "cpu": "CPU"}
-MET: dict[str, Callable[[float, float], bool]] = {
-    "at least": operator.ge,
-    "at most": operator.le,
-    "under": operator.lt,
-    "below": operator.lt,
 }
 METHOD = (
     "`python tests/bench` measures every number in a separate process, one at a time.",
@@ -60,7 +52,6 @@ class Page:
 
     def __init__(self, document: Found) -> None:
         self.found: dict[str, Found] = document["found"]
-        self.document = document
 
     def __call__(
         self, task: str, size: int, suffix: str = "lp", formulation: str = MILP, *rest: object
@@ -85,7 +76,7 @@ def seconds(found: Found | None, what: str = "seconds") -> str:
 def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: int, pixels: int) -> str:
     """The page as Markdown."""
     at = Page(document)
-    given, found = document["machine"], targets(at, sizes, names, middle, pixels)
+    given = document["machine"]
     packages = ", ".join(f"{name} {given[name]}" for name in PACKAGES)
     loads = [each["load"] for each in at.found.values()]
     lines = [
@@ -93,16 +84,11 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
         "",
         "[All pages](index.md). Speed and memory of the writers, compared with other programs.",
         "",
-        f"{sum(line[3] == 'met' for line in found)} of {len(found)} [targets](#targets) are met.",
-        "",
         *METHOD,
         "",
         f"{given['processor']}, {given['system']}. Python {given['Python']}, {packages}.",
         f"Load average while measuring: {min(loads):.1f} to {max(loads):.1f}.",
         "",
-        "## Targets",
-        "",
-        *table(["", "target", "measured", ""], found),
         f"## LP and MPS of `{MILP}` next to other programs",
         "",
         "linopy and HiGHS build their models from whole arrays. The other programs do not write our names.",
@@ -125,98 +111,6 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
 def times(value: float | None) -> str:
     """A ratio with significant digits."""
     return "" if value is None else f"{value:.1f}" if value < 10 else f"{value:.0f}"
-
-
-def targets(
-    at: Page, sizes: Sequence[int], names: Sequence[str], middle: int, pixels: int
-) -> list[list[str]]:
-    """The lines of the table of targets."""
-    half, big = sizes[-2:]
-    return [
-        *(linopy_target(at, half, what) for what in WHAT),
-        *(pyomo_target(at, names, middle, what) for what in WHAT),
-        write_target(at, half, big),
-        *everything_targets(at, big),
-        *(growth_target(at, half, big, what) for what in ("seconds", "cpu", "memory")),
-        *small_targets(at, min(24, big)),
-        solution_target(at, pixels),
-    ]
-
-
-def target(what: str, values: dict[str, float | None], met: str, limit: float, unit: str = "") -> list[str]:
-    """A line: what is measured, the target (a word of MET and a limit), the values known,
-    and whether they meet it.
-    """
-    known = {name: value for name, value in values.items() if value is not None}
-    text = ", ".join(f"{name} {value:.3g}{unit}".strip() for name, value in known.items())
-    reached = bool(known) and all(MET[met](value, limit) for value in known.values())
-    return [what, f"{met} {limit:g}{unit}", text or "not measured", "met" if reached else "not met"]
-
-
-def linopy_target(at: Page, size: int, what: str) -> list[str]:
-    """linopy over ours."""
-    ratios = {s.upper(): at.ratio(at("linopy", size, s), at("ours", size, s), what) for s in ("lp", "mps")}
-    return target(f"LP and MPS, {size} x {size}, linopy over ours ({WHAT[what]})", ratios, "at least", 10)
-
-
-def pyomo_target(at: Page, names: Sequence[str], size: int, what: str) -> list[str]:
-    """Pyomo over ours, at its smallest ratio."""
-    ratios = {
-        f"{name} {suffix}": at.ratio(*pair(at, name, suffix, size), what)
-        for name in names
-        for suffix in ("nl", "lp", "mps", "gms")
-    }
-    least = min(((value, name) for name, value in ratios.items() if value is not None), default=(None, ""))
-    title = f"any formulation and format, {size} x {size}, Pyomo over ours ({WHAT[what]})"
-    return target(title, {f"least ({least[1]})": least[0]}, "at least", 40)
-
-
-def write_target(at: Page, half: int, big: int) -> list[str]:
-    """Ours over one write of the same bytes."""
-    ratios = {
-        f"{s.upper()} {size}": at.ratio(at("ours", size, s), at("copied", size, s))
-        for s in ("lp", "mps")
-        for size in (half, big)
-    }
-    return target("ours over one write of the same bytes (seconds)", ratios, "at most", 3)
-
-
-def everything_targets(at: Page, size: int) -> list[list[str]]:
-    """All formats of the largest size: seconds and memory."""
-    runs = {f"{jobs} at once": at("everything", size, "", MILP, jobs) for jobs in (1, 2)}
-    spent = {name: found and found["seconds"] for name, found in runs.items()}
-    peak = {name: found and found["memory"] / 1e9 for name, found in runs.items()}
-    return [
-        target(f"{size} x {size}, all formats", spent, "under", 30, " s"),
-        target("its peak memory", peak, "under", 2, " GB"),
-    ]
-
-
-def growth_target(at: Page, half: int, big: int, what: str) -> list[str]:
-    """Ratio of times for four times the pixels."""
-    grown = {
-        s.upper(): at.ratio(at("ours", big, s, MILP, *rest), at("ours", half, s, MILP, *rest), what)
-        for s, rest in (("lp", ()), ("mps", ()), ("nl", ("text",)), ("gms", ()))
-    }
-    return target(f"growth of {WHAT.get(what, what)} from {half} to {big}", grown, "below", 4.4)
-
-
-def small_targets(at: Page, size: int) -> list[list[str]]:
-    """Targets of small tasks: one drawing in everything, and the help."""
-    found = at("everything", size, "", "all", 1)
-    spent = {"": found and found["seconds"]}
-    return [
-        target(f"size {size}, all formulations in all formats", spent, "under", 2, " s"),
-        target("`crossfield --help`", {"": at.document["help"]}, "under", 0.4, " s"),
-    ]
-
-
-def solution_target(at: Page, pixels: int) -> list[str]:
-    """Reading a large solution back."""
-    runs = {name: at("solution", pixels, suffix) for name, suffix in (("HiGHS", "highs"), ("AMPL", "ampl"))}
-    spent = {name: found and found["seconds"] for name, found in runs.items()}
-    title = f"a solution of {pixels} x {pixels} pixels (4 million columns at 552) to a field"
-    return target(title, spent, "under", 4, " s")
 
 
 def pair(at: Page, name: str, suffix: str, size: int) -> tuple[Found | None, Found | None]:

@@ -100,7 +100,7 @@ def linopy(instance: Instance, formulation: str, suffix: str, path: Path) -> Mea
 
 def highs(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
     """HiGHS: a model passed as whole arrays, with our names left out, and its writeModel."""
-    from crossfield.models.formulations.highs_model import highs_of
+    from crossfield.models.formulations.arrays import highs_of
 
     def run() -> None:
         arrays = formulated(formulation, instance).to_arrays(names=False)

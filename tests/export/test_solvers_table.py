@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import shutil
@@ -24,11 +23,6 @@ ROOT = Path(cf.__file__).parent
 TOY = Solver(
     "toy", "Toy", ("lp",), "cbc", {"quadratic rows": Refusal("read", "Toy reads no products, at no price")}
 )
-
-
-def sources(*parts: str) -> dict[str, str]:
-    files = (path for part in parts for path in (ROOT / part).rglob("*.py"))
-    return {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in files}
 
 
 def test_what_the_table_names_is_there():
@@ -91,22 +85,3 @@ def test_a_program_that_is_hidden_is_absent_and_its_neighbours_are_not(tmp_path,
     hidden("glpsol")
     assert SOLVERS["glpk"].missing == "apt install glpk-utils"
     assert subprocess.run([shutil.which("neighbour")], check=False).returncode == 0
-
-
-@pytest.mark.parametrize(
-    "called,places",
-    [
-        ("readModel", ["export/programs/highs.py"]),
-        ("highspy.Highs", ["export/programs/highs.py", "models/formulations/highs_model.py"]),
-        ("NlpBuilder", ["export/programs/casadi.py"]),
-    ],
-)
-def test_highs_and_nl_are_loaded_in_one_place(called: str, places: list[str]):
-    """Calls, not the lines of Python that pages show. Arrays go to HiGHS from the formulations."""
-    found = [
-        name
-        for name, text in sources("export", "models").items()
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Call) and f".{ast.unparse(node.func)}".endswith(f".{called}")
-    ]
-    assert sorted(found) == places

@@ -12,16 +12,6 @@ from pathlib import Path
 ROOT = next(path for path in Path(__file__).resolve().parents if (path / "pyproject.toml").exists())
 PARTS = ("models", "export", "templates", "docs", "tests")
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
-NOT_HERE = (
-    "formats.md",
-    "domain notes",
-    "formulation notes",
-    "the project's notes",
-    "../shared",
-    "the brief",
-    "design.md",
-)
-"""Things that only the authors of the first version had."""
 
 
 @cache
@@ -89,12 +79,6 @@ def test_every_rule_that_the_code_cites_is_on_the_page_of_rules():
     assert {(where, rule) for where, rule in pages if rule not in listed} == set()
 
 
-def test_nothing_is_cited_that_only_others_have():
-    texts = {path: " ".join(text_of(path).split()) for path in [*modules(), *PAGES]}
-    del texts[Path(__file__).resolve()]
-    assert [(place(path), words) for path in texts for words in NOT_HERE if words in texts[path]] == []
-
-
 def test_cited_pages_and_their_sections_are_there():
     sections = re.findall(r"^## (\d+)\.", (ROOT / "docs" / "mathematics.md").read_text(), re.MULTILINE)
     assert sections == [str(number) for number in range(1, len(sections) + 1)]
@@ -155,27 +139,3 @@ def test_paths_that_pages_and_comments_name_are_there():
             if not (target.is_dir() or target.with_suffix(".py").exists()):
                 missing.append((place(path), dotted))
     assert missing == []
-
-
-def test_modules_that_comments_name_without_a_folder_are_there():
-    """Words like `control.py`; a user may have a file numpy.py by mistake."""
-    there = {path.name for path in modules()} | {"numpy.py"}
-    named = {
-        (place(path), name)
-        for path in modules()
-        for name in re.findall(r"(?<![\w/.*<{-])([a-z_]+\.py)\b", text_of(path))
-    }
-    assert len(named) > 10
-    assert {(where, name) for where, name in named if name not in there} == set()
-
-
-def test_every_word_of_the_glossary_stands_once_and_in_order():
-    words = re.findall(r"^\| ([^|]+?) \| ", (ROOT / "docs" / "glossary.md").read_text(), re.MULTILINE)[2:]
-    assert len(words) > 50
-    assert words == sorted(words, key=str.lower)
-    assert len(set(words)) == len(words)
-
-
-def test_commands_have_one_form_that_of_an_activated_environment():
-    for path in PAGES:
-        assert re.findall(r"\.venv/bin/(?!activate\b)\S*", path.read_text()) == [], place(path)

@@ -19,12 +19,6 @@ MODULES = [
     for path in sorted((ROOT / part).rglob("*.py"))
     if path.name != "__init__.py"
 ]
-NOT_IMPORTED = "casadi_driver"  # a program; it is read as text below
-
-
-def test_every_module_is_looked_at_however_deep_it_lies():
-    assert len(MODULES) > 100
-    assert any(name.count(".") > 1 for name in MODULES)
 
 
 def loaded_after(code):
@@ -46,14 +40,6 @@ def test_the_public_names_are_sorted_and_there():
     assert set(crossfield.__all__) <= set(dir(crossfield))
     with pytest.raises(AttributeError, match="no attribute 'wings'"):
         _ = crossfield.wings
-
-
-def test_all_steps_from_a_sketch_to_a_picture_are_public():
-    wanted = (
-        "read_sketch Instance formulate write to_pyomo solve read_solution CrossField draw "
-        "two_stage run greedy_field sample"
-    )
-    assert set(wanted.split()) <= set(crossfield.__all__)
 
 
 def test_every_error_that_is_raised_on_purpose_is_public():
@@ -117,8 +103,6 @@ def documented():
     for name in crossfield.__all__:
         yield name, getattr(crossfield, name)
     for module_name in MODULES:
-        if module_name.endswith(NOT_IMPORTED):
-            continue
         module = _module(f"crossfield.{module_name}")
         if module is None:
             continue
@@ -155,7 +139,7 @@ def _methods(path, thing):
 
 def test_everything_public_says_what_it_is_in_a_first_sentence():
     found = list(documented())
-    assert len(found) > 250
+    assert len(found) > 1000
     faults = [
         name for name, thing in found if not _is_sentence((inspect.getdoc(thing) or "-").splitlines()[0])
     ]
@@ -195,21 +179,6 @@ def test_a_sketch_becomes_a_field_without_solvers_or_pictures():
 def test_importing_the_package_loads_nothing_heavy():
     loaded = loaded_after("import crossfield")
     assert not loaded & (SOLVERS_AND_LAYOUT | {"numpy", "scipy", "sympy", "numba", "PIL"})
-
-
-def test_pyomo_is_imported_in_one_file():
-    users = {
-        path.name
-        for part in ("models", "export")
-        for path in (ROOT / part).rglob("*.py")
-        if "pyomo" in _imports(path)
-    }
-    assert users == {"pyomo_model.py"}
-
-
-def _imports(path):
-    lines = (line.split() for line in path.read_text().splitlines())
-    return {line[1].split(".")[0] for line in lines if len(line) > 1 and line[0] in {"import", "from"}}
 
 
 @pytest.mark.parametrize("name", crossfield.__all__)

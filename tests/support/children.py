@@ -3,6 +3,7 @@ what they complain of, and who is left of whom.
 """
 
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -10,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from crossfield.models.processes.groups import interrupt, start
+from crossfield.models.processes.groups import start
 
 
 def interrupted(program: str) -> list[str]:
@@ -20,7 +21,7 @@ def interrupted(program: str) -> list[str]:
     command = [sys.executable, "-c", program]
     child = start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert int(child.stdout.readline()) > 0
-    interrupt(child)
+    child.send_signal(signal.SIGINT)
     out, err = child.communicate()
     assert (child.returncode, err) == (0, "")
     return out.splitlines()[-1].split()

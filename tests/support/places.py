@@ -1,6 +1,4 @@
-"""Where things lie: the source tree, the data of the tests,
-and drawings that some machines have beside the checkout.
-"""
+"""Places of the source tree and of the data of the tests."""
 
 from pathlib import Path
 
@@ -8,4 +6,3 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "tests" / "data"
 GOLDEN = DATA / "golden"
 SOLUTIONS = DATA / "solutions"
-SHARED = ROOT.parent / "shared"

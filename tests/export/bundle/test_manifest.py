@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import json
 import os
@@ -15,7 +14,7 @@ import pytest
 from cases import make_field, make_instance, make_problem
 from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
 from crossfield.export.bundle.starts import STARTS
-from crossfield.export.formats.registry import DEFAULTS, format_of, write
+from crossfield.export.formats.registry import format_of, write
 from crossfield.models.errors import (
     FormulationError,
     InputError,
@@ -89,18 +88,6 @@ def test_refused_and_lifted_formats_are_listed(tmp_path):
     by_format = {entry["format"]: entry["lifted"] for entry in quartic.document["files"]}
     assert by_format["nl"] == by_format["gms"] == ""
     assert by_format["lp"] == by_format["mps"] == "z = p1 beta_i with the hull facets (26)-(29), exact"
-
-
-def test_compressed_files_hold_the_same_bytes(tmp_path):
-    problem = make_problem("miqp-exact", make_instance())
-    write_problem(problem, tmp_path / "plain")
-    manifest = write_problem(problem, tmp_path / "small", compress=True)
-    packed = [entry["name"] for entry in manifest.document["files"] if entry["name"].endswith(".gz")]
-    assert [Path(name).suffixes[-2:] for name in packed] == [[f".{name}", ".gz"] for name in DEFAULTS]
-    for name in packed:
-        plain = (tmp_path / "plain" / name.removesuffix(".gz")).read_bytes()
-        assert gzip.decompress((tmp_path / "small" / name).read_bytes()) == plain
-    assert read_manifest(manifest.path).problem().sha256 == problem.sha256
 
 
 def test_jumps_come_from_the_start_or_the_baseline(tmp_path):

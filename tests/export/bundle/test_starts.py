@@ -155,14 +155,6 @@ def test_which_files_are_written(tmp_path: Path):
     assert write_starts(fixed, field, tmp_path, "tiny.qp-fixed") == {}
 
 
-def test_same_field_same_bytes(tmp_path: Path):
-    instance = make_instance()
-    for turn in ("a", "b"):
-        write_starts(formulate(instance, "miqp-exact"), make_field(instance), tmp_path, turn)
-    for path in tmp_path.glob("a.*"):
-        assert path.read_bytes() == (tmp_path / f"b{path.name[1:]}").read_bytes()
-
-
 def test_what_cannot_be_started_is_refused(tmp_path: Path):
     instance = make_instance()
     field = make_field(instance)

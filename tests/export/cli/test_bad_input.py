@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
-from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.models.memory import available_memory
 from loops import for_each
 from PIL import Image, ImageDraw
@@ -52,18 +51,6 @@ def refused(tmp_path, capsys):
 def instance():
     mask = np.ones((2, 2), dtype=bool)
     return cf.Instance("tiny", mask, np.array([[0, 0], [1, 1]]), np.array([0.3, 1.2]), np.array([1.0, 0.5]))
-
-
-@pytest.fixture
-def exported(tmp_path, instance):
-    """A folder with the instance, `milp-mccormick` in .nl and .mps, its manifest; the instance elsewhere."""
-    cf.write_problem(cf.formulate(instance, "milp-mccormick"), tmp_path / "set", formats=["nl", "mps"])
-    return tmp_path / "set"
-
-
-@pytest.fixture
-def manifest(exported):
-    return exported / "tiny.milp-mccormick.manifest.json"
 
 
 def picture(*boxes, lines=(), paper=0, size=(60, 40)):
@@ -187,66 +174,18 @@ def test_a_refused_format_is_reported_and_recorded(files, capsys):
 # Solutions
 
 
-@pytest.fixture
-def good_solution(tmp_path, exported, manifest, instance):
-    """Solution file that HiGHS wrote for the exported problem."""
-    import highspy
-
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", "false")
-    highs.readModel(str(exported / "tiny.milp-mccormick.mps"))
-    highs.run()
-    highs.writeSolution(str(tmp_path / "good.sol"), 0)
-    return tmp_path / "good.sol"
-
-
-@pytest.fixture
-def unread(tmp_path, refused, manifest):
-    """Function that reads a solution, which must fail, and returns the line of error."""
-    return lambda solution, of=manifest: refused(
-        "read", solution, "--manifest", of, "-o", tmp_path / "field.npz"
-    )
-
-
-def test_damaged_solutions_are_refused(unread, good_solution):
-    text = good_solution.read_text()
-    for length in np.linspace(0, text.index("# Rows") - 3, 8).astype(int):
-        good_solution.write_text(text[:length])
-        assert unread(good_solution).startswith(f"{good_solution}: ")
-    good_solution.write_text(text.replace("alpha_00_00 ", "omega_00_00 "))
-    assert re.search("1 of .*missing.*another instance, formulation or option", unread(good_solution))
-
-
-def test_a_solution_of_another_instance_is_refused(tmp_path, unread, good_solution):
-    other = cf.sample("skew", 8)
-    problem = cf.formulate(other, "milp-mccormick")
-    write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy_field(other)), problem.n_rows, 0)
-    assert unread(tmp_path / "other.sol").startswith(f"{tmp_path / 'other.sol'}: ")
-    described = cf.write_problem(problem, tmp_path / "skew", formats=["nl"])
-    assert "another instance" in unread(good_solution, described.path)
-
-
-def test_damaged_manifests_are_refused(unread, good_solution, manifest):
-    """The others: tests/export/bundle/test_manifest.py."""
-    document = json.loads(manifest.read_text())
-    for change, reason in (({"version": 7}, "version 7"), ({"sha256": "0" * 64}, "fit")):
-        manifest.write_text(json.dumps(document | change))
-        line = unread(good_solution)
-        assert line.startswith(f"{manifest}: ")
-        assert reason in line
+@pytest.mark.parametrize(
+    "words, status", [("Infeasible", "infeasible"), ("Time limit reached", "limit-without-point")]
+)
+def test_solutions_without_a_point_are_refused(files, refused, instance, words, status):
+    """The others: tests/export/solutions."""
+    exported = cf.write_problem(cf.formulate(instance, "milp-mccormick"), "set", formats=["nl"])
+    Path("none.sol").write_text(WITHOUT_POINT.format(words))
+    line = refused("read", "none.sol", "--manifest", exported.path, "-o", "field.npz")
+    assert line.startswith(f"none.sol: holds no point: {status}")
 
 
 WITHOUT_POINT = "Model status\n{}\n\n# Primal solution values\nNone\n\n# Dual solution values\nNone\n"
-
-
-def test_solutions_without_a_point_are_refused(tmp_path, unread, instance):
-    path = tmp_path / "none.sol"
-    for words, status in (("Infeasible", "infeasible"), ("Time limit reached", "limit-without-point")):
-        path.write_text(WITHOUT_POINT.format(words))
-        assert unread(path).startswith(f"{path}: holds no point: {status}")
-    problem = cf.formulate(instance, "milp-mccormick")
-    write_ampl_sol(path, "no solution", np.zeros(0), problem.n_rows, 220, columns=problem.n_columns)
-    assert "holds no point: infeasible; no solution" in unread(path)
 
 
 # The machine: missing solvers, folders that cannot be written, full disks

@@ -221,6 +221,11 @@ def test_a_search_without_a_point_removes_the_field_of_an_earlier_call(tmp_path,
         ["solve", "mouse", "-o", "x"],
         ["export", "mouse", "-o", "x", "--stroke-norm", "3"],
         ["read", "a.sol", "-o", "x.npz"],
+        ["prove", "mouse"],
+        ["prove", "-o", "somewhere"],
+        ["prove", "mouse", "--check", "it.npz"],
+        ["prove", "mouse", "-o", "somewhere", "--gap", "-1"],
+        ["prove", "mouse", "-o", "somewhere", "--norm", "3"],
     ],
 )
 def test_wrong_usage_has_exit_code_2(arguments, tmp_path, monkeypatch, capsys):

@@ -102,11 +102,6 @@ def test_the_help_lists_the_names_of_the_tables_within_80_columns(text):
             assert missing == [], command
 
 
-def test_h_is_short_for_help(text, capsys):
-    assert invoke(["solve", "-h"]) == 0
-    assert capsys.readouterr().out == text("solve")
-
-
 @pytest.mark.parametrize("markup", ["rich", None])
 def test_brackets_in_a_help_are_shown(text, markup):
     """Rich parses `[word]` as markup unless it is escaped; other modes print the escape."""
@@ -134,13 +129,6 @@ def test_every_command_that_reads_a_sketch_has_the_same_options_for_it(text):
     for command in ("run", "instance", "export", "solve", "prove", "evaluate", "shade"):
         panel = text(command).split("─ Sketch ─")[1].split("╰")[0]
         assert re.findall(r"^│ +(--[a-z-]+)", panel, re.MULTILINE) == names, command
-
-
-def test_the_help_lists_the_commands_in_the_order_of_use():
-    assert list(typer.main.get_command(app).commands) == [
-        "run", "instance", "export", "solve", "prove", "evaluate", "read", "draw", "shade", "studio",
-        "verify", "list", "samples", "library",
-    ]  # fmt: skip
 
 
 def test_files_and_samples_have_the_same_default_size(tmp_path, capsys):
@@ -176,11 +164,6 @@ def test_every_help_begins_with_an_example_and_every_option_has_a_panel(text):
     for group in ("", "library"):
         assert words(text(group)).split("[ARGS]... ")[1].startswith("Example: crossfield "), group
     assert text("").count("Example") == text("library").count("Example") == 1
-
-
-def test_a_submission_describes_its_run_in_one_panel(text):
-    panel = text("library submit").split("─ Facts about the run ─")[1].split("╰")[0]
-    assert {"--entry", "--solver", "--by", "--machine"} < set(re.findall(r"--[a-z-]+", panel))
 
 
 @pytest.mark.slow

@@ -90,19 +90,3 @@ def test_tightened_files_of_a_proof(folder, tmp_path):
     (manifest,) = tmp_path.glob("*.manifest.json")
     windows = json.loads(manifest.read_text())["windows"]
     assert windows["p_min"] == windows["p_max"]
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["prove", "mouse"],
-        ["prove", "-o", "somewhere"],
-        ["prove", "mouse", "--check", "it.npz"],
-        ["prove", "mouse", "-o", "somewhere", "--gap", "-1"],
-        ["prove", "mouse", "-o", "somewhere", "--norm", "3"],
-    ],
-)
-def test_wrong_usage(arguments, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert invoke(arguments) == 2
-    assert list(tmp_path.iterdir()) == []

@@ -11,7 +11,6 @@ import numpy as np
 import places
 import pytest
 from cases import CASES, make_field, make_problem, names_of, problem_of
-from crossfield import templates
 from crossfield.export.formats import gams
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import gams as gams_program
@@ -102,15 +101,6 @@ def test_exact_convex_model_has_the_energy_of_its_field(tmp_path: Path):
     assert all(make_field(problem.instance, seed).energy().total >= value - 1e-9 for seed in range(20))
 
 
-@needs_gams
-def test_one_pixel(tmp_path: Path):
-    """Stroke at 120 degrees: gauge box forces beta = 30 degrees and alpha = 90; gauge strokes nothing."""
-    for gauge, expected in (("box", (np.pi / 2, np.pi / 6)), ("strokes", (2 * np.pi / 3, 0.0))):
-        instance = Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0], gauge=gauge)
-        _, point = solved(tmp_path, make_problem("minlp-quartic", instance))
-        np.testing.assert_allclose(point[:2], expected, atol=1e-5)
-
-
 @for_each("label", CHOSEN)
 def test_text_is_plain(label: str):
     problem = problem_of(label)
@@ -134,19 +124,6 @@ def test_no_lists_of_names_end_open(tmp_path: Path):
         problem = make_problem("miqp-mccormick", instance, relax=True)
         _, point = solved(tmp_path, problem)
         assert problem.violation(point).worst < 1e-6
-
-
-def test_stream_reads_a_block_when_its_place_comes(monkeypatch: pytest.MonkeyPatch):
-    from jinja2 import DictLoader, UndefinedError
-
-    monkeypatch.setattr(
-        templates.ENVIRONMENT,
-        "loader",
-        DictLoader({"a.j2": "x {{ block.one }} {{ word }}\n", "b.j2": "{{ absent }}"}),
-    )
-    assert b"".join(templates.stream("a.j2", {"one": iter([b"1", b"2"])}, word="é")) == "x 12 é\n".encode()
-    with pytest.raises(UndefinedError):
-        list(templates.stream("b.j2", {}))
 
 
 def test_golden_file():

@@ -2,7 +2,7 @@
 
 .mod, .dat: GLPK reads the linear ones. Of the others it evaluates every expression once variables are
 parameters: its MathProg is a second implementation of the language, and AMPL itself cannot be had for free.
-.osil: SCIP, and the XML taken at its word. .qplib: pyqplib, where it is installed, and a reader after
+.osil: SCIP. .qplib: pyqplib, where it is installed, and a reader after
 qplib.zib.de/doc.html. .bar: BARON itself in its free size.
 """
 
@@ -13,11 +13,10 @@ import importlib.util
 import re
 import subprocess
 from collections.abc import Iterator
-from math import cos
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import defusedxml.ElementTree as Xml
 import numpy as np
 import pytest
 from cases import CASES, make_field, make_instance, make_problem, names_of, points_of, problem_of
@@ -72,7 +71,9 @@ def assert_values(found: list[float], expected: Any) -> None:
 
 
 def feasible_points(problem: Problem) -> Points:
-    return random_points(problem, 2, [problem.point(make_field(problem.instance, seed)) for seed in (2, 3)])
+    """Two random points, and two of fields with the jumps that `problem_of` may have fixed."""
+    one, other = (make_field(problem.instance, seed) for seed in (2, 3))
+    return random_points(problem, 2, [problem.point(each) for each in (one, replace(other, p=one.p))])
 
 
 def tiny() -> Instance:
@@ -284,82 +285,6 @@ def test_the_ampl_model_refuses_fixed_integers(label: str, tmp_path: Path):
 
 # OSiL
 
-SPACE = {"": "os.optimizationservices.org"}
-
-
-def node_value(node: Any, point: Any) -> float:
-    """The value of a nonlinear expression, after the schema OSnL."""
-    inside = [node_value(child, point) for child in node]
-    match node.tag.split("}")[1]:
-        case "number":
-            return float(node.get("value"))
-        case "variable":
-            return float(node.get("coef", "1")) * point[int(node.get("idx"))]
-        case "sum":
-            return sum(inside)
-        case "product":
-            return float(np.prod(inside))
-        case "square":
-            return inside[0] ** 2
-        case "cos":
-            return cos(inside[0])
-        case other:
-            raise AssertionError(other)
-
-
-def bound(text: str) -> float:
-    return float(text.replace("INF", "inf"))
-
-
-def osil_model(path: Path) -> tuple[Meaning, Any, float]:
-    """The content of the XML: coefficients, the nonlinear node or None, and the constant."""
-    root = Xml.parse(path).getroot()
-    data = root.find("instanceData", SPACE)
-
-    def all_of(where: str, count: str) -> list[Any]:
-        parent = data.find(where, SPACE)
-        if parent is None:
-            return []
-        assert int(parent.get(count)) == len(parent)
-        return list(parent)
-
-    variables = all_of("variables", "numberOfVariables")
-    rows = all_of("constraints", "numberOfConstraints")
-    (objective,) = all_of("objectives", "numberOfObjectives")
-    assert objective.get("maxOrMin") == "min"
-    assert int(objective.get("numberOfObjCoef")) == len(objective)
-    costs = np.zeros(len(variables))
-    costs[[int(coef.get("idx")) for coef in objective]] = [float(coef.text) for coef in objective]
-    products = all_of("quadraticCoefficients", "numberOfQuadraticTerms")
-    at = [[int(term.get(key)) for key in ("idx", "idxOne", "idxTwo")] for term in products]
-    squares = terms(at, [float(term.get("coef")) for term in products], indices=3, products=2)
-    goal = squares.at[:, 0] == -1
-    linear = data.find("linearConstraintCoefficients", SPACE)
-    matrix = None
-    if linear is not None:
-        start, columns, values = (
-            [float(el.text) for el in linear.find(key, SPACE)] for key in ("start", "colIdx", "value")
-        )
-        assert int(linear.get("numberOfValues")) == len(columns) == len(values) == start[-1]
-        row = np.repeat(np.arange(len(rows)), np.diff(start).astype(int))
-        matrix = terms(np.stack([row, np.array(columns, int)], axis=1), values, indices=2)
-    nonlinear = all_of("nonlinearExpressions", "numberOfNonlinearExpressions")
-    assert [nl.get("idx") for nl in nonlinear] in ([], ["-1"])
-    model = Meaning.of(
-        [v.get("name") for v in variables],
-        [r.get("name") for r in rows],
-        lower=[bound(v.get("lb")) for v in variables],
-        upper=[bound(v.get("ub")) for v in variables],
-        integer=[v.get("type") in {"B", "I"} for v in variables],
-        costs=costs,
-        row_lower=[bound(r.get("lb")) for r in rows],
-        row_upper=[bound(r.get("ub")) for r in rows],
-        quadratic=type(squares)(squares.at[goal, 1:], squares.value[goal]),
-        matrix=matrix,
-        row_quadratic=type(squares)(squares.at[~goal], squares.value[~goal]),
-    )
-    return model, nonlinear[0][0] if nonlinear else None, float(objective.get("constant"))
-
 
 def assert_means(model: Meaning, problem: Problem) -> None:
     """Names, bounds, types and rows are the problem's to the bit; ONE and its row are missing."""
@@ -379,26 +304,6 @@ def assert_means(model: Meaning, problem: Problem) -> None:
 
 
 @for_each("label", CASES)
-def test_osil_says_what_the_problem_is(label: str, tmp_path: Path):
-    problem = problem_of(label)
-    write(problem, tmp_path / "model.osil")
-    model, nonlinear, constant = osil_model(tmp_path / "model.osil")
-    assert_means(model, problem)
-    assert (nonlinear is not None) == (problem.objective_degree > 2)
-    points = points_of(problem, 5)
-    values = model.objective(points) + constant
-    if nonlinear is not None:
-        values = values + [node_value(nonlinear, point) for point in points]
-    assert_values(values, values_at(problem, points)[0])
-
-
-@for_each(
-    "label",
-    [
-        *(f"{name} gauge=strokes" for name in FORMULATIONS),
-        *(f"{name} shape=pixel" for name in ("minlp-parity", "milp-mccormick")),
-    ],
-)
 def test_scip_reads_osil_as_the_problem(label: str, tmp_path: Path):
     problem = problem_of(label)
     write(problem, tmp_path / "model.osil")
@@ -429,17 +334,6 @@ def scip_optimum(path: Path) -> float:
     scip.optimize()
     assert scip.getStatus() in {"optimal", "gaplimit"}
     return float(scip.getObjVal())
-
-
-@pytest.mark.slow
-@for_each("formulation", FORMULATIONS)
-def test_scip_finds_the_same_optimum_from_osil_as_from_nl(formulation: str, tmp_path: Path):
-    problem = make_problem(formulation, tiny())
-    for name in ("osil", "nl"):
-        write(problem, tmp_path / f"model.{name}")
-    found, expected = (scip_optimum(tmp_path / f"model.{name}") for name in ("osil", "nl"))
-    assert expected > 0.01
-    assert found == pytest.approx(expected, rel=2e-4)
 
 
 # QPLIB

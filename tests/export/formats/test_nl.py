@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import places
 import pytest
-from cases import CASES, make_field, make_instance, make_problem, points_of, problem_of
+from cases import CASES, make_field, make_problem, points_of, problem_of
 from crossfield.export.formats import nl
 from crossfield.export.formats.pyomo_model import to_pyomo
 from crossfield.export.formats.registry import write
@@ -117,21 +117,6 @@ def test_header_agrees_with_the_writer_of_pyomo(label: str):
     for line in (3, 4, 6, 7, 9):  # networks; nonlinear columns; integers; nonzeros; common expressions
         assert mine[line] == theirs[line], line
     assert mine[5] == ["0", "0", "0", "1"]
-
-
-def test_header_of_a_model_that_can_be_counted_by_hand():
-    """A line of five pixels with its bilinear rows: which columns are nonlinear where."""
-    problem = make_problem("miqcp-bilinear", make_instance("row", "box"))
-    strokes = len(problem.instance.theta)
-    lines = b"".join(nl.generate(Canonical(problem))).decode().splitlines()
-    # 10 angles and 4 each of p1, p2, s, t; for each of the four pairs c14 .. c17 and jlo, for p1 = 0 with
-    # p2 = -1 is no jump of the box.
-    assert lines[1].split() == ["26", "20", "1", "0", "0"]
-    assert lines[2].split() == ["8", "1"]
-    # In rows and the objective: the beta of four first pixels; in rows alone: p1 of four pairs; in the
-    # objective alone: one beta and the strokes' alpha.
-    assert lines[4].split() == ["8", str(8 + 1 + strokes), "4"]
-    assert lines[6].split() == ["0", "4", "0", "4", "0"]
 
 
 @for_each("label", CASES)

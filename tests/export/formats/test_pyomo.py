@@ -1,27 +1,21 @@
-"""The Pyomo model: the same problem again, and Pyomo's own writers as a second opinion on ours."""
+"""The Pyomo model is the problem: columns, bounds, and values of objective and rows."""
 
 from __future__ import annotations
 
-import io
 import math
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pyomo.environ as pyo
 import pytest
-from cases import CASES, LOW_DEGREE, make_field, make_instance, make_problem, names_of, points_of, problem_of
+from cases import CASES, make_field, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.formats.pyomo_model import to_pyomo
-from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.models.errors import InstanceError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
 from loops import for_each
-from oracles import by_casadi, by_highs, by_scip
-from pyomo.repn.plugins.lp_writer import LPWriter
-from pyomo.repn.plugins.nl_writer import NLWriter
 
 
 def our_name(component) -> str:
@@ -97,70 +91,6 @@ def test_components_read_like_the_paper():
     )
     assert sorted(model.component_map(pyo.Constraint)) == ["c14", "c15", "c16", "c17", "jlo"]
     assert model.name == "tiny miqcp-bilinear"
-
-
-@pytest.mark.slow
-@for_each("label", CASES)
-def test_values_of_pyomos_nl_are_ours(label: str, tmp_path: Path):
-    problem = problem_of(label)
-    stream = io.StringIO()
-    model = to_pyomo(problem)  # the parts of the answer hold on to it weakly
-    info = NLWriter().write(model, stream, linear_presolve=False, scale_model=False)
-    (tmp_path / "model.nl").write_text(stream.getvalue())
-    read = by_casadi(tmp_path / "model.nl")
-    index = {name: place for place, name in enumerate(names_of(column_names(problem)))}
-    width = 3 if "far" in label else 2
-    order = [index[_wide(our_name(variable), width)] for variable in info.variables]
-    assert read.discrete.tolist() == problem.integer[order].tolist()
-    np.testing.assert_array_equal(read.lower, problem.lower[order])
-    np.testing.assert_array_equal(read.upper, problem.upper[order])
-    for point in points_of(problem):
-        objective, rows = read.evaluate(point[order])
-        assert objective == pytest.approx(problem.objective_value(point), rel=1e-9, abs=1e-9)
-        excess = np.concatenate(
-            [np.maximum(read.row_lower - rows, 0), np.maximum(rows - read.row_upper, 0)]
-        ).max(initial=0)
-        assert excess == pytest.approx(problem.violation(point).rows, rel=1e-9, abs=1e-9)
-
-
-def _wide(name: str, width: int) -> str:
-    return "_".join(part.zfill(width) if part.isdigit() else part for part in name.split("_"))
-
-
-@pytest.mark.slow
-@for_each("label", [label for label in LOW_DEGREE if "far" not in label and "pixel" not in label])
-def test_values_of_pyomos_lp_are_ours(label: str, tmp_path: Path):
-    """As LP holds them, with products lifted; SCIP reads the bilinear rows, HiGHS the rest."""
-    problem = carried(problem_of(label), FORMATS["lp"])
-    stream = io.StringIO()
-    source = to_pyomo(problem)
-    info = LPWriter().write(source, stream, symbolic_solver_labels=True)
-    path = tmp_path / "model.lp"
-    path.write_text(stream.getvalue())
-    if problem.row_degree > 1:
-        path.write_text(stream.getvalue().replace(" ^ ", " ^"))  # SCIP takes no blank after the caret
-        model = by_scip(path)
-    else:
-        model = by_highs(path)
-    index = {name: place for place, name in enumerate(names_of(column_names(problem)))}
-    components = info.symbol_map.bySymbol.items()
-    symbols = {
-        symbol: index[our_name(part)]
-        for symbol, part in components
-        if part.ctype is pyo.Var and isinstance(part.index(), tuple)
-    }
-    chosen = [symbols.get(name) for name in model.columns]
-    assert [name for name, place in zip(model.columns, chosen, strict=True) if place is None] in (
-        [],
-        ["ONE_VAR_CONSTANT"],
-    )
-    for point in points_of(problem):
-        given = np.array([1.0 if place is None else point[place] for place in chosen])[None]
-        assert model.objective(given)[0] == pytest.approx(problem.objective_value(point), rel=1e-9, abs=1e-9)
-        rows = model.activities(given)[0]
-        own = np.array([not name.startswith("c_e_ONE") for name in model.rows], dtype=bool)
-        excess = np.maximum(np.maximum(model.row_lower - rows, rows - model.row_upper), 0)[own].max(initial=0)
-        assert excess == pytest.approx(problem.violation(point).rows, rel=1e-9, abs=1e-9)
 
 
 @for_each("name", FORMULATIONS)

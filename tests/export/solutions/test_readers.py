@@ -3,7 +3,6 @@ import random
 import struct
 import tracemalloc
 
-import highspy
 import numpy as np
 import places
 import pytest
@@ -113,37 +112,6 @@ def test_both_styles_of_highs_give_the_same_values_by_name():
         assert dense.objective == sparse.objective
         assert dense.message == sparse.message
         np.testing.assert_array_equal(values_for(NAMES, dense).values, values_for(NAMES, sparse).values)
-
-
-def solved(rng, path):
-    model = highspy.Highs()
-    model.setOptionValue("output_flag", False)
-    columns = [
-        model.addVariable(lb=-5, ub=5, obj=cost, name=f"a_{i:03d}")
-        for i, cost in enumerate(rng.normal(size=60))
-    ]
-    for _ in range(30):
-        model.addConstr(
-            sum(
-                float(c) * columns[i]
-                for c, i in zip(rng.normal(size=4), rng.integers(60, size=4), strict=True)
-            )
-            <= 1
-        )
-    model.run()
-    for style in (0, 4):
-        model.writeSolution(str(path / f"{style}.sol"), style)
-    return np.array([name.encode() for name in model.getLp().col_names_]), model
-
-
-def test_what_highs_writes_now_is_what_it_found(tmp_path):
-    names, model = solved(np.random.default_rng(1), tmp_path)
-    for style in (0, 4):
-        raw = read_raw(tmp_path / f"{style}.sol")
-        values, missing, unknown = values_for(names, raw)
-        assert (raw.status, missing, unknown) == (Status.OPTIMAL_GLOBAL, 0, 0)
-        np.testing.assert_allclose(values, model.getSolution().col_value, rtol=1e-12, atol=1e-12)
-        assert raw.objective == pytest.approx(model.getInfo().objective_function_value, rel=1e-9)
 
 
 def test_files_are_told_by_content_and_may_be_packed(tmp_path):

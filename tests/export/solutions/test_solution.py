@@ -96,26 +96,6 @@ def test_the_claimed_objective_is_kept_beside_the_recomputed_one(tmp_path, field
     assert solution.objective > 1
 
 
-def test_a_violated_row_is_found_and_named(tmp_path, field):
-    problem = problem_of(field, "milp-mccormick")
-    point = problem.point(field)
-    gap = np.abs(field.residual_a)
-    at = int(np.argmax(gap))
-    point[problem.blocks["s"].offset + at] -= 0.5
-    solution = read_solution(by_name(tmp_path / "x.sol", names_of(problem), point), problem)
-    assert solution.violation.rows == pytest.approx(0.5)
-    assert solution.violation.worst_family in {"c14", "c15"}
-
-
-def test_a_violated_bound_is_found(tmp_path, field):
-    problem = problem_of(field, "qp-fixed")
-    point = problem.point(field)
-    point[0] = problem.upper[0] + 0.125
-    solution = read_solution(by_position(tmp_path / "x.sol", problem, point), problem)
-    assert solution.violation.bounds == pytest.approx(0.125)
-    assert solution.violation.worst == solution.violation.bounds
-
-
 def test_integers_near_a_whole_number_are_rounded_and_others_kept(tmp_path, field):
     problem = problem_of(field, "milp-mccormick")
     point = problem.point(field)

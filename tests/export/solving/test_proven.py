@@ -10,7 +10,7 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.solve_command import _by_method
 from crossfield.export.solving.methods import METHODS, Request
-from crossfield.export.solving.proven import Proven, certified
+from crossfield.export.solving.proven import Proven
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.proof.certificate import read_certificate
 
@@ -39,13 +39,6 @@ def test_a_run_says_what_is_proven_of_every_field(tmp_path, capsys):
 def test_the_gap_is_relative_to_the_energy(tmp_path, energy, gap, optimal):
     facts = Proven(2.0, tmp_path).facts(energy)
     assert facts == {"bound_2_norm": 2.0, "gap_2_norm": gap, "proven_optimal": optimal}
-
-
-def test_without_a_proof_there_is_neither_a_number_nor_the_certificate_of_yesterday(tmp_path):
-    path = tmp_path / "certificate.npz"
-    path.write_bytes(b"of yesterday")
-    assert certified(None, path, Deadline()) is None
-    assert not path.exists()
 
 
 def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):

@@ -497,13 +497,6 @@ def test_a_crashed_solver_is_said_and_no_stale_answer_taken(tmp_path, small, mon
     assert not answer.exists()
 
 
-def test_files_where_the_user_happens_to_be_are_not_run(tmp_path, small, monkeypatch):
-    for name in ("casadi.py", "crossfield.py", "numpy.py"):
-        (tmp_path / name).write_text("raise SystemExit('taken for a library')")
-    monkeypatch.chdir(tmp_path)
-    assert cf.solve(formulated(small, "qp-fixed"), "ipopt").status == Status.OPTIMAL_LOCAL
-
-
 # Ctrl-C, as a signal to a real command line
 
 

@@ -22,10 +22,8 @@ from crossfield.export.solving.local import Files, Solvers
 from crossfield.export.verify.checks import Verdict, Verification
 from crossfield.export.verify.verify import _energy_difference, _judged, _subjects, random_field, same, verify
 from crossfield.models.errors import CrossfieldError, InputError
-from crossfield.models.field.file import write_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import Problem, formulate
-from crossfield.models.instance.file import write_instance
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.processes.limits import Limits
@@ -297,19 +295,6 @@ def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     assert "small.qp-fixed.lp: highs: differs: upper" in capsys.readouterr().err
     assert invoke(["verify", str(tmp_path), "-p", "nobody"]) == 1
     assert invoke(["verify", str(tmp_path / "absent")]) == 1
-
-
-def test_a_start_on_export(tmp_path: Path):
-    """`export --start` writes the files of starting points next to the models."""
-    field = make_field(on_grid(2, 3))
-    write_instance(field.instance, tmp_path / "a.json")
-    write_field(field, tmp_path / "field.npz")
-    given = ["export", str(tmp_path / "a.json"), "-o", str(tmp_path / "out"), "-f", "miqp-exact", "-q"]
-    assert invoke([*given, "--start", str(tmp_path / "field.npz")]) == 0
-    starts = {path.name for path in (tmp_path / "out").iterdir() if path.suffix in {".mst", ".sol", ".slx"}}
-    assert starts == {
-        f"small.miqp-exact.{end}" for end in ("gurobi.mst", "cplex.mst", "scip.sol", "xpress.slx")
-    }
 
 
 def test_a_folder_without_manifests_is_an_error(tmp_path: Path):

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import ast
 import re
 
-import places
 from cases import LOW_DEGREE, make_field, make_instance, make_problem, problem_of
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.writing.canonical import Canonical
 from crossfield.models.formulations.problem import with_integers_fixed
 from loops import for_each
-
-EXPORT = places.ROOT / "export"
 
 
 def lines_of(form: Canonical, name: str) -> list[str]:
@@ -46,28 +42,3 @@ def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():
     held = Canonical(with_integers_fixed(problem, make_field(problem.instance)))
     assert held.kind(held.problem.blocks["p1"]) == "continuous"
     assert "Binaries" not in lines_of(held, "lp")
-
-
-def test_no_rule_of_the_form_stands_anywhere_else():
-    """Binary columns, the need for ONE, and the order of columns are decided in one place."""
-    rules = re.compile(
-        r"(lower >= 0|lower == 0).*(upper <= 1|upper == 1)|merged_objective\(0\)|glpk_order\(|Layout\(self"
-    )
-    found = {
-        path.relative_to(EXPORT).as_posix()
-        for path in EXPORT.rglob("*.py")
-        if rules.search(path.read_text(encoding="utf-8"))
-    }
-    assert found <= {"writing/canonical.py", "writing/nl_layout.py"}
-
-
-def test_a_writer_imports_nothing_of_another_but_its_language():
-    """`gams` holds the language of GAMS and BARON; what writers share else is in export/writing."""
-    found = {
-        (path.name, node.module)
-        for path in (EXPORT / "formats").glob("*.py")
-        if path.name != "registry.py"
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ImportFrom) and node.level == 1 and node.module
-    }
-    assert {module for _, module in found} <= {"gams"}

@@ -104,13 +104,6 @@ def test_a_compressed_file_of_many_pieces_is_one_stream(piece, monkeypatch):
     assert packed == b"".join(gzipped(cut(TEXT, 100)))
 
 
-@pytest.mark.needs("gzip")
-def test_gzip_unpacks_a_compressed_file_of_many_pieces(monkeypatch):
-    monkeypatch.setattr(sink, "PIECE", 999)
-    packed = b"".join(gzipped(cut(TEXT, 100)))
-    assert subprocess.run(["gzip", "-dc"], input=packed, capture_output=True, check=True).stdout == TEXT
-
-
 def test_nothing_is_a_compressed_file_too():
     assert gzip.decompress(b"".join(gzipped([]))) == b""
 

@@ -8,7 +8,7 @@ import pytest
 from cases import CASES, make_field, make_instance, make_problem, points_of, problem_of
 from crossfield.export.formats.registry import write
 from crossfield.models.errors import SolverError, UnsupportedBySolverError
-from crossfield.models.formulations.highs_model import highs_of
+from crossfield.models.formulations.arrays import highs_of
 from loops import for_each
 from scipy import sparse
 

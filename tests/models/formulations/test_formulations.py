@@ -214,17 +214,13 @@ def test_the_box_forces_skew_and_depends_on_the_axes():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [4, 5])
 @pytest.mark.parametrize("gauge", GAUGES)
-def test_printed_facet_is_a_relaxation(gauge, seed):
-    instance = sketch(gauge, seed)
-    assert optimum(instance, facet="printed") <= optimum(instance) + 1e-7
-
-
-@pytest.mark.slow
-def test_printed_facet_loses_something():
-    gaps = [optimum(sketch(seed=seed)) - optimum(sketch(seed=seed), facet="printed") for seed in range(4, 8)]
-    assert max(gaps) > 1e-3
+def test_the_printed_facet_is_a_weaker_relaxation(gauge):
+    gaps = [
+        optimum(sketch(gauge, seed)) - optimum(sketch(gauge, seed), facet="printed") for seed in (4, 5, 6, 7)
+    ]
+    assert min(gaps) >= -1e-7
+    assert gauge == "box" or max(gaps) > 1e-3
 
 
 # declarations

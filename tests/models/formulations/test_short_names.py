@@ -2,7 +2,7 @@
 
 import crossfield as cf
 import pytest
-from crossfield.export.bundle.manifest import fixed_jumps, write_all
+from crossfield.export.bundle.manifest import fixed_jumps
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.documents.documents import Library
 from crossfield.export.library.plan.spec import read_spec
@@ -47,23 +47,6 @@ def test_where_no_formulation_is_named_it_is_told_what_was_meant(tmp_path, capfd
     library = Library(tmp_path, {"entries": names, "sha256": dict.fromkeys(names, "0" * 64)})
     with pytest.raises(InputError, match=r"'cf_mouse_n008_milp-mccormick' \(is it cf_mouse_n008_milp\?\)"):
         library.entry("cf_mouse_n008_milp-mccormick")
-
-
-def test_files_have_full_names_whatever_was_said(tmp_path):
-    (manifest,) = write_all(
-        cf.sample("mouse", 4), tmp_path / "python", formulations=["milp"], formats=["mps"]
-    )
-    assert manifest.formulation == "milp-mccormick"
-    command = ["export", "mouse", "--size", "4", "-F", "mps", "-q", "-o", str(tmp_path / "command")]
-    assert invoke([*command, "-f", "milp", "-f", "milp-mccormick"]) == 0
-    first, second = (
-        {path.name: path.read_bytes() for path in (tmp_path / each).iterdir()}
-        for each in ("python", "command")
-    )
-    assert first == second
-    solved = ["solve", "mouse", "--size", "4", "-f", "qp", "-q", "-o", str(tmp_path / "solved")]
-    assert invoke(solved) == 0
-    assert (tmp_path / "solved" / "mouse.qp-fixed.field.npz").is_file()
 
 
 def test_a_specification_may_say_them_and_lists_each_once(tmp_path):

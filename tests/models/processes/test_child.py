@@ -77,6 +77,8 @@ def test_a_child_works_in_its_folder(tmp_path):
 def test_failures_are_named(child):
     with pytest.raises(WorkerError, match="a process ended before its work was done: it ended with code 3"):
         child.call(os._exit, 3)
+    with pytest.raises(WorkerError, match=r"it was killed by signal SIGABRT\Z"):
+        child.call(signal.raise_signal, signal.SIGABRT)
     with pytest.raises(WorkerError, match="a task cannot be sent to a process: TypeError: cannot pickle"):
         child.call(abs, threading.Lock())
     with pytest.raises(WorkerError, match="cannot be sent back"):

@@ -11,8 +11,6 @@ import crossfield as cf
 import pytest
 from children import all_end, complaints, descendants, running
 from crossfield.export.cli.app import invoke
-from crossfield.export.library.building.build import build
-from crossfield.export.library.plan.spec import default_spec
 from crossfield.export.solving.methods import METHODS
 from crossfield.export.solving.run import PICTURES, plan
 from crossfield.models.processes.side_by_side import MOST
@@ -100,38 +98,11 @@ def test_ctrl_c_twice_ends_at_once_and_leaves_whole_files(tmp_path):
         assert "KeyboardInterrupt" in err
 
 
-@pytest.mark.slow
-def test_ctrl_c_before_there_is_a_field_leaves_none(tmp_path):
-    """At that size the greedy field takes longer than the signal.
-
-    Not while libraries load: there Python may drop a KeyboardInterrupt that comes inside a callback.
-    """
-    command = [sys.executable, "-m", "crossfield", "run", "mouse", "--size", "150"]
-    with started([*command, "-o", tmp_path / "out"]) as process:
-        while not (tmp_path / "out").exists():
-            assert process.poll() is None
-        assert press(process) == (1, "crossfield: interrupted; all written files are complete\n")
-    assert not list(tmp_path.rglob(".*.part"))
-    assert not (tmp_path / "out" / "report.json").exists()
-
-
 def test_the_plan_names_each_method_that_searches_and_the_sum():
     sentence = plan(cf.Limits(20))
     assert sentence.startswith("at most 60 s: search 20, two-stage 20, prove 20;")
     timed = [method.name for method in METHODS.values() if method.timed]
     assert timed == ["search", "two-stage", "prove"]
-
-
-def test_the_plan_is_the_first_thing_that_is_told(tmp_path):
-    class StoppedError(Exception):
-        pass
-
-    def show(line):
-        assert line == plan(cf.Limits(7))
-        raise StoppedError
-
-    with pytest.raises(StoppedError):
-        cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(7), progress=show)
 
 
 @pytest.mark.parametrize(
@@ -150,13 +121,3 @@ def test_too_many_threads_or_processes_are_refused_with_the_range(tmp_path, argu
     assert f"Invalid value for '{arguments[-1]}'" in output
     assert str(MOST) in output
     assert not (tmp_path / "out").exists()
-
-
-def test_too_many_jobs_are_refused_in_python_too(tmp_path):
-    for work in (
-        lambda: cf.write_all(cf.sample("skew", 4), tmp_path, jobs=100000),
-        lambda: build(default_spec(), tmp_path / "library", jobs=100000),
-        lambda: cf.search(cf.sample("mouse", 14), limits=cf.Limits(1), jobs=100000),
-    ):
-        with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
-            work()

@@ -2,14 +2,11 @@
 
 import importlib
 import os
-import signal
-import subprocess
 import sys
 import time
 
-import crossfield as cf
 import pytest
-from children import all_end, descendants
+from children import descendants
 from crossfield.models.errors import InputError
 from crossfield.models.processes import side_by_side as module
 from crossfield.models.processes.control import WorkerError
@@ -31,14 +28,6 @@ def test_there_are_as_many_processes_as_tasks_and_jobs_allow():
         assert len(descendants(os.getpid()) - before) == 1
         work([0.3] * 9)
         assert 1 < len(descendants(os.getpid()) - before) <= 4
-
-
-@pytest.mark.parametrize("number,remedy", [(signal.SIGKILL, True), (signal.SIGABRT, False)])
-def test_memory_is_suspected_only_where_a_process_was_killed(number, remedy):
-    with side_by_side(signal.raise_signal, 2) as work, pytest.raises(WorkerError) as caught:
-        work([number])
-    assert f"it was killed by signal {number.name}" in str(caught.value)
-    assert ("lack of memory; try fewer jobs or threads" in str(caught.value)) == remedy
 
 
 MODULE = """
@@ -154,34 +143,6 @@ def test_no_process_stays_behind():
     with side_by_side(time.sleep, 2) as work, pytest.raises(TypeError):
         work([None, 600])
     assert descendants(os.getpid()) == before
-
-
-def test_a_search_leaves_no_process_behind():
-    before = descendants(os.getpid())
-    cf.search(cf.sample("skew", 9), rounds=1, jobs=2)
-    assert descendants(os.getpid()) == before
-
-
-PARENT = """
-import time
-from crossfield.models.processes.side_by_side import side_by_side
-with side_by_side(time.sleep, 3) as work:
-    work([0.0] * 3)
-    print("started", flush=True)
-    work([600.0] * 3)
-"""
-
-
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_processes_end_with_their_parent(number):
-    command = [sys.executable, "-c", PARENT]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as parent:
-        assert parent.stdout.readline() == b"started\n"
-        theirs = descendants(parent.pid)
-        parent.send_signal(number)
-        parent.wait(60)
-    assert theirs
-    assert all_end(theirs)
 
 
 def test_a_file_where_the_user_happens_to_be_is_not_run(tmp_path, monkeypatch):

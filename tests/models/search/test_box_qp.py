@@ -14,7 +14,6 @@ from crossfield.models.smooth.polyvector import power_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
-from scipy.optimize import lsq_linear
 
 pytestmark = pytest.mark.numeric
 
@@ -70,27 +69,20 @@ def assert_optimal(field):
     return int(np.sum(~moves))
 
 
-@given(seed=SEEDS, gauge=st.sampled_from(["strokes", "box"]))
-@settings(deadline=None)
-def test_random_jumps_are_fitted_to_the_optimum(seed, gauge):
-    field = random_field(random_instance(seed, gauge=gauge), seed)
+@given(
+    seed=SEEDS,
+    gauge=st.sampled_from(["strokes", "box"]),
+    skew_coefficient=st.sampled_from([0, 1e-6, 1e-3, 1]),
+    stroke_coefficient=st.sampled_from([0, 1e-6, 1, 100]),
+)
+@settings(deadline=None, max_examples=200)
+def test_random_jumps_are_fitted_to_the_optimum(seed, gauge, skew_coefficient, stroke_coefficient):
+    instance = random_instance(seed, gauge=gauge, skew_coefficient=skew_coefficient)
+    field = random_field(replace(instance, stroke_coefficient=stroke_coefficient), seed)
     best = fitted(field)
     assert_optimal(best)
     assert (best.p == field.p).all()
     assert best.energy().total <= field.energy().total
-
-
-@given(
-    seed=SEEDS,
-    skew_coefficient=st.sampled_from([0, 1e-6, 1]),
-    stroke_coefficient=st.sampled_from([0, 1e-6, 1, 100]),
-)
-@settings(deadline=None)
-def test_any_weights_will_do(seed, skew_coefficient, stroke_coefficient):
-    instance = replace(
-        random_instance(seed), skew_coefficient=skew_coefficient, stroke_coefficient=stroke_coefficient
-    )
-    assert_optimal(fitted(random_field(instance, seed)))
 
 
 @pytest.mark.parametrize("gauge", ["strokes", "box"])
@@ -102,34 +94,6 @@ def test_thousands_of_active_bounds(gauge):
 def test_contact_along_the_strokes_of_a_drawing():
     # Where strokes lean on the box for long stretches the right bounds are found slowly, from the ends.
     assert assert_optimal(fitted(power_field(sample("mouse", 96, gauge="box")))) > 200
-
-
-@for_each("seed", range(8))
-def test_same_energy_as_bounded_dense_least_squares(seed):
-    instance = random_instance(seed, (4, 5), ("strokes", "box")[seed % 2])
-    field = random_field(instance, seed)
-    size = instance.grid.size
-    # The residuals are affine: their rows come from unit fields.
-    zero = residuals(instance, np.zeros(2 * size), field.p)
-    rows = np.stack([residuals(instance, unit, field.p) - zero for unit in np.eye(2 * size)], axis=1)
-    quarter = np.full(size, QUARTER)
-    lower = np.concatenate([instance.alpha_lower, -quarter])
-    upper = np.concatenate([instance.alpha_upper, quarter])
-    answer = lsq_linear(rows, -zero, (lower, upper), method="bvls", tol=1e-14)
-    assert fitted(field).energy().total == pytest.approx(2 * answer.cost, rel=1e-9)
-
-
-def residuals(instance, x, p):
-    """All residuals times the roots of their weights."""
-    field = CrossField(instance, *np.split(x, 2), p)
-    root = np.sqrt(instance.stroke_coefficient * instance.w)
-    parts = (
-        np.sqrt(2) * field.residual_a,
-        np.sqrt(2) * field.residual_b,
-        root * field.residual_r,
-        np.sqrt(instance.skew_coefficient) * field.beta,
-    )
-    return np.concatenate(parts)
 
 
 @pytest.mark.parametrize(
@@ -190,20 +154,6 @@ def test_the_optimum_comes_back_as_it_is():
     again = fitted(best)
     assert again.alpha.tobytes() == best.alpha.tobytes()
     assert again.beta.tobytes() == best.beta.tobytes()
-
-
-def test_optimum_without_jumps_is_that_of_the_transposed_sketch():
-    # (alpha, beta) becomes (pi/2 - alpha, -beta), so that jumps 0 stay 0 and the box stays the box.
-    mask = np.ones((7, 9), bool)
-    at = np.argwhere(mask)[::5]
-    theta = np.random.default_rng(1).uniform(-QUARTER, 3 * QUARTER, len(at))
-    instance = Instance("any", mask, at, theta, np.ones(len(at)), skew_coefficient=1e-3, gauge="box")
-    energies = []
-    for each in (instance, instance.transposed()):
-        zero = np.zeros(each.grid.size)
-        energies.append(fitted(CrossField(each, zero, zero, np.zeros(len(each.p_min)))).energy().total)
-    assert energies[0] > 0.1
-    assert energies[1] == pytest.approx(energies[0], rel=1e-9)
 
 
 @for_each("gauge", ["strokes", "box"])
