@@ -294,7 +294,8 @@ def in_short(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
   {max(undoubted):.1f} degrees, and crossfield has no doubt.
 - Catenoids and saddle sheets come out on the wrong side half of the time, because inside out they are
   surfaces of the same kind: the default side is right in {sum(even):.0f} of {len(even)} views.
-  On the surfaces below, it is right in {sum(sides):.0f} of {len(sides)} cases, from exact crosses and three methods.
+  On the surfaces below, it is right in {sum(sides):.0f} of {len(sides)} cases, from exact crosses and
+  three methods.
 - `confidence` hardly shows errors: its rank correlation with the true error over the pixels of a surface
   is {min(ranks):.1f} to {max(ranks):.1f}."""
 
