@@ -112,7 +112,7 @@ class _Solver:
         if self._factors is None:
             self._factors = factored(matrix(), self._order)
             return self._factors(right)
-        return preconditioned(product, right, self._factors, _RESIDUAL)
+        return preconditioned(product, right, self._factors, _RESIDUAL)[0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -116,24 +116,20 @@ def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.nd
 
 
 def preconditioned(
-    product: Solve, right: Floats, approximate: Solve, tolerance: float
-) -> np.ndarray[Any, Any]:
-    """The x with Ax = right to a relative residual, by conjugate gradients.
+    product: Solve, right: Floats, approximate: Solve, tolerance: float, most: int = _MOST_STEPS
+) -> tuple[np.ndarray[Any, Any], bool]:
+    """The x with Ax = right by conjugate gradients, and whether its relative residual is small enough.
 
-    product: A times a vector, A symmetric. approximate: an approximate solver of the same system.
+    product: A times a vector, A symmetric. approximate: an approximate solver of the same system. most:
+    steps.
     """
     shape = (len(right), len(right))
-    matrix = LinearOperator(shape, matvec=product, dtype=right.dtype)
+    matrix, inverse = (
+        LinearOperator(shape, matvec=each, dtype=right.dtype) for each in (product, approximate)
+    )
     with one_thread():
-        solution: np.ndarray[Any, Any] = cg(
-            matrix,
-            right,
-            rtol=tolerance,
-            atol=_ROUNDING,
-            maxiter=_MOST_STEPS,
-            M=LinearOperator(shape, matvec=approximate, dtype=right.dtype),
-        )[0]
-    return solution
+        solution, late = cg(matrix, right, rtol=tolerance, atol=_ROUNDING, maxiter=most, M=inverse)
+    return solution, not late
 
 
 @contextmanager

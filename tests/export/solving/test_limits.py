@@ -109,7 +109,9 @@ def limits(seconds, *paces):
     """Limits of a certified proof whose clock stands still, on a machine that checks at these paces."""
     whole = Deadline.after(seconds, lambda: 0.0)
     measured = iter(paces)
-    return WorkLimits(whole, lambda: False, 0.0, certified=True, work=math.inf, measured=lambda: next(measured))
+    return WorkLimits(
+        whole, lambda: False, 0.0, certified=True, work=math.inf, measured=lambda: next(measured)
+    )
 
 
 def test_a_proof_keeps_time_for_its_certificate():
