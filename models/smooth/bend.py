@@ -182,10 +182,11 @@ class _Bend:
 
     def _along(self, x: Floats) -> Any:
         """The matrix (q, 2m) from differences to derivatives along the other line; a quadrant counts 1/4."""
-        angle, every = x[self.across], np.arange(len(self.across))
-        places = (np.concatenate([every, every]), np.concatenate([self.sideways, self.upward]))
-        parts = np.concatenate([np.cos(angle), np.sin(angle)]) / 2
-        return sparse.csr_array((parts, places), shape=(len(every), len(self.offset)))
+        angle, count = x[self.across], len(self.across)
+        parts = np.stack([np.cos(angle), np.sin(angle)], axis=1).ravel() / 2
+        beside = np.stack([self.sideways, self.upward], axis=1).ravel()
+        begin = np.arange(0, 2 * count + 1, 2)
+        return sparse.csr_array((parts, beside, begin), shape=(count, len(self.offset)))
 
 
 def _differences(field: CrossField) -> tuple[Any, Floats]:
