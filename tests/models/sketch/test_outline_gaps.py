@@ -182,12 +182,20 @@ def test_a_construction_box_round_the_body_is_warned_of():
     assert "a box of straight lines" in read(stream.getvalue(), source="a.png").reading.warnings[0]
 
 
+def test_a_construction_box_in_perspective_is_warned_of():
+    silhouette, edges = "M30 60L110 30L180 60L180 150L100 185L30 140Z", "M30 60L100 95L180 60M100 95V185"
+    body = "M105 50C150 60 160 90 150 130C130 160 80 160 60 130C40 100 60 55 105 50Z"
+    (text,) = in_black(silhouette, edges, body, page=LARGE).reading.warnings
+    assert "a box of straight lines" in text
+
+
 def test_sheets_and_plates_are_no_construction_boxes():
     lines = "".join(f"M{20 + 20 * k} 20V180M20 {20 + 20 * k}H180" for k in range(1, 8))
     hatching = "".join(f"M{30 + 20 * k} 30V170" for k in range(8))
     sheet = "M20 20H180V180H20Z"
     circles = "M100 20A80 80 0 1 1 99.9 20Z", "M100 50A50 50 0 1 1 99.9 50Z"
-    for paths in ((sheet, lines), (sheet, hatching), circles):
+    hole = sheet, "M100 70A30 30 0 1 1 99.9 70Z", "M20 100H70M130 100H180M100 20V70M100 130V180M20 20L79 79"
+    for paths in ((sheet, lines), (sheet, hatching), circles, hole):
         assert in_black(*paths, page=LARGE).reading.warnings == ()
 
 
