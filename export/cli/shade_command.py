@@ -43,6 +43,7 @@ def shade_command(
 
     Crosses do not determine which parts are bumps and which are hollows (--flip), nor the depth of parts that
     bend in one direction only (--hint). Doubts about the surface are printed and written to surface.json.
+    A surface without doubts can be wrong too: crosses between strokes are extrapolated.
     """
     from ...models.field.file import write_field
     from ...models.surface.lift import surface

@@ -95,7 +95,7 @@ class Report:
 
     @property
     def shaded(self) -> bool:
-        """Whether the surface can be trusted, and is therefore drawn."""
+        """Whether there is no doubt about the surface, which is therefore drawn."""
         return self.surface is not None and not self.surface.doubts
 
     def facts(self, candidate: Candidate) -> dict[str, Any]:
@@ -185,7 +185,7 @@ def run(
     - DIR/solve: input and output of the local solvers
     - DIR/field.npz, .json, .rawfield with .obj and .sings: the kept field
     - DIR/overview.png and other pictures of it; overlay.svg, .png: the same on the drawing
-    - DIR/shaded.png: its surface, if it can be trusted; otherwise report.json has the reasons
+    - DIR/shaded.png: its surface, without doubts; otherwise report.json has the reasons
     - DIR/lowest.npz: the field of minimum 2-norm energy
     - DIR/mask.png: the mask, as `read_sketch` accepts it; not for an instance from a file
     - DIR/certificate.npz: the certificate of the proven bound, with the field of the method `prove`

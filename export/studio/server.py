@@ -99,8 +99,8 @@ class Guard:
         given = request.url.path.split("/")[1]
         if not secrets.compare_digest(given.encode(), self._token.encode()):
             return (
-                "The address lacks the token of the running server. Use the address that "
-                "`crossfield studio` printed; drawings of an earlier page can be saved there and opened here."
+                "This address belongs to an earlier server, or lacks the token of the running one. Use the "
+                "address that `crossfield studio` printed. Pages of an earlier server can still save."
             )
         return ""
 

@@ -22,6 +22,7 @@ SIDE: Final = 480  # pixels of the longer side of a shaded picture
 _FINE: Final = 32767  # steps of a part of a normal: 8 bits would show as bands
 _SPACING: Final = 44  # streamlines of one family across the longer side of the grid
 _LEAST: Final = 2  # stroke pixels of a stroke about which there is a doubt
+_MOST: Final = 5  # strokes in doubt at a time, of those with at least half as many wrong pixels as the worst
 
 
 def ready() -> None:
@@ -75,11 +76,14 @@ def _field_view(document: Document, found: Drawn, field: CrossField) -> dict[str
 
 
 def _suspects(found: Drawn, wrong: np.ndarray[Any, Any]) -> list[int]:
-    """Numbers of the strokes with a doubt at most of their pixels."""
+    """Numbers of the few worst strokes with a doubt at most of their pixels."""
+    # Once these are marked as cuts, field and surface change, and others are often no longer in doubt.
     stroke, at = found.strokes.T
     count = np.bincount(stroke) if len(stroke) else np.zeros(1)
     off = np.bincount(stroke, wrong[at], len(count))
-    return np.flatnonzero((count >= _LEAST) & (off > count / 2)).tolist()
+    off[(count < _LEAST) | (off <= count / 2)] = 0
+    worst = np.argsort(-off, kind="stable")[:_MOST]
+    return np.sort(worst[off[worst] >= max(off.max() / 2, 1)]).tolist()
 
 
 def lines_step(found: CrossField) -> dict[str, Any]:

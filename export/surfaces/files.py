@@ -173,7 +173,7 @@ def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -
 
 
 def surface_facts(surface: Surface) -> dict[str, Any]:
-    """Whether a surface can be trusted, doubts, and freedom; in pixels and degrees."""
+    """Doubts about a surface, its freedom, and measurements in pixels and degrees."""
     off = np.degrees(off_right_angles(surface.field, surface.heights))
     slant = np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1.0, 1.0)))
     numbers = {
@@ -187,7 +187,6 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
         "height_range_pixels": np.ptp(surface.corners),
     }
     return {
-        "trusted": not surface.doubts,
         "doubts": list(surface.doubts),
         "freedom": list(surface.freedom),
         **{name: round(float(value), 4) for name, value in numbers.items()},

@@ -62,6 +62,12 @@ class Cover:
         single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
         return np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
 
+    def joined(self, other: Cover) -> Cover:
+        """The cover by both kinds of strokes."""
+        parts = [each.amount[..., None] * each.direction for each in (self, other)]
+        amount = self.amount + other.amount
+        return Cover(amount, sum(parts) / np.where(amount > 0, amount, 1)[..., None])
+
 
 def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
     """The frame of `size` pixels on its longer side centred on a box (left, top, right, bottom)."""

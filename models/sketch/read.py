@@ -28,7 +28,7 @@ from .bridges import closing, curve_ends, opened
 from .choice import AS_DRAWN, Choice, Kind, Silhouette
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
-from .outline import along_outline, boundless, crowded, inside_outline, off_page, parts_with
+from .outline import along_outline, boundless, boxed, crowded, inside_outline, off_page, parts_with, unbounded
 from .pen_strokes import SPATIAL, read_curves, read_scap
 from .svg import read_svg
 
@@ -337,6 +337,8 @@ def _solve_mask(
     warnings = (
         *opened(openings),
         *boundless(region),
+        *unbounded(closed, region, frame),
+        *boxed(closed, region, lines.joined(others)),
         *crowded(filled, solve, frame),
         *off_page(solve, frame, sketch.page),
     )

@@ -7,7 +7,7 @@ along -z. x runs to the right, y up, z towards the viewer.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -69,7 +69,7 @@ class AnalyticInstance:
     heights: Floats
 
 
-def _turn(tilt: float, spin: float) -> Floats:
+def turned_by(tilt: float, spin: float) -> Floats:
     """The rotation by `tilt` about x, the top away, then by `spin` about z (degrees)."""
     a, b = np.radians([-tilt, spin])
     about_x = np.array([[1, 0, 0], [0, cosine(a), -sine(a)], [0, sine(a), cosine(a)]])
@@ -95,7 +95,7 @@ def _revolved(
         along_t=lambda s, t: _vectors(widening(t) * cosine(s), rise(t), widening(t) * sine(s)),
         s_range=(cut, np.pi - cut),
         t_range=t_range,
-        turn=_turn(-30, 15),
+        turn=turned_by(-30, 15),
         share=0.25,
     )
 
@@ -129,7 +129,7 @@ def _ellipsoid(long: float, deep: float, short: float) -> CurvaturePatch:
         ),
         s_range=(0.6, np.pi - 0.6),
         t_range=(0.9, np.pi - 0.9),
-        turn=_turn(20, 20),
+        turn=turned_by(20, 20),
         share=0.25,
     )
 
@@ -144,7 +144,7 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
         along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
         s_range=(0.45, np.pi - 0.45),
         t_range=(-1.3, 1.3),
-        turn=_turn(35, 20),
+        turn=turned_by(35, 20),
         share=1 / 3,
     ),
     "torus_patch": CurvaturePatch(
@@ -159,7 +159,7 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
         ),
         s_range=(0.5, np.pi - 0.4),
         t_range=(0.7, np.pi - 0.3),
-        turn=_turn(30, -10),
+        turn=turned_by(30, -10),
         share=0.2,
     ),
     "wave_sheet": CurvaturePatch(
@@ -168,7 +168,7 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
         along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
         s_range=(-1.5 * np.pi, 1.5 * np.pi),
         t_range=(-4.0, 4.0),
-        turn=_turn(50, 25),
+        turn=turned_by(50, 25),
         share=0.2,
     ),
     "cone": _revolved(
@@ -233,7 +233,13 @@ def analytic(
     if name not in SURFACES:
         raise InputError(f"there is no surface {name!r}; choose one of {', '.join(SURFACES)}")
     check_size(size)
-    surface = SURFACES[name]
+    found = instance_on(SURFACES[name], name, size, gauge)
+    weighted = found.instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
+    return replace(found, instance=weighted)
+
+
+def instance_on(surface: CurvaturePatch, name: str, size: int, gauge: Gauge = "strokes") -> AnalyticInstance:
+    """Instance of any patch, as `analytic`, with the default weights."""
     frame = _frame(surface, size)
     s, t, mask = _parameters(surface, frame)
     tangents = surface.tangents(s, t)
@@ -252,7 +258,7 @@ def analytic(
         origin=(frame.x, frame.y),
     )
     return AnalyticInstance(
-        instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight),
+        instance.with_weights(stroke_weight=STROKE_WEIGHT, skew_weight=SKEW_WEIGHT),
         u_angle,
         v_angle,
         normals=_towards_viewer(*tangents),

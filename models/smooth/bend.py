@@ -17,10 +17,10 @@ from scipy import sparse
 
 from ..field.field import CrossField
 from ..instance.angles import wrap
-from ..instance.grid import Floats, Ints
+from ..instance.grid import Floats, Grid, Ints
 from ..instance.instance import HALF, QUARTER
 from ..processes.deadline import Over, Stop, stop_function
-from .systems import Solve, factored, one_thread, preconditioned
+from .systems import Solve, dissected, factored, one_thread, preconditioned
 
 _Places = NDArray[np.intp]
 
@@ -80,7 +80,7 @@ def bend_field(
     over = stop_function(stop)
     if over():
         return start
-    solver = _Solver()
+    solver = _Solver(start.instance.grid)
     x = np.concatenate([start.u_angle, start.v_angle])
     x = _Bend.of(start, HARMONIC if harmonic is None else harmonic, hold).least(x, solver, over)
     field = CrossField.from_lines(start.instance, *np.split(x, 2))
@@ -102,15 +102,17 @@ def tremble(field: CrossField) -> float:
 class _Solver:
     """Solves similar systems: the first exactly, later ones to a residual, preconditioned by its factors."""
 
-    def __init__(self) -> None:
+    def __init__(self, grid: Grid) -> None:
+        places = dissected(grid.rows, grid.columns, reach=1)
+        self._order = np.stack([places, places + grid.size], axis=1).ravel()
         self._factors: Solve | None = None
 
     def solve(self, matrix: Callable[[], Any], product: Solve, right: Floats) -> Floats:
         """The solution of a positive semidefinite system. matrix: returns it. product: times a vector."""
         if self._factors is None:
-            self._factors = factored(matrix())
+            self._factors = factored(matrix(), self._order)
             return self._factors(right)
-        return preconditioned(product, right, self._factors, _RESIDUAL)
+        return preconditioned(product, right, self._factors, _RESIDUAL)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,10 +182,11 @@ class _Bend:
 
     def _along(self, x: Floats) -> Any:
         """The matrix (q, 2m) from differences to derivatives along the other line; a quadrant counts 1/4."""
-        angle, every = x[self.across], np.arange(len(self.across))
-        places = (np.concatenate([every, every]), np.concatenate([self.sideways, self.upward]))
-        parts = np.concatenate([np.cos(angle), np.sin(angle)]) / 2
-        return sparse.csr_array((parts, places), shape=(len(every), len(self.offset)))
+        angle, count = x[self.across], len(self.across)
+        parts = np.stack([np.cos(angle), np.sin(angle)], axis=1).ravel() / 2
+        beside = np.stack([self.sideways, self.upward], axis=1).ravel()
+        begin = np.arange(0, 2 * count + 1, 2)
+        return sparse.csr_array((parts, beside, begin), shape=(count, len(self.offset)))
 
 
 def _differences(field: CrossField) -> tuple[Any, Floats]:

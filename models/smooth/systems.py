@@ -21,6 +21,8 @@ Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
 PULL: Final = 1e-9  # pull to the present values, where strokes or w_beta are missing and a system is singular
 
 _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution would follow rounding
+_DENSE: Final = 8  # columns of a dense block in the factors by nested dissection
+_LEAF: Final = 24  # places that are not parted
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual
 _MOST_STEPS: Final = 50  # of preconditioned ones; 2 to 10 are usual
 _LOCK: Final = threading.Lock()
@@ -48,27 +50,58 @@ def symmetric(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
     return sparse.csr_array((values, place), shape=(len(diagonal), len(diagonal)))
 
 
-def factored(matrix: Any) -> Solve:
-    """The solver of a positive semidefinite Hermitian system H, made definite as H + 1e-9."""
+def factored(matrix: Any, order: Ints | None = None) -> Solve:
+    """The solver of a positive semidefinite Hermitian system H, made definite as H + 1e-9.
+
+    order: of elimination, which keeps the factors sparse, as from `dissected`. None finds one by minimum
+    degree, which is better for systems where only neighbours meet.
+    """
     pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
     with one_thread():
-        # A definite matrix needs no pivots, so the ordering keeps the factors sparse. In such sparse factors,
-        # dense blocks of several columns would mostly hold zeros.
+        # A definite matrix needs no pivots, so the ordering keeps the factors sparse. In the sparse factors
+        # by minimum degree, dense blocks of several columns would mostly hold zeros.
         factors = splu(
-            pulled,
-            permc_spec="MMD_AT_PLUS_A",
+            pulled if order is None else pulled[order][:, order],
+            permc_spec="MMD_AT_PLUS_A" if order is None else "NATURAL",
             diag_pivot_thresh=0.0,
-            relax=1,
-            panel_size=1,
+            relax=1 if order is None else _DENSE,
+            panel_size=1 if order is None else _DENSE,
             options={"SymmetricMode": True},
         )
 
     def solve(right: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         with one_thread():
-            solution: np.ndarray[Any, Any] = factors.solve(right)
+            if order is None:
+                found: np.ndarray[Any, Any] = factors.solve(right)
+                return found
+            solution = np.empty_like(right)
+            solution[order] = factors.solve(right[order])
         return solution
 
     return solve
+
+
+def dissected(row: Ints, column: Ints, reach: int) -> Ints:
+    """The order of elimination of unknowns at places of a grid by nested dissection, (n,).
+
+    row, column: of the unknowns, (n,). reach: rows or columns between two unknowns that meet in an equation.
+    A strip as wide as that parts the places into halves, whose unknowns are eliminated before its own.
+    """
+    order: list[Ints] = []
+    todo: list[Ints] = [np.arange(len(row), dtype=np.int32)]
+    while todo:
+        at = todo.pop()
+        tall, wide = np.ptp(row[at]), np.ptp(column[at])
+        along = (row if tall >= wide else column)[at]
+        first = np.partition(along, len(at) // 2)[len(at) // 2]
+        if len(at) <= _LEAF or max(tall, wide) <= reach:
+            order.append(at)
+            continue
+        before, after = along < first, along >= first + reach
+        # From the last to the first: the strip, then both halves.
+        order.append(at[~(before | after)])
+        todo += [half for half in (at[before], at[after]) if len(half)]
+    return np.concatenate(order[::-1])
 
 
 def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.ndarray[Any, Any]:
@@ -83,24 +116,20 @@ def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.nd
 
 
 def preconditioned(
-    product: Solve, right: Floats, approximate: Solve, tolerance: float
-) -> np.ndarray[Any, Any]:
-    """The x with Ax = right to a relative residual, by conjugate gradients.
+    product: Solve, right: Floats, approximate: Solve, tolerance: float, most: int = _MOST_STEPS
+) -> tuple[np.ndarray[Any, Any], bool]:
+    """The x with Ax = right by conjugate gradients, and whether its relative residual is small enough.
 
-    product: A times a vector, A symmetric. approximate: an approximate solver of the same system.
+    product: A times a vector, A symmetric. approximate: an approximate solver of the same system. most:
+    steps.
     """
     shape = (len(right), len(right))
-    matrix = LinearOperator(shape, matvec=product, dtype=right.dtype)
+    matrix, inverse = (
+        LinearOperator(shape, matvec=each, dtype=right.dtype) for each in (product, approximate)
+    )
     with one_thread():
-        solution: np.ndarray[Any, Any] = cg(
-            matrix,
-            right,
-            rtol=tolerance,
-            atol=_ROUNDING,
-            maxiter=_MOST_STEPS,
-            M=LinearOperator(shape, matvec=approximate, dtype=right.dtype),
-        )[0]
-    return solution
+        solution, late = cg(matrix, right, rtol=tolerance, atol=_ROUNDING, maxiter=most, M=inverse)
+    return solution, not late
 
 
 @contextmanager

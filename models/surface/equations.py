@@ -8,12 +8,13 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
-from ..instance.grid import Floats
+from ..instance.grid import Bools, Floats, Ints
 from ..processes.deadline import Over
-from ..smooth.systems import factored
-from .stencils import Crosses, Stencils, scaled
+from ..smooth.systems import Solve, factored, preconditioned
+from .stencils import SLOPES, Crosses, Stencils, scaled
 
 CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree
 FORGIVEN: Final = 0.007  # cosine of the angle in space from which a cross counts less and less
@@ -22,6 +23,10 @@ _TRIALS: Final = 12  # increases of the damping in a round
 _FALL: Final = 2e-4  # least share of the energy that a round has to remove before another one
 _DAMPING: Final = 1e-2
 _LEAST: Final = 1e-9
+_RESIDUAL: Final = 0.01  # relative, of a system that is not factored
+_STEPS: Final = 12  # of conjugate gradients, which take as long as a factorisation
+_FEW: Final = 1000  # unknowns of systems that are always factored: exact, and as quick
+_MEETING: Final = 2  # rows or columns between two heights that meet in a square
 _UP: Final = 5.0
 _DOWN: Final = 8.0
 
@@ -91,15 +96,28 @@ class Equations:
         )
 
     @cached_property
-    def _squares(self) -> tuple[Rows, Any]:
-        """All squares that are linear, and the matrix (N, N) of their sum."""
+    def _even(self) -> Any:
+        """The matrix of the linear squares without goals: conjugacy and twist."""
         size = self.stencils.grid.size
         conjugacy = np.sqrt(CONJUGACY * size / 2) * self.conjugacy
-        twist = np.sqrt(self.weights.even * size / 10) * self.stencils.twist
-        matrix = sparse.vstack([conjugacy, twist, *(rows.matrix for rows in self.extra)]).tocsr()
-        plain = np.zeros(conjugacy.shape[0] + twist.shape[0])
-        goal = np.concatenate([plain, *(rows.goal for rows in self.extra)])
-        return Rows(matrix, goal), matrix.T @ matrix
+        return sparse.vstack([conjugacy, np.sqrt(self.weights.even * size / 10) * self.stencils.twist])
+
+    @cached_property
+    def _linear(self) -> Rows:
+        """All squares that are linear."""
+        matrix = sparse.vstack([self._even, *(rows.matrix for rows in self.extra)]).tocsr()
+        plain = np.zeros(self._even.shape[0])
+        return Rows(matrix, np.concatenate([plain, *(rows.goal for rows in self.extra)]))
+
+    @cached_property
+    def _sum(self) -> BlockSum:
+        """The sum of squares without goals, and of blocks of pixels and of neighbours in both orders."""
+        grid, corners = self.stencils.grid, self.stencils.corners
+        every = np.arange(grid.size, dtype=np.int32)
+        first = np.concatenate([every, grid.first, grid.second])
+        second = np.concatenate([every, grid.second, grid.first])
+        constant = self._even.T @ self._even
+        return BlockSum.of(constant, corners[:, first], corners[:, second], self.stencils.used)
 
     def right_angles(self, z: Floats) -> Floats:
         """The cosines r (n,) of the angles in space between both lines."""
@@ -109,7 +127,7 @@ class Equations:
 
     def energy(self, z: Floats) -> float:
         """The energy of heights."""
-        linear, _ = self._squares
+        linear = self._linear
         cosine, scale = self.right_angles(z), self.weights.forgiven
         plain = np.isinf(scale)
         loss = np.sum(cosine**2) if plain else scale**2 * np.sum(np.log1p((cosine / scale) ** 2))
@@ -124,19 +142,20 @@ class Equations:
 
     def model(self, z: Floats) -> tuple[Floats, Any]:
         """Half the slope (N,) of the energy at z, and half its curvature (N, N) by Gauss and Newton."""
-        linear, squares = self._squares
+        linear = self._linear
         down, angles = self._of_angles(z)
-        even, bend = self._of_normals(z)
-        upright = self.weights.facing * normals_of(self.stencils, z)[2] ** 2
-        to_slopes = sparse.vstack(self.stencils.slopes).tocsr()
-        facing = np.concatenate([upright, upright])
-        inner = angles + bend + sparse.diags_array(facing)
-        slope = to_slopes.T @ (down + even + facing * (to_slopes @ z))
-        slope += linear.matrix.T @ (linear.matrix @ z - linear.goal)
-        return slope, to_slopes.T @ (inner @ to_slopes) + squares
+        even, blocks = self._of_normals(z)
+        facing = self.weights.facing * normals_of(self.stencils, z)[2] ** 2
+        blocks[:, :, : len(facing)] += angles
+        blocks[[0, 1], [0, 1], : len(facing)] += facing
+        slope = linear.matrix.T @ (linear.matrix @ z - linear.goal)
+        for matrix, part in zip(self.stencils.slopes, down + even, strict=True):
+            slope += matrix.T @ (part + facing * (matrix @ z))
+        extra = (rows.matrix.T @ rows.matrix for rows in self.extra)
+        return slope, sum(extra, self._sum.matrix(blocks))
 
-    def _of_angles(self, z: Floats) -> tuple[Floats, Any]:
-        """Slope (2n,) and curvature (2n, 2n) of the right angles by dz/dx, then dz/dy, of all pixels."""
+    def _of_angles(self, z: Floats) -> tuple[Floats, Floats]:
+        """Slope (2, n) and curvature (2, 2, n) of the right angles by dz/dx and dz/dy of each pixel."""
         u, v = self._lines
         cosine = self.right_angles(z)
         a, b = (along @ z for along in self._along)
@@ -144,19 +163,58 @@ class Equations:
         both = np.sqrt(long_a * long_b)
         change = u.T * (b / both - cosine * a / long_a) + v.T * (a / both - cosine * b / long_b)
         weighed = change / (1 + (cosine / self.weights.forgiven) ** 2)
-        every = np.arange(len(cosine))
-        return (weighed * cosine).ravel(), _in_blocks(weighed[:, None] * change, every, every, len(every))
+        return weighed * cosine, weighed[:, None] * change
 
-    def _of_normals(self, z: Floats) -> tuple[Floats, Any]:
-        """The same of the unevenness of the normals."""
+    def _of_normals(self, z: Floats) -> tuple[Floats, Floats]:
+        """Slope (2, n) of uneven normals, and curvature (2, 2, k) at the k places of `_sum`."""
+        grid, uneven = self.stencils.grid, self.stencils.unevenness
         normals, change = normals_of(self.stencils, z), changes_of_normals(self.stencils, z)
-        weight = self.weights.even * normals.shape[1]
-        uneven = self.stencils.unevenness.tocoo()
-        row, column = uneven.coords
-        pulls = weight * (self.stencils.unevenness @ normals.T).T
-        blocks = np.einsum("cak,cbk->abk", change[:, :, row], change[:, :, column])
-        slope: Floats = np.einsum("cak,ck->ak", change, pulls).ravel()
-        return slope, _in_blocks(weight * uneven.data * blocks, row, column, normals.shape[1])
+        weight = self.weights.even * grid.size
+        own = np.einsum("cak,cbk->abk", weight * uneven.diagonal() * change, change)
+        beside = np.einsum("cak,cbk->abk", -weight * change[:, :, grid.first], change[:, :, grid.second])
+        slope = np.einsum("cak,ck->ak", change, weight * (uneven @ normals.T).T)
+        return slope, np.concatenate([own, beside, beside.swapaxes(0, 1)], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class BlockSum:
+    """A sparse symmetric matrix (N, N) whose entries are a constant and sums over blocks of slopes.
+
+    A block belongs to two pixels; its 2 x 2 numbers count for the slopes of the first and of the second one.
+    places: int (16 k,), the entry of each pair of corners of the first and the second of k pairs of pixels.
+    """
+
+    constant: Any
+    places: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, constant: Any, first: Ints, second: Ints, used: Bools) -> BlockSum:
+        """Plan the sum of a matrix and of blocks of pixels with these corners, (4, k) each."""
+        size, across, (row, column) = constant.shape[0], 2 * _MEETING + 1, np.nonzero(used)
+
+        def key(one: Ints, other: Ints) -> NDArray[np.intp]:
+            """Numbers of pairs of corners, in the order of the entries."""
+            down, right = row[other] - row[one] + _MEETING, column[other] - column[one] + _MEETING
+            return np.asarray(across * (across * one.astype(np.intp) + down) + right)
+
+        old = constant.tocoo()
+        whose = np.full(across**2 * size, -1, dtype=np.int32)
+        places, kept = key(first[:, None], second), key(*old.coords)
+        whose[places] = second
+        whose[kept] = old.coords[1]
+        there = whose >= 0
+        entry = np.cumsum(there) - 1
+        data = np.zeros(entry[-1] + 1)
+        data[entry[kept]] = old.data
+        begin = np.concatenate([[0], entry[across**2 - 1 :: across**2] + 1])
+        whole = sparse.csr_array((data, whose[there], begin), shape=constant.shape)
+        return cls(whole, entry[places].ravel())
+
+    def matrix(self, blocks: Floats) -> Any:
+        """The matrix for blocks (2, 2, k)."""
+        each = np.kron(SLOPES, SLOPES).T @ blocks.reshape(4, -1)
+        data = self.constant.data + np.bincount(self.places, each.ravel(), len(self.constant.data))
+        return sparse.csr_array((data, self.constant.indices, self.constant.indptr), self.constant.shape)
 
 
 def normals_of(stencils: Stencils, z: Floats) -> Floats:
@@ -173,25 +231,33 @@ def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
     return changes
 
 
-def _in_blocks(values: Floats, row: Any, column: Any, size: int) -> Any:
-    """The matrix (2n, 2n) of 2 x 2 blocks (n, n) with values (2, 2, k) at these places; n = size."""
-    places = [
-        np.concatenate([each + size * block[axis] for block in np.ndindex(2, 2)])
-        for axis, each in enumerate((row, column))
-    ]
-    return sparse.csr_array((values.ravel(), tuple(places)), shape=(2 * size, 2 * size))
+class _Solver:
+    """Solves similar systems by the factors of an earlier one where that takes few steps."""
+
+    def __init__(self, order: Ints) -> None:
+        self._order = order
+        self._factors: Solve | None = None
+
+    def solve(self, matrix: Any, right: Floats) -> Floats:
+        """The solution of a positive definite system."""
+        if self._factors is not None and len(right) > _FEW:
+            found, near = preconditioned(matrix.__matmul__, right, self._factors, _RESIDUAL, _STEPS)
+            if near:
+                return found
+        self._factors = factored(matrix, self._order)
+        return self._factors(right)
 
 
 def descended(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
     """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
-    energy, damping = equations.energy(z), _DAMPING
+    energy, damping, solver = equations.energy(z), _DAMPING, _Solver(equations.stencils.order)
     for _ in range(_ROUNDS):
         if over():
             break
         slope, curvature = equations.model(z)
         diagonal = sparse.diags_array(curvature.diagonal())
         for _ in range(_TRIALS):
-            tried = z - factored(curvature + damping * diagonal)(slope)
+            tried = z - solver.solve(curvature + damping * diagonal, slope)
             reached = equations.energy(tried)
             if reached < energy:
                 break

@@ -13,8 +13,11 @@ from scipy import sparse
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..smooth.polyvector import roots
+from ..smooth.systems import dissected
 
 SMALL: Final = 500  # most pixels of the coarsest level, where all starts are tried
+SLOPES: Final = np.array([[-0.5, 0.5, -0.5, 0.5], [0.5, 0.5, -0.5, -0.5]])
+"""Weights of the four values of a 2 x 2 block, row by row, in the derivatives by x and y at its centre."""
 _DOME: Final = 0.7  # height of a dome, relative to a half sphere
 _PLANE: Final = 0.5  # slope of a plane
 
@@ -42,9 +45,15 @@ class Stencils:
         return int(self.used.sum())
 
     @cached_property
+    def order(self) -> Ints:
+        """The order of elimination of the heights (N,), of which those two rows or columns apart meet."""
+        row, column = np.nonzero(self.used)
+        return dissected(row.astype(np.int32), column.astype(np.int32), reach=2)
+
+    @cached_property
     def slopes(self) -> tuple[Any, Any]:
         """The matrices (n, N) of dz/dx and of dz/dy at the centres of pixels."""
-        return self._at_pixels(-0.5, 0.5, -0.5, 0.5), self._at_pixels(0.5, 0.5, -0.5, -0.5)
+        return self._at_pixels(*SLOPES[0]), self._at_pixels(*SLOPES[1])
 
     @cached_property
     def twist(self) -> Any:
@@ -61,7 +70,7 @@ class Stencils:
     def changes(self) -> tuple[Any, Any]:
         """The matrices (b, n) from values of pixels to derivatives by x and y at the centres of blocks."""
         size = self.grid.size
-        return _sums(self.blocks, size, -0.5, 0.5, -0.5, 0.5), _sums(self.blocks, size, 0.5, 0.5, -0.5, -0.5)
+        return _sums(self.blocks, size, *SLOPES[0]), _sums(self.blocks, size, *SLOPES[1])
 
     @cached_property
     def unevenness(self) -> Any:
@@ -71,11 +80,15 @@ class Stencils:
         difference = _sums(ends, grid.size, 1.0, -1.0)
         return difference.T @ difference
 
-    def _at_pixels(self, *weights: float) -> Any:
+    @cached_property
+    def corners(self) -> Ints:
+        """Numbers of the corners of each pixel, shape (4, n): upper left and right, lower left and right."""
         number = np.full(self.used.shape, -1, dtype=np.int32)
         number[self.used] = np.arange(self.count, dtype=np.int32)
-        corners = np.stack([corner[self.grid.mask] for corner in around(number)])
-        return _sums(corners, self.count, *weights)
+        return np.stack([corner[self.grid.mask] for corner in around(number)])
+
+    def _at_pixels(self, *weights: float) -> Any:
+        return _sums(self.corners, self.count, *weights)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from ..previews import Pictured
 
 @dataclass(frozen=True, eq=False)
 class Surface(Pictured):
-    """Heights that a cross field was lifted to, and how far they can be trusted.
+    """Heights that a cross field was lifted to, with doubts about them.
 
     Parameters
     ----------
@@ -28,7 +28,8 @@ class Surface(Pictured):
         How well the equations hold at each pixel, float (n,) in [0, 1]. It does not measure the distance from
         the intended surface.
     doubts
-        Sentences with reasons not to trust the surface; empty if there are none.
+        Sentences with reasons not to trust the surface. Without any, one surface fits the crosses, which may
+        still be wrong between strokes.
     freedom
         Sentences that describe other surfaces with the same crosses.
     firmness

@@ -83,7 +83,7 @@ def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:
     change, slopes = changes_of_normals(level.stencils, z), level.stencils.slopes
     turns = [scaled(slopes[0], part[0]) + scaled(slopes[1], part[1]) for part in change]
     turning = sum(turn.T @ turn for turn in turns)
-    solve = factored(curvature + _PULL * turning)
+    solve = factored(curvature + _PULL * turning, level.stencils.order)
     vectors = np.random.default_rng(0).standard_normal((level.stencils.count, _VECTORS))
     least = np.zeros(_VECTORS)
     for _ in range(_ROUNDS):

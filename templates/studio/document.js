@@ -108,3 +108,4 @@ const dense = (points, step) => {
 
 const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
 export const decoded = { bytes, shorts: text => new Int16Array(bytes(text).buffer), floats: text => new Float32Array(bytes(text).buffer) };
+export const encoded = data => btoa(Array.from(new Uint8Array(data), byte => String.fromCharCode(byte)).join(""));

@@ -59,10 +59,16 @@ export class View {
   }
 }
 
-export const trace = (context, points) => {
+const trace = (context, points) => {
   context.moveTo(points[0], points[1]);
   for (let k = 2; k < points.length; k += 2) context.lineTo(points[k], points[k + 1]);
 };
+
+/** Draws strokes in one colour. */
+export function draw(context, strokes, colour, width) {
+  context.strokeStyle = colour; context.lineWidth = width; context.beginPath();
+  strokes.forEach(({ points }) => trace(context, points)); context.stroke();
+}
 
 /** A small picture with a pixel per pixel of the grid. */
 export function gridPicture(rows, columns, colour) {
@@ -138,16 +144,12 @@ export function paintBase(view, { doc, chosen, field, lines, mode, suspects }) {
     const box = boxOf(stroke);
     return box[2] >= left && box[0] <= right && box[3] >= top && box[1] <= bottom;
   });
-  const draw = (some, colour, width) => {
-    if (!some.length) return;
-    context.strokeStyle = colour; context.lineWidth = width * thin; context.beginPath();
-    some.forEach(({ stroke }) => trace(context, stroke.points)); context.stroke();
-  };
-  draw(seen.filter(({ number }) => suspects.has(number)), ink.suspect, 11);
-  draw(seen.filter(({ number }) => chosen.has(number)), ink.chosen, 9);
+  const drawn = some => seen.filter(some).map(({ stroke }) => stroke);
+  draw(context, drawn(({ number }) => suspects.has(number)), ink.suspect, 11 * thin);
+  draw(context, drawn(({ number }) => chosen.has(number)), ink.chosen, 9 * thin);
   for (const mark of ["ignored", "cut", "line"]) {
     context.setLineDash(mark === "ignored" ? [4 * thin, 4 * thin] : []);
-    draw(seen.filter(({ stroke }) => stroke.mark === mark), ink[mark], mark === "ignored" ? 1.2 : 2.2);
+    draw(context, drawn(({ stroke }) => stroke.mark === mark), ink[mark], (mark === "ignored" ? 1.2 : 2.2) * thin);
   }
   context.setLineDash([]);
   if (!field) return;

@@ -1,6 +1,6 @@
 // The right picture: the surface as normal map, in the light of a lamp, or in the material of a glazed ball.
 
-import { colours, gridPicture } from "./drawing.js";
+import { colours, draw, gridPicture } from "./drawing.js";
 
 const AMBIENT = 0.04, VIEWER = 0.10, LAMP = 0.95, FILL = 0.08, CLAY = [0.80, 0.77, 0.73]; // as export/shading/colours.py
 export const LAMP_AT = { azimuth: 130 * Math.PI / 180, elevation: 38 * Math.PI / 180 };
@@ -58,7 +58,7 @@ const doubtMap = surface => surface.doubtful ??= gridPicture(surface.rows, surfa
   return n < 0 || surface.confidence[n] >= DOUBT ? [0, 0, 0, 0] : [235, 120, 0, 130 - surface.confidence[n]];
 });
 
-export function paintSurface(view, { surface, frame, kind, lamp, doubtful, hints, live }) {
+export function paintSurface(view, { surface, frame, kind, lamp, doubtful, strokes, hints, live }) {
   const context = view.begin(view.canvas);
   if (!frame) return;
   const wide = frame.pixel * frame.columns, high = frame.pixel * frame.rows;
@@ -77,6 +77,9 @@ export function paintSurface(view, { surface, frame, kind, lamp, doubtful, hints
     context.globalCompositeOperation = "source-over";
   }
   const reach = reachOf(frame), thin = 1 / view.scale;
+  context.globalAlpha = 0.7;
+  if (surface) for (const mark of ["cut", "line"]) draw(context, strokes.filter(stroke => stroke.mark === mark), colours()[mark], 1.2 * thin);
+  context.globalAlpha = 1;
   for (const hint of live ? [...hints, live] : hints) {
     const [x, y] = tipOf(hint, reach), angle = hint.tilt * Math.PI / 180;
     for (const [colour, width] of [["#fffc", 5], [colours().minus, 2.5]]) {

@@ -1,11 +1,11 @@
 // The page: tools, keys, requests. The document lives here; the server computes functions of it.
 
-import { History, decoded, emptyDocument, erased, FORMAT, rounded, strokeAt, strokesIn } from "./document.js";
+import { History, decoded, emptyDocument, encoded, erased, FORMAT, rounded, strokeAt, strokesIn } from "./document.js";
 import { View, paint, paintBase } from "./drawing.js";
 import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shading.js";
 
 const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
-const page = crypto.randomUUID(), KEPT = "crossfield-studio", REACH = 9, RETRY = 3000;
+const page = crypto.randomUUID(), KEPT = "crossfield-studio", FILE = `${KEPT}-file`, REACH = 9, RETRY = 3000;
 const state = {
   history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "line", live: null, brush: null, edit: 0,
   field: null, lines: null, surface: null, mode: "crosses", kind: "shaded", lamp: LAMP_AT, suspects: new Set(), opened: null, proving: null,
@@ -24,7 +24,7 @@ function refresh(base = true) {
     if (dirty) paintBase(left, state);
     dirty = false;
     paint(left, state.live, state.brush);
-    paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked, hints: state.doc.hints, live: state.arrow });
+    paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked, strokes: $("#ink").checked ? state.doc.strokes : [], hints: state.doc.hints, live: state.arrow });
   });
 }
 
@@ -49,7 +49,7 @@ function commit(change) {
 }
 function step(by) { if (state.history.step(by)) { state.chosen.clear(); keep(); show(state.history.now); } }
 function start(doc, opened = null) {
-  state.history.reset(doc); state.opened = opened; state.chosen.clear(); forget(); left.fit(pageBox(doc)); keep(); show(doc);
+  state.history.reset(doc); state.opened = opened; keepFile(opened); state.chosen.clear(); forget(); left.fit(pageBox(doc)); keep(); show(doc);
   if (state.tool === "turn" && !opened) choose("draw");
 }
 const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); doubts(); };
@@ -61,6 +61,18 @@ function keep() {
   }
 }
 
+// The file of a drawing in space, from which it is turned.
+function keepFile(opened) {
+  sessionStorage.removeItem(FILE);
+  try { if (opened) sessionStorage.setItem(FILE, JSON.stringify({ name: opened.name, data: encoded(opened.bytes) })); } catch {
+    banner("This file is too large to be turned after a reload of the page. Open it again to turn it then.", { kind: "large" });
+  }
+}
+function keptFile() {
+  const file = JSON.parse(sessionStorage.getItem(FILE));
+  return file && { name: file.name, bytes: decoded.bytes(file.data) };
+}
+
 // Requests. A newer edit aborts older ones, here and on the server.
 let waiting = null, lost = null, begun = 0;
 const ask = (path, options) => fetch(path, options).catch(error => {
@@ -68,10 +80,11 @@ const ask = (path, options) => fetch(path, options).catch(error => {
   throw error;
 });
 function missing() {
-  banner("The server does not answer. Your drawing is safe on this page. Save it, start “crossfield studio” again, and open the saved session there.", { kind: "lost", retry: true });
+  banner("The server does not answer. Your drawing is safe on this page. Save it, start “crossfield studio” again, and open the saved session at the new address that it prints.", { kind: "lost", retry: true });
   ready("no server"); clearTimeout(lost); lost = setTimeout(request, RETRY);
 }
 async function trouble(response) {
+  if (response.status === 403) return "The server was started again, and this page belongs to the earlier start. Save the drawing, go to the new address that “crossfield studio” printed, and open the saved session there.";
   const text = await response.text();
   try { return JSON.parse(text).message; } catch { return text.slice(0, 300) || `The server answered ${response.status}.`; }
 }
@@ -252,16 +265,16 @@ const editMask = edit => commit(doc => ({ ...doc, mask: [...doc.mask, edit] }));
 // Turning a drawing in space: the file is read again from another side.
 let turning = null;
 async function turn({ path }, done = false) {
-  const { opened } = state, from = opened.view ?? [30, 25], k = path.length - 2;
+  const { opened } = state, from = state.history.now.view ?? [30, 25], k = path.length - 2;
   const view = [from[0] - (path[k] - path[0]) * left.scale / 3, Math.max(-89, Math.min(89, from[1] + (path[k + 1] - path[1]) * left.scale / 3))].map(Math.round);
   if (turning && !done) return;
   await turning;
   turning = read(opened.bytes, opened.name, view.join(",")).finally(() => { turning = null; });
   const found = await turning;
   if (!found || opened !== state.opened) return;
-  const doc = { ...state.history.now, page: found.page, strokes: found.strokes, mask: [], hints: [] };
+  const doc = { ...state.history.now, page: found.page, strokes: found.strokes, mask: [], hints: [], view };
   left.fit(pageBox(doc)); state.chosen.clear();
-  if (done) { opened.view = view; commit(doc); } else { state.doc = doc; state.field = state.lines = null; refresh(); }
+  if (done) commit(doc); else { state.doc = doc; state.field = state.lines = null; refresh(); }
 }
 
 // Hints.
@@ -422,7 +435,7 @@ for (const [name, read_] of Object.entries(settings)) {
   $(`#${name}`).addEventListener("change", () => commit(read_()));
 }
 $("#brush").addEventListener("input", controls);
-$("#doubtful").addEventListener("change", () => refresh());
+for (const name of ["#doubtful", "#ink"]) $(name).addEventListener("change", () => refresh(false));
 all("input[name=field]").forEach(each => each.addEventListener("change", () => { state.mode = each.value; refresh(); if (each.value === "lines" && !state.lines) request(); }));
 all("input[name=surface]").forEach(each => each.addEventListener("change", () => { state.kind = each.value; refresh(false); }));
 
@@ -456,7 +469,7 @@ async function begin() {
   const kept = sessionStorage.getItem(KEPT), same = sessionStorage.getItem(`${KEPT}-at`) === location.pathname;
   let found = null;
   try { found = await (await ask("first")).json(); } catch { return; }
-  if (kept && (same || !found || confirm("This tab has a drawing of an earlier page. Keep it instead of the new one?"))) try { const doc = JSON.parse(kept); check(doc); start(doc); return; } catch { sessionStorage.removeItem(KEPT); }
+  if (kept && (same || !found || confirm("This tab has a drawing of an earlier page. Keep it instead of the new one?"))) try { const doc = JSON.parse(kept); check(doc); start(doc, keptFile()); return; } catch { sessionStorage.removeItem(KEPT); }
   if (found?.document) start({ ...emptyDocument(), ...found.document });
   else found ? drawn(found, found.file ? { bytes: decoded.bytes(found.file.data), name: found.file.name } : null) : start(emptyDocument());
 }

@@ -126,7 +126,7 @@ def test_a_run_writes_all_files_and_reports_separate_parts(two_parts):
     assert report["instance"]["parts"] == 2
     proven = {"certificate.npz"} if report["proof"] else set()  # the time may not suffice on a busy machine
     shaded = {report["surface"]["picture"]} - {None}
-    assert bool(shaded) == report["surface"]["trusted"]
+    assert bool(shaded) == (not report["surface"]["doubts"])
     assert {path.name for path in folder.iterdir() if path.is_file()} == RUN_FILES | proven | shaded
     models = {path.name for path in (folder / "models").iterdir()}
     assert {name.split(".")[1] for name in models} == {"instance", *FORMULATIONS}

@@ -289,7 +289,9 @@ def test_a_lost_server_gets_a_message_and_nothing_is_lost(browser, tmp_path):
         saved = given(browser, folder, find(browser, "[data-do=save]").click)
         with studio("--port", page.host.split(":")[1]) as another:
             find(browser, "#retry").click()
-            until(browser, lambda _: "token" in banner(browser))
+            until(browser, lambda _: "was started again" in banner(browser))
+            assert "go to the new address" in banner(browser)
+            assert "save" in banner(browser).lower()
             opened(browser, another.address)
             assert document(browser) == kept
         assert json.loads(saved.read_text()) == kept
@@ -331,17 +333,55 @@ def test_ten_thousand_strokes_are_drawn_and_edited(empty, tmp_path):
     assert pixels(browser) > 0
 
 
-def test_a_drawing_in_space_is_turned_by_dragging(empty, tmp_path):
+def in_space(browser, folder):
+    """The browser with a drawing in space and the tool that turns it, and the document."""
     ring = [(math.cos(t / 5), math.sin(t / 5), 0.3 * math.sin(t / 2)) for t in range(32)]
     lines = [f"v {len(ring)}", *(" ".join(f"{x:.4f}" for x in point) for point in ring)]
     lines += ["v 2", "-1 0 0", "1 0 0.5", "v 2", "0 -1 0", "0 1 -0.5"]
-    browser = load(empty, tmp_path / "a.curves", "\n".join(lines).encode())
-    before = document(browser)
+    load(browser, folder / "a.curves", "\n".join(lines).encode())
     tool(browser, "turn")
+    return browser, document(browser)
+
+
+def test_a_drawing_in_space_is_turned_by_dragging_also_after_a_reload(empty, tmp_path):
+    browser, before = in_space(empty, tmp_path)
+    drag(browser, [(200, 300), (230, 310), (280, 330), (300, 340)])
+    until(browser, lambda _: document(browser)["strokes"] != before["strokes"])
+    turned = document(settled(browser))
+    browser.refresh()
+    tool(settled(browser), "turn")
+    drag(browser, [(200, 300), (210, 300), (220, 300)])
+    until(browser, lambda _: document(browser)["strokes"] != turned["strokes"])
+    assert turned["view"][1] >= 33  # from 25
+    assert document(browser)["view"][1] == pytest.approx(turned["view"][1], abs=4)
+    find(browser, "#undo").click()
+    assert document(settled(browser)) == turned
+
+
+def test_a_turn_is_undone(empty, tmp_path):
+    browser, before = in_space(empty, tmp_path)
     drag(browser, [(200, 300), (230, 310), (280, 330), (300, 340)])
     until(browser, lambda _: document(browser)["strokes"] != before["strokes"])
     find(browser, "#undo").click()
     assert document(settled(browser)) == before
+
+
+REDDISH = """
+const canvas = document.querySelector('#surface');
+const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+let count = 0;
+for (let k = 0; k < data.length; k += 4) count += data[k + 3] > 0 && data[k] > data[k + 1] + 60;
+return count;
+"""
+
+
+def test_strokes_are_drawn_over_the_surface(empty, tmp_path):
+    browser = pebble(empty, tmp_path)
+    find(browser, "#doubtful").click()
+    with_strokes = until(browser, lambda each: each.execute_script(REDDISH))
+    assert with_strokes > 100
+    find(browser, "#ink").click()
+    until(browser, lambda each: each.execute_script(REDDISH) == 0)
 
 
 def test_a_doubt_is_followed_by_its_suggestion(empty, tmp_path):

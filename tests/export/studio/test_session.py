@@ -190,6 +190,17 @@ def test_strokes_that_the_field_does_not_follow_are_suspects():
     assert field_step(changed(strokes=CONTRADICTING[:8], size=32))[0]["suspects"] == []
 
 
+def test_only_a_few_strokes_are_suspects_at_a_time():
+    ends = np.random.default_rng(0).uniform([12, 12, 12, 12], [108, 88, 108, 88], (30, 4))
+    lines = [{"points": each.tolist(), "mark": "line", "weight": 1} for each in ends]
+    data = changed(strokes=[PEBBLE["strokes"][0], *lines], size=24)
+    _, found, field = field_step(data)
+    suspects = surface_step(data, found, field)["suspects"]
+    assert 1 <= len(suspects) <= 5
+    assert suspects == sorted(suspects)
+    assert min(suspects) >= 1
+
+
 @pytest.mark.parametrize("what", [name for name in DOWNLOADS if name != "solver"])
 def test_downloads_are_the_same_twice(what):
     name, content = download(changed(), what)

@@ -26,8 +26,8 @@ def read(data, size=48, source="a.svg"):
     return instance_of(data, size=size, name="a", source=source)
 
 
-def in_black(*paths):
-    return read(svg([(path, "black") for path in paths]))
+def in_black(*paths, page="0 0 100 100"):
+    return read(svg([(path, "black") for path in paths], page))
 
 
 def middles(instance):
@@ -136,6 +136,67 @@ def test_a_hole_is_solved_in_one_colour_and_left_out_between_cuts():
     assert in_black(outer, inner).mask[23:25, 23:25].all()
     lines = [(outer, "black"), (inner, "black"), ("M10 50H30M70 50H90M50 10V30M50 70V90", "#d1242f")]
     assert not read(svg(lines)).mask[18:30, 18:30].any()
+
+
+LARGE = "0 0 200 200"
+
+
+@pytest.mark.parametrize("width", [5, 6, 30])
+def test_a_gap_between_limbs_stays_outside(width):
+    trousers = f"M30 40H170V180H{100 + width / 2}V90H{100 - width / 2}V180H30Z"
+    instance = read(svg([(trousers, "black")], LARGE), 96)
+    column, first, last = (int((at - instance.origin[0]) / instance.pixel_size) for at in (100, 105, 165))
+    assert not instance.mask[first:last, column].any()
+    assert instance.mask[first : last + 5, : column - 5].sum() > 30 * 60 / instance.pixel_size**2
+    assert not instance.reading.warnings
+
+
+HAND = (
+    "M60 190V110L30 90Q20 80 30 74L60 92V30Q68 20 76 30V80L80 80V20Q88 10 96 20V80L100 80V24Q108 14 116 24V80"
+    "L120 82V40Q128 30 136 40V120L132 190"
+)
+
+
+def test_an_open_wrist_that_loses_the_palm_is_warned_of():
+    (text,) = in_black(HAND, page=LARGE).reading.warnings
+    assert text.startswith("46 of 214 stroke pixels bound no area, most of them round (13")
+    assert "close the outline" in text
+    assert in_black(f"{HAND}H60", page=LARGE).reading.warnings == ()
+
+
+BODY = "M100 21C150 30 178 60 179 100C175 150 150 178 100 179C50 178 25 150 21 100C25 50 50 25 100 21Z"
+
+
+def test_a_construction_box_round_the_body_is_warned_of():
+    box = "M10 20H190M10 180H190M20 10V190M180 10V190"
+    for size, body in ((96, BODY), (48, "M100 50A50 50 0 1 1 99.9 50Z")):
+        paths = [(path, "black") for path in (box, body, "M60 100Q100 130 140 100")]
+        (text,) = read(svg(paths, LARGE), size).reading.warnings
+        assert "a box of straight lines encloses another outline, and the" in text
+    image = Image.new("L", (400, 400), 255)
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((40, 40, 360, 360), outline=0, width=3)
+    draw.ellipse((100, 80, 300, 330), outline=0, width=3)
+    stream = io.BytesIO()
+    image.save(stream, "PNG")
+    assert "a box of straight lines" in read(stream.getvalue(), source="a.png").reading.warnings[0]
+
+
+def test_a_construction_box_in_perspective_is_warned_of():
+    silhouette, edges = "M30 60L110 30L180 60L180 150L100 185L30 140Z", "M30 60L100 95L180 60M100 95V185"
+    body = "M105 50C150 60 160 90 150 130C130 160 80 160 60 130C40 100 60 55 105 50Z"
+    (text,) = in_black(silhouette, edges, body, page=LARGE).reading.warnings
+    assert "a box of straight lines" in text
+
+
+def test_sheets_and_plates_are_no_construction_boxes():
+    lines = "".join(f"M{20 + 20 * k} 20V180M20 {20 + 20 * k}H180" for k in range(1, 8))
+    hatching = "".join(f"M{30 + 20 * k} 30V170" for k in range(8))
+    sheet = "M20 20H180V180H20Z"
+    circles = "M100 20A80 80 0 1 1 99.9 20Z", "M100 50A50 50 0 1 1 99.9 50Z"
+    hole = sheet, "M100 70A30 30 0 1 1 99.9 70Z", "M20 100H70M130 100H180M100 20V70M100 130V180M20 20L79 79"
+    for paths in ((sheet, lines), (sheet, hatching), circles, hole):
+        assert in_black(*paths, page=LARGE).reading.warnings == ()
 
 
 def test_solid_ink_and_hatching_are_warned_of_with_their_place():
