@@ -83,7 +83,7 @@ def _suspects(found: Drawn, wrong: np.ndarray[Any, Any]) -> list[int]:
     off = np.bincount(stroke, wrong[at], len(count))
     off[(count < _LEAST) | (off <= count / 2)] = 0
     worst = np.argsort(-off, kind="stable")[:_MOST]
-    return np.sort(worst[off[worst] >= max(off.max() / 2, 1)]).tolist()
+    return sorted(int(each) for each in worst if off[each] >= max(off.max() / 2, 1))
 
 
 def lines_step(found: CrossField) -> dict[str, Any]:

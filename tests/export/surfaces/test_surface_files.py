@@ -97,7 +97,8 @@ def test_the_folder_has_every_file_the_same_twice_whatever_the_users_settings(tm
     assert set(sizes.values()) == {(996, 996, "RGBA")}
     assert (first / "surface.mtl").read_text().split()[-2:] == ["map_Kd", "drawing.png"]
     facts = json.loads((first / "surface.json").read_text())
-    assert facts["doubts"] == [] and "trusted" not in facts  # no check shows that a surface is right
+    assert facts["doubts"] == []
+    assert "trusted" not in facts  # no check shows that a surface is right
     assert facts["instance"]["sha256"] == surface.instance.sha256
     assert not any("second" in key for key in facts)
 
