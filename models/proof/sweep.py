@@ -39,7 +39,7 @@ from .slack import quad_slacks
 from .state import Clusters, Indices, State
 
 _ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
-_LOST: Final = 0.02  # share of the gap that rounding shares may cost at most; a fifth of it is usual
+_LOST: Final = 0.1  # share of the gap that rounding shares may cost at most; a fifth of it is usual
 _ROUNDING: Final = 32 * 2.0**-53
 """Relative error of a term: eight numbers, with angles right to four units in the last place, squared."""
 

@@ -187,9 +187,9 @@ def test_points_that_are_missing_or_damaged_are_refused(searched, tmp_path):
 
 @pytest.mark.slow
 def test_the_points_that_ship_are_about_the_shipped_instances():
-    """No search is needed, and every instance with a proof has its certificate."""
+    """No search is needed, and tiny and small instances with a proof have their certificates."""
     spec = default_spec()
-    assert spec.points.stat().st_size < 3_000_000
+    assert sum(path.stat().st_size for path in spec.points.iterdir()) < 12_000_000
     points = read_points(spec.points)
     for each in plan(spec):
         given = points(each.recipe.name)
@@ -200,7 +200,9 @@ def test_the_points_that_ship_are_about_the_shipped_instances():
             for norm in NORMS:
                 assert field.energy(norm).total == facts[f"energy_{norm}norm"]
         certificates = given.certificates(instance_from(each.recipe), NORMS)
-        assert tuple(found.norm for found in certificates) == each.recipe.prove
+        assert all(found.facts["status"] == "optimal" for found in certificates)
+        if each.recipe.rung in {"tiny", "small"}:
+            assert tuple(found.norm for found in certificates) == each.recipe.prove
 
 
 @pytest.mark.slow
