@@ -1,13 +1,12 @@
 """The content of a solution file, before it is mapped to a problem, and fast parsing of its columns of text.
 
-The fast path passes megabytes of text to numpy at a time, without line numbers; the place of an error is
+A regular expression checks megabytes of text at a time, without line numbers; the place of an error is
 determined only when one occurs.
 """
 
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -19,14 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....models.errors import SolutionError
-from ....models.instance.grid import Bools, Floats
+from ....models.instance.grid import Floats
 
 if TYPE_CHECKING:  # the driver of a solver needs neither the writers nor the formulations
     from ...writing.canonical import Order
 
 Bytes = NDArray[np.bytes_]
-Letters = NDArray[np.uint8]
-Positions = NDArray[np.int64]
 
 TOKEN_LIMIT: Final = 63
 """Longest name or number, in bytes. Names of this package have at most 15, numbers at most 24."""
@@ -34,10 +31,12 @@ TOKEN_LIMIT: Final = 63
 HEAD: Final = 1 << 16
 """Number of bytes at the start of a file that determine its format."""
 
-_PIECE: Final = 1 << 22  # bytes processed at once: temporary arrays stay below some 100 MB
+_PIECE: Final = 1 << 20  # bytes processed at once: their words take some ten times as much
+_WORD: Final = rb"(?=[^\0- ]{1,%d}+[ \t\n])" % TOKEN_LIMIT
 _NUMBER = re.compile(
-    rb"([-+]?)(?:((?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?)|inf(?:inity)?|1\.#inf0*)", re.IGNORECASE
+    rb"[-+]?(?:1\.#inf0*|inf(?:inity)?|(?:\d+(?:\.\d*)?|\.\d+)(?:[ed][-+]?\d+)?)", re.IGNORECASE
 )
+_NOT_TEXT = re.compile(rb"[^\t -\xff]")
 _WINDOWS_INFINITY = re.compile(rb"1\.#inf0*", re.IGNORECASE)
 _FORTRAN = bytes.maketrans(b"dD", b"eE")
 _CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
@@ -328,11 +327,7 @@ def is_number(text: bytes) -> bool:
 
 def number_of(text: bytes) -> float | None:
     """The number in a word in the notation of solvers, or None."""
-    found = _NUMBER.fullmatch(text)
-    if found is None or len(text) > TOKEN_LIMIT:
-        return None
-    sign, digits = found.groups()
-    return float(sign + digits.translate(_FORTRAN)) if digits else float(sign + b"inf")
+    return float(_plain(text)) if is_number(text) else None
 
 
 def numbers(data: bytes, start: int, stop: int) -> Floats:
@@ -340,8 +335,7 @@ def numbers(data: bytes, start: int, stop: int) -> Floats:
 
     Raises SolutionError with the line of a word that is not a number, or of a missing new line.
     """
-    pieces = [_floats(piece, _tokens(piece, 1)) for piece in _pieces(data, start, stop)]
-    return np.concatenate([np.empty(0), *pieces])
+    return labelled_numbers(data, start, stop, 1, label=0, numeric=(0,))[1][:, 0].copy()
 
 
 def named_numbers(data: bytes, start: int, stop: int, per_line: int) -> tuple[Bytes, Floats]:
@@ -361,13 +355,16 @@ def labelled_numbers(
     label, numeric: places of the label and of the numbers among the words of a line; others are left out.
     Raises SolutionError with the line at fault.
     """
+    lines = re.compile(b"(?:%b)*+" % _line_of(per_line, numeric), re.IGNORECASE)
     names: list[Bytes] = [np.empty(0, dtype="S1")]
     values = [np.empty((0, len(numeric)))]
-    chosen = np.isin(np.arange(per_line), numeric)
-    for piece in _pieces(data, start, stop):
-        tokens = _tokens(piece, per_line)
-        names.append(_names(piece.text, tokens.take(slice(label, None, per_line))))
-        values.append(_floats(piece, tokens.take(np.tile(chosen, len(names[-1])))).reshape(-1, len(numeric)))
+    for begin, end in _pieces(data, start, stop):
+        read = lines.match(data, begin, end)
+        if read is None or read.end() < end:
+            raise _line_fault(data, read.end() if read else begin, per_line, numeric)
+        words = data[begin:end].split()
+        names.append(np.array(words[label::per_line]))
+        values.append(np.stack([_floats(words[at::per_line]) for at in numeric], axis=1))
     return np.concatenate(names), np.concatenate(values)
 
 
@@ -392,102 +389,45 @@ def words_of_line(data: bytes, position: int) -> list[bytes]:
     return data[position : len(data) if end < 0 else end].split()
 
 
-class _Piece(NamedTuple):
-    """Some whole lines of a text: bytes from `start` to `stop`."""
-
-    data: bytes
-    start: int
-    stop: int
-
-    @property
-    def text(self) -> Letters:
-        return np.frombuffer(self.data, np.uint8, self.stop - self.start, self.start)
-
-    def fault(self, offset: int, text: str) -> SolutionError:
-        return fault(self.data, self.start + offset, text)
+def _line_of(per_line: int, numeric: tuple[int, ...]) -> bytes:
+    """Pattern of a line of `per_line` words, of which some are numbers."""
+    words = [_WORD + _NUMBER.pattern if at in numeric else _WORD + rb"\S++" for at in range(per_line)]
+    return rb"[ \t]*+%b[ \t]*+\n" % rb"[ \t]++".join(words)
 
 
-class _Tokens(NamedTuple):
-    """Starts and ends of the words in a piece."""
-
-    starts: Positions
-    ends: Positions
-
-    def take(self, which: slice | Bools) -> _Tokens:
-        return _Tokens(self.starts[which], self.ends[which])
-
-
-def _pieces(data: bytes, start: int, stop: int) -> Iterator[_Piece]:
+def _pieces(data: bytes, start: int, stop: int) -> Iterator[tuple[int, int]]:
+    """Start and end of pieces of whole lines."""
     while start < stop:
         end = data.rfind(b"\n", start, min(start + _PIECE, stop)) + 1 or data.find(b"\n", start, stop) + 1
         if not end:
             raise fault(data, start, "the file is cut off in the middle of this line")
-        yield _Piece(data, start, end)
+        yield start, end
         start = end
 
 
-def _tokens(piece: _Piece, per_line: int) -> _Tokens:
-    text = piece.text
-    blank = text <= ord(" ")
-    control = blank & (text != ord(" ")) & (text != ord("\n")) & (text != ord("\t"))
-    if control.any():
-        raise piece.fault(int(np.argmax(control)), "there is a byte that is not text; the file is damaged")
-    edges = np.flatnonzero(np.diff(blank, prepend=True))
-    tokens = _Tokens(edges[0::2], edges[1::2])
-    _check_words(piece, tokens, per_line)
-    return tokens
+def _line_fault(data: bytes, start: int, per_line: int, numeric: tuple[int, ...]) -> SolutionError:
+    """The error about the line from byte `start` on, which does not have these words."""
+    text = data[start : data.index(b"\n", start)]
+    words = text.split()
+    if _NOT_TEXT.search(text):
+        return fault(data, start, "there is a byte that is not text; the file is damaged")
+    if len(words) != per_line:
+        return fault(data, start, f"{len(words)} words stand where {per_line} should")
+    if max(map(len, words)) > TOKEN_LIMIT:
+        return fault(data, start, f"a word is longer than {TOKEN_LIMIT} characters")
+    wrong = next(words[at] for at in numeric if not is_number(words[at]))
+    return fault(data, start, f"{shown(wrong)} is not a number")
 
 
-def _check_words(piece: _Piece, tokens: _Tokens, per_line: int) -> None:
-    ends_of_lines = np.flatnonzero(piece.text == ord("\n"))
-    words = np.diff(np.searchsorted(tokens.starts, ends_of_lines), prepend=0)
-    wrong = words != per_line
-    if wrong.any():
-        at = int(np.argmax(wrong))
-        raise piece.fault(int(ends_of_lines[at]), f"{words[at]} words stand where {per_line} should")
-    long = tokens.ends - tokens.starts > TOKEN_LIMIT
-    if long.any():
-        raise piece.fault(
-            int(tokens.starts[np.argmax(long)]), f"a word is longer than {TOKEN_LIMIT} characters"
-        )
+def _floats(words: list[bytes]) -> Floats:
+    """The numbers in words that are numbers. Python's own rounding: exact."""
+    return np.fromstring(_plain(b" ".join(words)), sep=" ")
 
 
-def _names(text: Letters, tokens: _Tokens) -> Bytes:
-    length = tokens.ends - tokens.starts
-    offset = np.arange(length.max())
-    letters = text.take(tokens.starts[:, None] + offset, mode="clip")
-    letters[offset >= length[:, None]] = 0
-    return letters.view(f"S{len(offset)}").ravel()
-
-
-def _floats(piece: _Piece, tokens: _Tokens) -> Floats:
-    """The given words of a piece as numbers."""
-    text = np.where(_inside(tokens, len(piece.text)), piece.text, np.uint8(ord(" ")))
-    values = _fast_floats(text.tobytes())
-    if values is not None and len(values) == len(tokens.starts) and not np.isnan(values).any():
-        return values
-    spans = zip(tokens.starts + piece.start, tokens.ends + piece.start, strict=True)
-    return np.array([_number(piece.data, start, piece.data[start:end]) for start, end in spans])
-
-
-def _inside(tokens: _Tokens, size: int) -> Bools:
-    change = np.zeros(size + 1, dtype=np.int8)  # the last word may end with the piece
-    change[tokens.starts] = 1
-    change[tokens.ends] = -1
-    return np.cumsum(change[:size], dtype=np.int8).view(bool)
-
-
-def _fast_floats(text: bytes) -> Floats | None:
-    """Numbers between blanks, or None for other content. Python's own rounding: exact."""
+def _plain(text: bytes) -> bytes:
+    """Numbers in the notation of solvers as Python reads them."""
     text = text.translate(_FORTRAN)
-    if b"#" in text:
-        text = _WINDOWS_INFINITY.sub(b"inf", text)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", DeprecationWarning)  # before numpy 2.3, later ones raise
-        try:
-            return np.fromstring(text, dtype=np.float64, sep=" ")
-        except (ValueError, DeprecationWarning):
-            return None
+    return _WINDOWS_INFINITY.sub(b"inf", text) if b"#" in text else text
 
 
 def _number(data: bytes, position: int, text: bytes) -> float:
