@@ -10,6 +10,8 @@ import io
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -35,9 +37,10 @@ def shot(page: Any, name: str, *selectors: str) -> None:
         image.convert("RGB").save(PICTURES / name, optimize=True)
 
 
-def main() -> None:
-    """Draw both pictures."""
-    command = [sys.executable, "-m", "crossfield", "studio", "bottle", "--no-browser"]
+@contextmanager
+def page_of(sample: str) -> Iterator[Any]:
+    """The page of the studio with a sample, in Chromium."""
+    command = [sys.executable, "-m", "crossfield", "studio", sample, "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
         options = webdriver.ChromeOptions()
@@ -47,11 +50,17 @@ def main() -> None:
         try:
             page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", METRICS)
             page.get(server.stdout.readline().strip())
-            shot(page, "studio_page.png", "input[value=lines]", "input[value=matcap]")
-            shot(page, "studio_doubts.png", *PIPE.split("|"))
+            yield page
         finally:
             page.quit()
             server.terminate()
+
+
+def main() -> None:
+    """Draw both pictures."""
+    with page_of("bottle") as page:
+        shot(page, "studio_page.png", "input[value=lines]", "input[value=matcap]")
+        shot(page, "studio_doubts.png", *PIPE.split("|"))
 
 
 if __name__ == "__main__":
