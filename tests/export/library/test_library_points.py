@@ -247,7 +247,7 @@ def test_sidecars_tell_density_and_difficulty(searched):
     assert entry["density"] == round(entry["instance"]["strokes"] / entry["instance"]["pixels"], 4)
     assert entry["difficulty"] == "hard"
     assert read_library(searched).entry(f"{STEM}_qp")["difficulty"] == "easy"
-    assert read_library(searched).entry(f"{STEM}_milp")["difficulty"] == "open"
+    assert read_library(searched).entry(f"{STEM}_printed_milp")["difficulty"] == "open"
 
 
 @pytest.mark.slow
