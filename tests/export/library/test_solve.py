@@ -29,6 +29,7 @@ SMALL = """formulations = ["bilin1", "milp", "qp"]
 [rungs.tiny]
 sizes = [3]
 formats = ["mps"]
+prove = false
 [[sketches]]
 name = "a"
 sample = "mouse"

@@ -36,4 +36,5 @@ def test_where_no_finer_level_fits_the_rest_goes_to_the_search(monkeypatch, tmp_
     assert proof.energy <= cf.search(instance, rounds=5, jobs=1).field.energy().total + 1e-9
     assert proof.levels[-1].bound == proof.bound
     certificate = write_certificate(proof, tmp_path / "it.npz")
-    assert certificate.bound == pytest.approx(proof.bound, rel=1e-5)
+    # The checker has the best shares of later pixels, so it may prove more than the rounded ones.
+    assert proof.bound * (1 - 1e-5) <= certificate.bound <= proof.energy
