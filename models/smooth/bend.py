@@ -7,7 +7,8 @@ direction changes little from one to the next.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -17,10 +18,10 @@ from scipy import sparse
 
 from ..field.field import CrossField
 from ..instance.angles import wrap
-from ..instance.grid import Floats, Grid, Ints
+from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, QUARTER
 from ..processes.deadline import Over, Stop, stop_function
-from .systems import Solve, dissected, factored, one_thread, preconditioned
+from .systems import SimilarSystems, dissected, one_thread
 
 _Places = NDArray[np.intp]
 
@@ -31,7 +32,10 @@ HOLD: Final = 0.25  # factor of the stroke weights; from 0.3 on, 3 degrees of no
 _LEAST_HARMONIC: Final = 0.01  # smallest deviation from clean strokes
 _SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size
 _ROUNDS: Final = 20  # 2 to 6 are usual
-_RESIDUAL: Final = 0.1  # relative, of the systems after the first round
+_PAST: Final = 5  # rounds whose steps are combined with the present one
+_RESIDUAL: Final = 0.1  # relative, of systems that are not factored
+_DEPENDENT: Final = 1e-8  # relative singular value below which past rounds count as linearly dependent
+_STEPS: Final = 5  # of conjugate gradients; where they do not suffice, a system is factored
 _FALL: Final = 1e-4  # least share of the energy that a round has to remove before another one
 
 
@@ -53,10 +57,12 @@ def bend_field(
     field with the hardest hold.
 
     Each round fixes the unit vectors and minimises over the angles: one sparse system. The system of the
-    first round is factored. Its factors precondition conjugate gradients in later rounds. Rounds end when the
-    energy hardly decreases, and after 20 rounds at the latest; a round that increases it is discarded. Labels
-    are then moved into the windows of the instance, as by `CrossField.from_lines`. Deterministic unless
-    `stop` ends it.
+    first round is factored. Its factors precondition conjugate gradients in later rounds, until a round needs
+    more than five steps; its system is then factored. Anderson acceleration combines a step with those of up
+    to 5 rounds before it (Walker, Ni: SIAM Journal on Numerical Analysis 49, 2011), unless this increases the
+    energy. Rounds end when the energy hardly decreases, and after 20 rounds at the latest; a round that
+    increases it is discarded. Labels are then moved into the windows of the instance, as by
+    `CrossField.from_lines`. Deterministic unless `stop` ends it.
 
     Parameters
     ----------
@@ -80,7 +86,10 @@ def bend_field(
     over = stop_function(stop)
     if over():
         return start
-    solver = _Solver(start.instance.grid)
+    grid = start.instance.grid
+    places = dissected(grid.rows, grid.columns, reach=1)
+    order = np.stack([places, places + grid.size], axis=1).ravel()
+    solver = SimilarSystems(order, residual=_RESIDUAL, steps=_STEPS)
     x = np.concatenate([start.u_angle, start.v_angle])
     x = _Bend.of(start, HARMONIC if harmonic is None else harmonic, hold).least(x, solver, over)
     field = CrossField.from_lines(start.instance, *np.split(x, 2))
@@ -99,20 +108,28 @@ def tremble(field: CrossField) -> float:
     return _SIGMA * float(np.median(deviation)) if len(deviation) else 0.0
 
 
-class _Solver:
-    """Solves similar systems: the first exactly, later ones to a residual, preconditioned by its factors."""
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """A round: the angles at its begin, half the slope there, and minus the step to the least energy."""
 
-    def __init__(self, grid: Grid) -> None:
-        places = dissected(grid.rows, grid.columns, reach=1)
-        self._order = np.stack([places, places + grid.size], axis=1).ravel()
-        self._factors: Solve | None = None
+    x: Floats
+    slope: Floats
+    step: Floats
 
-    def solve(self, matrix: Callable[[], Any], product: Solve, right: Floats) -> Floats:
-        """The solution of a positive semidefinite system. matrix: returns it. product: times a vector."""
-        if self._factors is None:
-            self._factors = factored(matrix(), self._order)
-            return self._factors(right)
-        return preconditioned(product, right, self._factors, _RESIDUAL)[0]
+    def accelerated(self, past: Collection[_Round]) -> Floats:
+        """The angles after this round, by Anderson acceleration with rounds before it.
+
+        The combination of rounds that has the smallest slope, measured by the energy of its step.
+        """
+        if not past:
+            return self.x - self.step
+        x, slope, step = (
+            np.array([getattr(each, part) for each in past]) - getattr(self, part)
+            for part in ("x", "slope", "step")
+        )
+        share = np.linalg.lstsq(step @ slope.T, -(step @ self.slope), rcond=_DEPENDENT)[0]
+        found: Floats = self.x + share @ x - (self.step + share @ step)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,14 +163,21 @@ class _Bend:
         goal = [even * offset, squared * theta, np.full(every.shape[0], -skew * QUARTER)]
         return cls(difference, offset, *_quadrants(start), sparse.vstack(rows).tocsr(), np.concatenate(goal))
 
-    def least(self, x: Floats, solver: _Solver, over: Over) -> Floats:
+    def least(self, x: Floats, solver: SimilarSystems, over: Over) -> Floats:
         """Angles of low energy, in rounds that begin at x."""
         energy, slope, along = self.at(x)
+        past: deque[_Round] = deque(maxlen=_PAST)
         for _ in range(_ROUNDS):
-            moved = x - self._step(along, slope, solver)
+            present = _Round(x, slope, self._step(along, slope, solver))
+            moved = present.accelerated(past)
             there = self.at(moved)
+            if past and there[0] >= energy:
+                past.clear()
+                moved = present.accelerated(past)
+                there = self.at(moved)
             fallen = energy - there[0]
             if fallen > 0:
+                past.append(present)
                 x, (energy, slope, along) = moved, there
             if fallen <= _FALL * energy or over():
                 break
@@ -166,7 +190,7 @@ class _Bend:
         slope = self.difference.T @ (along.T @ bend) + self.rows.T @ linear
         return float(np.sum(bend**2) + np.sum(linear**2)), slope, along
 
-    def _step(self, along: Any, slope: Floats, solver: _Solver) -> Floats:
+    def _step(self, along: Any, slope: Floats, solver: SimilarSystems) -> Floats:
         """Minus the step to the least energy for fixed unit vectors."""
 
         def matrix() -> Any:

@@ -24,7 +24,6 @@ _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution woul
 _DENSE: Final = 8  # columns of a dense block in the factors by nested dissection
 _LEAF: Final = 24  # places that are not parted
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual
-_MOST_STEPS: Final = 50  # of preconditioned ones; 2 to 10 are usual
 _LOCK: Final = threading.Lock()
 _HELD: Final[list[Any]] = []  # the limit of BLAS, once for each context that is open
 
@@ -115,21 +114,45 @@ def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.nd
     return solution
 
 
-def preconditioned(
-    product: Solve, right: Floats, approximate: Solve, tolerance: float, most: int = _MOST_STEPS
-) -> tuple[np.ndarray[Any, Any], bool]:
-    """The x with Ax = right by conjugate gradients, and whether its relative residual is small enough.
+class SimilarSystems:
+    """Solves similar symmetric systems one after another, by the factors of an earlier one if few steps do.
 
-    product: A times a vector, A symmetric. approximate: an approximate solver of the same system. most:
-    steps.
+    Parameters
+    ----------
+    order
+        Of elimination, as of `factored`.
+    residual
+        Relative residual of solutions by the factors of an earlier system; others are exact.
+    steps
+        Of conjugate gradients, preconditioned by these factors, after which the present system is factored.
+    few
+        Unknowns of systems that are always factored.
+
     """
-    shape = (len(right), len(right))
-    matrix, inverse = (
-        LinearOperator(shape, matvec=each, dtype=right.dtype) for each in (product, approximate)
-    )
-    with one_thread():
-        solution, late = cg(matrix, right, rtol=tolerance, atol=_ROUNDING, maxiter=most, M=inverse)
-    return solution, not late
+
+    def __init__(self, order: Ints, *, residual: float, steps: int, few: int = 0) -> None:
+        self._order, self._residual, self._steps, self._few = order, residual, steps, few
+        self._factors: Solve | None = None
+
+    def solve(self, matrix: Any, product: Solve, right: Floats) -> Floats:
+        """The solution of a positive semidefinite system.
+
+        matrix: of the system, or a function that returns it. product: times a vector.
+        """
+        if self._factors is not None and len(right) > self._few:
+            shape = (len(right), len(right))
+            times, inverse = (
+                LinearOperator(shape, each, dtype=right.dtype) for each in (product, self._factors)
+            )
+            with one_thread():
+                solution, late = cg(
+                    times, right, rtol=self._residual, atol=_ROUNDING, maxiter=self._steps, M=inverse
+                )
+            if not late:
+                found: Floats = solution
+                return found
+        self._factors = factored(matrix() if callable(matrix) else matrix, self._order)
+        return self._factors(right)
 
 
 @contextmanager

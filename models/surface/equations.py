@@ -13,7 +13,7 @@ from scipy import sparse
 
 from ..instance.grid import Bools, Floats, Ints
 from ..processes.deadline import Over
-from ..smooth.systems import Solve, factored, preconditioned
+from ..smooth.systems import SimilarSystems
 from .stencils import SLOPES, Crosses, Stencils, scaled
 
 CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree
@@ -231,33 +231,18 @@ def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
     return changes
 
 
-class _Solver:
-    """Solves similar systems by the factors of an earlier one where that takes few steps."""
-
-    def __init__(self, order: Ints) -> None:
-        self._order = order
-        self._factors: Solve | None = None
-
-    def solve(self, matrix: Any, right: Floats) -> Floats:
-        """The solution of a positive definite system."""
-        if self._factors is not None and len(right) > _FEW:
-            found, near = preconditioned(matrix.__matmul__, right, self._factors, _RESIDUAL, _STEPS)
-            if near:
-                return found
-        self._factors = factored(matrix, self._order)
-        return self._factors(right)
-
-
 def descended(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
     """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
-    energy, damping, solver = equations.energy(z), _DAMPING, _Solver(equations.stencils.order)
+    energy, damping = equations.energy(z), _DAMPING
+    solver = SimilarSystems(equations.stencils.order, residual=_RESIDUAL, steps=_STEPS, few=_FEW)
     for _ in range(_ROUNDS):
         if over():
             break
         slope, curvature = equations.model(z)
         diagonal = sparse.diags_array(curvature.diagonal())
         for _ in range(_TRIALS):
-            tried = z - solver.solve(curvature + damping * diagonal, slope)
+            damped = curvature + damping * diagonal
+            tried = z - solver.solve(damped, damped.__matmul__, slope)
             reached = equations.energy(tried)
             if reached < energy:
                 break
