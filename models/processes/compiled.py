@@ -22,6 +22,7 @@ from .side_by_side import checked
 _Part = TypeVar("_Part")
 _Work = TypeVar("_Work", bound=Callable[..., Any])
 _MADE: Final[list[Any]] = []
+_PARTS: Final = 2  # of shared work for each thread: one that takes longer than expected then costs less
 
 
 def compiled(work: _Work) -> _Work:
@@ -63,9 +64,9 @@ class Crew:
         self._count, self._others = count, others
 
     def parts(self, work: np.ndarray[Any, Any]) -> list[slice]:
-        """Consecutive items for each thread, as equal in work as whole items allow."""
+        """Consecutive items, some parts for each thread, as equal in work as whole items allow."""
         done = np.concatenate([[0.0], np.cumsum(work, dtype=np.float64)])
-        goals = np.linspace(0.0, done[-1], self._count + 1)
+        goals = np.linspace(0.0, done[-1], (_PARTS * self._count if self._count > 1 else 1) + 1)
         ends = np.abs(done[:, None] - goals).argmin(axis=0)
         ends[0], ends[-1] = 0, len(work)
         return [slice(a, b) for a, b in pairwise(ends) if a < b]
@@ -76,11 +77,16 @@ class Crew:
         return [slice(a, b) for a, b in pairwise(ends)]
 
     def run(self, work: Callable[[_Part], object], parts: Sequence[_Part]) -> None:
-        """Do the work on all parts at the same time."""
-        waiting = [self._others.submit(work, part) for part in parts[1:]]
-        for part in parts[:1]:
-            work(part)
-        for each in waiting:
+        """Do the work on all parts; each thread takes the next part when it has done one."""
+        waiting = iter(parts)
+
+        def work_on() -> None:
+            for part in waiting:
+                work(part)
+
+        others = [self._others.submit(work_on) for _ in range(min(self._count, len(parts)) - 1)]
+        work_on()
+        for each in others:
             each.result()
 
 

@@ -164,6 +164,7 @@ HEAD = re.compile(
 Array = Any
 Field = tuple[Array, Array, Array]
 Over = Callable[[], bool]
+Product = Callable[[Array, Array], Array]
 
 
 class RefusedError(Exception):
@@ -184,7 +185,8 @@ class Sketch:
 
     norm: 1, 2 or "mixed". offset (n,): o. weight, target (n,): W and theta, 0 where there is no stroke. slope
     (n,): l of 5. lower (n,): least alpha of the gauge. earlier, later: numbers of the pairs of each pixel to
-    later, to earlier pixels.
+    later, to earlier pixels. diagonals: the pixels of each diagonal, from the upper left; none of them form
+    a pair, and earlier pixels are on earlier diagonals.
     """
 
     norm: Any
@@ -198,6 +200,7 @@ class Sketch:
     w_beta: float
     later: list[list[int]]
     earlier: list[list[int]]
+    diagonals: list[list[int]]
 
 
 @dataclass
@@ -217,8 +220,8 @@ class Level:
     """A lattice, its allowed labels, and the messages of the pairs.
 
     ranges (n, 4): steps, as first and count of alpha, first and count of beta; allowed (a, b) of each pixel;
-    the message of each pair is to its earlier pixel. clusters: the tables of quads; tables: their sum at each
-    pair that has some, by alphas of its first and of its second pixel.
+    the message of each pair is to its earlier pixel: `Messages`, or arrays. clusters: the tables of quads;
+    tables: their sum at each pair that has some, by alphas of its first and of its second pixel.
     """
 
     h: float
@@ -226,7 +229,7 @@ class Level:
     beta: Array
     ranges: Array
     allowed: list[Array]
-    messages: list[Array]
+    messages: Sequence[Array]
     clusters: list[Cluster]
     tables: dict[int, Array]
 
@@ -480,7 +483,12 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
     norm, white = norm_of(claim), (rows + columns) % 2 == 1
     offset = 0.5 * white if norm == 2 else np.zeros(n)
     slope = _slopes(arrays, norm, n)
-    return Sketch(norm, offset, slope, first, second, weight, target, lower, w_beta, later, earlier)
+    diagonals: list[list[int]] = [[] for _ in range(sum(mask.shape) - 1)]
+    for i, diagonal in enumerate((rows + columns).tolist()):
+        diagonals[diagonal].append(i)
+    return Sketch(
+        norm, offset, slope, first, second, weight, target, lower, w_beta, later, earlier, diagonals
+    )
 
 
 def _slopes(arrays: dict[str, Array], norm: Any, n: int) -> Array:
@@ -597,7 +605,7 @@ def level_of(arrays: dict[str, Array], number: int, sketch: Sketch) -> Level:
     for cluster in clusters:
         for e, table in zip(cluster.pairs, cluster.tables):
             tables[e] = tables[e] + table if e in tables else table
-    return Level(h, alpha, beta, ranges, allowed, _messages(arrays, at, sketch, shapes), clusters, tables)
+    return Level(h, alpha, beta, ranges, allowed, Messages(arrays, at, sketch, shapes), clusters, tables)
 
 
 def _clusters(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) -> list[Cluster]:
@@ -619,35 +627,45 @@ def _clusters(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) 
     counts = sides.prod(axis=1)
     scale = _given(arrays, f"{at}table_scale", "<f8", len(counts))
     _need((scale >= 0) & (scale <= 1), f"{at}table_scale", "is not in [0, 1]")
-    steps = _given(arrays, f"{at}table_steps", "<i4", int(counts.sum())).astype(np.int64)
-    tables = _cut(_summed(steps, counts) * np.repeat(scale, counts), sides)
-    for number, cluster in enumerate(found):
-        cluster.tables = tables[4 * number : 4 * number + 4]
+    steps = _given(arrays, f"{at}table_steps", "<i4", int(counts.sum()))
+    end = 0
+    for number, (count, shape) in enumerate(zip(counts.tolist(), sides.tolist())):
+        whole = np.cumsum(steps[end : end + count], dtype=np.int64).astype(np.int32)  # modulo 2^32
+        found[number // 4].tables.append((whole * scale[number]).reshape(shape))
+        end += count
     return found
 
 
-def _summed(steps: Array, counts: Array, kind: Any = np.int32) -> Array:
-    """The whole numbers, modulo 2^32 or 2^64, of which blocks hold the first and then the differences."""
-    total = np.cumsum(steps)
-    before = np.repeat((total - steps)[np.cumsum(counts) - counts], counts)
-    return (total - before).astype(kind)
+class Messages(Sequence[Array]):
+    """The messages of the pairs to their earlier pixels: whole numbers, given by their steps, times a scale.
 
+    Each is computed whenever it is asked for, because all of them together take much memory.
+    """
 
-def _messages(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) -> list[Array]:
-    """The message of each pair to its earlier pixel: whole numbers, given by their steps, times its scale."""
-    receivers = shapes[np.minimum(sketch.first, sketch.second)]
-    counts = receivers.prod(axis=1)
-    scale = _given(arrays, f"{at}scale", "<f8", len(counts))
-    wide = _given(arrays, f"{at}wide", "|b1", len(counts))
-    steps = np.zeros(int(counts.sum()), np.int64)
-    each = np.repeat(wide, counts)
-    for chosen, name in zip((~each, each), STEP_PARTS[sketch.norm]):
-        kind = {"steps_16": "<i2", "steps_32": "<i4", "steps_64": "<i8"}[name]
-        steps[chosen] = _given(arrays, f"{at}{name}", kind, int(chosen.sum()))
-    _need((scale >= 0) & (scale <= 1), f"{at}scale", "is not in [0, 1]")
-    whole = _summed(steps, counts, np.int32 if sketch.norm == 2 else np.int64)
-    _need(np.abs(whole / MOST_WHOLE) <= 1, f"{at}steps", "lead too far")
-    return _cut(whole * np.repeat(scale, counts), receivers)
+    def __init__(self, arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) -> None:
+        self.name, self.norm = f"{at}steps", sketch.norm
+        self.shapes = shapes[np.minimum(sketch.first, sketch.second)]
+        counts = self.shapes.prod(axis=1)
+        self.scale = _given(arrays, f"{at}scale", "<f8", len(counts))
+        _need((self.scale >= 0) & (self.scale <= 1), f"{at}scale", "is not in [0, 1]")
+        wide = _given(arrays, f"{at}wide", "|b1", len(counts))
+        kinds = {"steps_16": "<i2", "steps_32": "<i4", "steps_64": "<i8"}
+        self.steps: list[Array] = [None] * len(counts)
+        for chosen, name in zip((~wide, wide), STEP_PARTS[sketch.norm]):
+            given = _given(arrays, f"{at}{name}", kinds[name], int(counts[chosen].sum()))
+            ends = np.cumsum(counts[chosen])
+            for e, end in zip(np.flatnonzero(chosen).tolist(), ends.tolist()):
+                self.steps[e] = given[end - counts[e] : end]
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def __getitem__(self, e: Any) -> Array:
+        whole = np.cumsum(self.steps[e], dtype=np.int64)  # modulo 2^64
+        if self.norm == 2:
+            whole = whole.astype(np.int32)  # modulo 2^32
+        _need(np.abs(whole / MOST_WHOLE).max() <= 1, self.name, "lead too far")
+        return (whole * self.scale[e]).reshape(self.shapes[e])
 
 
 def _cut(flat: Array, shapes: Array) -> list[Array]:
@@ -748,21 +766,21 @@ class Pair:
                 if least >= sum(float(part.max()) for part in self.parts[better]):
                     self.parts.pop(worse)
 
-    def to_later(self, *given: Array) -> list[Array]:
+    def to_later(self, *given: Array, product: Product) -> list[Array]:
         """The least given(x) + c(x, y) over labels x of the earlier pixel, for each label y of the later one.
 
         One such array for each array of `given`.
         """
         stacked = np.concatenate(given)
-        found = [np.split(_min_plus(stacked, b), len(given)) for _, b in self.parts]
-        ends = [_min_plus(along.T, np.hstack(half)) for (along, _), half in zip(self.parts, found)]
+        found = [np.split(product(stacked, b), len(given)) for _, b in self.parts]
+        ends = [product(along.T, np.hstack(half)) for (along, _), half in zip(self.parts, found)]
         return np.split(np.minimum.reduce(ends), len(given), axis=1)
 
 
-def _min_plus(left: Array, right: Array) -> Array:
+def min_plus(left: Array, right: Array) -> Array:
     """The (min,+) product of two matrices; NumPy is quicker along the longer side, and with few calls."""
     if left.shape[0] > right.shape[1]:
-        turned: Array = _min_plus(np.ascontiguousarray(right.T), np.ascontiguousarray(left.T)).T
+        turned: Array = min_plus(np.ascontiguousarray(right.T), np.ascontiguousarray(left.T)).T
         return turned
     columns, many = np.ascontiguousarray(left.T)[:, :, None], max(1, BLOCK // (len(left) * right.shape[1]))
     work = np.empty((min(many, len(right)), len(left), right.shape[1]))
@@ -776,28 +794,39 @@ def _min_plus(left: Array, right: Array) -> Array:
 # The pass --------------------------------------------------------------------------------------------------
 
 
+@dataclass
+class Way:
+    """How to compute: the (min,+) product of two matrices, and a function like `map` for independent work."""
+
+    product: Product = min_plus
+    each: Callable[[Callable[[int], Any], list[int]], Any] = map
+
+
+PLAIN = Way()
+
+
 class Pass:
     """The pass of 3. over a level."""
 
-    def __init__(self, level: Level, sketch: Sketch) -> None:
-        self.level, self.sketch = level, sketch
-        self.costs = [unary(level, sketch, i) for i in range(len(sketch.offset))]
-        self.before: list[Array] = [None] * len(level.messages)  # S
-        self.after: list[Array] = [None] * len(level.messages)  # N
+    def __init__(self, level: Level, sketch: Sketch, way: Way) -> None:
+        self.level, self.sketch, self.way = level, sketch, way
+        self.before: dict[int, Array] = {}  # S of the pairs whose later pixel is still to come
+        self.after: dict[int, Array] = {}  # N of the same
         self.errors: list[float] = []
 
     def run(self, stop: Over) -> Passed:
         """Do the pass. Raises StoppedError when it has to end before the last pixel."""
-        numbers, least, waiting = [], [], []
-        for i in range(len(self.costs)):
+        n = len(self.sketch.offset)
+        numbers: list[Array] = [None] * n
+        least, waiting = [0.0] * n, [0.0] * n
+
+        def visit(i: int) -> None:
             if stop():
                 raise StoppedError
-            waiting.append(self._theta(i, self.before)[1])
-            over, lowest = self._theta(i, self.after)
-            numbers.append(over)
-            least.append(lowest)
-            for e in self.sketch.later[i]:
-                self._send(e, over, len(self.sketch.earlier[i]), len(self.sketch.later[i]))
+            numbers[i], least[i], waiting[i] = self._visit(i)
+
+        for diagonal in self.sketch.diagonals:
+            list(self.way.each(visit, diagonal))
         quads = [self._quad(cluster) for cluster in self.level.clusters]
         error = 2 * math.fsum(self.errors)
         rights = [
@@ -805,31 +834,42 @@ class Pass:
         ]
         return Passed(math.fsum([*quads, *least]) - error, rights, error)
 
+    def _visit(self, i: int) -> tuple[Array, float, float]:
+        """t_i, mu_i and mu*_i; what the pairs to later pixels send is stored."""
+        earlier, later = self.sketch.earlier[i], self.sketch.later[i]
+        cost, size = unary(self.level, self.sketch, i)
+        held = [self.level.messages[e] for e in later]
+        _, waiting = self._theta(cost, size, held + [self.before.pop(e) for e in earlier])
+        over, least = self._theta(cost, size, held + [self.after.pop(e) for e in earlier])
+        for e, message in zip(later, held):
+            self._send(e, message, over / max(1, len(earlier), len(later)))
+        return over, least, waiting
+
     def _quad(self, cluster: Cluster) -> float:
         """The least cost of a quad over the alphas that have an allowed label."""
         a, b, c, d = (self.level.allowed[i].any(axis=1) for i in cluster.pixels)
         ab, bc, dc, ad = (-table for table in cluster.tables)
-        upper = _min_plus(ab[np.ix_(a, b)], bc[np.ix_(b, c)])
-        lower = _min_plus(ad[np.ix_(a, d)], dc[np.ix_(d, c)])
+        upper = self.way.product(ab[np.ix_(a, b)], bc[np.ix_(b, c)])
+        lower = self.way.product(ad[np.ix_(a, d)], dc[np.ix_(d, c)])
         self._err(sum(float(np.abs(table).max()) for table in cluster.tables))
         return float((upper + lower).min())
 
-    def _theta(self, i: int, given: list[Array]) -> tuple[Array, float]:
-        """Excess of theta_i over its minimum at each label, and the minimum."""
-        cost, size = self.costs[i]
-        shares = [self.level.messages[e] for e in self.sketch.later[i]]
-        shares += [given[e] for e in self.sketch.earlier[i]]
+    def _theta(self, cost: Array, size: float, shares: list[Array]) -> tuple[Array, float]:
+        """Excess of theta over its minimum at each label of a pixel, and the minimum.
+
+        cost, size: as of `unary`. shares: messages and shares of its pairs.
+        """
         total: Array = np.sum([cost, *shares], axis=0)
         self._err(size + sum(float(np.abs(share).max()) for share in shares))
         least = float(total.min())
         return total - least, least
 
-    def _send(self, e: int, over: Array, earlier: int, later: int) -> None:
-        """Send the message of pair e to its later pixel, without and with the share of its earlier pixel."""
-        pair, held = Pair(self.level, self.sketch, e), self.level.messages[e]
-        given = over / max(1, earlier, later) - held
+    def _send(self, e: int, held: Array, handed: Array) -> None:
+        """Send the message of pair e to its later pixel, without and with what its earlier pixel hands on."""
+        pair, given = Pair(self.level, self.sketch, e), handed - held
         allowed = np.isfinite(given)
-        self.before[e], self.after[e] = pair.to_later(np.where(allowed, -held, np.inf), given)
+        messages = (np.where(allowed, -held, np.inf), given)
+        self.before[e], self.after[e] = pair.to_later(*messages, product=self.way.product)
         greatest = float(np.abs(given[allowed]).max() + np.abs(held).max() + np.abs(self.after[e]).max())
         self._err(pair.size + greatest)
 
@@ -1141,28 +1181,28 @@ def lower_bound(
 # The whole -------------------------------------------------------------------------------------------------
 
 
-def check(arrays: dict[str, Array], over: Over = lambda: False) -> Verdict:
+def check(arrays: dict[str, Array], over: Over = lambda: False, way: Way = PLAIN) -> Verdict:
     """Check the arrays of a certificate and return what they prove.
 
-    over: called repeatedly, returns whether to end; then only the levels passed by then count. Raises
-    RefusedError when a level does not follow from the one before, or when less is proven than claimed. Raises
-    UnreadableError for arrays that are not a certificate, and StoppedError when time is over before the first
-    level was passed.
+    over: called repeatedly, returns whether to end; then only the levels passed by then count. way: a
+    quicker one to compute the same. Raises RefusedError when a level does not follow from the one before, or
+    when less is proven than claimed. Raises UnreadableError for arrays that are not a certificate, and
+    StoppedError when time is over before the first level was passed.
     """
     try:
-        return _check(arrays, over)
+        return _check(arrays, over, way)
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, MemoryError, RecursionError) as error:
         raise UnreadableError(f"is damaged ({type(error).__name__}: {str(error)[:80]})") from error
 
 
-def _check(arrays: dict[str, Array], over: Over) -> Verdict:
+def _check(arrays: dict[str, Array], over: Over, way: Way) -> Verdict:
     head = head_of(arrays)
     sketch = sketch_of(arrays)
     field = field_of(arrays, sketch)
     energy, error = energy_of(sketch, *field)
     count = _levels(head)
     slack = slack_of(sketch, count)
-    bounds, boxes, level = _descend(arrays, sketch, count, energy + error + slack, over)
+    bounds, boxes, level = _descend(arrays, sketch, energy + error + slack, over, way)
     bound = max(0.0, min(energy - error, max(bounds) - slack))
     enough = energy - error - OPTIMAL / 2 * max(1.0, energy)
     multipliers = _multipliers(arrays, sketch)
@@ -1185,7 +1225,7 @@ def _multipliers(arrays: dict[str, Array], sketch: Sketch) -> Array:
 
 
 def _descend(
-    arrays: dict[str, Array], sketch: Sketch, count: int, most: float, over: Over
+    arrays: dict[str, Array], sketch: Sketch, most: float, over: Over, way: Way
 ) -> tuple[list[float], Array, Level]:
     """The bounds of all levels, the boxes round the cells left after the last one, and the first level."""
     first = level = level_of(arrays, 0, sketch)
@@ -1193,13 +1233,13 @@ def _descend(
     bounds: list[float] = []
     cells: list[Array] = []
     try:
-        for number in range(count):
+        for number in range(_levels(head_of(arrays))):
             finer = level_of(arrays, number, sketch) if number else first
             centred = (finer.alpha == first.alpha) & (finer.beta == first.beta)
             _need(centred, f"level_{number}_alpha or beta", "is not that of the first level")
             if number:
                 need_covered(level, cells, finer, sketch, number)
-            found = Pass(finer, sketch).run(over)
+            found = Pass(finer, sketch, way).run(over)
             bounds.append(found.bound)
             level, cells = finer, surviving(finer, found, most)
     except StoppedError:
@@ -1207,7 +1247,7 @@ def _descend(
             raise
     left = all(kept.any() for kept in cells)
     _need(left, "the last level", "has a pixel without a cell, not even that of the field")
-    return bounds, boxes_of(level, cells, sketch, 2 * (count + 1) * SLIVER), first
+    return bounds, boxes_of(level, cells, sketch, 2 * (len(bounds) + 1) * SLIVER), first
 
 
 def _compare(head: dict[str, Any], verdict: Verdict, error: float) -> None:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..instance.grid import Floats, Grid
 from ..processes.compiled import compiled_if_needed
 from .lattice import Lattice, starts
-from .products import alpha_costs, beta_costs, lower_by_product, over_beta, share_of
+from .products import alpha_costs, beta_costs, min_plus, over_beta, share_of
 from .state import Clusters, Indices, State
 
 IndexTable = NDArray[np.int64]  # of two axes
@@ -37,12 +37,23 @@ def clusters_on(lattice: Lattice, quads: Indices) -> Clusters:
     """Clusters with zero tables on some quads of the grid. quads (q,): their numbers, ascending."""
     grid = lattice.instance.grid
     pairs = grid.quads[quads].astype(np.int64)
-    rows, columns = lattice.alpha_count[grid.first[pairs]], lattice.alpha_count[grid.second[pairs]]
-    begin = starts((rows.astype(np.int64) * columns).ravel())
+    begin = starts(table_sizes(lattice, pairs))
     of_pair = np.full((len(grid.first), 2), -1, np.int64)
     for number, pair in enumerate(pairs.ravel().tolist()):
         of_pair[pair, int(of_pair[pair, 0] >= 0)] = number
     return Clusters(pairs, begin, of_pair, np.zeros(begin[-1]))
+
+
+def table_sizes(lattice: Lattice, quads: Indices) -> Indices:
+    """The numbers of each table of clusters on a lattice. quads (q, 4): as in `Clusters`."""
+    grid, pairs = lattice.instance.grid, quads.ravel()
+    rows, columns = lattice.alpha_count[grid.first[pairs]], lattice.alpha_count[grid.second[pairs]]
+    return rows.astype(np.int64) * columns
+
+
+def table_work(lattice: Lattice, quads: Indices) -> float:
+    """The number of additions of (min,+) products of the clusters' tables, up to a factor."""
+    return float((table_sizes(lattice, quads) ** 1.5).sum())
 
 
 def extended(old: Clusters, new: Clusters) -> Clusters:
@@ -99,11 +110,11 @@ def update_clusters(numbers: Indices, state: State) -> None:
         table = 4 * number
         f0, f1 = _reduced(table, rows, state), _reduced(table + 1, rows, state)
         f2, f3 = _reduced(table + 2, rows, state), _reduced(table + 3, rows, state)
-        upper, lower = _min_plus(f0, f1), _min_plus(f3, f2)
-        _store(table, rows, state, f0, _min_plus(lower, _turned(f1)))
-        _store(table + 1, rows, state, f1, _min_plus(_turned(f0), lower))
-        _store(table + 2, rows, state, f2, _min_plus(_turned(f3), upper))
-        _store(table + 3, rows, state, f3, _min_plus(upper, _turned(f2)))
+        upper, lower = min_plus(f0, f1), min_plus(f3, f2)
+        _store(table, rows, state, f0, min_plus(lower, _turned(f1)))
+        _store(table + 1, rows, state, f1, min_plus(_turned(f0), lower))
+        _store(table + 2, rows, state, f2, min_plus(_turned(f3), upper))
+        _store(table + 3, rows, state, f3, min_plus(upper, _turned(f2)))
 
 
 @compiled_if_needed
@@ -112,8 +123,8 @@ def least_of_clusters(begin: int, end: int, state: State, least: Floats) -> None
     for number in range(begin, end):
         rows = _rows(number, state)
         table = 4 * number
-        upper = _min_plus(_negative(table, rows, state), _negative(table + 1, rows, state))
-        lower = _min_plus(_negative(table + 3, rows, state), _negative(table + 2, rows, state))
+        upper = min_plus(_negative(table, rows, state), _negative(table + 1, rows, state))
+        lower = min_plus(_negative(table + 3, rows, state), _negative(table + 2, rows, state))
         found = np.inf
         for x in range(upper.shape[0]):
             for z in range(upper.shape[1]):
@@ -171,7 +182,7 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
         cheapest += beta_costs(state.beta[i], state.beta[j], state, odd, in_beta)
         if cheapest + least < most:
             over_beta(other, in_beta, half)
-            most = _lower_to(best, _min_plus(own, _turned(half)), in_alpha, mine, others)
+            most = _lower_to(best, min_plus(own, _turned(half)), in_alpha, mine, others)
     _add(best, _negative(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
     return best
 
@@ -241,15 +252,6 @@ def _store(table: int, rows: IndexTable, state: State, f: Floats, rest: Floats) 
         for y in range(f.shape[1]):
             value = 0.25 * (f[x, y] + rest[x, y]) - f[x, y]
             state.clusters.tables[begin + mine[x + 1] * wide + others[y + 1]] = value
-
-
-@compiled_if_needed
-def _min_plus(left: Floats, right: Floats) -> Floats:
-    """The (min,+) product of two matrices."""
-    out = np.empty((left.shape[0], right.shape[1]))
-    out[:] = np.inf
-    lower_by_product(left, right, out)
-    return out
 
 
 @compiled_if_needed

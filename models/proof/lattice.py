@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,9 @@ from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import HALF, QUARTER, Instance
 from ..smooth.systems import stroke_weight
 
-Starts = NDArray[np.int64]  # starts of the blocks of flat arrays, and the end of the last one
+Starts = NDArray[np.int64]  # places in flat arrays, as of the starts of blocks and the end of the last one
+
+_AT_ONCE: Final = 200_000  # labels whose costs are computed together, for some 100 bytes each
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,19 +101,17 @@ class Lattice:
         """The pixel of each label, flat."""
         return np.repeat(np.arange(len(self.count), dtype=np.int32), self.count)
 
-    @property
-    def steps(self) -> tuple[Ints, Ints]:
-        """The steps k and l of each label, flat."""
-        inside = np.arange(self.start[-1]) - self.start[self.pixel]
-        row, column = np.divmod(inside.astype(np.int32), self.beta_count[self.pixel])
-        return self.alpha_first[self.pixel] + row, self.beta_first[self.pixel] + column
+    def steps(self, at: Starts) -> tuple[Ints, Ints]:
+        """The steps k and l of some labels."""
+        pixel = self.pixel[at]
+        row, column = np.divmod((at - self.start[pixel]).astype(np.int32), self.beta_count[pixel])
+        return self.alpha_first[pixel] + row, self.beta_first[pixel] + column
 
-    @property
-    def angles(self) -> tuple[Floats, Floats]:
-        """Alpha and beta of each label in radians, flat."""
-        k, l = self.steps  # noqa: E741 - the letters of the equation
-        at, offset = self.pixel, self.offset[self.pixel]
-        return self.alpha[at] + self.h * (k + offset), self.beta[at] + self.h * (l + offset)
+    def angles(self, at: Starts) -> tuple[Floats, Floats]:
+        """Alpha and beta of some labels in radians."""
+        k, l = self.steps(at)  # noqa: E741 - the letters of the equation
+        pixel, offset = self.pixel[at], self.offset[self.pixel[at]]
+        return self.alpha[pixel] + self.h * (k + offset), self.beta[pixel] + self.h * (l + offset)
 
     @property
     def work(self) -> float:
@@ -126,18 +126,21 @@ class Lattice:
 
     def unary_costs(self) -> Floats:
         """D of each label, flat: skew and stroke term; inf for labels that are not allowed."""
-        alpha, beta = self.angles
-        cost = self.instance.skew_coefficient * self._skew(beta)
-        weight = stroke_weight(self.instance)[self.pixel]
-        at = np.flatnonzero(weight)
-        cost[at] += weight[at] * self._misfit(at, alpha[at], beta[at])
-        cost[~self.allowed] = np.inf
+        cost = np.full(self.start[-1], np.inf)
+        weights = stroke_weight(self.instance)
+        for begin in range(0, len(cost), _AT_ONCE):
+            at = begin + np.flatnonzero(self.allowed[begin : begin + _AT_ONCE])
+            alpha, beta = self.angles(at)
+            cost[at] = self.instance.skew_coefficient * self._skew(beta)
+            weight = weights[self.pixel[at]]
+            held = np.flatnonzero(weight)
+            cost[at[held]] += weight[held] * self._misfit(at[held], alpha[held], beta[held])
         return cost
 
     def _skew(self, beta: Floats) -> Floats:
         return np.abs(beta) if self.norm == 1 else beta**2 - self.h * self.h / 4
 
-    def _misfit(self, at: NDArray[np.int64], alpha: Floats, beta: Floats) -> Floats:
+    def _misfit(self, at: Starts, alpha: Floats, beta: Floats) -> Floats:
         """The size of the angle from the stroke to the nearer line, less its deduction, at some labels."""
         pixel, half = self.pixel[at], self.h * self.h / 2
         target = np.zeros(self.instance.grid.size)
@@ -156,10 +159,10 @@ class Lattice:
         away = np.abs(u - slope[pixel] / 2)
         return np.minimum(u * u - np.where(away < near, away * away, half), v * v - half)
 
-    def _squares(self, at: NDArray[np.int64], u: Floats, v: Floats, target: Floats) -> Floats:
+    def _squares(self, at: Starts, u: Floats, v: Floats, target: Floats) -> Floats:
         """In the 2-norm. One line and turn, u as at the centre, has its own deduction, even if v is near."""
         pixel, square = self.pixel[at], self.h * self.h
-        k, l = (steps[at] for steps in self.steps)  # noqa: E741 - the letters of the equation
+        k, l = self.steps(at)  # noqa: E741 - the letters of the equation
         turn = np.round((self.alpha + self.beta - target) / np.pi)[pixel]
         away = np.abs(k + l + 2 * self.offset[pixel])
         lost = np.where(away <= 1, away, 0.5)
@@ -210,7 +213,7 @@ def whole_ranges(instance: Instance, beta: Floats, h: float, offset: Floats) -> 
     return ranges(instance, -k, k, *strip(beta, h, offset))
 
 
-def starts(counts: Ints) -> Starts:
+def starts(counts: Ints | Starts) -> Starts:
     """Starts of consecutive blocks of those lengths, and the end of the last."""
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
 

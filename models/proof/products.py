@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from ..instance.grid import Floats
-from ..processes.compiled import compiled
+from ..processes.compiled import compiled, compiled_if_needed
 from .state import State
 
 _HALF: Final = float(np.pi / 2)
@@ -74,6 +74,16 @@ def share_of(pair: int, i: int, state: State) -> Floats:
     if state.first[pair] == i:
         return state.shares_first[state.start_first[pair] : state.start_first[pair + 1]]
     return state.shares_second[state.start_second[pair] : state.start_second[pair + 1]]
+
+
+@compiled
+def all_taken(i: int, state: State) -> Floats:
+    """The cost of each label of a pixel plus the shares of all its pairs."""
+    theta = state.unary[state.start[i] : state.start[i + 1]].copy()
+    for pair in state.around[i]:
+        if pair >= 0:
+            add(theta, share_of(pair, i, state))
+    return theta
 
 
 @compiled
@@ -212,6 +222,15 @@ def lower_by_product(left: Floats, right: Floats, out: Floats) -> None:
         for y in range(right.shape[0]):
             if sums[y] < reached:
                 _lower(out[row], right[y], left[row, y])
+
+
+@compiled_if_needed
+def min_plus(left: Floats, right: Floats) -> Floats:
+    """The (min,+) product of two matrices."""
+    out = np.empty((left.shape[0], right.shape[1]))
+    out[:] = np.inf
+    lower_by_product(left, right, out)
+    return out
 
 
 @compiled

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from ..errors import InputError
@@ -15,6 +17,7 @@ from ..processes.groups import interruptible
 from ..processes.limits import Limits
 from ..processes.side_by_side import checked
 from ..smooth.systems import one_thread
+from .certificate import checking_pace
 from .prove_absolute import WorkIn1Norm, WorkInMixedNorm
 from .record import Proof
 from .work import Work, WorkLimits
@@ -93,7 +96,8 @@ def prove(
     checked(jobs)
     given = limits or Limits(math.inf, gap=0.0)
     began = time.monotonic()
-    with interruptible() as interrupted, crew(given.threads or jobs) as hands:
+    threads = given.threads or jobs
+    with interruptible() as interrupted, crew(threads) as hands:
         asked = stop_function(stop)
         own = WorkLimits(
             given.deadline(),
@@ -101,8 +105,9 @@ def prove(
             given.gap,
             certified,
             work or math.inf,
+            measured=partial(checking_pace, threads),
         )
         kind = KINDS[norm]
         proving = kind(instance, kind.first(instance, start, own.over), own, hands, (seed, jobs), progress)
         ended = proving.run()
-        return proving.proof(time.monotonic() - began, ended)
+        return replace(proving.proof(time.monotonic() - began, ended), threads=threads)

@@ -56,8 +56,8 @@ def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
     """The cells that a level leaves below an energy, after a forward pass of the dual."""
     lattice = dual.lattice
     dual.forward()
-    spare = energy + TOLERANCE * (1 + energy) - bound
-    survives = dual.state.theta - dual.state.least[lattice.pixel] <= spare
+    most = dual.state.least + (energy + TOLERANCE * (1 + energy) - bound)
+    survives = dual.state.theta <= np.repeat(most, lattice.count)
     cells = np.zeros(len(survives), dtype=bool)
     _mark_cells(_rectangles(lattice), lattice.allowed, survives, cells)
     steps = _ends(lattice, cells)
@@ -81,12 +81,12 @@ def finer(left: RemainingCells) -> Lattice:
     allowed = new.allowed
     allowed[:] = False
     _allow((_rectangles(lattice), left.cells), (_rectangles(new), allowed), 3 + half)
-    allowed |= ~reached(lattice.instance)[new.pixel]
+    allowed |= np.repeat(~reached(lattice.instance), new.count)
     return new
 
 
-def prolonged(dual: Dual, lattice: Lattice) -> Dual:
-    """The dual on a finer lattice with the same centres; shares and tables are interpolated."""
+def prolong(dual: Dual, lattice: Lattice) -> None:
+    """Move the dual to a finer lattice with the same centres; shares and tables are interpolated."""
     old, grid = dual.lattice, dual.lattice.instance.grid
     shares = []
     for ends, values in ((grid.first, dual.state.shares_first), (grid.second, dual.state.shares_second)):
@@ -95,10 +95,7 @@ def prolonged(dual: Dual, lattice: Lattice) -> Dual:
         now = _rectangles(lattice), lattice.share_starts(ends), found
         _interpolate(was, now, ends, lattice.h / old.h, (lattice.offset, lattice.allowed))
         shares.append(found)
-    clusters = prolonged_clusters(old, dual.state.clusters, lattice)
-    finer_dual = Dual(lattice, dual.crew, (shares[0], shares[1]), clusters)
-    finer_dual.seconds = dual.seconds_on(lattice)
-    return finer_dual
+    dual.move(lattice, shares, prolonged_clusters(old, dual.state.clusters, lattice))
 
 
 def _ends(lattice: Lattice, cells: Bools) -> Ints:

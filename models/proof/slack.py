@@ -16,7 +16,9 @@ from ..field.field import CrossField
 from ..field.jumps import stepped
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF
+from ..processes.compiled import compiled_if_needed
 from .lattice import Lattice
+from .products import all_taken
 from .state import State
 
 _THRESHOLDS: Final = (0.25, 0.75)  # of the rounding on a common lattice
@@ -34,7 +36,8 @@ def quad_slacks(lattice: Lattice, state: State, field: CrossField) -> Floats:
     else:
         corners = _round_field(lattice, field)
         both = [(corner, corner) for corner in corners]
-    theta = _all_taken(lattice, state)
+    theta = np.empty_like(state.theta)
+    _fill_taken(state, theta)
     least = np.minimum.reduceat(theta, lattice.start[:-1])
     at_pixel = np.mean([theta[lattice.start[:-1] + corner.label] for corner in corners], axis=0) - least
     at_pair = np.mean([_pairs(lattice, state, x, y) for x, y in both], axis=0) / 2
@@ -78,15 +81,11 @@ def _round_field(lattice: Lattice, field: CrossField) -> list[_Corner]:
     ]
 
 
-def _all_taken(lattice: Lattice, state: State) -> Floats:
-    """The cost of each label plus the shares of all pairs there."""
-    theta = state.unary.copy()
-    for ends, shares in ((state.first, state.shares_first), (state.second, state.shares_second)):
-        counts = lattice.count[ends]
-        begin = np.cumsum(counts) - counts
-        place = np.arange(len(shares)) + np.repeat(lattice.start[ends] - begin, counts)
-        np.add.at(theta, place, shares)
-    return theta
+@compiled_if_needed
+def _fill_taken(state: State, theta: Floats) -> None:
+    """Fill in the cost of each label plus the shares of all pairs there."""
+    for i in range(state.least.size):
+        theta[state.start[i] : state.start[i + 1]] = all_taken(i, state)
 
 
 def _pairs(lattice: Lattice, state: State, x: _Corner, y: _Corner) -> Floats:

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -32,14 +32,15 @@ from ..field.field import CrossField
 from ..instance.grid import Floats, Grid
 from ..processes.compiled import Crew, compiled
 from ..processes.deadline import Over, never
-from .clusters import cluster_fronts, clusters_on, extended, least_of_clusters, update_clusters
+from .clusters import cluster_fronts, clusters_on, extended, least_of_clusters, table_work, update_clusters
 from .lattice import Lattice
-from .products import add, pair_minimum, pixel_pass, share_of
+from .products import all_taken, pair_minimum, pixel_pass
 from .slack import quad_slacks
 from .state import Clusters, Indices, State
 
 _ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
-_LOST: Final = 0.1  # share of the gap that rounding shares may cost at most; a fifth of it is usual
+_LOST: Final = 0.1  # share of the gap that rounding may cost at most; a fifth of it is usual
+_TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
 _ROUNDING: Final = 32 * 2.0**-53
 """Relative error of a term: eight numbers, with angles right to four units in the last place, squared."""
 
@@ -47,22 +48,30 @@ _ROUNDING: Final = 32 * 2.0**-53
 class Dual:
     """A dual solution on a lattice: the shares of all pairs, and the bound of the last pass."""
 
-    def __init__(
-        self,
-        lattice: Lattice,
-        crew: Crew,
-        shares: tuple[Floats, Floats] | None = None,
-        clusters: Clusters | None = None,
-    ) -> None:
-        """Start from zero shares and without clusters, or from the given ones."""
+    state: State
+    _before: list[NDArray[np.float32]]  # the direction of a change needs no more digits
+
+    def __init__(self, lattice: Lattice, crew: Crew) -> None:
+        """Start from zero shares and without clusters."""
+        grid = lattice.instance.grid
         self.lattice, self.crew = lattice, crew
-        self.state = _state(lattice, shares, clusters)
-        self._before: list[NDArray[np.float32]]  # the direction of a change needs no more digits
+        self._pass_seconds = self._table_seconds = 0.0  # of the last pass that was not cut off
+        self._fronts = fronts(grid)
+        shares = [np.zeros(int(lattice.share_starts(ends)[-1])) for ends in (grid.first, grid.second)]
+        self._begin(shares, clusters_on(lattice, np.zeros(0, np.int64)))
+
+    def move(self, lattice: Lattice, shares: Sequence[Floats], clusters: Clusters) -> None:
+        """Go on with these shares and clusters on another lattice of the same grid."""
+        self._pass_seconds, self._table_seconds = self._seconds_on(lattice)
+        self.lattice = lattice
+        del self.state  # the new arrays need its memory
+        self._begin(shares, clusters)
+
+    def _begin(self, shares: Sequence[Floats], clusters: Clusters) -> None:
+        self.state = _state(self.lattice, shares, clusters)
         self._take_clusters()
-        self._fronts = fronts(lattice.instance.grid)
-        self._parts = [crew.parts(lattice.count[front]) for front in self._fronts]
+        self._parts = [self.crew.parts(self.lattice.count[front]) for front in self._fronts]
         self._times, self._reached = 0, -math.inf
-        self.seconds = 0.0  # of the last pass that was not cut off
 
     def forward(self, over: Over = never) -> float:
         """The bound after a forward pass."""
@@ -72,10 +81,15 @@ class Dual:
         """The bound after a backward pass."""
         return self._pass(2, over)
 
-    def ascend(self, times: int, over: Over = never) -> float:
-        """The bound after that many passes forwards and backwards; -inf if time cut a pass off."""
-        bound = -math.inf
+    def ascend(self, times: int, over: Over = never, closing: Over = never) -> float:
+        """The bound after that many passes forwards and backwards; -inf if time cut a pass off.
+
+        over: returns whether to cut a pass off. closing: returns whether not to begin another two.
+        """
+        bound = self._reached
         for _ in range(times):
+            if closing():
+                break
             self._extrapolate()
             self.update_clusters(1)
             self.forward(over)
@@ -123,10 +137,14 @@ class Dual:
         """Update all clusters; way: -1 for the reverse order."""
         if not len(self._of_clusters):
             return
+        began = time.monotonic()
         self._of_clusters[:] = 0.0
         for front in self._cluster_fronts[::way]:
-            parts = [front[part] for part in self.crew.equal_parts(len(front))]
-            self.crew.run(lambda numbers: update_clusters(numbers, self.state), parts)
+            self.crew.run(
+                lambda numbers: update_clusters(numbers, self.state),
+                [front[k : k + 1] for k in range(len(front))],
+            )
+        self._table_seconds = time.monotonic() - began
 
     def _pass(self, earlier: int, over: Over) -> float:
         def work(pixels: Indices) -> None:
@@ -140,15 +158,26 @@ class Dual:
                 if over():
                     return -math.inf
                 self.crew.run(work, [front[part] for part in parts])
-        self.seconds = time.monotonic() - began
+        self._pass_seconds = time.monotonic() - began
         return math.fsum([*self.state.least, *self._of_clusters])
 
-    def seconds_on(self, lattice: Lattice) -> float:
-        """Expected seconds of a pass over another lattice, after one over this one."""
-        return self.seconds * lattice.work / max(self.lattice.work, 1.0)
+    @property
+    def seconds(self) -> float:
+        """Expected seconds of a pass and an update of the clusters."""
+        return self._pass_seconds + self._table_seconds
 
-    def quantise(self, gap: float = 0.0) -> float:
-        """Round the shares to whole multiples of a power of two, and return it; see `LevelRecord`.
+    def seconds_on(self, lattice: Lattice) -> float:
+        """The same on another lattice, after a pass over this one."""
+        return sum(self._seconds_on(lattice))
+
+    def _seconds_on(self, lattice: Lattice) -> tuple[float, float]:
+        quads = self.state.clusters.quads
+        passes = lattice.work / max(self.lattice.work, 1.0)
+        tables = table_work(lattice, quads) / max(table_work(self.lattice, quads), 1.0)
+        return self._pass_seconds * passes, self._table_seconds * tables
+
+    def quantise(self, gap: float = 0.0) -> tuple[float, float]:
+        """Round shares and tables to whole multiples of two powers of two, and return these.
 
         Multiples of a greater power take less space in a certificate. gap: of the level's bound, of which
         the rounding costs a small part at most.
@@ -157,12 +186,14 @@ class Dual:
         most = max(*(_most(shares) for shares in both), 2.0**-16)
         least = 2.0 ** (math.ceil(math.log2(most)) - (30 if self.lattice.norm == 2 else 48))
         # Shares and tables, wrong by half a quantum, enter the minima of pixels and pairs, or of clusters.
-        wrong = 2 * len(self.state.first) + 4 * len(self._of_clusters)
-        quantum = 2.0 ** math.floor(math.log2(max(_LOST * gap / max(wrong, 1), least)))
-        for shares in both:
-            np.round(shares / quantum, out=shares)
-            np.multiply(shares, quantum, out=shares)
-        return quantum
+        wrong = np.array([2 * len(self.state.first), 4 * len(self._of_clusters)])
+        lost = _LOST * gap * np.array([1 - _TABLES, _TABLES]) / np.maximum(wrong, 1)
+        of_shares, of_tables = (2.0 ** math.floor(math.log2(max(each, least))) for each in lost)
+        for values, quantum in zip(both, (of_shares, of_shares, of_tables), strict=True):
+            np.multiply(values, 1 / quantum, out=values)
+            np.round(values, out=values)
+            np.multiply(values, quantum, out=values)
+        return of_shares, of_tables
 
     def bound(self) -> float:
         """The bound that any shares prove, as `LevelRecord` defines it."""
@@ -199,11 +230,10 @@ def _carry_on(values: Floats, before: NDArray[np.float32], part: float) -> None:
         before[x] = now
 
 
-def _state(lattice: Lattice, shares: tuple[Floats, Floats] | None, clusters: Clusters | None) -> State:
+def _state(lattice: Lattice, shares: Sequence[Floats], clusters: Clusters) -> State:
     grid = lattice.instance.grid
     unary = lattice.unary_costs()
     start_first, start_second = lattice.share_starts(grid.first), lattice.share_starts(grid.second)
-    first, second = shares or (np.zeros(start_first[-1]), np.zeros(start_second[-1]))
     return State(
         lattice.h,
         lattice.alpha + lattice.h * (lattice.alpha_first + lattice.offset),
@@ -218,12 +248,12 @@ def _state(lattice: Lattice, shares: tuple[Floats, Floats] | None, clusters: Clu
         start_first,
         start_second,
         _around(grid),
-        first,
-        second,
+        shares[0],
+        shares[1],
         unary.copy(),
         np.zeros(grid.size),
         2 if lattice.norm == 2 else 1,
-        clusters_on(lattice, np.zeros(0, np.int64)) if clusters is None else clusters,
+        clusters,
     )
 
 
@@ -244,7 +274,8 @@ def fronts(grid: Grid) -> list[Indices]:
 
 
 def _most(values: Floats) -> float:
-    return float(np.abs(values).max(initial=0.0))
+    """The greatest size, without an array of all sizes."""
+    return float(max(values.max(initial=0.0), -values.min(initial=0.0)))
 
 
 @compiled
@@ -265,8 +296,4 @@ def _pair_minima(begin: int, end: int, state: State, found: Floats) -> None:
 def _pixel_minima(begin: int, end: int, state: State, found: Floats) -> None:
     """Fill in the least D + sum of the shares of some pixels."""
     for i in range(begin, end):
-        theta = state.unary[state.start[i] : state.start[i + 1]].copy()
-        for pair in state.around[i]:
-            if pair >= 0:
-                add(theta, share_of(pair, i, state))
-        found[i] = theta.min()
+        found[i] = all_taken(i, state).min()

@@ -30,10 +30,11 @@ from ..processes.deadline import Deadline, Over, Progress, never
 from ..search.improvement import improved_field
 from ..search.search import search_patches
 from ..search.starts import best_start, polyvector_start
-from .certificate import certificate_effort, checking_pace
+from .certificate import certificate_effort
+from .clusters import table_sizes
 from .forced import Forced, forced
 from .lattice import Lattice, reached
-from .pruning import finer, prolonged, remaining_cells
+from .pruning import finer, prolong, remaining_cells
 from .record import EXACT, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
 from .sweep import Dual
@@ -42,7 +43,8 @@ COARSEST: Final = 16  # steps in pi/2 of the first level
 _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
 _PASSES: Final = 3  # forwards and backwards between two roundings
 _BEFORE: Final = 9  # forwards and backwards before the gap shows where the first clusters are needed
-_SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on: the next one does more
+_SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on, if labels do not grow
+_GROWTH: Final = 3.0  # of the number of labels, expected after the first level
 _SLOWEST: Final = 0.005  # the same on the last level
 _MOST_ROUNDS: Final = 40  # a level
 _CLUSTERS: Final = 12  # quads that become clusters first
@@ -50,15 +52,16 @@ _MORE_CLUSTERS: Final = 6  # later
 _QUADS: Final = 0.15  # share of all quads that may become clusters at once
 _STALLED: Final = 0.3  # share of the gap, left by half the spacing, above which there are more; 1/4 is usual
 _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
-MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
-_RECORDING: Final = 4  # passes: what rounding begins, the bound of a record and the pruning take as long
+MOST_LABELS: Final = 24_000_000  # a level; each takes some 100 bytes
+_TABLES: Final = 4  # numbers of tables that take as much as a label
+_RECORDING: Final = 6  # passes: the last two, the bound of a record and the pruning take as long
 _WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
 _MANY: Final = 4  # levels after which the field may cause the rest of the gap
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
-_SEARCH: Final = 0.1  # share of the time for that search
+_SEARCH: Final = 0.05  # share of the time for that search
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 
@@ -80,7 +83,7 @@ class WorkLimits:
     labels: int = 0
     pace: float = 0.0
     kept: float = 0.0
-    measured: Callable[[], float] = checking_pace
+    measured: Callable[[], float] = field(kw_only=True)
 
     @property
     def deadline(self) -> Deadline:
@@ -116,17 +119,13 @@ def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossF
 
 @dataclass
 class _Chain:
-    """The levels round one centre, and what they prove together."""
+    """The levels round one centre, the effort of a certificate of each, and what they prove together."""
 
     levels: list[LevelRecord] = field(default_factory=list)
+    efforts: list[float] = field(default_factory=list)
     bound: float = 0.0
     forced: int = 0
     multipliers: Floats | None = None
-
-    @property
-    def effort(self) -> float:
-        """The effort of a certificate of these levels."""
-        return sum(map(certificate_effort, self.levels))
 
 
 @dataclass
@@ -196,18 +195,19 @@ class Work:
             return met
         self.chain, before, self.began = _Chain(), self.best, time.monotonic()
         dual = Dual(self.level(_centre(before)), self.hands)
-        self.limits.keep(self._effort_with(dual.lattice))
+        self.limits.keep(self._effort_with(dual, dual.lattice))
         patient = False
         while True:
-            if not patient and (count := self._wants_clusters()):
-                dual.ascend(1 if len(dual.state.clusters.quads) else _BEFORE, self._closing(dual))
+            if count := self._wants_clusters():
+                times = 1 if len(dual.state.clusters.quads) else _BEFORE
+                dual.ascend(times, self.limits.over, self._closing(dual))
                 dual.add_clusters(count, self.best)
-            self._ascend(dual, _SLOWEST if patient else _SLOW)
+            self._ascend(dual, _SLOWEST if patient else _SLOW / self._growth(dual.lattice) ** 2)
             what = self._record(dual, again=patient)
             if (ended := self._ended()) or what is None:
                 return ended or "labels"
             lattice = finer(what.left)
-            small = not _too_large(lattice) and self._in_time(dual, lattice)
+            small = not _too_large(dual, lattice) and self._in_time(dual, lattice)
             # The next level takes long, or the field may cause the rest of the gap.
             costly = len(self.chain.levels) == _MANY or lattice.start[-1] > _LARGE
             if not self.searched and costly:
@@ -221,22 +221,29 @@ class Work:
                 return self.limits.met() or "time"
             patient = not small
             if small:
-                self.limits.keep(self._effort_with(lattice))
-                dual = prolonged(dual, lattice)
+                self.limits.keep(self._effort_with(dual, lattice))
+                prolong(dual, lattice)
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for some passes over the lattice that follows, and for its certificate."""
         passes = _WORTH * dual.seconds_on(lattice)
-        certificate = self._effort_with(lattice) * self.limits.pace if self.limits.certified else 0.0
+        certificate = self._effort_with(dual, lattice) * self.limits.pace if self.limits.certified else 0.0
         return not self.limits.over(passes + max(0.0, certificate - self.limits.kept))
 
-    def _effort_with(self, lattice: Lattice) -> float:
-        """The effort of a certificate with one more level."""
-        return max(self.proven.effort, self.chain.effort + certificate_effort(lattice))
+    def _effort_with(self, dual: Dual, lattice: Lattice) -> float:
+        """The effort of a certificate with one more level, which has the clusters of the dual."""
+        more = certificate_effort(lattice, dual.state.clusters.quads)
+        return max(sum(self.proven.efforts), sum(self.chain.efforts) + more)
 
     def _closing(self, dual: Dual) -> Over:
         """A function that returns whether only the time to record the level is left."""
         return lambda: self.limits.over(_RECORDING * dual.seconds)
+
+    def _growth(self, lattice: Lattice) -> float:
+        """The factor by which labels grow from level to level: the greater, the more passes pay before."""
+        if not self.chain.levels:
+            return _GROWTH
+        return max(1.0, float(lattice.allowed.sum() / self.chain.levels[-1].allowed.sum()))
 
     def _wants_clusters(self) -> int:
         """The number of quads to become clusters on the next level."""
@@ -244,7 +251,7 @@ class Work:
         vortex = len(gaps) == 1 and len(self.best.singularities.index) > 0
         if not vortex and not (len(gaps) == 2 and gaps[1] > _STALLED * gaps[0]):
             return 0
-        most = _MORE_CLUSTERS if len(self.chain.levels[-1].clusters.quads) else _CLUSTERS
+        most = _MORE_CLUSTERS if len(self.chain.levels[-1].tables["quads"]) else _CLUSTERS
         return min(most, math.ceil(_QUADS * len(self.instance.grid.quads)))
 
     def _ended(self) -> str:
@@ -284,7 +291,7 @@ class Work:
         """Raise the dual of a level, and round fields from it, until the bound's rise is slow."""
         reached, rounding, closing = -np.inf, Rounding(dual, self.improve), self._closing(dual)
         for _ in range(_MOST_ROUNDS):
-            bound = dual.ascend(_PASSES, closing)
+            bound = dual.ascend(_PASSES, self.limits.over, closing)
             self.best = rounding.lower(self.best, closing)
             energy = self.energy(self.best)
             self._report(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
@@ -305,8 +312,10 @@ class Work:
             if level.bound <= chain.levels[-1].bound:
                 return None
             chain.levels.pop()
+            chain.efforts.pop()
         if level.bound > chain.bound or not self.limits.over():
             chain.levels.append(level)
+            chain.efforts.append(certificate_effort(dual.lattice, dual.state.clusters.quads))
             chain.bound = max(chain.bound, level.bound)
         if not self.limits.over():
             what = self.forced(remaining_cells(dual, level.bound, energy))
@@ -325,10 +334,11 @@ class Work:
             self.chain.bound = max(self.chain.bound, min(least, self.chain.levels[-1].energy))
 
 
-def _too_large(lattice: Lattice) -> bool:
-    """Whether a level is beyond what memory, time or the digits of an angle allow."""
-    fine = lattice.h < np.pi / 2 / _FINEST
-    return fine or bool(lattice.start[-1] > MOST_LABELS) or lattice.work > _MOST_WORK
+def _too_large(dual: Dual, lattice: Lattice) -> bool:
+    """Whether the next level of a dual is beyond what memory, time or the digits of an angle allow."""
+    tables = int(table_sizes(lattice, dual.state.clusters.quads).sum())
+    many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
+    return lattice.h < np.pi / 2 / _FINEST or many or lattice.work > _MOST_WORK
 
 
 def _centre(field: CrossField) -> CrossField:

@@ -7,9 +7,7 @@ from crossfield.models.instance.instance import HALF
 def discrete(lattice):
     """Own costs (D of each pixel, c of each pair with its pixels) by formula, over all jumps and turns."""
     instance, grid, h = lattice.instance, lattice.instance.grid, lattice.h
-    angles = [
-        [a[s:e] for a in lattice.angles] for s, e in zip(lattice.start, lattice.start[1:], strict=False)
-    ]
+    angles = [lattice.angles(np.arange(s, e)) for s, e in zip(lattice.start, lattice.start[1:], strict=False)]
     unary = [instance.skew_coefficient * (beta**2 - h * h / 4) for _, beta in angles]
     for pixel, theta, w in zip(instance.stroke_index, instance.theta, instance.w, strict=True):
         alpha, beta = angles[pixel]

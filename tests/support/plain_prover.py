@@ -126,13 +126,10 @@ class Table:
             *(np.array(x) for x in zip(*((k[0], len(k), q[0], len(q)) for k, q, _ in labels), strict=True)),
             np.concatenate([allowed.ravel() for *_, allowed in labels]),
         )
-        shares = {
-            "shares_first": np.concatenate([*first, []]),
-            "shares_second": np.concatenate([*second, []]),
-        }
+        shares = [np.concatenate([*each, []]) for each in (first, second)]
         clusters = clusters_on(lattice, np.zeros(0, int))
         return LevelRecord.on(
-            lattice, **shares, clusters=clusters, quantum=QUANTUM, bound=bound, energy=energy
+            lattice, shares, clusters, quanta=(QUANTUM, QUANTUM), bound=bound, energy=energy
         )
 
 

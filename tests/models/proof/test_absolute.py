@@ -109,7 +109,7 @@ def test_the_mean_cost_of_a_rounded_cross_is_at_most_its_own(norm):
         lattice = Lattice.common(field, norm, np.array([slope]), int(rng.choice([8, 10, 16])))
         rows, columns = lattice.alpha_count[0], lattice.beta_count[0]
         cost = lattice.unary_costs().reshape(rows, columns)
-        alpha, beta = (angle.reshape(rows, columns) for angle in lattice.angles)
+        alpha, beta = (angle.reshape(rows, columns) for angle in lattice.angles(np.arange(rows * columns)))
         x, y = rng.uniform(0, rows - 1, 300), rng.uniform(0, columns - 1, 300)
         k, l = x.astype(int), y.astype(int)  # noqa: E741 - the letter of the equation
         mean = sum(

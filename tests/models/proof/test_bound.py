@@ -11,7 +11,7 @@ from crossfield.models.instance.instance import HALF, Instance
 from crossfield.models.processes.compiled import crew
 from crossfield.models.processes.deadline import never
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import finer, prolonged, remaining_cells
+from crossfield.models.proof.pruning import finer, prolong, remaining_cells
 from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
@@ -192,5 +192,5 @@ def test_pruning_keeps_every_field_of_no_more_energy():
                     field = relabelled(instance, alpha, beta, best.p)
                     if field.energy().total <= energy:
                         assert holds(lattice, (field.alpha, field.beta)), seed
-                dual = prolonged(dual, lattice)
+                prolong(dual, lattice)
     assert dropped > 0

@@ -416,7 +416,7 @@ def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(writ
             + steep * np.arange(message.size).reshape(message.shape)
             for message in level.messages
         ]
-        passed = check_certificate.Pass(level, sketch_).run(never)
+        passed = check_certificate.Pass(level, sketch_, check_certificate.PLAIN).run(never)
         places = [check_certificate.positions(level, sketch_, i) for i in range(instance.grid.size)]
         for near in (1.0, 0.3, 0.05, 0.01) * 40:
             at = [near * rng.uniform(-1, 1, 2) * np.pi / 4 for _ in places]

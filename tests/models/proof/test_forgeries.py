@@ -41,9 +41,12 @@ def proof_of_kind(kind):
     if kind == "tables":
         *before, last = proof.levels
         clusters = clusters_on(last, np.zeros(1, int))
-        whole = np.random.default_rng(3).integers(-4, 5, len(clusters.tables))
-        clusters.tables[:] = COARSE * whole
-        proof = replace(proof, levels=(*before, replace(last, clusters=clusters)))
+        tables = {
+            "quads": field.instance.grid.first[clusters.quads[:, 0]].astype(np.int32),
+            "table_scale": np.full(4, COARSE),
+            "table_steps": np.random.default_rng(3).integers(-1, 2, clusters.start[-1]).astype(np.int32),
+        }
+        proof = replace(proof, levels=(*before, replace(last, tables=tables)))
     return proof
 
 

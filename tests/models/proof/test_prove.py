@@ -110,10 +110,9 @@ def test_the_levels_are_a_chain_round_one_centre_and_its_bound_is_theirs():
         size = level.alpha_count.astype(int) * level.beta_count
         assert len(level.allowed) == size.sum()
         grid = proof.field.instance.grid
-        for shares, ends in ((level.shares_first, grid.first), (level.shares_second, grid.second)):
-            assert len(shares) == size[ends].sum()
-            assert (np.abs(shares) < 2**31 * level.quantum).all()
-            assert (shares == np.round(shares / level.quantum) * level.quantum).all()
+        steps = sum(len(level.messages[part]) for part in ("steps_16", "steps_32"))
+        assert steps == size[np.minimum(grid.first, grid.second)].sum()
+        assert len(set(level.messages["scale"])) == 1
         assert level.bound <= proof.energy <= level.energy
         np.testing.assert_array_equal(level.alpha, proof.levels[0].alpha)
         np.testing.assert_array_equal(level.p, proof.levels[0].p)
