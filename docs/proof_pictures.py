@@ -39,6 +39,11 @@ def shares(level: LevelRecord) -> Floats:
     return np.minimum(np.array(counts) * level.h**2 / STRIP, 1.0)
 
 
+def ends(proof: Proof) -> list[LevelRecord]:
+    """The last level of each spacing."""
+    return list({level.h: level for level in proof.levels}.values())
+
+
 def of_boxes(boxes: Floats) -> Floats:
     """The part of the strip in the boxes (n, 4) of a certificate."""
     return (boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2]) / STRIP
@@ -46,7 +51,7 @@ def of_boxes(boxes: Floats) -> Floats:
 
 def maps(proof: Proof, boxes: Floats, path: Path) -> None:
     """Draw the part left at every pixel for every level, and after the last; one colour scale."""
-    levels = proof.levels
+    levels = ends(proof)
     values = [*map(shares, levels), of_boxes(boxes)]
     titles = [
         f"level {number}, {np.degrees(level.h):.2g}° apart\n"
@@ -74,7 +79,7 @@ def maps(proof: Proof, boxes: Floats, path: Path) -> None:
 
 def _gaps(place: Any, proof: Proof) -> None:
     """Draw the distance of every level's bound from the energy."""
-    gaps = [100 * (proof.energy - level.bound) / proof.energy for level in proof.levels]
+    gaps = [100 * (proof.energy - level.bound) / proof.energy for level in ends(proof)]
     numbers = range(1, len(gaps) + 1)
     place.set_axis_on()
     place.semilogy(numbers, gaps, "o-", color=CELL, markersize=4)
@@ -105,7 +110,7 @@ def strips(proof: Proof, path: Path) -> list[int]:
     """Draw the cells that are left, level by level, for a pixel with a stroke and the last one to be decided;
     return these pixels.
     """
-    levels, instance = proof.levels[:SHOWN], proof.field.instance
+    levels, instance = ends(proof)[:SHOWN], proof.field.instance
     late = shares(levels[2])
     drawn = instance.stroke_index
     pixels = (int(drawn[np.argsort(late[drawn])[len(drawn) // 2]]), int(np.argmax(late)))

@@ -92,10 +92,14 @@ def _between(old: Lattice, new: Lattice, i: int) -> tuple[Indices, Floats]:
 
 
 def cluster_fronts(grid: Grid, clusters: Clusters) -> list[Indices]:
-    """The clusters in two parts, like the colours of a checkerboard: no two of one part share a pair."""
+    """The clusters in two parts, like the colours of a checkerboard: no two of one part share a pair.
+
+    Those with the largest tables come first, so that threads that share a part end together.
+    """
     corner = grid.first[clusters.quads[:, 0]]
     colour = (grid.rows[corner] + grid.columns[corner]) % 2
-    return [np.flatnonzero(colour == each) for each in (0, 1)]
+    order = np.argsort(-np.diff(clusters.start[::4]), kind="stable")
+    return [order[colour[order] == each] for each in (0, 1)]
 
 
 # Tables are named by one number, 4 * cluster + column: Numba would compile a function once for each literal

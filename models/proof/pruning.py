@@ -3,8 +3,9 @@
 1. After a forward pass (models/proof/sweep.py), label x of pixel i survives where `bound` + theta_i(x) - min
    theta_i <= U + tolerance. models/proof/check_certificate.py, 3, proves that no more is needed.
 2. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and one of them survives.
-3. The next level has half the spacing round the same centres. It allows every label whose cells meet a cell
-   that is left, except labels beyond the cells that cover |beta| <= pi/4. In its steps, cell (k, l) begins at
+3. The next level has the same centres. If it also has the same spacing, it allows the vertices of the cells
+   that are left. If it has half the spacing, it allows every label whose cells meet a cell that is left,
+   except labels beyond the cells that cover |beta| <= pi/4. In its steps, cell (k, l) begins at
    (2 k + o, 2 l + o): a vertex on black pixels and the middle of a cell on white ones.
 
 Pixels that no stroke reaches are exempt from these rules: see `reached` in models/proof/lattice.py.
@@ -56,10 +57,7 @@ def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
     """The cells that a level leaves below an energy, after a forward pass of the dual."""
     lattice = dual.lattice
     dual.forward()
-    most = dual.state.least + (energy + TOLERANCE * (1 + energy) - bound)
-    survives = dual.state.theta <= np.repeat(most, lattice.count)
-    cells = np.zeros(len(survives), dtype=bool)
-    _mark_cells(_rectangles(lattice), lattice.allowed, survives, cells)
+    cells = _left(dual, bound, energy)
     steps = _ends(lattice, cells)
     at = lattice.h * (steps + lattice.offset[:, None])
     return RemainingCells(
@@ -67,6 +65,19 @@ def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
         lattice.alpha + at[:, 0], lattice.alpha + at[:, 1],
         np.maximum(lattice.beta + at[:, 2], -QUARTER), np.minimum(lattice.beta + at[:, 3], QUARTER),
     )  # fmt: skip
+
+
+def count_left(dual: Dual, bound: float, energy: float) -> int:
+    """The number of cells that the last pass of the dual leaves."""
+    return int(np.count_nonzero(_left(dual, bound, energy)))
+
+
+def _left(dual: Dual, bound: float, energy: float) -> Bools:
+    most = dual.state.least + (energy + TOLERANCE * (1 + energy) - bound)
+    survives = dual.state.theta <= np.repeat(most, dual.lattice.count)
+    cells = np.zeros(len(survives), dtype=bool)
+    _mark_cells(_rectangles(dual.lattice), dual.lattice.allowed, survives, cells)
+    return cells
 
 
 def finer(left: RemainingCells) -> Lattice:
@@ -80,13 +91,24 @@ def finer(left: RemainingCells) -> Lattice:
     new = replace(lattice, h=h, **ranges(lattice.instance, *ends.T))
     allowed = new.allowed
     allowed[:] = False
-    _allow((_rectangles(lattice), left.cells), (_rectangles(new), allowed), 3 + half)
+    _allow((_rectangles(lattice), left.cells), (_rectangles(new), allowed), 2, 3 + half)
     allowed |= np.repeat(~reached(lattice.instance), new.count)
     return new
 
 
+def narrowed(left: RemainingCells) -> Lattice:
+    """The vertices of the cells that are left, as a lattice of the same spacing."""
+    lattice = left.lattice
+    new = replace(lattice, **ranges(lattice.instance, *_ends(lattice, left.cells).T))
+    new.allowed[:] = False
+    side = np.full(len(lattice.count), 2, np.int32)
+    _allow((_rectangles(lattice), left.cells), (_rectangles(new), new.allowed), 1, side)
+    new.allowed[:] |= np.repeat(~reached(lattice.instance), new.count)
+    return new
+
+
 def prolong(dual: Dual, lattice: Lattice) -> None:
-    """Move the dual to a finer lattice with the same centres; shares and tables are interpolated."""
+    """Move the dual to a finer or smaller lattice with the same centres; interpolate shares and tables."""
     old, grid = dual.lattice, dual.lattice.instance.grid
     shares = []
     for ends, values in ((grid.first, dual.state.shares_first), (grid.second, dual.state.shares_second)):
@@ -148,16 +170,16 @@ def _bounds(at: Rectangles, cells: Bools, ends: Ints) -> None:
 
 
 @compiled
-def _allow(was: tuple[Rectangles, Bools], now: tuple[Rectangles, Bools], side: Ints) -> None:
-    """Allow the labels of the finer lattice whose cells meet a cell that is left, `side` of them each way."""
+def _allow(was: tuple[Rectangles, Bools], now: tuple[Rectangles, Bools], times: int, side: Ints) -> None:
+    """Allow labels of a lattice `times` as fine: for each cell that is left, `side` of them each way."""
     (old, cells), (new, allowed) = was, now
     for i in range(len(old.rows)):
         columns = old.columns[i]
         for x in range(old.start[i + 1] - old.start[i]):
             if not cells[old.start[i] + x]:
                 continue
-            row = 2 * (old.first_row[i] + x // columns) - new.first_row[i]
-            column = 2 * (old.first_column[i] + x % columns) - new.first_column[i]
+            row = times * (old.first_row[i] + x // columns) - new.first_row[i]
+            column = times * (old.first_column[i] + x % columns) - new.first_column[i]
             for k in range(row, row + side[i]):
                 if not 0 <= k < new.rows[i]:
                     continue

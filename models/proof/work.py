@@ -1,9 +1,12 @@
 """The work of a proof: a field, and a bound of its distance from the minimum.
 
-Lattice after lattice, each of half the spacing. On each level the dual rises by passes
-(models/proof/sweep.py), fields are rounded from it (rounding.py), and what cannot hold a better field is
-dropped (pruning.py), until the jumps are forced (forced.py). A better field becomes the centre: the
-lattices begin anew round it.
+Lattice after lattice, each of half the spacing, or of the same spacing with fewer labels. On each level the
+dual rises by passes (models/proof/sweep.py), fields are rounded from it (rounding.py), and what cannot hold
+a better field is dropped (pruning.py), until the jumps are forced (forced.py). A better field becomes the
+centre: the lattices begin anew round it.
+
+The labels of a level are those that the gap of the level before leaves. While passes close that gap, most of
+them can be dropped, and the work of a pass falls faster than the gap. A record of the level justifies that.
 
 Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
 lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second
@@ -34,7 +37,7 @@ from .certificate import certificate_effort
 from .clusters import table_sizes
 from .forced import Forced, forced
 from .lattice import Lattice, reached
-from .pruning import finer, prolong, remaining_cells
+from .pruning import RemainingCells, count_left, finer, narrowed, prolong, remaining_cells
 from .record import EXACT, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
 from .sweep import Dual
@@ -44,11 +47,12 @@ _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
 _PASSES: Final = 3  # forwards and backwards between two roundings
 _BEFORE: Final = 9  # forwards and backwards before the gap shows where the first clusters are needed
 _SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on, if labels do not grow
-_GROWTH: Final = 3.0  # of the number of labels, expected after the first level
+_GROWTH: Final = 3.0  # of the number of labels from level to level, expected at first: it makes passes pay
+_NARROWED: Final = 0.5  # share of the labels that are left, at which passes go on over these only
 _SLOWEST: Final = 0.005  # the same on the last level
 _MOST_ROUNDS: Final = 40  # a level
-_CLUSTERS: Final = 12  # quads that become clusters first
-_MORE_CLUSTERS: Final = 6  # later
+_CLUSTERS: Final = 24  # quads that become clusters first
+_MORE_CLUSTERS: Final = 12  # later
 _QUADS: Final = 0.15  # share of all quads that may become clusters at once
 _STALLED: Final = 0.3  # share of the gap, left by half the spacing, above which there are more; 1/4 is usual
 _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
@@ -127,6 +131,11 @@ class _Chain:
     forced: int = 0
     multipliers: Floats | None = None
 
+    @property
+    def ends(self) -> list[LevelRecord]:
+        """The last level of each spacing."""
+        return list({level.h: level for level in self.levels}.values())
+
 
 @dataclass
 class Work:
@@ -196,33 +205,36 @@ class Work:
         self.chain, before, self.began = _Chain(), self.best, time.monotonic()
         dual = Dual(self.level(_centre(before)), self.hands)
         self.limits.keep(self._effort_with(dual, dual.lattice))
-        patient = False
+        patient, growth = False, _GROWTH
         while True:
-            if count := self._wants_clusters():
-                times = 1 if len(dual.state.clusters.quads) else _BEFORE
-                dual.ascend(times, self.limits.over, self._closing(dual))
-                dual.add_clusters(count, self.best)
-            self._ascend(dual, _SLOWEST if patient else _SLOW / self._growth(dual.lattice) ** 2)
-            what = self._record(dual, again=patient)
-            if (ended := self._ended()) or what is None:
-                return ended or "labels"
-            lattice = finer(what.left)
-            small = not _too_large(dual, lattice) and self._in_time(dual, lattice)
-            # The next level takes long, or the field may cause the rest of the gap.
-            costly = len(self.chain.levels) == _MANY or lattice.start[-1] > _LARGE
-            if not self.searched and costly:
-                self.searched = True
-                self._search(_SEARCH)
+            self._add_clusters(dual)
+            rising = self._ascend(dual, _SLOWEST if patient else _SLOW / growth**2)
+            left = self._record(dual)
+            if (ended := self._ended()) or left is None:
+                return ended or "time"
+            lattice = narrowed(left) if rising and not patient else finer(left)
+            self._search_once(lattice)
             if self.energy(self.best) < self.energy(before) * (1 - _BETTER):
                 return self.limits.met()
-            if not small and patient:
-                return "labels"
-            if not small and self._closing(dual)():
-                return self.limits.met() or "time"
-            patient = not small
-            if small:
-                self.limits.keep(self._effort_with(dual, lattice))
-                prolong(dual, lattice)
+            if _too_large(dual, lattice) or not self._in_time(dual, lattice):
+                if patient and not rising:
+                    return "labels"
+                if self._closing(dual)():
+                    return self.limits.met() or "time"
+                lattice = narrowed(left)
+            if lattice.h < dual.lattice.h:
+                patient, growth = False, max(1.0, lattice.allowed.sum() / dual.lattice.allowed.sum())
+            else:
+                patient = patient or not rising
+            self.limits.keep(self._effort_with(dual, lattice))
+            prolong(dual, lattice)
+
+    def _search_once(self, lattice: Lattice) -> None:
+        """Search, if the next level takes long, or the field may cause the rest of the gap."""
+        costly = len(self.chain.ends) == _MANY or lattice.start[-1] > _LARGE
+        if not self.searched and costly:
+            self.searched = True
+            self._search(_SEARCH)
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for some passes over the lattice that follows, and for its certificate."""
@@ -239,15 +251,19 @@ class Work:
         """A function that returns whether only the time to record the level is left."""
         return lambda: self.limits.over(_RECORDING * dual.seconds)
 
-    def _growth(self, lattice: Lattice) -> float:
-        """The factor by which labels grow from level to level: the greater, the more passes pay before."""
-        if not self.chain.levels:
-            return _GROWTH
-        return max(1.0, float(lattice.allowed.sum() / self.chain.levels[-1].allowed.sum()))
+    def _add_clusters(self, dual: Dual) -> None:
+        """Add clusters at the beginning of a spacing, if vortices cause the gap."""
+        count = self._wanted_clusters(dual.lattice)
+        if count:
+            times = 1 if len(dual.state.clusters.quads) else _BEFORE
+            dual.ascend(times, self.limits.over, self._closing(dual))
+            dual.add_clusters(count, self.best)
 
-    def _wants_clusters(self) -> int:
-        """The number of quads to become clusters on the next level."""
-        gaps = [self.energy(self.best) - level.bound for level in self.chain.levels[-2:]]
+    def _wanted_clusters(self, lattice: Lattice) -> int:
+        """The number of quads to become clusters on a lattice, which is the next one."""
+        if self.chain.levels and self.chain.levels[-1].h == lattice.h:
+            return 0
+        gaps = [self.energy(self.best) - level.bound for level in self.chain.ends[-2:]]
         vortex = len(gaps) == 1 and len(self.best.singularities.index) > 0
         if not vortex and not (len(gaps) == 2 and gaps[1] > _STALLED * gaps[0]):
             return 0
@@ -287,43 +303,50 @@ class Work:
     def _offer(self, found: CrossField) -> None:
         self.best = min(self.best, found, key=self.energy)
 
-    def _ascend(self, dual: Dual, slow: float) -> None:
-        """Raise the dual of a level, and round fields from it, until the bound's rise is slow."""
-        reached, rounding, closing = -np.inf, Rounding(dual, self.improve), self._closing(dual)
+    def _ascend(self, dual: Dual, slow: float) -> bool:
+        """Raise the dual of a level, and round fields from it, until the bound's rise is slow.
+
+        Returns whether it is not, but the gap has become so small that passes over fewer labels are worth a
+        record.
+        """
+        rounding, closing = Rounding(dual, self.improve), self._closing(dual)
+        rises = [np.inf, np.inf]
+        reached = -np.inf
         for _ in range(_MOST_ROUNDS):
             bound = dual.ascend(_PASSES, self.limits.over, closing)
             self.best = rounding.lower(self.best, closing)
             energy = self.energy(self.best)
             self._report(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
-            if closing() or self._exact(bound) or bound - reached <= slow * (energy - bound):
-                return
+            rises = [rises[1], (bound - reached) / max(energy - bound, 1e-300)]
+            if closing() or self._exact(bound) or max(rises) <= slow:
+                break
+            few = count_left(dual, bound, energy) <= _NARROWED * dual.lattice.allowed.sum()
+            if few and self._in_time(dual, dual.lattice):
+                return True
             reached = bound
+        return False
 
     def _report(self, bound: float, labels: int) -> None:
         """Report bound, least energy and remaining labels, and count the labels as work."""
         self.limits.labels += labels
         self.progress(f"energy {self.energy(self.best):.5g}, bound {bound:.5g}, {labels} labels")
 
-    def _record(self, dual: Dual, *, again: bool) -> Forced | None:
-        """Record the level, `again` if it has a record, and prune it in time; the choices that are forced."""
+    def _record(self, dual: Dual) -> RemainingCells | None:
+        """Record the level and, in time, prune it; the cells that are left."""
         chain, energy = self.chain, self.energy(self.best)
-        level, what = LevelRecord.of(dual, energy), None
-        if again:
-            if level.bound <= chain.levels[-1].bound:
-                return None
-            chain.levels.pop()
-            chain.efforts.pop()
+        level, left = LevelRecord.of(dual, energy), None
         if level.bound > chain.bound or not self.limits.over():
             chain.levels.append(level)
             chain.efforts.append(certificate_effort(dual.lattice, dual.state.clusters.quads))
             chain.bound = max(chain.bound, level.bound)
         if not self.limits.over():
-            what = self.forced(remaining_cells(dual, level.bound, energy))
+            left = remaining_cells(dual, level.bound, energy)
+            what = self.forced(left)
             chain.forced = int(what.pairs.sum())
             self._fit(what)
         if chain.bound >= self.proven.bound:
             self.proven = chain
-        return what
+        return left
 
     def _fit(self, what: Forced) -> None:
         """Solve the convex problem that is left, if all is forced."""

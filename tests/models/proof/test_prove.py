@@ -4,6 +4,7 @@ import math
 import re
 import threading
 from dataclasses import replace
+from itertools import pairwise
 
 import crossfield as cf
 import numpy as np
@@ -116,9 +117,9 @@ def test_the_levels_are_a_chain_round_one_centre_and_its_bound_is_theirs():
         assert level.bound <= proof.energy <= level.energy
         np.testing.assert_array_equal(level.alpha, proof.levels[0].alpha)
         np.testing.assert_array_equal(level.p, proof.levels[0].p)
-    assert [round(a.h / b.h) for a, b in zip(proof.levels, proof.levels[1:], strict=False)] == [2] * (
-        len(proof.levels) - 1
-    )
+    for before, after in pairwise(proof.levels):
+        narrower = after.h == before.h and after.allowed.sum() < before.allowed.sum()
+        assert narrower or after.h == before.h / 2
 
 
 def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
