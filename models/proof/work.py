@@ -49,6 +49,7 @@ _BEFORE: Final = 9  # forwards and backwards before the gap shows where the firs
 _SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on, if labels do not grow
 _GROWTH: Final = 3.0  # of the number of labels from level to level, expected at first: it makes passes pay
 _NARROWED: Final = 0.5  # share of the labels that are left, at which passes go on over these only
+_MANY_LABELS: Final = 600_000  # with fewer, passes take less time than one more level of the certificate
 _SLOWEST: Final = 0.005  # the same on the last level
 _MOST_ROUNDS: Final = 40  # a level
 _CLUSTERS: Final = 24  # quads that become clusters first
@@ -320,11 +321,16 @@ class Work:
             rises = [rises[1], (bound - reached) / max(energy - bound, 1e-300)]
             if closing() or self._exact(bound) or max(rises) <= slow:
                 break
-            few = count_left(dual, bound, energy) <= _NARROWED * dual.lattice.allowed.sum()
-            if few and self._in_time(dual, dual.lattice):
+            if self._may_narrow(dual, bound):
                 return True
             reached = bound
         return False
+
+    def _may_narrow(self, dual: Dual, bound: float) -> bool:
+        """Whether passes over the labels that are left are worth a record of the level."""
+        labels, energy = dual.lattice.allowed.sum(), self.energy(self.best)
+        few = labels > _MANY_LABELS and count_left(dual, bound, energy) <= _NARROWED * labels
+        return few and self._in_time(dual, dual.lattice)
 
     def _report(self, bound: float, labels: int) -> None:
         """Report bound, least energy and remaining labels, and count the labels as work."""
