@@ -222,6 +222,7 @@ class Level:
     ranges (n, 4): steps, as first and count of alpha, first and count of beta; allowed (a, b) of each pixel;
     the message of each pair is to its earlier pixel: `Messages`, or arrays. clusters: the tables of quads;
     tables: their sum at each pair that has some, by alphas of its first and of its second pixel.
+    rows, columns: numbers of the alphas and betas of each pixel that have an allowed label.
     """
 
     h: float
@@ -232,6 +233,11 @@ class Level:
     messages: Sequence[Array]
     clusters: list[Cluster]
     tables: dict[int, Array]
+
+    def __post_init__(self) -> None:
+        self.rows, self.columns = (
+            [np.flatnonzero(allowed.any(axis=axis)) for allowed in self.allowed] for axis in (1, 0)
+        )
 
 
 @dataclass
@@ -737,12 +743,18 @@ def jumps(alpha_i: Array, alpha_j: Array) -> range:
 class Pair:
     """The costs c of a pair: for each parity of the jump the sum of a matrix in alpha and one in beta.
 
-    c is the lesser of the two; rows are labels of the earlier pixel.
+    c is the lesser of the two; rows are labels of the earlier pixel. Alphas and betas without an allowed
+    label are left out, because no minimum needs them.
     """
 
     def __init__(self, level: Level, sketch: Sketch, e: int) -> None:
         i, j = int(sketch.first[e]), int(sketch.second[e])
-        (alpha_i, beta_i), (alpha_j, beta_j) = positions(level, sketch, i), positions(level, sketch, j)
+        self.earlier, self.later = ((level.rows[x], level.columns[x]) for x in sorted((i, j)))
+        (alpha_i, beta_i), (alpha_j, beta_j) = (
+            (alpha[level.rows[x]], beta[level.columns[x]])
+            for x, (alpha, beta) in ((x, positions(level, sketch, x)) for x in (i, j))
+        )
+        tables = level.tables.get(e, np.zeros(level.ranges[[i, j], 1]))[np.ix_(level.rows[i], level.rows[j])]
         span = jumps(alpha_i, alpha_j)
         apart = alpha_i[:, None] - alpha_j[None, :]
         self.parts = []
@@ -751,11 +763,12 @@ class Pair:
             a = [2 * sized(apart + HALF * p, squared)[0] for p in span if p % 2 == parity]
             b = 2 * sized((1 - 2 * parity) * beta_i[:, None] - beta_j[None, :], squared)[0]
             if a:
-                along = np.min(a, axis=0) - squared * level.h * level.h + level.tables.get(e, 0.0)
+                along = np.min(a, axis=0) - squared * level.h * level.h + tables
                 self.parts.append((along, b) if i < j else (along.T, b.T))
         reach = [float(np.abs(each).max()) for each in (alpha_i, alpha_j, beta_i, beta_j)]
         self.size = (1.0 + sum(reach) + HALF * max(abs(p) for p in span)) ** 2
-        self.size += float(np.abs(level.tables.get(e, 0.0)).max())
+        self.size += float(np.abs(tables).max())
+        self.shape = tuple(level.ranges[max(i, j), 1::2])
         self._drop_idle()
 
     def _drop_idle(self) -> None:
@@ -769,12 +782,15 @@ class Pair:
     def to_later(self, *given: Array, product: Product) -> list[Array]:
         """The least given(x) + c(x, y) over labels x of the earlier pixel, for each label y of the later one.
 
-        One such array for each array of `given`.
+        One such array for each array of `given`; 0 at the alphas and betas y without an allowed label.
         """
-        stacked = np.concatenate(given)
-        found = [np.split(product(stacked, b), len(given)) for _, b in self.parts]
-        ends = [product(along.T, np.hstack(half)) for (along, _), half in zip(self.parts, found)]
-        return np.split(np.minimum.reduce(ends), len(given), axis=1)
+        stacked = np.concatenate([each[np.ix_(*self.earlier)] for each in given])
+        halves = [np.split(product(stacked, b), len(given)) for _, b in self.parts]
+        ends = [product(along.T, np.hstack(half)) for (along, _), half in zip(self.parts, halves)]
+        found = np.zeros((len(given), *self.shape))
+        for whole, least in zip(found, np.split(np.minimum.reduce(ends), len(given), axis=1)):
+            whole[np.ix_(*self.later)] = least
+        return list(found)
 
 
 def min_plus(left: Array, right: Array) -> Array:
@@ -847,7 +863,7 @@ class Pass:
 
     def _quad(self, cluster: Cluster) -> float:
         """The least cost of a quad over the alphas that have an allowed label."""
-        a, b, c, d = (self.level.allowed[i].any(axis=1) for i in cluster.pixels)
+        a, b, c, d = (self.level.rows[i] for i in cluster.pixels)
         ab, bc, dc, ad = (-table for table in cluster.tables)
         upper = self.way.product(ab[np.ix_(a, b)], bc[np.ix_(b, c)])
         lower = self.way.product(ad[np.ix_(a, d)], dc[np.ix_(d, c)])
