@@ -69,7 +69,9 @@ def build_command(
         wanted = default_spec() if spec == "default" else read_spec(spec)
         wanted = replace(wanted, points=None) if search else wanted
         built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
-    left_out = f", {len(built.skipped)} instances skipped" if built.skipped else ""
+    tight = sum(name.endswith("_tight") for name in built.skipped)
+    left = {"instances": len(built.skipped) - tight, "tightened entries": tight}
+    left_out = "".join(f", {count} {kind} skipped" for kind, count in left.items() if count)
     line = f"{output}: {len(built.document['entries'])} entries{left_out}"
     printing.show(built.document, lambda: print_line(line))
     for name, reason in built.skipped.items():

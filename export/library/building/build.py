@@ -18,7 +18,7 @@ from ..documents.documents import Library, about_file, are_whole, read_about, re
 from ..documents.lock import locked
 from ..ledger.given import NO_POINTS, Points, points_of, read_points
 from ..ledger.ledger import Ledger, Record, merged, read_ledger, write_ledger
-from ..plan.recipe import InstancePlan, plan
+from ..plan.recipe import InstancePlan, plan, without
 from ..plan.spec import Spec
 from .entry_task import Inputs, make_entry
 from .executor import Tasks, ahead, executor
@@ -76,7 +76,7 @@ def _built(
         for each in sorted(plans, key=lambda each: -each.recipe.size):
             work.begin(each)  # the last task runs first: small ones, whose faults show at once
         tasks.run()
-    kept = [each for each in plans if each.recipe.name not in work.skipped]
+    kept = without(plans, work.skipped)
     if not kept:
         name, reason = next(iter(work.skipped.items()))
         raise InputError(f"every grid is too coarse for its sketch; {name}: {reason}")
@@ -113,7 +113,7 @@ class _Build:
     def __init__(self, folder: Path, inputs: Inputs, tasks: Tasks, progress: Progress) -> None:
         self.folder, self.inputs, self.tasks, self.progress = folder, inputs, tasks, progress
         self.total, self.done = sum(len(each.entries) for each in self.inputs.plans), 0
-        self.skipped: dict[str, str] = {}  # instances too small for their sketch, and the reasons
+        self.skipped: dict[str, str] = {}  # instances and entries that cannot be made, and the reasons
 
     def begin(self, each: InstancePlan) -> None:
         """Schedule an instance unless it is complete, and then its entries."""
@@ -146,6 +146,11 @@ class _Build:
         return found if found["recipe_sha256"] == sha256 and are_whole(self.folder, found["files"]) else None
 
     def _entries(self, each: InstancePlan, about: dict[str, Any]) -> None:
+        for recipe in each.entries:
+            if reason := recipe.lacks(about):
+                self.total -= 1
+                self.skipped[recipe.name] = reason
+                self.progress(f"skipped: {recipe.name}: {reason}")
         for task in reversed(list(self.inputs.entries(each, about, self.folder))):
             if self._whole(f"{task.name}.json", task.sha256, read_sidecar):
                 self.done += 1

@@ -19,6 +19,7 @@ from ....models.formulations.problem import Problem, formulate
 from ....models.instance.file import read_instance
 from ....models.instance.grid import Ints
 from ....models.instance.instance import Instance
+from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes
 from ...bundle.starts import Start, start_of
 from ...formats.nl import Layout
@@ -27,7 +28,7 @@ from ...solutions.readers.ampl import write_ampl_sol
 from ...writing.curvature import probtype
 from ...writing.records import number
 from ..documents.citation import REFERENCES
-from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
+from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps, tightened_by
 from ..documents.statistics import counts, curvature, density, tangent_bound
 from ..ledger.given import NO_POINTS, Points
 from ..ledger.ledger import FILE as LEDGER
@@ -44,7 +45,7 @@ from ..ledger.standing import (
     standing,
 )
 from ..plan.equivalence import equivalent, notes_of
-from ..plan.recipe import EntryRecipe, InstancePlan, digest, norm_minimised
+from ..plan.recipe import EntryRecipe, InstancePlan, digest, entry_name
 from .instance_task import Evidence, Files, Preparation, Submitted
 
 _TANGENT = "tangent at the point"
@@ -55,7 +56,8 @@ _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for
 class Entry:
     """The task of an entry: its recipe, and the document and files of its instance.
 
-    records, submitted: of all entries of the instance in the ledger; relatives: all entries of the instance.
+    records, submitted: of all entries of the instance in the ledger; relatives: all
+    plain entries of the instance.
     """
 
     recipe: EntryRecipe
@@ -75,7 +77,14 @@ class Entry:
         """Digest of everything that its files depend on."""
         submitted = [hashlib.sha256(each.data).hexdigest() for each in self.submitted]
         records = [asdict(record) for record in self.records]
-        return digest([generator(), asdict(self.recipe), self.about, records, submitted, self.relatives])
+        recipe = self.recipe.document()
+        return digest([generator(), recipe, self.about, records, submitted, self.relatives])
+
+    @property
+    def certificate(self) -> dict[str, Any] | None:
+        """The facts about the certificate in the norm that the entry minimises; None without one."""
+        found: dict[str, Any] | None = self.about.get("certificates", {}).get(str(self.recipe.norm))
+        return found
 
 
 def make_entry(task: Entry) -> Files:
@@ -84,8 +93,12 @@ def make_entry(task: Entry) -> Files:
         made = Path(temporary)
         instance, known = _read(task, made)
         problem = formulated(instance, task.recipe.formulation, task.recipe.facet, known["baseline"].field.p)
+        certified = None
+        if task.recipe.tightened and task.certificate is not None:
+            certificate = read_certificate(made / task.certificate["file"], on=instance)
+            problem, certified = tightened_by(certificate, problem), certificate.field
         listed, refused = model_files(problem, task.recipe, made)
-        best = best_point(problem, list(known.values()))
+        best = best_point(problem, list(known.values()), certified)
         records = _records(task, best, instance)
         bounds = _bounds(task, best, records)
         results = _results(task, best, records, bounds)
@@ -177,8 +190,7 @@ def _bounds(task: Entry, best: Best, records: list[Record]) -> list[dict[str, An
         via = None if record.entry == name else record.entry
         found.append({key: getattr(record, key) for key in stated} | {"via": via})
     tangent = tangent_bound(best.problem, best.point)
-    norm = norm_minimised(task.recipe.formulation, task.recipe.facet)
-    certificate = task.about.get("certificates", {}).get(str(norm))
+    certificate = task.certificate
     if tangent is not None:
         found.append(_computed(_TANGENT, tangent))
     if certificate is not None:
@@ -249,6 +261,7 @@ def _sidecar(
         "paper": problem.formulation.paper,
         "options": asdict(problem.formulation.options),
         "jumps": listed_jumps(problem),
+        **_tightening(task, problem),
         "problem_sha256": problem.sha256,
         "class": problem.problem_class,
         "probtype": probtype(problem),
@@ -258,6 +271,21 @@ def _sidecar(
         "files": listed,
         "refused": refused,
         "best": {**numbers, "point": named["miplib"], "nl_point": named.get("ampl"), **facts},
+    }
+
+
+def _tightening(task: Entry, problem: Problem) -> dict[str, Any]:
+    """The certificate of a tightened entry, and its plain entry; empty for others."""
+    if problem.windows is None or task.certificate is None:
+        return {}
+    file, recipe = task.certificate["file"], task.recipe
+    return {
+        "tightened": {
+            "certificate": file,
+            "sha256": hashlib.sha256(task.files[file]).hexdigest(),
+            "plain": entry_name(recipe.instance, recipe.formulation, recipe.facet),
+            "windows": problem.tightened,
+        }
     }
 
 
@@ -284,12 +312,17 @@ class Inputs:
         return Preparation(each.recipe, self._submitted(each), self.points(name), self._certificates(name))
 
     def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
-        """Yield the tasks of its entries. Raises as `preparation`, and InputError for a missing file."""
+        """Yield the tasks of its entries that can be made.
+
+        Raises as `preparation`, and InputError for a missing file.
+        """
         files = {facts["name"]: read_bytes(folder / facts["name"]) for facts in about["files"]}
-        names, submitted = tuple(entry.name for entry in each.entries), self._submitted(each)
+        names, submitted = {entry.name for entry in each.entries}, self._submitted(each)
         records = tuple(record for record in self.ledger.records if record.entry in names)
+        plain = tuple(entry.name for entry in each.entries if not entry.tightened)
         for recipe in each.entries:
-            yield Entry(recipe, about, files, records, submitted, names)
+            if not recipe.lacks(about):
+                yield Entry(recipe, about, files, records, submitted, plain)
 
     def _submitted(self, each: InstancePlan) -> tuple[Submitted, ...]:
         """The fields that the ledger keeps for the entries of an instance."""

@@ -90,6 +90,7 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
         "kinds": {each["formulation"]: each for each in reversed(sidecars)},
         "formats": [entry for name, entry in FORMATS.items() if name in written],
         "packed": any(file["name"].endswith(".gz") for each in sidecars for file in each["files"]),
+        "tightened": sum("tightened" in each for each in sidecars),
         "certified": any("certificate" in bound for each in sidecars for bound in each["bounds"]),
         "proven_by": _minimising(spec),
         "example": sidecars[0],

@@ -18,11 +18,11 @@ from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.storage import make_folder
 from ...formats.registry import Written, write
-from ..documents.documents import about_file
+from ..documents.documents import about_file, tightened_by
 from ..ledger.given import ROLES, Given, read_point
 from ..ledger.ledger import Ledger, read_ledger
 from ..ledger.points import Known, best_point, ours
-from ..plan.recipe import EntryRecipe, InstancePlan, norm_minimised, plan
+from ..plan.recipe import EntryRecipe, InstancePlan, plan
 from ..plan.sources import instance_from
 from ..plan.spec import DEFAULT, RUNGS, Spec, default_spec
 from .entry_task import formulated, model_files
@@ -82,13 +82,17 @@ class LibraryEntry:
         """The problem. Raises InputError, InstanceError for damaged points of a `qp` entry."""
         recipe = self._recipe
         jumps = self._given.field("baseline").field.p if FORMULATIONS[recipe.formulation].fixed else None
-        return formulated(self.instance, recipe.formulation, recipe.facet, jumps)
+        found = formulated(self.instance, recipe.formulation, recipe.facet, jumps)
+        if not recipe.tightened or self.certificate is None:
+            return found
+        return tightened_by(self.certificate, found)
 
     @cached_property
     def field(self) -> CrossField:
         """The field of the best known point. Raises InputError, InstanceError for damaged points."""
-        known = [self._given.field(role) for role in ROLES]
-        return best_point(self.problem, [*known, *self._submitted()]).known.field
+        known = [*(self._given.field(role) for role in ROLES), *self._submitted()]
+        certified = self.certificate.field if self._recipe.tightened and self.certificate else None
+        return best_point(self.problem, known, certified).known.field
 
     @cached_property
     def certificate(self) -> Certificate | None:
@@ -96,8 +100,7 @@ class LibraryEntry:
 
         Raises InputError for a certificate that is refused.
         """
-        norm = norm_minimised(self._recipe.formulation, self._recipe.facet)
-        stated = self._given.about.get("certificates", {}).get(str(norm))
+        stated = self._given.about.get("certificates", {}).get(str(self._recipe.norm))
         if stated is None:
             return None
         return read_certificate(_points() / stated["file"], on=self.instance)

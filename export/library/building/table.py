@@ -75,6 +75,7 @@ COLUMNS: Final[Mapping[str, Column]] = {
     "gauge": Column(str, "Window of alpha: strokes or box.", _at("source", "gauge")),
     "formulation": Column(str, "Formulation.", _at("formulation")),
     "facet": Column(str, "Facet (26): hull or printed.", _at("options", "facet")),
+    "tightened": Column(bool, "In the windows of a certificate.", lambda sidecar: "tightened" in sidecar),
     "problem_class": Column(str, "Class of the problem, as MILP.", _at("class")),
     "probtype": Column(str, "Three letters as in QPLIB.", _at("probtype")),
     "convex": Column(bool, "Whether the continuous relaxation is convex.", _at("convex")),

@@ -237,6 +237,7 @@ def _described(files: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _known(task: Entry) -> set[Provenance]:
     """The provenances of the known fields of an entry's instance."""
     known = {Provenance.of(facts) for facts in task.about["fields"].values()}
+    known |= {ours(METHOD)} if task.recipe.tightened else set()
     return known | {each.provenance for each in task.submitted}
 
 

@@ -33,7 +33,7 @@ from ..documents.lock import unchanged
 from ..ledger.given import points_of
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
-from ..plan.recipe import InstancePlan, plan
+from ..plan.recipe import InstancePlan, plan, without
 from ..plan.sources import instance_from
 from .check_entry import BUILD, Finding, instance_findings, of_error, run_findings, verify_entry
 
@@ -145,19 +145,24 @@ class _Verification:
         else:
             self.known |= {name for sketch in spec.sketches for name in sketch.files}
             yield from self._skipped(library, plans)
-            made = [each for each in plans if each.recipe.name not in library.skipped]
+            made = without(plans, library.skipped)
             if [entry.name for each in made for entry in each.entries] != names:
                 yield Finding(INDEX, "lists other entries than its specification asks for")
         for name in sorted({*TEXTS, SOLU, TABLE, CROISSANT, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
 
     def _skipped(self, library: Library, plans: tuple[InstancePlan, ...]) -> Iterator[Finding]:
-        """Skipped instances that can be made, or that have another reason."""
+        """Skipped instances and entries that can be made, or that have another reason."""
         recipes = {each.recipe.name: each.recipe for each in plans}
+        entries = {entry.name: entry for each in plans for entry in each.entries}
         for name, stated in library.skipped.items():
             try:
                 if name in recipes:
                     instance_from(recipes[name])
+                elif name in entries:
+                    about = read_about(self.folder / about_file(entries[name].instance))
+                    if reason := entries[name].lacks(about):
+                        raise InputError(f"{name}: {reason}")
                 yield Finding(INDEX, f"skips {name}, which can be made or is not asked for")
             except CrossfieldError as error:
                 if str(error) != f"{name}: {stated}":

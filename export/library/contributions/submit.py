@@ -421,7 +421,8 @@ class _Session:
         found = [
             each
             for each in self.library.entries
-            if each["instance"]["sha256"] == instance.sha256 and self.entry in (None, each["name"])
+            if each["instance"]["sha256"] == instance.sha256
+            and (self.entry == each["name"] or (self.entry is None and "tightened" not in each))
         ]
         if not found:
             what = f"is a {kind} of an instance that is not in the library: {instance.summary}"

@@ -17,8 +17,10 @@ import numpy as np
 
 from ....models.errors import InputError, InstanceError
 from ....models.formulations.catalogue import FORMULATIONS
-from ....models.formulations.problem import Problem, formulate
+from ....models.formulations.problem import Problem, formulate, tightened
 from ....models.instance.file import read_document, read_instance
+from ....models.proof.certificate import Certificate, read_certificate
+from ....models.proof.tightening import windows_left
 from ....models.storage import sha256_of
 from ..plan.spec import Spec, spec_of
 
@@ -51,7 +53,7 @@ class Library:
 
     @property
     def skipped(self) -> dict[str, str]:
-        """Names of instances whose size is too small for their sketch, and the reasons."""
+        """Names of instances too small for their sketch and of entries without certificate, and why."""
         return dict(self.document.get("skipped", {}))
 
     @property
@@ -120,12 +122,21 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
             )
         jumps[listed[:, 0]] = listed[:, 1]
     problem = formulate(instance, document["formulation"], p=jumps, **document["options"])
+    if "tightened" in document:
+        problem = tightened_by(
+            read_certificate(folder / document["tightened"]["certificate"], on=instance), problem
+        )
     if problem.sha256 != document["problem_sha256"]:
         raise InstanceError(
             f"is not the instance that {document['name']}.json was made from; build the library again",
             file=path,
         )
     return problem
+
+
+def tightened_by(certificate: Certificate, problem: Problem) -> Problem:
+    """Return a problem in the windows that a certificate leaves."""
+    return tightened(problem, windows_left(certificate))
 
 
 def listed_jumps(problem: Problem) -> list[list[int]] | None:

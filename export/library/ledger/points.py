@@ -26,6 +26,7 @@ from ....models.search.pinned import pinned
 from ...bundle.starts import write_start
 from ...formats.registry import generator, write
 from ...solutions.solution import read_solution
+from .standing import FEASIBLE
 
 METHOD: Final = "prove"
 _ROUNDS: Final = 8
@@ -194,6 +195,11 @@ class Best:
         """The recomputed objective."""
         return self.problem.objective_value(self.point)
 
+    @property
+    def is_feasible(self) -> bool:
+        """Whether no violation exceeds FEASIBLE."""
+        return self.problem.violation(self.point).worst <= FEASIBLE
+
     def facts(self) -> dict[str, Any]:
         """Return objective, worst violation, integrality, energy of the field, and provenance."""
         violation, provenance = self.problem.violation(self.point), self.known.provenance
@@ -209,7 +215,13 @@ class Best:
         }
 
 
-def best_point(problem: Problem, known: Sequence[Known]) -> Best:
-    """Return the point of least objective among those of the known fields, the first of equal ones."""
+def best_point(problem: Problem, known: Sequence[Known], certified: CrossField | None = None) -> Best:
+    """Return the point of least objective among those of the known fields, the first of equal ones.
+
+    certified: field of the certificate of a tightened problem, if no known field is in its windows.
+    """
     points = [Best(problem, each, complete_point(problem, each.field)) for each in known]
-    return min(points, key=lambda best: best.objective)
+    inside = [each for each in points if problem.windows is None or each.is_feasible]
+    if not inside and certified is not None:
+        return Best(problem, Known(certified, ours(METHOD)), complete_point(problem, certified))
+    return min(inside, key=lambda best: best.objective)

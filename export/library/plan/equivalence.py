@@ -17,8 +17,12 @@ def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, An
     """Return the formulations with the same optimum, and the reasons. names: entries of the library."""
     if recipe.facet == "printed":
         return []
-    found = []
+    found: list[dict[str, Any]] = []
     mine = FORMULATIONS[recipe.formulation].minimises
+    if recipe.tightened:
+        plain = entry_name(recipe.instance, recipe.formulation, recipe.facet)
+        why = "the windows of the certificate contain every field of at most its energy; points transfer"
+        found.append({"formulation": recipe.formulation, "entry": plain, "why": why})
     for other, declared in FORMULATIONS.items():
         if other != recipe.formulation and declared.minimises == mine:
             name = entry_name(recipe.instance, other, "hull")

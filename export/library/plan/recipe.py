@@ -1,15 +1,15 @@
 """Plan of a library: all instances and entries (an instance in one formulation), with names.
 
 cf_SHORT_nSSS[_sK][_box]              an instance: sketch, size, seed, gauge
-instance[_printed]_TOKEN              an entry: facet and formulation
+instance[_printed]_TOKEN[_tight]      an entry: facet, formulation, windows that a certificate leaves
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from collections.abc import Container, Iterable
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Final
 
 from ....models.errors import InputError
@@ -55,7 +55,7 @@ class InstanceRecipe:
 
 @dataclass(frozen=True)
 class EntryRecipe:
-    """Recipe of an entry: instance, formulation, facet, formats, and compression."""
+    """Recipe of an entry: instance, formulation, facet, formats, compression; tightened: by a certificate."""
 
     name: str
     instance: str
@@ -63,6 +63,23 @@ class EntryRecipe:
     facet: str
     formats: tuple[str, ...]
     compress: bool
+    tightened: bool = False
+
+    @property
+    def norm(self) -> Norm | None:
+        """The norm whose energy the entry minimises over all jumps; None without one."""
+        return norm_minimised(self.formulation, self.facet)
+
+    def document(self) -> dict[str, Any]:
+        """Return everything that determines its files, beyond its instance, as JSON."""
+        return {key: value for key, value in asdict(self).items() if (key, value) != ("tightened", False)}
+
+    def lacks(self, about: dict[str, Any]) -> str:
+        """Return why it cannot be made from the document of its instance; empty if it can."""
+        if not self.tightened or str(self.norm) in about.get("certificates", {}):
+            return ""
+        named = f"the norm {self.norm}" if self.norm == "mixed" else f"the {self.norm}-norm"
+        return f"{self.instance} has no certificate in {named}; submit one of `crossfield prove`"
 
 
 @dataclass(frozen=True)
@@ -73,9 +90,19 @@ class InstancePlan:
     entries: tuple[EntryRecipe, ...]
 
 
-def entry_name(instance: str, formulation: str, facet: str) -> str:
+def entry_name(instance: str, formulation: str, facet: str, *, tightened: bool = False) -> str:
     """Return the name of an entry."""
-    return f"{instance}{'_printed' if facet == 'printed' else ''}_{FORMULATIONS[formulation].short}"
+    printed = "_printed" if facet == "printed" else ""
+    return f"{instance}{printed}_{FORMULATIONS[formulation].short}{'_tight' if tightened else ''}"
+
+
+def without(plans: Iterable[InstancePlan], skipped: Container[str]) -> tuple[InstancePlan, ...]:
+    """Return plans without the instances and entries that were skipped."""
+    return tuple(
+        replace(each, entries=tuple(entry for entry in each.entries if entry.name not in skipped))
+        for each in plans
+        if each.recipe.name not in skipped
+    )
 
 
 def plan(spec: Spec) -> tuple[InstancePlan, ...]:
@@ -134,13 +161,25 @@ def _instance_name(short: str, size: int, seed: int | None, gauge: str) -> str:
 
 
 def _entries(recipe: InstanceRecipe, rung: Rung, formulations: tuple[str, ...]) -> tuple[EntryRecipe, ...]:
-    return tuple(
-        EntryRecipe(
-            entry_name(recipe.name, name, facet), recipe.name, name, facet, rung.formats, rung.compress
-        )
+    chosen = [
+        (name, facet, False)
         for facet in rung.facets
         for name in formulations
         if facet == "hull" or "facet" in FORMULATIONS[name].settable
+    ]
+    if recipe.gauge == "strokes":  # certificates are of this gauge
+        chosen += [(name, "hull", True) for name in rung.tightened]
+    return tuple(
+        EntryRecipe(
+            entry_name(recipe.name, name, facet, tightened=tightened),
+            recipe.name,
+            name,
+            facet,
+            rung.formats,
+            rung.compress,
+            tightened,
+        )
+        for name, facet, tightened in chosen
     )
 
 

@@ -88,7 +88,10 @@ def day(text: str, place: str) -> str:
 
 @dataclass(frozen=True)
 class Rung:
-    """A step of the ladder: its sizes, and the formats, gauges and facets of its entries."""
+    """A step of the ladder: its sizes, and the formats, gauges and facets of its entries.
+
+    tightened: formulations with a second entry in the windows that a certificate leaves.
+    """
 
     name: str
     sizes: tuple[int, ...]
@@ -98,12 +101,13 @@ class Rung:
     facets: tuple[str, ...]
     prove: bool
     added: str = ""
+    tightened: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """Return the rung as a table of a specification."""
         named = asdict(self).items()
         stated = {key: list(value) if isinstance(value, tuple) else value for key, value in named}
-        return {key: value for key, value in stated.items() if key != "name" and value != ""}
+        return {key: value for key, value in stated.items() if key != "name" and value not in ("", [])}
 
 
 @dataclass(frozen=True)
@@ -295,13 +299,11 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         "gauges": _words(document, "gauges", GAUGES, ("strokes",)),
         "facets": _words(document, "facets", FACETS, ("hull",)),
     }
-    known = (*FORMULATIONS, *short_names())
-    named = _words(document, "formulations", known, tuple(FORMULATIONS))
-    formulations = tuple(declaration_of(name).name for name in named)
-    if (name := _twice(formulations)) is not None:
-        raise InputError(f"formulations: {name[1]!r} is listed twice; list it once")
+    formulations = _formulations(document, "formulations", tuple(FORMULATIONS))
     rungs = tuple(
-        _rung(name, document["rungs"][name], defaults) for name in RUNGS if name in document["rungs"]
+        _rung(name, document["rungs"][name], defaults, formulations)
+        for name in RUNGS
+        if name in document["rungs"]
     )
     sketches = tuple(
         _sketch(table, f"sketches[{number}].", folder, rungs)
@@ -348,12 +350,34 @@ def _check_known(word: str, known: Collection[str], place: str, kind: str = "") 
         raise InputError(f"{place}: there is no {kind}{shortened(word)!r}; choose from {', '.join(known)}")
 
 
-def _rung(name: str, table: dict[str, Any], defaults: dict[str, tuple[str, ...]]) -> Rung:
+def _formulations(
+    table: dict[str, Any], key: str, default: tuple[str, ...], place: str = ""
+) -> tuple[str, ...]:
+    """The full names of formulations in a list, or the default."""
+    named = _words(table, key, (*FORMULATIONS, *short_names()), default, place)
+    found = tuple(declaration_of(name).name for name in named)
+    if (name := _twice(found)) is not None:
+        raise InputError(f"{place}{key}: {name[1]!r} is listed twice; list it once")
+    return found
+
+
+def _rung(
+    name: str, table: dict[str, Any], defaults: dict[str, tuple[str, ...]], formulations: tuple[str, ...]
+) -> Rung:
     known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
     words = {key: _words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
     compress, prove = table.get("compress", False), table.get("prove", name in PROVEN)
     added = day(table.get("added", ""), f"rungs.{name}.added")
-    return Rung(name, _whole(table["sizes"]), compress=compress, prove=prove, added=added, **words)
+    tightened = _formulations(table, "tightened", (), f"rungs.{name}.")
+    for each in tightened:
+        if each not in formulations:
+            raise InputError(f"rungs.{name}.tightened: {each!r} is not in formulations; add it there")
+        if FORMULATIONS[each].minimises == AT_JUMPS:
+            raise InputError(
+                f"rungs.{name}.tightened: {each} has fixed jumps, and no certificate is about it; omit it"
+            )
+    sizes = _whole(table["sizes"])
+    return Rung(name, sizes, compress=compress, prove=prove, added=added, tightened=tightened, **words)
 
 
 def _whole(numbers: list[float]) -> tuple[int, ...]:

@@ -1,0 +1,178 @@
+"""Tightened entries: the plain entry in the windows that a certificate leaves, with the same optimum."""
+
+import hashlib
+import json
+import shutil
+
+import crossfield as cf
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.library.building.table import read_table
+from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.contributions.submit import submit
+from crossfield.export.library.documents.documents import problem_of
+from crossfield.export.library.site.site import write_site
+from crossfield.models.errors import InputError
+from forging import change, seal
+from libraries import library_of, spec_of
+
+SPEC = """formulations = ["milp", "exact", "qp"]
+
+[rungs.tiny]
+sizes = [3]
+formats = ["mps"]
+gauges = ["strokes", "box"]
+tightened = ["exact", "milp-mccormick"]
+
+[[sketches]]
+name = "rand"
+random = "full"
+seeds = [1]
+points = "proven"
+split = "test"
+"""
+STEM = "cf_rand_n003_s1"
+CERTIFICATES = {"exact": f"{STEM}.certificate.npz", "milp": f"{STEM}.l1.certificate.npz"}
+
+
+REMEDY = "submit one of `crossfield prove`"
+ORDER = (("", ("milp", "exact")), ("_tight", ("exact", "milp")))
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A library with tightened entries; not to be changed."""
+    return library_of(tmp_path_factory.mktemp("tightened"), SPEC)
+
+
+@pytest.fixture
+def lib(built, tmp_path):
+    return shutil.copytree(built.folder, tmp_path / "lib")
+
+
+def test_it_has_the_optimum_of_its_plain_entry_and_names_its_certificate(built):
+    names = [f"{STEM}_{token}{end}" for end, tokens in ORDER for token in tokens]
+    assert [name for name in built.document["entries"] if "qp" not in name and "box" not in name] == names
+    for token, file in CERTIFICATES.items():
+        narrow, plain = built.entry(f"{STEM}_{token}_tight"), built.entry(f"{STEM}_{token}")
+        for key in ("status", "bound", "gap", "split", "instance"):
+            assert narrow[key] == plain[key]
+        assert narrow["best"]["objective"] == plain["best"]["objective"]
+        assert (narrow["status"], narrow["solved"]["by"]) == ("optimal", "certificate")
+        stated = narrow["tightened"]
+        assert (stated["certificate"], stated["plain"]) == (file, plain["name"])
+        assert stated["sha256"] == hashlib.sha256((built.folder / file).read_bytes()).hexdigest()
+        assert plain["name"] in [each["entry"] for each in narrow["equivalent"]]
+        assert "tightened" not in plain
+        windows = [problem_of(built, each).blocks["alpha"] for each in (narrow, plain)]
+        width = [(block.upper - block.lower).sum() for block in windows]
+        assert width[0] < width[1]
+    rows = read_table(built.folder / "entries.csv")
+    assert {row["name"] for row in rows if row["tightened"]} == {name for name in names if "tight" in name}
+    assert verify_library(built.folder) == []
+
+
+@pytest.mark.parametrize("token, name", [("milp", "milp-mccormick"), ("exact", "miqp-exact")])
+def test_it_has_the_bytes_of_an_export_with_the_certificate(built, tmp_path, token, name):
+    instance, certificate = built.folder / f"{STEM}.instance.json", built.folder / CERTIFICATES[token]
+    command = ["export", str(instance), "-o", str(tmp_path), "--tightened", str(certificate), "-q"]
+    assert invoke([*command, "-f", name, "-F", "mps"]) == 0
+    (written,) = tmp_path.glob("*.mps")
+    assert written.read_bytes() == (built.folder / f"{STEM}_{token}_tight.mps").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "token, solver",
+    [
+        ("milp", "highs"),
+        pytest.param("exact", "scip", marks=pytest.mark.needs("scip")),
+    ],
+)
+def test_a_solver_finds_the_proven_optimum(built, token, solver):
+    sidecar = built.entry(f"{STEM}_{token}_tight")
+    found = cf.solve(problem_of(built, sidecar), solver)
+    assert found.objective == pytest.approx(sidecar["best"]["objective"], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "key, value",
+    [("tightened__sha256", "0" * 64), ("tightened__windows", "none"), ("tightened__plain", f"{STEM}_qp")],
+)
+def test_a_forged_justification_is_found(lib, key, value):
+    change(lib / f"{STEM}_milp_tight.json", **{key: value})
+    seal(lib)
+    assert "states another tightened" in str(verify_library(lib)[0])
+
+
+def test_windows_of_another_certificate_are_found(lib):
+    change(lib / f"{STEM}_milp_tight.json", tightened__certificate=CERTIFICATES["exact"])
+    seal(lib)
+    assert "is not the instance" in str(verify_library(lib)[0])
+
+
+def test_a_forged_model_is_found(lib):
+    path = lib / f"{STEM}_milp_tight.mps"
+    path.write_bytes((lib / f"{STEM}_milp.mps").read_bytes())
+    seal(lib)
+    assert any(
+        each.file == path.name and "does not hold the problem" in each.what for each in verify_library(lib)
+    )
+
+
+def test_an_entry_without_a_certificate_is_skipped_with_its_reason(tmp_path):
+    made = library_of(tmp_path, SPEC.replace("proven", "greedy"))
+    assert made.skipped == {
+        f"{STEM}_{token}_tight": f"{STEM} has no certificate in the {norm}-norm; {REMEDY}"
+        for token, norm in (("exact", 2), ("milp", 1))
+    }
+    assert not any("tight" in name for name in made.document["entries"])
+    assert f"{STEM}_exact_tight: {STEM} has no certificate" in (made.folder / "README.md").read_text()
+    assert verify_library(made.folder) == []
+    proof = cf.prove(cf.read_instance(made.folder / f"{STEM}.instance.json"), jobs=1)
+    cf.write_certificate(proof, tmp_path / "it.npz")
+    assert [each.outcome for each in submit(made.folder, [tmp_path / "it.npz"])] == ["accepted"]
+    assert f"{STEM}_exact_tight" in json.loads((made.folder / "library.json").read_text())["entries"]
+    assert verify_library(made.folder) == []
+
+
+def test_a_field_outside_the_windows_is_not_better_and_not_refused(lib, tmp_path):
+    path = tmp_path / "worse.npz"
+    field = cf.power_field(cf.read_instance(lib / f"{STEM}.instance.json"))
+    cf.write_field(field, path)
+    assert [each.outcome for each in submit(lib, [path])] == ["not better"]
+
+
+def test_its_page_links_its_certificate_and_its_plain_entry(built, tmp_path):
+    write_site(built.folder, tmp_path / "site")
+    page = (tmp_path / "site" / "entry" / f"{STEM}_milp_tight.html").read_text()
+    assert f'href="{STEM}_milp.html"' in page
+    assert f'href="../files/{CERTIFICATES["milp"]}"' in page
+    plain = (tmp_path / "site" / "entry" / f"{STEM}_milp.html").read_text()
+    assert f'href="{STEM}_milp_tight.html"' in plain
+
+
+@pytest.mark.parametrize(
+    "stated, words",
+    [
+        ('["parity"]', "rungs.tiny.tightened: 'minlp-parity' is not in formulations"),
+        ('["qp"]', "rungs.tiny.tightened: qp-fixed has fixed jumps"),
+        ('["exact", "miqp-exact"]', "rungs.tiny.tightened: 'miqp-exact' is listed twice"),
+        ('["exakt"]', "rungs.tiny.tightened: there is no 'exakt'"),
+    ],
+)
+def test_a_bad_list_is_refused(tmp_path, stated, words):
+    with pytest.raises(InputError, match=r"spec\.toml") as error:
+        spec_of(tmp_path, SPEC.replace('["exact", "milp-mccormick"]', stated))
+    assert words in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["cf_skew_n008_milp", "cf_skew_n008_exact"])
+def test_the_library_that_ships_has_them_by_name(name, tmp_path):
+    narrow, plain = cf.entry(f"{name}_tight"), cf.entry(name)
+    assert (narrow.objective, narrow.bound, narrow.status) == (plain.objective, plain.bound, "optimal")
+    assert narrow.instance.sha256 == plain.instance.sha256
+    assert narrow.problem.sha256 != plain.problem.sha256
+    assert narrow.certificate.energy == pytest.approx(narrow.objective)
+    assert narrow.problem.violation(narrow.problem.point(narrow.field)).worst < 1e-8
+    assert narrow.name in {each.name for each in cf.entries(where="tightened == True")}
+    assert narrow.write(tmp_path / "it.mps").files.keys() == {"it.mps"}
