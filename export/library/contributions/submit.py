@@ -18,24 +18,19 @@ from ....models.errors import (
     CrossfieldError,
     InputError,
     SolutionError,
-    UnsupportedByFormatError,
     naming,
 )
 from ....models.field.field import CrossField, Norm
 from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, Violation
-from ....models.input_limits import MAX_LOG
 from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes
-from ...formats.registry import FORMATS, carried, generator
-from ...solutions.logs.registry import parse_log
-from ...solutions.logs.run_log import RunLog
+from ...formats.registry import generator
 from ...solutions.readers.registry import read_raw
 from ...solutions.solution import read_solution
-from ...solvers_table import SOLVERS
 from ..building.build import rebuilt
 from ..building.index import SUMS
 from ..documents.documents import Library, about_file, folder_of, problem_of, read_about, read_library
@@ -43,14 +38,14 @@ from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record, RunStatus, log_file, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
-from ..ledger.standing import FEASIBLE, MAKERS, SAME, best_of_each, contradicts, is_better
+from ..ledger.standing import FEASIBLE, SAME, best_of_each, contradicts, is_better
 from ..plan.recipe import norm_minimised
+from .logs import SubmittedLog, solver_of
 from .sources import Source, sources_of
 
 Outcome = Literal["accepted", "not better", "refused", "skipped"]
 
 _ENTRY: Final = re.compile(r"cf_[a-z0-9_]+")
-_ADDED: Final = 2  # columns that a program adds: for a constant, for an objective that is not linear
 
 
 @dataclass(frozen=True)
@@ -154,22 +149,6 @@ def _settled(library: Library, progress: Progress) -> Library:
     return library if f"{digest}  {LEDGER}" in sums else rebuilt(library.folder, progress=progress)
 
 
-@dataclass(frozen=True)
-class _Log:
-    """The log of a run: its path, its bytes, and the facts in it."""
-
-    path: Path
-    content: bytes
-    run: RunLog
-
-    @classmethod
-    def read(cls, path: Path) -> _Log:
-        """Read a log. Raises InputError, and SolutionError for a log without bound and objective."""
-        content = read_bytes(path, MAX_LOG, "give the part of the last run")
-        with naming(path):
-            return cls(path, content, parse_log(content))
-
-
 @dataclass
 class _Session:
     """A submission in progress: the ledger with all accepted records."""
@@ -212,7 +191,7 @@ class _Session:
 
     # the entry of a file
 
-    def _name_of(self, source: Source, log: _Log | None) -> str:
+    def _name_of(self, source: Source, log: SubmittedLog | None) -> str:
         """The entry of a run by the stamp of its problem, a name in the log, or the name of a file."""
         stamps = set(log.run.stamps) if log else set()
         path = source.path or source.files[0]
@@ -229,7 +208,7 @@ class _Session:
                 return found.pop()
         raise InputError("does not show its entry; name the entry", file=path)
 
-    def _named_in(self, log: _Log | None) -> set[str]:
+    def _named_in(self, log: SubmittedLog | None) -> set[str]:
         """The entries that a log names."""
         names = _ENTRY.findall(log.run.text) if log else ()
         return {name for name in names if name in self.library.document["sha256"]}
@@ -243,12 +222,12 @@ class _Session:
 
     def _run(self, source: Source) -> Submission:
         """Check the solution and the log of a run; keep the best run of its solver, and a better point."""
-        log = _Log.read(source.log) if source.log else None
+        log = SubmittedLog.read(source.log) if source.log else None
         sidecar = self.library.entry(self.entry or self._name_of(source, log))
         name, problem = sidecar["name"], self._problem(sidecar)
         found = None if source.path is None else self._point(source.path, sidecar)
         if log is not None:
-            self._check_log(log, name, problem)
+            log.check(name, problem, self._named_in(log))
         known = self._known(sidecar)
         objective = None if found is None else problem.objective_value(complete_point(problem, found))
         record = self._record(sidecar, log, objective, known)
@@ -268,23 +247,8 @@ class _Session:
             better_point=better,
         )
 
-    def _check_log(self, log: _Log, entry: str, problem: Problem) -> None:
-        """Raise SolutionError if a log is about another problem."""
-        named = self._named_in(log)
-        others = sorted(named - {entry}) if entry not in named else []
-        if log.run.stamps - {problem.stamp}:
-            others = others or [f"a problem {min(log.run.stamps - {problem.stamp})}"]
-        if others:
-            raise SolutionError(f"is a log of {others[0]}, not of {entry}", file=log.path)
-        if "GAMS" not in log.run.text and not _has_size(log.run, problem):
-            raise SolutionError(
-                f"is a log of a model of {log.run.columns} columns and {log.run.rows} rows, "
-                f"and {entry} has other numbers",
-                file=log.path,
-            )
-
     def _record(
-        self, sidecar: dict[str, Any], log: _Log | None, objective: float | None, known: float
+        self, sidecar: dict[str, Any], log: SubmittedLog | None, objective: float | None, known: float
     ) -> Record:
         """The record of a run. known: the least objective of the entry's feasible points.
 
@@ -295,7 +259,7 @@ class _Session:
             self.facts.record,
             entry=sidecar["name"],
             problem_sha256=sidecar["problem_sha256"],
-            solver=_solver(self.facts.solver, log),
+            solver=solver_of(self.facts.solver, log),
             primal=objective,
         )
         if log is None:
@@ -331,7 +295,7 @@ class _Session:
         record: Record,
         sidecar: dict[str, Any],
         found: CrossField | None = None,
-        log: _Log | None = None,
+        log: SubmittedLog | None = None,
     ) -> None:
         self.ledger, _ = self.ledger.added(record, found, log.content if log else None)
         if found is not None:
@@ -470,32 +434,6 @@ class _Session:
         about = read_about(self.library.folder / about_file(instance))
         stated: float | None = about.get("certificates", {}).get(str(norm), {}).get("bound")
         return self.certified.get((instance, norm), stated)
-
-
-def _has_size(log: RunLog, problem: Problem) -> bool:
-    """Whether a log states no size, or the size of the problem in one of the formats."""
-    if log.columns is None:
-        return True
-    for each in FORMATS.values():
-        try:
-            held = carried(problem, each)
-        except UnsupportedByFormatError:
-            continue
-        if 0 <= log.columns - held.n_columns <= _ADDED and (log.rows or 0) <= held.n_rows + 1:
-            return True
-    return False
-
-
-def _solver(stated: str | None, log: _Log | None) -> str:
-    """The solver's title in the table of solvers, or its stated name. Raises InputError."""
-    titles = {name.lower(): each.title for each in SOLVERS.values() for name in (each.name, each.title)}
-    title = None if stated is None else titles.get(stated.lower(), stated)
-    if log is None:
-        return title or "unknown"
-    solver = SOLVERS[log.run.solver]
-    if title is not None and MAKERS.get(title) != solver.maker:
-        raise InputError(f"the solver is given as {title}, and the log is of {solver.title}; leave it out")
-    return title or solver.title
 
 
 def _check_feasible(path: Path, entry: str, found: Violation) -> None:
