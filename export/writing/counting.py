@@ -16,8 +16,7 @@ import sympy as sp
 
 from ...models.errors import ConsistencyError
 from ...models.formulations.declaration import Family
-from ...models.formulations.families import Monomial, PlacedFamily
-from ...models.formulations.monomials import Monomials, beyond_noise, monomials
+from ...models.formulations.families import Monomial, Monomials, PlacedFamily, beyond_noise, monomials
 from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import elements
 from ...models.instance.grid import Floats

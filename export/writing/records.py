@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.errors import UnsupportedByFormatError
-from ...models.formulations.monomials import ranked
+from ...models.formulations.families import ranked
 from ...models.formulations.names import Bytes, digits
 from ...models.instance.grid import Bools, Floats
 

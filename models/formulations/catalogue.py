@@ -9,6 +9,7 @@ symbols: symbols.py.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, Final
 
 import sympy as sp
@@ -68,6 +69,12 @@ QUARTIC: Final = 2 * (A**2 + B**2)
 """The smoothness of a pair, (8)."""
 CUBIC: Final = sp.expand(sp.expand(QUARTIC).subs(p1**2, p1))
 """(8) expanded, with p1^2 = p1: (9)."""
+
+_EXACT: Final = "z = p1 beta_i with the hull facets (26)-(29), exact"
+_WEAKER: Final = (
+    "z for p1 beta_i between the hull facets (26)-(29), a relaxation: "
+    "p1 is not only 0 or 1 here; .nl and .gms hold the products"
+)
 
 Families = Iterator[Family]
 
@@ -241,16 +248,27 @@ def norm_of(formulation: Formulation) -> Norm | None:
     return norms.get((options.stroke_norm, options.beta_norm)) if options.facet == "hull" else None
 
 
-__all__ = [
-    "AT_JUMPS",
-    "CUBIC",
-    "FORMULATIONS",
-    "PARITY",
-    "QUARTIC",
-    "TWO_NORM",
-    "declaration_of",
-    "declare",
-    "facets_of_z",
-    "norm_of",
-    "short_names",
-]
+def lift_products(formulation: Formulation) -> Formulation:
+    """The formulation with z for every product p1 beta_i, and its hull facets.
+
+    It is the same problem while p1 is 0 or 1. With integrality dropped the result is a relaxation
+    (`Formulation.weakened`). A square stays a square of a linear expression, so that (8) becomes convex; (9)
+    stays the expanded polynomial with 4 z beta_j.
+    """
+    lifted = tuple(replace(family, expression=_lift(family.expression)) for family in formulation.objective)
+    return replace(
+        formulation,
+        objective=lifted,
+        rows=(*facets_of_z("hull"), *formulation.rows),
+        lifted=_WEAKER if formulation.options.relax else _EXACT,
+    )
+
+
+def _lift(expression: sp.Expr) -> sp.Expr:
+    squares_kept = expression.replace(
+        lambda e: e.is_Pow and e.base.is_Add, lambda e: sp.expand(e.base).subs(p1 * beta_i, z) ** e.exp
+    )
+    return squares_kept.subs(p1 * beta_i, z)
+
+
+__all__ = ["FORMULATIONS", "declaration_of", "short_names"]  # the table and its names come from there

@@ -1,23 +1,27 @@
-"""Families of terms and rows, placed on an instance: blocks of columns, monomials, values at points."""
+"""Families of terms and rows, placed on an instance: blocks of columns, monomials and their sums, values."""
 
 from __future__ import annotations
 
 import builtins
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Final, Protocol
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
-from ..instance.grid import Floats, Ints
+from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from .declaration import Family
-from .monomials import beyond_noise, monomials
 from .symbols import SCALARS, SLOTS, IndexSet, numeric, way
 
 Coefficient = float | Floats
+Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]
+"""Symbols, each repeated as often as its power, and a coefficient without these symbols."""
 
+_NOISE: Final = 1e-12
+"""Rounding noise relative to an element's largest coefficient: cancelled terms, angles of 1e-16."""
 ANY_DEGREE: Final = 99
 """Degree of a function that is not a polynomial."""
 
@@ -130,7 +134,7 @@ class PlacedFamily:
 
     def data(self, expression: sp.Expr) -> Coefficient:
         """Value of an expression free of columns: a number, or an array (count,)."""
-        symbols = sorted(expression.free_symbols, key=symbol_name)
+        symbols = sorted(expression.free_symbols, key=str)
         if not symbols:
             return float(expression)
         value = numeric(symbols, expression)(*(self._datum(symbol) for symbol in symbols))
@@ -175,7 +179,7 @@ class PlacedFamily:
 
     def values(self, point: Floats) -> Floats:
         """The expression (of a row: left minus right side) at a point, shape (count,)."""
-        symbols = sorted(self.family.body.free_symbols, key=symbol_name)
+        symbols = sorted(self.family.body.free_symbols, key=str)
         evaluate = numeric(symbols, self.family.body)
         given = (point[self.column_of(s)] if s in self.variables else self._datum(s) for s in symbols)
         return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
@@ -207,6 +211,59 @@ def _add(sums: Floats, inside: Ints | None, values: Coefficient) -> None:
         np.add.at(sums, inside, values)
 
 
-def symbol_name(symbol: sp.Symbol) -> str:
-    """Name of a symbol, as text: the order of symbols."""
-    return str(symbol.name)
+@cache
+def monomials(family: Family, variables: tuple[sp.Symbol, ...]) -> Monomials | None:
+    """The monomials of a declaration by degree, constant included; None if it is not a polynomial.
+
+    Declarations are few and fixed: SymPy expands each once, for any number of instances.
+    """
+    if not variables:
+        return (((), family.body),)
+    try:
+        terms = sp.Poly(family.body, *variables).terms()
+    except sp.PolynomialError:
+        return None
+    terms = sorted(terms, key=lambda term: (sum(term[0]), tuple(-power for power in term[0])))
+    return tuple(
+        (tuple(s for s, power in zip(variables, powers, strict=True) for _ in range(power)), value)
+        for powers, value in terms
+        if value != 0
+    )
+
+
+def ordered(factors: tuple[Ints, ...]) -> Ints:
+    """Columns of each monomial in ascending order, shape (count, degree)."""
+    if len(factors) == 2:  # nearly all monomials, and faster than sorting rows
+        return np.stack([np.minimum(*factors), np.maximum(*factors)], axis=1)
+    return np.sort(np.stack(factors, axis=1), axis=1)
+
+
+def merged(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
+    """Sums over equal rows of `index`, sorted, without noise. columns: a number above every index."""
+    key = index[:, 0].astype(np.int64)
+    for factor in range(1, index.shape[1]):
+        key = key * columns + index[:, factor]
+    place, rank = ranked(key)
+    total, largest = (_sums(values, rank, len(place)) for values in (coefficient, scale))
+    kept = beyond_noise(total, largest)
+    return index[place[kept]], total[kept]
+
+
+def _sums(values: Floats, rank: NDArray[np.intp], count: int) -> Floats:
+    return np.bincount(rank, weights=values, minlength=count).astype(np.float64, copy=False)
+
+
+def beyond_noise(total: Floats, scale: Floats) -> Bools:
+    """Whether sums exceed rounding, for terms of that scale."""
+    return np.abs(total) > _NOISE * scale
+
+
+def ranked(values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Positions of the distinct values in ascending order, and the rank of every value among them."""
+    order = np.argsort(values, kind="stable")
+    ascending = values[order]
+    new = np.ones(len(values), dtype=bool)
+    np.not_equal(ascending[1:], ascending[:-1], out=new[1:])
+    rank = np.empty(len(values), dtype=np.intp)
+    rank[order] = np.cumsum(new) - 1
+    return order[new], rank

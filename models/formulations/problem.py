@@ -22,11 +22,9 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER, Instance, whole_numbers
 from ..previews import table_of
 from .arrays import ProblemArrays, arrays_of, check_highs, highs_of
-from .catalogue import declare, norm_of
-from .declaration import FORMULATIONS, Family, Formulation
-from .families import ANY_DEGREE, Block, Monomial, PlacedFamily, block_costs, symbol_name
-from .lifting import lift_products
-from .monomials import merged, ordered
+from .catalogue import declare, lift_products, norm_of
+from .declaration import Family, Formulation
+from .families import ANY_DEGREE, Block, Monomial, PlacedFamily, block_costs, merged, ordered
 from .symbols import NARROWED, SLOTS, VARIABLES, Variable, elements, numeric, way
 from .windows import Windows
 
@@ -189,10 +187,8 @@ class Problem:
 
     def _value(self, bound: sp.Expr) -> Floats:
         """Values of a bound: one for each element, or one for all."""
-        symbols = sorted(bound.free_symbols, key=symbol_name)
-        return np.asarray(
-            numeric(symbols, bound)(*(self.data[symbol_name(each)] for each in symbols)), np.float64
-        )
+        symbols = sorted(bound.free_symbols, key=str)
+        return np.asarray(numeric(symbols, bound)(*(self.data[str(each)] for each in symbols)), np.float64)
 
     @property
     def n_columns(self) -> int:
@@ -410,7 +406,7 @@ def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
         return np.asarray(given[name], dtype=np.float64)
     variable = VARIABLES[name]
     sources = problem.data | given
-    symbols = sorted(variable.value.free_symbols, key=symbol_name)
+    symbols = sorted(variable.value.free_symbols, key=str)
     slots = (SLOTS[variable.over][symbol] for symbol in symbols)
     arguments = (sources[quantity][way(problem.instance, kind)] for quantity, kind in slots)
     return np.asarray(numeric(symbols, variable.value)(*arguments), dtype=np.float64)
@@ -482,14 +478,3 @@ def tightened(problem: Problem, windows: Windows) -> Problem:
 def lifted(problem: Problem) -> Problem:
     """The problem with each p1 beta_i lifted to z, for formats up to quadratic (`Formulation.weakened`)."""
     return replace(problem, formulation=lift_products(problem.formulation))
-
-
-__all__ = [
-    "FORMULATIONS",
-    "Problem",
-    "Violation",
-    "formulate",
-    "lifted",
-    "tightened",
-    "with_integers_fixed",
-]

@@ -17,7 +17,7 @@ import numpy as np
 import sympy as sp
 
 from ..instance.grid import Ints
-from ..instance.instance import HALF, Instance
+from ..instance.instance import Instance
 
 IndexSet = Literal["pixels", "strokes", "pairs"]
 Way = Literal["itself", "first", "second", "stroke"]
@@ -177,22 +177,3 @@ def numeric(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., An
 def _compiled(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
     """The compiled expression; declarations are few and fixed, so each is compiled once."""
     return sp.lambdify(arguments, expression, modules="numpy", cse=True)  # type: ignore[no-any-return]
-
-
-__all__ = [
-    "B_LIFTED",
-    "HALF",
-    "LATEX",
-    "NARROWED",
-    "SCALARS",
-    "SLOTS",
-    "VARIABLES",
-    "A",
-    "B",
-    "R",
-    "Variable",
-    "elements",
-    "numeric",
-    "pixel_of",
-    "way",
-]

@@ -14,6 +14,7 @@ from ..instance.instance import QUARTER, Instance, whole_numbers
 
 _SLACK = 1e-9
 _ARRAYS = ("alpha_lower", "alpha_upper", "beta_lower", "beta_upper", "p_min", "p_max")
+_SYMBOLS = ("alpha_lo", "alpha_up", "beta_lo", "beta_up", "p_min", "p_max")
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +63,7 @@ class Windows:
     @property
     def data(self) -> dict[str, Any]:
         """The arrays by the names of symbols."""
-        return {
-            "alpha_lo": self.alpha_lower,
-            "alpha_up": self.alpha_upper,
-            "beta_lo": self.beta_lower,
-            "beta_up": self.beta_upper,
-            "p_min": self.p_min,
-            "p_max": self.p_max,
-        }
+        return {symbol: getattr(self, name) for symbol, name in zip(_SYMBOLS, _ARRAYS, strict=True)}
 
     @property
     def bytes(self) -> bytes:
@@ -87,15 +81,8 @@ class Windows:
     @classmethod
     def of_document(cls, document: dict[str, Any]) -> Windows:
         """The windows that `document` wrote."""
-        given = {name: np.array(document[name], dtype=np.float64) for name in _ARRAYS}
-        return cls(
-            given["alpha_lower"],
-            given["alpha_upper"],
-            given["beta_lower"],
-            given["beta_upper"],
-            whole_numbers(given["p_min"], "p_min"),
-            whole_numbers(given["p_max"], "p_max"),
-            float(document["energy"]),
-            str(document["proof"]),
-            document.get("norm", 2),
-        )
+        arrays = (np.array(document[name], dtype=np.float64) for name in _ARRAYS)
+        alpha_lower, alpha_upper, beta_lower, beta_upper, p_min, p_max = arrays
+        jumps = whole_numbers(p_min, "p_min"), whole_numbers(p_max, "p_max")
+        energy, proof, norm = float(document["energy"]), str(document["proof"]), document.get("norm", 2)
+        return cls(alpha_lower, alpha_upper, beta_lower, beta_upper, *jumps, energy, proof, norm)
