@@ -14,12 +14,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
-PARTS: Final = ("proofs", "solvers", "quality", "practice")
+PARTS: Final = ("quality", "practice")
 """One file each."""
-NOT_RUN: Final = "not run"
-"""Status of a row about all runs of a rung that a rule skips."""
-EVERY: Final = "*"
-"""The instance of such a row."""
+FAILED: Final = "failed"
+PROOF: Final = "prove"
 
 
 @dataclass(frozen=True)
@@ -27,19 +25,14 @@ class Run:
     """One run: one field from one instance.
 
     instance: its name (studying/instances.py). hidden: number of the hidden curve, -1 for none. noise:
-    standard deviation in degrees of the noise on each stroke. way: formulation, or method. start: `cold`
-    or `greedy`. facet: `hull` or `printed`. windows: `gauge`, or `proof` for the windows of a certificate.
-    norm: of the energy, if the way has a choice. limit: seconds.
+    standard deviation in degrees of the noise on each stroke. way: the method. norm: of the energy, if the
+    way has a choice. limit: seconds.
     """
 
     part: str
     instance: str
     size: int
     way: str
-    solver: str = ""
-    start: str = "cold"
-    facet: str = "hull"
-    windows: str = "gauge"
     norm: int = 2
     w_strokes: float = 1.0
     w_beta: float = 1e-6
@@ -56,15 +49,14 @@ class Run:
 
 ASKED: Final = tuple(field.name for field in fields(Run))
 FOUND: Final = (
-    "version", "format", "status", "objective", "bound", "energy_2", "energy_1", "violation", "error",
-    "off", "seconds", "nodes", "pixels", "pairs", "columns", "rows", "note", "machine", "load",
+    "version", "status", "objective", "bound", "energy_2", "energy_1", "error", "off", "seconds", "pixels",
+    "pairs", "note", "machine", "load",
 )  # fmt: skip
 """Results of a run. error: degrees to the hidden curve or the true field; off: to the strokes shown."""
 COLUMNS: Final = ASKED + FOUND
 NUMBERS: Final = frozenset(
     {"size", "norm", "w_strokes", "w_beta", "hidden", "noise", "limit", "seed", "objective", "bound"}
-    | {"energy_2", "energy_1", "violation", "error", "off", "seconds", "nodes", "pixels", "pairs"}
-    | {"columns", "rows", "load"}
+    | {"energy_2", "energy_1", "error", "off", "seconds", "pixels", "pairs", "load"}
 )
 Row = dict[str, Any]
 Table = tuple[tuple[str, ...], list[list[str]]]
