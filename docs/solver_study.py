@@ -32,7 +32,7 @@ os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
 from crossfield.export.library.documents.lock import locked
 from crossfield.export.solvers_table import SOLVERS
 from studying.solvers.measure import SLACK, busy_seconds, measured
-from studying.solvers.plan import DATA, FULL, PROVE, QUICK, Plan, Row, Run, append, key, read
+from studying.solvers.plan import DATA, FULL, PROVE, QUICK, Plan, Row, Run, table
 from studying.solvers.statistics import DISCARDED, FAILED, best_pairs
 
 _LONGEST: Final = 200  # characters of a note
@@ -49,15 +49,14 @@ class Study:
         """Start without rows. end: time of the monotonic clock."""
         self.plan, self.data, self.end = plan, data, end
         self.discards, self._lock = Counter[Run](), threading.Lock()
-        self.rows = read(data)
+        self.kept = table(data)
         self._taken: set[Run] = set()
 
     def left(self) -> list[Run]:
         """The runs without a row whose solver is installed, those discarded least often first."""
-        done = {key(row) for row in self.rows}
-        runs = [run for run in self.plan.first() if run not in done and _can(run)]
-        if not runs:
-            runs = [run for run in self.plan.last(best_pairs(self.rows, self.plan.limit)) if run not in done]
+        done, best = self.kept.done, best_pairs(self.kept.rows, self.plan.limit)
+        runs = [run for run in self.plan.first() if run.key not in done and _can(run)]
+        runs = runs or [run for run in self.plan.last(best) if run.key not in done]
         return sorted(runs, key=lambda run: self.discards[run])
 
     def work(self, core: int) -> None:
@@ -69,7 +68,7 @@ class Study:
                 if found["status"] == DISCARDED:
                     self.discards[run] += 1
                 else:
-                    self.rows.append(append(self.data, run, found))
+                    self.kept.append(run, found)
             times = f"{found.get('cpu') or 0:.1f} s, beside {found.get('beside') or 0:.1f} s"
             print(f"{run}: {found['status']}, {times}", file=sys.stderr, flush=True)
 
@@ -134,11 +133,11 @@ def main() -> None:
         parser.error("--quick is another plan; give --data FOLDER for its rows")
     study = Study(QUICK if given.quick else FULL, data, time.monotonic() + 60 * given.minutes)
     if given.plan:
-        print(f"{study.plan.size} runs, {len(study.rows)} done")
+        print(f"{study.plan.size} runs, {len(study.kept.rows)} done")
         return
     certificates(data).mkdir(parents=True, exist_ok=True)
     with locked(data.parent, "a study", lambda line: print(line, file=sys.stderr)):
-        study.rows = read(data)
+        study.kept = table(data)
         cores = sorted(os.sched_getaffinity(0))[-given.jobs :]
         threads = [threading.Thread(target=study.work, args=(core,)) for core in cores]
         for thread in threads:

@@ -19,7 +19,7 @@ from .rows import read as read_rows
 from .solvers import page as solvers_page
 from .solvers.plan import DATA as SOLVER_ROWS
 from .solvers.plan import FULL
-from .solvers.plan import read as read_solvers
+from .solvers.plan import table as solvers_table
 
 Kept = dict[str, list[Row]]
 SOLVERS: Final = SOLVER_ROWS.stem
@@ -36,7 +36,7 @@ def read(data: Path) -> Kept:
     """The rows of all parts."""
     files = {part: data / f"{part}.csv" for part in PARTS}
     kept = {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
-    return kept | {SOLVERS: read_solvers(data / SOLVER_ROWS.name)}
+    return kept | {SOLVERS: solvers_table(data / SOLVER_ROWS.name).rows}
 
 
 def ordered(kept: Kept, plan: Plan) -> Kept:

@@ -40,13 +40,12 @@ def test_a_quick_study_that_is_killed_goes_on_and_repeats_no_run(study, tmp_path
     before = file.read_text().rpartition("\n")[0]
     with file.open("a") as stream:
         stream.write("pixels 3 70")  # what a kill may leave of a line
-    assert len(study.plan.read(file)) == before.count("\n")
     subprocess.run(command, check=True)
     assert file.read_text().startswith(f"{before}\n")
-    rows = study.plan.read(file)
+    rows = study.plan.table(file).rows
     planned = list(study.plan.QUICK.first())
     planned += study.plan.QUICK.last(study.statistics.best_pairs(rows, study.plan.QUICK.limit))
-    keys = [study.plan.key(row) for row in rows]
+    keys = [study.plan.run_of(row) for row in rows]
     assert len(keys) == len(set(keys)) > 20
     assert set(keys) <= set(planned)
     for formulation in study.plan.PROBLEMS:
@@ -80,7 +79,7 @@ def test_a_run_beside_other_work_on_its_core_is_to_be_repeated(study):
 
 def row(study, seconds, status="optimal-global", objective=2.0, bound=2.0, limit=300.0):
     given = {"cpu": seconds, "status": status, "objective": objective, "bound": bound, "limit": limit}
-    return dict.fromkeys(study.plan.COLUMNS) | given
+    return dict.fromkeys(study.plan.ASKED + study.plan.FOUND) | given
 
 
 def test_means_and_intervals_are_those_calculated_by_hand(study):

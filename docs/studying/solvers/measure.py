@@ -22,8 +22,9 @@ from crossfield.models.formulations.problem import Problem, tightened
 from crossfield.models.proof.certificate import read_certificate
 from crossfield.models.proof.tightening import windows_left
 
+from ..rows import Row
 from .logs import progress, root_bound
-from .plan import PROVE, QUICK, Row, Run, made
+from .plan import PROVE, QUICK, Run, made
 from .statistics import DISCARDED, FAILED, GAP, TOO_LARGE, integral, is_solved
 
 MEMORY: Final = 8 << 30

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
 from crossfield.export.solvers_table import SOLVERS
 
-from ..rows import Table
+from ..rows import Row, Table
 from . import statistics
-from .plan import COMMERCIAL, LONG, PAIRS, PROBLEMS, PROVE, STARTS, Plan, Row, Run, key, made
-from .statistics import FAILED, TOO_LARGE, gap, interval, is_solved, seconds, shifted_geometric_mean
+from .plan import COMMERCIAL, LONG, PAIRS, PROBLEMS, PROVE, STARTS, Plan, Run, made, run_of
+from .statistics import (
+    FAILED,
+    TOO_LARGE,
+    contradicted,
+    gap,
+    interval,
+    is_solved,
+    seconds,
+    shifted_geometric_mean,
+)
 
 Kind = tuple[str, str, str]
 """Formulation, solver and start."""
@@ -46,12 +55,9 @@ def with_interval(values: np.ndarray, statistic: statistics.Statistic, form: str
     return f"{statistic(values):{form}} [{low:{form}}, {high:{form}}]"
 
 
-def counted(rows: list[Row], planned: int) -> str:
-    """Number of solved runs; of an incomplete group, also the number of planned runs."""
-    if not rows:
-        return MISSING
-    text = f"{sum(map(is_solved, rows))} of {len(rows)}"
-    return text if len(rows) == planned else f"{text} so far, {planned} planned"
+def counted(rows: list[Row]) -> str:
+    """Number of solved runs."""
+    return f"{sum(map(is_solved, rows))} of {len(rows)}"
 
 
 def solved_table(rows: list[Row], plan: Plan) -> Table:
@@ -62,9 +68,11 @@ def solved_table(rows: list[Row], plan: Plan) -> Table:
         line = [f"`{formulation}`", title(solver), "" if solver == PROVE else start]
         for count, names in plan.instances.items():
             mine = found[count][formulation, solver, start]
-            text = counted(mine, len(names))
+            text = counted(mine) if mine else MISSING
             if len(mine) == len(names):
                 text += f", {with_interval(seconds(mine), shifted_geometric_mean, '.1f')} s"
+            elif mine:
+                text += f" so far, {len(names)} planned"
             line.append(text)
         cells.append(line)
     heads = (f"about {count} pairs, {2 * count} integers" for count in plan.instances)
@@ -227,28 +235,24 @@ def editions_table(rows: list[Row], plan: Plan) -> Table:
     return ("formulation", "instances", "pairs", *(title(each) for each in sorted(COMMERCIAL))), cells
 
 
-PARTS: Final[dict[str, Callable[[Run], bool]]] = {
-    "proofs": lambda run: run.solver == PROVE and run.limit != LONG,
-    "cold": lambda run: _is_pair(run) and run.start == "cold" and not run.turns,
-    "tightened": lambda run: _is_pair(run) and run.start == "tightened",
-    "turned": lambda run: run.turns > 0,
-    "of an hour": lambda run: run.limit == LONG,
-    "of free commercial editions": lambda run: run.solver in COMMERCIAL,
-}
-"""Parts of the plan."""
-
-
-def _is_pair(run: Run) -> bool:
-    return (run.formulation, run.solver) in PAIRS and run.limit != LONG
+def part_of(run: Run) -> str:
+    """The part of the plan that a run belongs to."""
+    if run.limit == LONG:
+        return "of an hour"
+    if run.solver in COMMERCIAL:
+        return "of free commercial editions"
+    if run.solver == PROVE:
+        return "proofs"
+    return "turned" if run.turns else run.start
 
 
 def completeness(rows: list[Row], plan: Plan) -> str:
     """Sentences on the completed share of the plan."""
-    planned = [*plan.first(), *plan.last([*PAIRS[: statistics.BEST]])]
-    done = [key(row) for row in rows]
-    parts = [f"{sum(map(part, done))} of {sum(map(part, planned))} {name}" for name, part in PARTS.items()]
-    text = f"{len(rows)} of {len(planned)} planned runs are done: {', '.join(parts)}."
-    missing = len(planned) - len(rows)
+    planned = Counter(map(part_of, [*plan.first(), *plan.last([*PAIRS[: statistics.BEST]])]))
+    done = Counter(part_of(run_of(row)) for row in rows)
+    parts = ", ".join(f"{done[part]} of {count} {part}" for part, count in planned.items())
+    text = f"{len(rows)} of {plan.size} planned runs are done: {parts}."
+    missing = plan.size - len(rows)
     return (
         text if not missing else f"{text} **{missing} runs are missing**, and nothing is claimed about them."
     )
@@ -257,49 +261,34 @@ def completeness(rows: list[Row], plan: Plan) -> str:
 def claims(rows: list[Row]) -> str:
     """Sentence on answers that contradict a proven bound or a known field, and on failures."""
     best = known(rows)
-    wrong = Counter(
-        f"{title(row['solver'])}, {row['formulation']}"
-        for row in rows
-        if problem(row) in best and statistics.contradicted(row, *best[problem(row)])
+    wrong = [row for row in rows if problem(row) in best and contradicted(row, *best[problem(row)])]
+    lost = [row for row in rows if row["status"] in {FAILED, "unknown"}]
+    return (
+        f"{sum(map(is_solved, rows))} runs end with a proven optimum. Answers that contradict another run: "
+        f"{_listed(wrong)}. Runs without a usable answer: {_listed(lost)}."
     )
-    lost = Counter(
-        f"{title(row['solver'])}, {row['formulation']}"
-        for row in rows
-        if row["status"] in {FAILED, "unknown"}
-    )
-    solved = sum(map(is_solved, rows))
-    text = f"{solved} runs end with a proven optimum. " + (
-        f"Answers that contradict another run: {_listed(wrong)}."
-        if wrong
-        else "No answer contradicts another run."
-    )
-    return f"{text} Runs without a usable answer: {_listed(lost)}." if lost else text
 
 
-def _listed(found: Counter[str]) -> str:
-    return "; ".join(f"{name}: {count}" for name, count in sorted(found.items()))
+def _listed(rows: list[Row]) -> str:
+    """The numbers of rows by solver and formulation."""
+    found = Counter(f"{title(row['solver'])} on `{row['formulation']}`" for row in rows)
+    return "; ".join(f"{name} {count}" for name, count in sorted(found.items())) or "none"
 
 
 def answer(rows: list[Row], plan: Plan) -> list[str]:
-    """Answer on the reach of solvers: the numbers of pairs for which all cold runs are done."""
+    """Answer on the reach of solvers: a sentence per number of pairs with all cold runs done."""
     found = groups(rows, plan)
-    parts = []
+    cold = [kind for kind in KINDS if kind[2] == "cold"]
+    sentences = []
     for count, names in plan.instances.items():
-        cold = [kind for kind in KINDS if kind[2] == "cold"]
         if all(len(found[count][kind]) == len(names) for kind in cold):
-            solved = [
-                f"{title(kind[1])} on `{kind[0]}` {sum(map(is_solved, found[count][kind]))}" for kind in cold
-            ]
-            parts.append(f"with about {count} pairs of pixels, {', '.join(solved)}")
-    if not parts:
-        return [f"Not measured completely for any number of pairs: {len(rows)} of {plan.size} runs are done."]
-    return [
-        (
-            f"In {plan.limit:g} s on one thread, from a cold start, these solvers prove so many of "
-            f"{len(names)} instances: {'; '.join(parts)}."
-        ),
-        "`prove` uses the structure of the problem.",
-    ]
+            solved = [f"{title(kind[1])} on `{kind[0]}` {counted(found[count][kind])}" for kind in cold]
+            sentences.append(
+                f"In {plan.limit:g} s on one thread, from a cold start, solvers prove these optima of "
+                f"instances with about {count} pairs of pixels: {', '.join(solved)}."
+            )
+    unfinished = f"{len(rows)} of {plan.size} planned runs are done, and no number of pairs is complete."
+    return sentences or [f"The measurement is under way: {unfinished}"]
 
 
 def tables(rows: list[Row], plan: Plan) -> dict[str, Table]:

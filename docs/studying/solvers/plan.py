@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import os
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import crossfield as cf
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
+
+from ..rows import DATA as FOLDER
+from ..rows import Keyed, Row, Rows
 
 INSTANCES: Final[dict[int, tuple[str, ...]]] = {
     25: (
@@ -50,11 +50,11 @@ LONG_ONES: Final = ("mouse 11", "curved 9 7011")
 TURNED: Final = tuple(names[place] for names in INSTANCES.values() for place in (0, 3))
 BEST: Final = 3
 """Number of pairs that also get the turned instances."""
-DATA: Final = Path(__file__).resolve().parents[1] / "data" / "solvers.csv"
+DATA: Final = FOLDER / "solvers.csv"
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Keyed):
     """One run. formulation: for `prove`, one that has the same optimum. turns: quarters, of the sketch."""
 
     instance: str
@@ -127,52 +127,16 @@ FOUND: Final = (
     "pairs", "integers", "columns", "version", "status", "objective", "bound", "root_bound", "cpu", "wall",
     "nodes", "integral", "beside", "machine", "note",
 )  # fmt: skip
-COLUMNS: Final = ASKED + FOUND
 WORDS: Final = frozenset(
     {"instance", "formulation", "solver", "start", "version", "status", "machine", "note"}
 )
-Row = dict[str, Any]
 
 
-def key(row: Row) -> Run:
+def table(path: Path = DATA) -> Rows:
+    """The rows of a file."""
+    return Rows(path, ASKED, FOUND, frozenset(ASKED + FOUND) - WORDS)
+
+
+def run_of(row: Row) -> Run:
     """The run of a row."""
     return Run(**{name: row[name] for name in ASKED})
-
-
-def read(path: Path = DATA) -> list[Row]:
-    """The rows of a file; what a kill left of a last line is no row."""
-    if not path.exists():
-        return []
-    whole = path.read_text().rpartition("\n")[0]
-    return [typed(row) for row in csv.DictReader(io.StringIO(whole))]
-
-
-def typed(row: dict[str, str]) -> Row:
-    """A row with its numbers as numbers, None for an empty cell."""
-    found: Row = {
-        name: text if name in WORDS else float(text) if text else None for name, text in row.items()
-    }
-    return found | {"turns": int(row["turns"])}
-
-
-def append(path: Path, run: Run, found: Row) -> Row:
-    """Add the row of a run to a file, and return it; it is on the disk afterwards."""
-    cells = [*map(_text, astuple(run)), *(_text(found.get(name)) for name in FOUND)]
-    lines = io.StringIO()
-    writer = csv.writer(lines, lineterminator="\n")
-    if not path.exists():
-        writer.writerow(COLUMNS)
-    writer.writerow(cells)
-    with path.open("a+b") as file:
-        whole = path.read_bytes().rfind(b"\n") + 1
-        file.truncate(whole)
-        file.write(lines.getvalue().encode())
-        file.flush()
-        os.fsync(file.fileno())
-    return typed(dict(zip(COLUMNS, cells, strict=True)))
-
-
-def _text(value: Any) -> str:
-    if value is None:
-        return ""
-    return f"{value:.10g}" if isinstance(value, float) else " ".join(str(value).split())

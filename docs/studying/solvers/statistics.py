@@ -8,8 +8,9 @@ from typing import Final
 
 import numpy as np
 
+from ..rows import Row
 from .logs import Step
-from .plan import BEST, LIMIT, PAIRS, Row
+from .plan import BEST, LIMIT, PAIRS
 
 GAP: Final = 1e-6
 """Gap, relative to 1 or the objective if that is more, that all solvers are asked for and that is proven."""
