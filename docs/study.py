@@ -1,29 +1,22 @@
-"""Measure methods and formulations, and make docs/evidence.md: `python docs/study.py --page`.
+"""Measure methods, and make docs/evidence.md: `python docs/study.py --page`.
 
     python docs/study.py [--jobs N | --scheduler ADDRESS] [--parts PART ...] [--sketches FOLDER]
     python docs/study.py --quick --data FOLDER
     python docs/study.py --plan | --page
 
 Without options it does all runs that have no row yet in docs/studying/data, then makes the page. After an
-interruption, the same command continues. --quick does the same in two minutes, small, in another folder.
+interruption, the same command continues. --quick does the same in a minute, small, in another folder.
 --plan counts the runs and their seconds. With --scheduler, dask workers do the runs: scheduler and workers
-have the folder docs on their PYTHONPATH, and OPENBLAS_NUM_THREADS=1. Runs of a solver that is not installed
-wait for a machine with it.
+have the folder docs on their PYTHONPATH, and OPENBLAS_NUM_THREADS=1.
 
 The plan (studying/plan.py), every run on one thread:
 
-    proofs    30 instances on each of the rungs 4, 6, 8, 12, 16, 24: `prove` in both norms, at most 20 s, and
-              the best angles for the jumps of the greedy field; the reference for all other runs
-    solvers   the same instances: nine formulations x each solver that takes them, cold, 6 s each;
-              20 variants: from the greedy field, with the printed facet, with the windows of a proof. A pair
-              that proves fewer than a tenth of a rung is not run on the next one, and a row states this
     quality   drawings without one of their curves, surfaces with known answers, sizes 24 and 32: fields of
               many energies, both norms, several weights; the error and the gap to the best
     practice  drawings at 24, 48, 128, 256, whole and without their three longest curves: eight ways to a
               field, 1 s or 10 s for those with a limit
 
-18,400 runs, 28 hours on one core if each took all of its time. Solvers end early on small rungs, and the rule
-skips most runs of the large ones: some 10 hours on one core, 5 on two.
+docs/solver_study.py measures the solvers, and docs/fields.py drawings by others, for the same page.
 """
 
 from __future__ import annotations
@@ -56,8 +49,8 @@ def overview(plan: Plan, folder: Path | None) -> str:
 
 def main() -> None:
     """Do the remaining runs of the plan, and make the page."""
-    parser = argparse.ArgumentParser(description="Measure methods and formulations; make docs/evidence.md.")
-    parser.add_argument("--quick", action="store_true", help="a small plan of two minutes; give --data too")
+    parser = argparse.ArgumentParser(description="Measure methods; make docs/evidence.md.")
+    parser.add_argument("--quick", action="store_true", help="a small plan of a minute; give --data too")
     parser.add_argument("--plan", action="store_true", help="only print the runs and their seconds")
     parser.add_argument("--page", action="store_true", help="only make the page from the rows")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the rows")

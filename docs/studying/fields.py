@@ -22,8 +22,7 @@ from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.smooth.polyvector import HOLDS
 
 from .instances import curves, drawing, noisy
-from .rows import Run
-from .solving import FAILED, energies, sizes
+from .rows import FAILED, Run
 
 MOST_CURVES: Final = 8
 """Number of curves of a drawing that are hidden in turn, the longest ones."""
@@ -59,6 +58,16 @@ def error(run: Run, field: CrossField, folder: Path | None) -> float | None:
         truth = surface(run.instance, run.size)
         return float(np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean())
     return None if run.hidden < 0 else float(np.degrees(hidden(run, folder).deviation(field)))
+
+
+def sizes(instance: Instance) -> dict[str, int]:
+    """Numbers of pixels and pairs of an instance."""
+    return {"pixels": instance.grid.size, "pairs": len(instance.grid.first)}
+
+
+def energies(field: CrossField) -> dict[str, float]:
+    """The energies of a field in both norms."""
+    return {"energy_2": field.energy(2).total, "energy_1": field.energy(1).total}
 
 
 def fielded(run: Run, folder: Path | None) -> dict[str, Any]:

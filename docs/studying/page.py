@@ -10,48 +10,51 @@ import numpy as np
 from crossfield.export.solvers_table import PROGRAMS
 from make import generated, markdown
 
-from . import errors, fields_page, practice_page, quality_page, solver_page
+from . import errors, fields_page, practice_page, quality_page
+from .errors import percent
 from .instances import surfaces
-from .plan import FULL, Plan, stages
-from .rows import EVERY, NOT_RUN, PARTS, Row, Table, key_of
+from .plan import Plan, stages
+from .rows import PARTS, Row, Table, key_of
 from .rows import read as read_rows
-from .solver_page import percent
+from .solvers import page as solvers_page
+from .solvers.plan import DATA as SOLVER_ROWS
+from .solvers.plan import FULL
+from .solvers.plan import table as solvers_table
 
 Kept = dict[str, list[Row]]
+SOLVERS: Final = SOLVER_ROWS.stem
 TEMPLATE: Final = Path(__file__).with_name("evidence.template")
 COMMAND: Final = "python docs/study.py --page"
 MADE_BY: Final = {
     **dict.fromkeys(PARTS, "python docs/study.py"),
     "fields": "python docs/fields.py hidden missed surface --sketches FOLDER",
+    SOLVERS: "python docs/solver_study.py",
 }
 
 
 def read(data: Path) -> Kept:
     """The rows of all parts."""
     files = {part: data / f"{part}.csv" for part in PARTS}
-    return {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
+    kept = {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
+    return kept | {SOLVERS: solvers_table(data / SOLVER_ROWS.name).rows}
 
 
 def ordered(kept: Kept, plan: Plan) -> Kept:
     """The rows in the order of the plan, which colours and lines of tables follow; others come last."""
     place = {run.key: number for number, run in enumerate(r for s in stages(plan, None) for r in s.runs)}
     return {
-        part: sorted(rows, key=lambda row: place.get(key_of(row), len(place))) for part, rows in kept.items()
+        part: sorted(rows, key=lambda row: place.get(key_of(row), len(place))) if part in PARTS else rows
+        for part, rows in kept.items()
     }
 
 
 def completeness(kept: Kept, plan: Plan) -> str:
     """Sentence on the completed share of the plan."""
     planned = [run for stage in stages(plan, None) for run in stage.runs]
-    done = {key_of(row) for rows in kept.values() for row in rows}
-    skipped = {key_of(row) for row in kept["solvers"] if row["status"] == NOT_RUN}
+    done = {key_of(row) for part in PARTS for row in kept[part]}
     have = sum(run.key in done for run in planned)
-    left_out = sum((run.key[0], EVERY, *run.key[2:]) in skipped and run.key not in done for run in planned)
-    rest = len(planned) - have - left_out
-    text = (
-        f"The study planned {len(planned):,} runs: {have:,} are done and {left_out:,} were left out by the "
-        "rule in the appendix"
-    )
+    rest = len(planned) - have
+    text = f"{have:,} of the {len(planned):,} planned runs on fields are done"
     return f"{text}." if not rest else f"{text}; **{rest:,} are still missing**."
 
 
@@ -60,7 +63,7 @@ def findings(kept: Kept) -> dict[str, list[str]]:
     return {
         "Which method has the smallest error?": [by_others(), *practice_page.recommendation(kept)],
         "Do lower energies give better fields?": matters(kept),
-        "Can solvers prove optima?": solvable(kept),
+        "Can solvers prove optima?": solvers_page.answer(kept[SOLVERS], FULL),
     }
 
 
@@ -84,26 +87,6 @@ def by_others() -> str:
         f"hidden curves, compared with `polyvector`, by {', '.join(parts)}; {beyond} exceeds two standard "
         "errors."
     )
-
-
-def solvable(kept: Kept) -> list[str]:
-    """Answer on the reach of solvers, and of `prove`."""
-    found = solver_page.reach_of(kept)
-    own = solver_page.proof_rungs(kept["proofs"], 2)
-    if not own:
-        return ["Not measured yet."]
-    if found is None:
-        reach = "no pair of formulation and solver proves half of the instances of any size"
-    else:
-        reach = (
-            f"the best pair of formulation and solver ({solver_page.label(found[1])}) proves half of the "
-            f"instances up to {found[0]} pixels per side"
-        )
-    ours = [f"{own[size].proven} of {len(own[size].runs)} at {size} pixels" for size in sorted(own)[-2:]]
-    return [
-        f"In {FULL.limit:g} s per run, on one thread, from a cold start and with free editions, {reach}.",
-        f"`prove`, which uses the structure of the problem, proves {' and '.join(ours)}.",
-    ]
 
 
 def matters(kept: Kept) -> list[str]:
@@ -131,7 +114,7 @@ def matters(kept: Kept) -> list[str]:
 def threats(kept: Kept) -> dict[str, Any]:
     """Numbers of drawings and surfaces, editions, and machine."""
     free = [f"{p.title}: {p.free}" for p in PROGRAMS.values() if p.free]
-    rows = [row for part in kept.values() for row in part if row["machine"]]
+    rows = [row for part in PARTS for row in kept[part] if row["machine"]]
     machines = ", ".join(sorted({row["machine"] for row in rows}))
     loads = [row["load"] for row in rows] or [0.0]
     fields = [row for part in ("quality", "practice") for row in kept[part]]
@@ -151,16 +134,14 @@ def threats(kept: Kept) -> dict[str, Any]:
 def tables(kept: Kept) -> dict[str, Table]:
     """All tables by name; kept: in the order of the plan."""
     found = fields_page.tables()
-    for part in (solver_page, quality_page, practice_page):
+    for part in (quality_page, practice_page):
         found |= part.tables(kept)
-    return found
+    return found | solvers_page.tables(kept[SOLVERS], FULL)
 
 
 def page(kept: Kept, plan: Plan) -> str:
     """The text of the page; kept: in the order of the plan."""
     found = tables(kept)
-    heads, lines = found["variants"]
-    found["variants"] = heads[2:], [line[2:] for line in lines if line[0] == solver_page.ALL]
     counts = {part: len(rows) for part, rows in kept.items()} | {"fields": len(fields_page.read())}
     files = [f"| `{name}.csv` | {count:,} | `{MADE_BY[name]}` |" for name, count in counts.items()]
     return TEMPLATE.read_text(encoding="utf-8").format(
@@ -170,18 +151,18 @@ def page(kept: Kept, plan: Plan) -> str:
         missed=fields_page.missed_sentence(),
         files="\n".join(files),
         **fields_page.counts(),
-        **solver_page.sentences(kept),
+        **solvers_page.sentences(kept[SOLVERS], FULL),
         **quality_page.sentences(kept),
         **practice_page.sentences(kept),
         **threats(kept),
-        **{name: markdown(*table) for name, table in found.items()},
+        **{name: markdown(*table) if table[1] else "Not measured yet." for name, table in found.items()},
     )
 
 
 def write_page(data: Path, target: Path, plan: Plan) -> None:
     """Make evidence.md in a folder, its tables in `evidence` and its plots in `pictures` there."""
     kept = ordered(read(data), plan)
-    for part in (solver_page, quality_page, practice_page):
+    for part in (quality_page, practice_page):
         part.draw(kept, target / "pictures")
     (target / "evidence").mkdir(exist_ok=True)
     for name, (heads, lines) in tables(kept).items():

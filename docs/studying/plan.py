@@ -10,21 +10,9 @@ from typing import Final
 from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 
 from .fields import MOST_CURVES, PERTURBED, PLAIN, SHARES
-from .instances import curves, drawings, rung, surfaces
-from .rows import Run
-from .solving import ANGLES, PROOF, PROOF_SECONDS, pairs
+from .instances import curves, drawings, surfaces
+from .rows import PROOF, Run
 
-FEWEST_PROVEN: Final = 0.1
-"""Share of a rung that a pair has to prove to be run on the next one."""
-VARIANTS: Final = (
-    *(("milp-mccormick", solver, {"start": "greedy"}) for solver in ("highs", "scip", "cplex", "xpress")),
-    *(("miqp-exact", solver, {"start": "greedy"}) for solver in ("scip", "cplex", "bonmin", "gurobi")),
-    *(("milp-mccormick", solver, {"facet": "printed"}) for solver in ("highs", "scip", "cplex", "xpress")),
-    *(("miqp-mccormick", solver, {"facet": "printed"}) for solver in ("scip", "cplex")),
-    *(("miqp-exact", solver, {"windows": "proof"}) for solver in ("scip", "cplex", "bonmin", "gurobi")),
-    *(("minlp-cubic", solver, {"windows": "proof"}) for solver in ("scip", "gurobi")),
-)
-"""Variants in addition to the cold runs: formulation, solver, and the difference."""
 WEIGHTS: Final = (1.0, 5.0, 80.0)
 """Weights of the strokes, besides the default."""
 SKEWS: Final = (1e-4, 1e-2, 1.0)
@@ -42,10 +30,6 @@ METHODS_TIMED: Final = ("search", "two-stage", "prove")
 class Plan:
     """Extent of the study: sizes, and numbers of everything; seconds of a run by part."""
 
-    rungs: tuple[int, ...] = (4, 6, 8, 12, 16, 24)
-    instances: int = 30
-    limit: float = 6.0
-    proof: float = PROOF_SECONDS
     quality: tuple[int, ...] = (24, 32)
     quality_limit: float = 10.0
     practice: tuple[int, ...] = (24, 48, 128, 256)
@@ -58,60 +42,29 @@ class Plan:
 
 FULL: Final = Plan()
 QUICK: Final = Plan(
-    rungs=(4,), instances=2, limit=1.0, proof=5.0, quality=(16,), quality_limit=2.0, practice=(16, 24),
+    quality=(16,), quality_limit=2.0, practice=(16, 24),
     practice_limit=2.0, quick_search=0.5, hidden=1, curves=1, most=1,
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Stage:
-    """Runs that may be done in any order; after: the rung whose proofs decide which are run, 0 for none."""
+    """Runs that may be done in any order."""
 
     name: str
     runs: tuple[Run, ...]
-    after: int = 0
 
 
 def stages(plan: Plan, folder: Path | None) -> Iterator[Stage]:
-    """The whole plan: proofs first, small rungs before large ones, parts in turn; variants a rung later."""
-    rungs, practice, quality = (dict(enumerate(each)) for each in (plan.rungs, plan.practice, plan.quality))
-    for number in range(max(len(rungs) + 1, len(practice), len(quality))):
-        before = rungs.get(number - 1, 0)
-        if number in rungs:
-            size = rungs[number]
-            yield Stage(f"proofs {size}", tuple(proofs(plan, size)))
-            yield Stage(f"solvers {size}", tuple(cold(plan, size)), before)
+    """The whole plan: small sizes before large ones, parts in turn."""
+    practice, quality = (dict(enumerate(each)) for each in (plan.practice, plan.quality))
+    for number in range(max(len(practice), len(quality))):
         if number in practice:
             yield Stage(f"practice {practice[number]}", tuple(ways(plan, practice[number], folder)))
         if number in quality:
             yield Stage(f"quality {quality[number]}", tuple(qualities(plan, quality[number], folder)))
         if number == 1:
             yield Stage("weights", tuple(weights(plan, plan.quality[0], folder)))
-        if before:
-            yield Stage(f"variants {before}", tuple(variants(plan, before)), rungs.get(number - 2, 0))
-
-
-def proofs(plan: Plan, size: int) -> Iterator[Run]:
-    """The optima of a rung, in both norms and for the jumps of greedy fields."""
-    for name in rung(size)[: plan.instances]:
-        for norm in (2, 1):
-            yield Run("proofs", name, size, PROOF, norm=norm, limit=plan.proof)
-        yield Run("proofs", name, size, ANGLES)
-
-
-def cold(plan: Plan, size: int) -> Iterator[Run]:
-    """Every pair of formulation and solver on a rung, instance by instance."""
-    for name in rung(size)[: plan.instances]:
-        for formulation, solver in pairs():
-            yield Run("solvers", name, size, formulation, solver, limit=plan.limit)
-
-
-def variants(plan: Plan, size: int) -> Iterator[Run]:
-    """The variants on a rung, instance by instance, so that a certificate serves all of them."""
-    for name in rung(size)[: plan.instances]:
-        for formulation, solver, options in VARIANTS:
-            if (formulation, solver) in pairs():
-                yield Run("solvers", name, size, formulation, solver, limit=plan.limit, **options)
 
 
 def ways(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:

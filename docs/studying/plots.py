@@ -21,8 +21,6 @@ INK: Final = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", 
 """The palette of Okabe and Ito, without yellow, which is illegible on white paper."""
 MARKS: Final = ("o", "s", "^", "D", "v", "P", "X", "*", "h")
 DASHES: Final = ("-", "--", ":", "-.")
-OURS: Final = "crossfield prove"
-"""Beginnings of the names of lines that are drawn thicker."""
 _STYLE: Final = {
     "svg.fonttype": "path",
     "font.size": 9,
@@ -58,48 +56,6 @@ def styles(names: list[str]) -> dict[str, dict[str, Any]]:
         name: {"color": ink, "marker": mark, "linestyle": dash, "markersize": 5, "linewidth": 1.6}
         for name, (ink, mark, dash) in zip(names, looks, strict=False)
     }
-
-
-def _thick(name: str) -> dict[str, float]:
-    return {"linewidth": 2.6} if name.startswith(OURS) else {}
-
-
-def profiles(path: Path, panels: dict[str, dict[str, Any]]) -> None:
-    """Performance profiles: for each panel, the sorted ratios of every line."""
-    with drawn(path, len(panels), high=4.9) as axes:
-        for axis, (title, lines) in zip(axes, panels.items(), strict=True):
-            looks = styles(list(lines))
-            top = max((r[np.isfinite(r)].max(initial=1.0) for r in lines.values()), default=1.0) * 1.3
-            for name, ratios in lines.items():
-                solved = ratios[np.isfinite(ratios)]
-                x = np.concatenate([[1.0], solved, [top]])
-                y = np.concatenate([[(solved <= 1).sum()], np.arange(1, len(solved) + 1), [len(solved)]])
-                look = looks[name] | {"markevery": 0.18, "markersize": 4}
-                look |= _thick(name)
-                axis.step(x, 100 * y / max(len(ratios), 1), where="post", label=name, **look)
-            axis.set(title=title, xscale="log", xlim=(1, top), ylim=(-2, 102))
-            axis.set_xlabel("seconds, as a multiple of the quickest")
-            axis.xaxis.set_major_formatter("{x:g}")
-            axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncol=1)
-        axes[0].set_ylabel("instances proven, %")
-
-
-def growth(path: Path, rungs: list[int], share: dict[str, Line], seconds: dict[str, Line]) -> None:
-    """Share that is proven, and seconds, by size; a line for each formulation at its best solver."""
-    with drawn(path, 2, high=3.8) as (left, right):
-        looks = styles(list(share))
-        for name, (x, y) in share.items():
-            left.plot(x, y, label=name, **looks[name] | _thick(name))
-        for name, (x, y) in seconds.items():
-            right.plot(x, y, label=name, **looks[name] | _thick(name))
-        for axis in (left, right):
-            axis.set(xscale="log", xlabel="pixels of the longer side")
-            axis.set_xticks(rungs, [str(rung) for rung in rungs])
-            axis.minorticks_off()
-        left.set(ylabel="instances proven, %", ylim=(-3, 103))
-        right.set(ylabel="seconds, shifted geometric mean", yscale="log")
-        right.yaxis.set_major_formatter("{x:g}")
-        right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:

@@ -12,9 +12,8 @@ import numpy as np
 from crossfield.models.evaluation.hidden import Summary
 
 from . import errors, plots
-from .rows import Row, Table
-from .solver_page import percent
-from .solving import FAILED
+from .errors import percent
+from .rows import FAILED, Row, Table
 
 Kept = dict[str, list[Row]]
 QUICK: Final = 1.0

@@ -9,9 +9,8 @@ import numpy as np
 from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 
 from . import errors, plots
-from .errors import Change, Kind, change, is_default, is_surface, usable
+from .errors import Change, Kind, change, is_default, is_surface, percent, usable
 from .rows import Row, Table
-from .solver_page import percent
 
 Kept = dict[str, list[Row]]
 

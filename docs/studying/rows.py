@@ -14,32 +14,34 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
-PARTS: Final = ("proofs", "solvers", "quality", "practice")
+PARTS: Final = ("quality", "practice")
 """One file each."""
-NOT_RUN: Final = "not run"
-"""Status of a row about all runs of a rung that a rule skips."""
-EVERY: Final = "*"
-"""The instance of such a row."""
+FAILED: Final = "failed"
+PROOF: Final = "prove"
+
+
+class Keyed:
+    """A dataclass of what identifies a run."""
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Its values as text."""
+        return tuple(text(getattr(self, each.name)) for each in fields(self))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Keyed):
     """One run: one field from one instance.
 
     instance: its name (studying/instances.py). hidden: number of the hidden curve, -1 for none. noise:
-    standard deviation in degrees of the noise on each stroke. way: formulation, or method. start: `cold`
-    or `greedy`. facet: `hull` or `printed`. windows: `gauge`, or `proof` for the windows of a certificate.
-    norm: of the energy, if the way has a choice. limit: seconds.
+    standard deviation in degrees of the noise on each stroke. way: the method. norm: of the energy, if the
+    way has a choice. limit: seconds.
     """
 
     part: str
     instance: str
     size: int
     way: str
-    solver: str = ""
-    start: str = "cold"
-    facet: str = "hull"
-    windows: str = "gauge"
     norm: int = 2
     w_strokes: float = 1.0
     w_beta: float = 1e-6
@@ -48,25 +50,20 @@ class Run:
     limit: float = 0.0
     seed: int = 0
 
-    @property
-    def key(self) -> tuple[str, ...]:
-        """The fields that identify the run, as text."""
-        return tuple(text(getattr(self, field.name)) for field in fields(self))
-
 
 ASKED: Final = tuple(field.name for field in fields(Run))
 FOUND: Final = (
-    "version", "format", "status", "objective", "bound", "energy_2", "energy_1", "violation", "error",
-    "off", "seconds", "nodes", "pixels", "pairs", "columns", "rows", "note", "machine", "load",
+    "version", "status", "objective", "bound", "energy_2", "energy_1", "error", "off", "seconds", "pixels",
+    "pairs", "note", "machine", "load",
 )  # fmt: skip
 """Results of a run. error: degrees to the hidden curve or the true field; off: to the strokes shown."""
 COLUMNS: Final = ASKED + FOUND
 NUMBERS: Final = frozenset(
     {"size", "norm", "w_strokes", "w_beta", "hidden", "noise", "limit", "seed", "objective", "bound"}
-    | {"energy_2", "energy_1", "violation", "error", "off", "seconds", "nodes", "pixels", "pairs"}
-    | {"columns", "rows", "load"}
+    | {"energy_2", "energy_1", "error", "off", "seconds", "pixels", "pairs", "load"}
 )
 Row = dict[str, Any]
+Names = tuple[str, ...]
 Table = tuple[tuple[str, ...], list[list[str]]]
 """Heads and cells of a table."""
 DATA: Final = Path(__file__).resolve().parent / "data"
@@ -87,14 +84,16 @@ def number(given: str) -> float | None:
 class Rows:
     """The rows of a part, in a file that grows by whole lines."""
 
-    def __init__(self, path: Path) -> None:
-        """Read the file, after cutting off an incomplete line."""
-        self._path = path
+    def __init__(
+        self, path: Path, asked: Names = ASKED, found: Names = FOUND, numbers: frozenset[str] = NUMBERS
+    ) -> None:
+        """Read the file, after cutting off an incomplete line. The names are of its columns."""
+        self._path, self._asked, self._found, self._numbers = path, asked, found, numbers
         self.rows: list[Row] = []
         if path.exists():
             self._mend()
-            self.rows = list(read(path))
-        self.done = {key_of(row) for row in self.rows}
+            self.rows = list(read(path, asked + found, numbers))
+        self.done = {key_of(row, asked) for row in self.rows}
 
     def _mend(self) -> None:
         data = self._path.read_bytes()
@@ -103,18 +102,19 @@ class Rows:
             with self._path.open("r+b") as file:
                 file.truncate(whole)
 
-    def append(self, run: Run, found: dict[str, Any]) -> None:
+    def append(self, run: Keyed, found: dict[str, Any]) -> None:
         """Add the row of a run; it is on the disk afterwards."""
         if run.key in self.done:
             raise ValueError(f"{run} has a row already")
         fresh = not self._path.exists() or not self._path.stat().st_size
-        line = [text(getattr(run, name)) for name in ASKED] + [text(found.get(name)) for name in FOUND]
+        columns = self._asked + self._found
+        line = [*run.key, *(text(found.get(name)) for name in self._found)]
         with self._path.open("a", newline="", encoding="utf-8") as file:
-            file.write((_line(COLUMNS) if fresh else "") + _line(line))
+            file.write((_line(columns) if fresh else "") + _line(line))
             file.flush()
             os.fsync(file.fileno())
         self.done.add(run.key)
-        self.rows.append(typed(dict(zip(COLUMNS, line, strict=True))))
+        self.rows.append(typed(dict(zip(columns, line, strict=True)), self._numbers))
 
 
 def _line(cells: tuple[str, ...] | list[str]) -> str:
@@ -123,24 +123,24 @@ def _line(cells: tuple[str, ...] | list[str]) -> str:
     return buffer.getvalue()
 
 
-def read(path: Path) -> Iterator[Row]:
+def read(path: Path, columns: Names = COLUMNS, numbers: frozenset[str] = NUMBERS) -> Iterator[Row]:
     """The rows of a file, with numbers as numbers; a last line without an end is ignored."""
     whole = path.read_bytes().rpartition(b"\n")[0].decode()
-    head, *lines = csv.reader(io.StringIO(whole, newline="")) if whole else [COLUMNS]
-    if tuple(head) != COLUMNS:
+    head, *lines = csv.reader(io.StringIO(whole, newline="")) if whole else [columns]
+    if tuple(head) != columns:
         raise ValueError(f"{path.name} has other columns than this study; move it away")
     for line in lines:
-        yield typed(dict(zip(COLUMNS, line, strict=True)))
+        yield typed(dict(zip(columns, line, strict=True)), numbers)
 
 
-def typed(given: dict[str, str]) -> Row:
+def typed(given: dict[str, str], numbers: frozenset[str]) -> Row:
     """A row with its numbers as numbers."""
-    return {name: number(value) if name in NUMBERS else value for name, value in given.items()}
+    return {name: number(value) if name in numbers else value for name, value in given.items()}
 
 
-def key_of(row: Row) -> tuple[str, ...]:
+def key_of(row: Row, asked: Names = ASKED) -> tuple[str, ...]:
     """The key of the run of a row."""
-    return tuple(text(row[name]) for name in ASKED)
+    return tuple(text(row[name]) for name in asked)
 
 
 def tables(folder: Path) -> dict[str, Rows]:
