@@ -91,7 +91,8 @@ class Study:
     def _measured(self, run: Run, core: int) -> Row:
         command = [sys.executable, __file__, "--data", str(self.data)]
         command += ["--quick"] * (self.plan is QUICK) + ["--one", json.dumps(asdict(run))]
-        left = self.end + _GRACE - time.monotonic()
+        # A run that has begun may reach its limit, or none of the longest would ever end in a short session.
+        left = max(self.end - time.monotonic(), run.limit + _GRACE) + _GRACE
         done = subprocess.run([*command, str(core), f"{left:.1f}"], check=False, **_CAPTURED)
         if not done.returncode:
             return dict(json.loads(done.stdout.splitlines()[-1]))
