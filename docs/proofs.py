@@ -34,7 +34,7 @@ from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.work import MOST_LABELS
-from crossfield.models.sketch.samples import SAMPLES
+from crossfield.models.sketch.samples import SAMPLES, sample
 from drawings import PROVERS, Sketch, answered, optimum, sketches, tiny
 from make import generated, markdown
 
@@ -152,7 +152,7 @@ def solvers(request: Request) -> Iterator[tuple[str, Facts]]:
 
 def pictures(request: Request) -> Iterator[tuple[str, Facts]]:
     """The pictures of the crosses left at every level."""
-    proof = prove(Sketch(PICTURED, PICTURED).instance(SIZE), limits=Limits(request.seconds, gap=0))
+    proof = prove(sample(PICTURED, SIZE), limits=Limits(request.seconds, gap=0))
     certificate = write_certificate(proof, request.work / f"{PICTURED}.certificate.npz")
     proof_pictures.maps(proof, certificate.verdict.boxes, DOCS / "pictures" / "proof_levels.png")
     pixels = proof_pictures.strips(proof, DOCS / "pictures" / "proof_strips.png")
