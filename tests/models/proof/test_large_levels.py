@@ -27,12 +27,15 @@ def test_shares_that_are_carried_on_rise_faster():
 
 @pytest.mark.slow
 def test_where_no_finer_level_fits_the_rest_goes_to_the_search(monkeypatch, tmp_path):
-    """The level is raised once more, and its record replaced; the certificate holds all the same."""
+    """The bound rises once more on the labels that are left, and the certificate has one more level."""
     instance = cf.sample("ring", 12)
     monkeypatch.setattr(work, "MOST_LABELS", 40_000)
     proof = cf.prove(instance, jobs=1)
     assert proof.ended == "labels"
-    assert [round(np.pi / 2 / level.h) for level in proof.levels] == [16, 32]
+    assert [round(np.pi / 2 / level.h) for level in proof.levels] == [16, 32, 32]
+    before, last = proof.levels[-2:]
+    assert last.allowed.sum() < before.allowed.sum()
+    assert last.bound > before.bound
     assert proof.energy <= cf.search(instance, rounds=5, jobs=1).field.energy().total + 1e-9
     assert proof.levels[-1].bound == proof.bound
     certificate = write_certificate(proof, tmp_path / "it.npz")
