@@ -692,6 +692,12 @@ def positions(level: Level, sketch: Sketch, i: int) -> tuple[Array, Array]:
     )
 
 
+def kept(level: Level, sketch: Sketch, i: int) -> tuple[Array, Array]:
+    """The alphas and the betas of pixel i that have an allowed label."""
+    alpha, beta = positions(level, sketch, i)
+    return alpha[level.rows[i]], beta[level.columns[i]]
+
+
 def unary(level: Level, sketch: Sketch, i: int) -> tuple[Array, float]:
     """The cost D of each label of pixel i, inf for labels that are not allowed, and the size of its terms."""
     alpha, beta = positions(level, sketch, i)
@@ -750,10 +756,7 @@ class Pair:
     def __init__(self, level: Level, sketch: Sketch, e: int) -> None:
         i, j = int(sketch.first[e]), int(sketch.second[e])
         self.earlier, self.later = ((level.rows[x], level.columns[x]) for x in sorted((i, j)))
-        (alpha_i, beta_i), (alpha_j, beta_j) = (
-            (alpha[level.rows[x]], beta[level.columns[x]])
-            for x, (alpha, beta) in ((x, positions(level, sketch, x)) for x in (i, j))
-        )
+        (alpha_i, beta_i), (alpha_j, beta_j) = kept(level, sketch, i), kept(level, sketch, j)
         tables = level.tables.get(e, np.zeros(level.ranges[[i, j], 1]))[np.ix_(level.rows[i], level.rows[j])]
         span = jumps(alpha_i, alpha_j)
         apart = alpha_i[:, None] - alpha_j[None, :]

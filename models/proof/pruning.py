@@ -89,21 +89,22 @@ def finer(left: RemainingCells) -> Lattice:
     ends[:, 1] += half
     ends[:, 2], ends[:, 3] = np.maximum(ends[:, 2], lowest), np.minimum(ends[:, 3] + half, highest)
     new = replace(lattice, h=h, **ranges(lattice.instance, *ends.T))
-    allowed = new.allowed
-    allowed[:] = False
-    _allow((_rectangles(lattice), left.cells), (_rectangles(new), allowed), 2, 3 + half)
-    allowed |= np.repeat(~reached(lattice.instance), new.count)
-    return new
+    return _covering(left, new, 2, 3 + half)
 
 
 def narrowed(left: RemainingCells) -> Lattice:
     """The vertices of the cells that are left, as a lattice of the same spacing."""
     lattice = left.lattice
     new = replace(lattice, **ranges(lattice.instance, *_ends(lattice, left.cells).T))
-    new.allowed[:] = False
-    side = np.full(len(lattice.count), 2, np.int32)
-    _allow((_rectangles(lattice), left.cells), (_rectangles(new), new.allowed), 1, side)
-    new.allowed[:] |= np.repeat(~reached(lattice.instance), new.count)
+    return _covering(left, new, 1, np.full(len(lattice.count), 2, np.int32))
+
+
+def _covering(left: RemainingCells, new: Lattice, times: int, side: Ints) -> Lattice:
+    """The new lattice with the labels of `_allow` alone, and all labels that no stroke reaches."""
+    allowed = new.allowed
+    allowed[:] = False
+    _allow((_rectangles(left.lattice), left.cells), (_rectangles(new), allowed), times, side)
+    allowed |= np.repeat(~reached(new.instance), new.count)
     return new
 
 

@@ -56,8 +56,7 @@ _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for
 class Entry:
     """The task of an entry: its recipe, and the document and files of its instance.
 
-    records, submitted: of all entries of the instance in the ledger; relatives: all
-    plain entries of the instance.
+    records, submitted: of all entries of the instance in the ledger; relatives: its plain entries.
     """
 
     recipe: EntryRecipe
