@@ -32,9 +32,20 @@ def compiled(work: _Work) -> _Work:
     return made
 
 
+def compiled_in_any_order(work: _Work) -> _Work:
+    """As `compiled`, for a function whose result does not depend on the order of its terms, and without nan."""
+    made = _made(work, {"reassoc", "nnan", "nsz"})
+    _MADE.append(made)
+    return made
+
+
 def compiled_if_needed(work: _Work) -> _Work:
     """As `compiled`, for a function that most work does without, and that nobody waits for in advance."""
-    made: Any = numba.njit(error_model="numpy", nogil=True)(work)
+    return _made(work, False)
+
+
+def _made(work: _Work, fastmath: bool | set[str]) -> _Work:
+    made: Any = numba.njit(error_model="numpy", nogil=True, fastmath=fastmath)(work)
     with suppress(RuntimeError):  # no folder is writable
         made.enable_caching()
     return cast("_Work", made)

@@ -17,7 +17,8 @@ from typing import Final
 import numpy as np
 
 from ..instance.grid import Floats
-from ..processes.compiled import compiled, compiled_if_needed
+from ..processes.compiled import compiled, compiled_if_needed, compiled_in_any_order
+from .lattice import Starts
 from .state import State
 
 _HALF: Final = float(np.pi / 2)
@@ -113,20 +114,24 @@ def product(pair: int, i: int, state: State, out: Floats) -> None:
     given = source.reshape((rows, columns))
     found = out.reshape((state.alpha_count[i], state.beta_count[i]))
     found[:] = np.inf
+    begin, end = np.empty(found.shape[0], np.int64), np.empty(found.shape[0], np.int64)
+    unary = state.unary[state.start[i] : state.start[i + 1]].reshape(found.shape)
+    for row in range(found.shape[0]):
+        begin[row], end[row] = finite_part(unary[row])
     in_alpha = np.empty((found.shape[0], rows))
     in_beta = np.empty((columns, found.shape[1]))
     half = np.empty((rows, found.shape[1]))
-    least, reached = source.min(), np.inf
+    least, reached = least_of(source), np.inf
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
         cheapest = alpha_costs(pair, i, state, odd, in_alpha)
         cheapest += beta_costs(state.beta[i], state.beta[j], state, odd, in_beta)
         if cheapest + least < reached:
             over_beta(given, in_beta, half)
-            lower_by_product(in_alpha, half, found)
-            reached = found.max()
+            reached = lower_by_product(in_alpha, half, found, begin, end)
     if state.power == 2:
-        out -= state.h * state.h
+        for x in range(out.size):
+            out[x] -= state.h * state.h
 
 
 @compiled
@@ -145,17 +150,19 @@ def alpha_costs(pair: int, i: int, state: State, odd: bool, cost: Floats) -> flo
     a = state.alpha[i] - state.alpha[j]
     if odd:
         a += _HALF
+    last = cost.shape[0] - 1
+    of_steps = np.empty(last + cost.shape[1])  # for x - y from the last x to minus the last y
+    for place in range(of_steps.size):
+        away = a + state.h * (last - place)
+        away -= _PI * np.round(away / _PI)
+        of_steps[place] = 2 * sized(away, state.power)
     for x in range(cost.shape[0]):
-        for y in range(cost.shape[1]):
-            away = a + state.h * (x - y)
-            away -= _PI * np.round(away / _PI)
-            cost[x, y] = 2 * sized(away, state.power)
+        copy(of_steps[last - x : last - x + cost.shape[1]], cost[x])
     for place in range(2):
         number = state.clusters.of_pair[pair, place]
         if number >= 0:
             _add_table(number, state.first[pair] == i, state, cost)
-    least: float = cost.min()
-    return least
+    return least_of(cost.reshape(-1))
 
 
 @compiled
@@ -193,35 +200,45 @@ def over_beta(given: Floats, cost: Floats, half: Floats) -> None:
     half[:] = np.inf
     least, sums = np.empty(cost.shape[0]), np.empty(cost.shape[0])
     for y in range(cost.shape[0]):
-        least[y] = cost[y].min()
+        least[y] = least_of(cost[y])
     for row in range(given.shape[0]):
-        for y in range(cost.shape[0]):
-            sums[y] = given[row, y] + least[y]
-        best = np.argmin(sums)
-        if given[row, best] == np.inf:
-            continue
-        _lower(half[row], cost[best], given[row, best])
-        reached = half[row].max()
-        for y in range(given.shape[1]):
-            if given[row, y] + least[y] < reached:
-                _lower(half[row], cost[y], given[row, y])
+        begin, end = finite_part(given[row])
+        if begin < end:
+            _lower_row(half[row], given[row, begin:end], cost[begin:end], 0, least[begin:end], sums)
 
 
 @compiled
-def lower_by_product(left: Floats, right: Floats, out: Floats) -> None:
-    """Lower `out` to the (min,+) product of two matrices, without terms that cannot lower it."""
+def lower_by_product(left: Floats, right: Floats, out: Floats, begin: Starts, end: Starts) -> float:
+    """Lower a part of each row of `out` to the (min,+) product of two matrices; return the greatest left."""
     least, sums = np.empty(right.shape[0]), np.empty(right.shape[0])
     for y in range(right.shape[0]):
-        least[y] = right[y].min()
+        least[y] = least_of(right[y])
+    most = -np.inf
     for row in range(out.shape[0]):
-        for y in range(right.shape[0]):
-            sums[y] = least[y] + left[row, y]
-        best = np.argmin(sums)
-        _lower(out[row], right[best], left[row, best])
-        reached = out[row].max()
-        for y in range(right.shape[0]):
-            if sums[y] < reached:
-                _lower(out[row], right[y], left[row, y])
+        if begin[row] < end[row]:
+            target = out[row, begin[row] : end[row]]
+            _lower_row(target, left[row], right, begin[row], least, sums)
+            most = max(most, _most_of(target))
+    return most
+
+
+@compiled
+def _lower_row(
+    target: Floats, left: Floats, right: Floats, begin: int, least: Floats, sums: Floats
+) -> None:
+    """Lower the target to the least of left[y] + right[y, begin:], without the y that cannot lower it.
+
+    least: for each y, no more than right[y]. sums: room for as many numbers.
+    """
+    lowest = _add_up(left, least, sums)
+    best = 0
+    while sums[best] > lowest:
+        best += 1
+    _lower(target, right[best, begin : begin + target.size], left[best])
+    reached = _most_of(target)
+    for y in range(left.size):
+        if sums[y] < reached and y != best:
+            _lower(target, right[y, begin : begin + target.size], left[y])
 
 
 @compiled_if_needed
@@ -229,11 +246,60 @@ def min_plus(left: Floats, right: Floats) -> Floats:
     """The (min,+) product of two matrices."""
     out = np.empty((left.shape[0], right.shape[1]))
     out[:] = np.inf
-    lower_by_product(left, right, out)
+    lower_by_product(left, right, out, np.zeros(len(out), np.int64), np.full(len(out), out.shape[1]))
     return out
 
 
 @compiled
+def finite_part(values: Floats) -> tuple[int, int]:
+    """The places of the first value below infinity, and after the last one; twice 0 without any."""
+    end = values.size
+    while end > 0 and values[end - 1] == np.inf:
+        end -= 1
+    begin = 0
+    while begin < end and values[begin] == np.inf:
+        begin += 1
+    return begin, end
+
+
+@compiled
+def copy(values: Floats, target: Floats) -> None:
+    """Fill in the target."""
+    for x in range(target.size):
+        target[x] = values[x]
+
+
+# Minima do not depend on the order of their terms; in any order, processors find several at once.
+
+
+@compiled_in_any_order
+def least_of(values: Floats) -> float:
+    """The least value; infinity without any."""
+    least = np.inf
+    for x in range(values.size):
+        least = min(least, values[x])
+    return least
+
+
+@compiled_in_any_order
+def _most_of(values: Floats) -> float:
+    most = -np.inf
+    for x in range(values.size):
+        most = max(most, values[x])
+    return most
+
+
+@compiled_in_any_order
+def _add_up(values: Floats, others: Floats, sums: Floats) -> float:
+    """Fill in the sums of two arrays; return the least."""
+    least = np.inf
+    for x in range(values.size):
+        sums[x] = values[x] + others[x]
+        least = min(least, sums[x])
+    return least
+
+
+@compiled_in_any_order
 def _lower(target: Floats, values: Floats, plus: float) -> None:
     """Lower the target to the values + plus."""
     for x in range(target.size):
