@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..field.field import AbsoluteNorm, CrossField, Norm
+from ..field.jumps import stepped
 from ..instance.angles import wrap
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import HALF, QUARTER, Instance
@@ -170,6 +171,12 @@ class Lattice:
         nearest = np.abs(u - np.pi * turns)
         others = np.minimum(np.where(turns == turn, np.pi - nearest, nearest), np.abs(v))
         return np.minimum((u - np.pi * turn) ** 2 - lost * square, others**2 - square / 2)
+
+
+def labels_at(field: CrossField, lattice: Lattice) -> tuple[Floats, Floats, Ints]:
+    """Angles (n,) and jumps (m,) of a field, with the labels nearest to the centres of a lattice."""
+    steps = np.round((lattice.alpha - field.alpha) / HALF).astype(np.int32)
+    return stepped(lattice.instance.grid, field.alpha, field.beta, field.p, steps)
 
 
 def offsets(grid: Grid) -> Floats:

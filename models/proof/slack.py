@@ -13,15 +13,14 @@ from typing import Final
 import numpy as np
 
 from ..field.field import CrossField
-from ..field.jumps import stepped
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF
 from ..processes.compiled import compiled_if_needed
-from .lattice import Lattice
+from .lattice import Lattice, labels_at
 from .products import all_taken
 from .state import State
 
-_THRESHOLDS: Final = (0.25, 0.75)  # of the rounding on a common lattice
+_THRESHOLDS: Final = (0.25, 0.75)  # of the rounding
 
 
 def quad_slacks(lattice: Lattice, state: State, field: CrossField) -> Floats:
@@ -30,17 +29,12 @@ def quad_slacks(lattice: Lattice, state: State, field: CrossField) -> Floats:
     Pairs count as after a pass, when their least value is 0. Without a label near the field, a slack is 0.
     """
     grid = lattice.instance.grid
-    if lattice.norm == 2:
-        corners = _round_centre(lattice)
-        both = list(product(corners, repeat=2))
-    else:
-        corners = _round_field(lattice, field)
-        both = [(corner, corner) for corner in corners]
+    corners = _corners(lattice, field)
     theta = np.empty_like(state.theta)
     _fill_taken(state, theta)
     least = np.minimum.reduceat(theta, lattice.start[:-1])
     at_pixel = np.mean([theta[lattice.start[:-1] + corner.label] for corner in corners], axis=0) - least
-    at_pair = np.mean([_pairs(lattice, state, x, y) for x, y in both], axis=0) / 2
+    at_pair = np.mean([_pairs(lattice, state, corner) for corner in corners], axis=0) / 2
     for ends in (grid.first, grid.second):
         np.add.at(at_pixel, ends, at_pair)
     bottom, _, top, _ = grid.quads.T
@@ -63,18 +57,11 @@ class _Corner:
         self.beta = lattice.beta + lattice.h * (column + lattice.beta_first + lattice.offset)
 
 
-def _round_centre(lattice: Lattice) -> list[_Corner]:
-    """The labels round the centres, which are the field: on black pixels always the centre itself."""
-    white = (lattice.offset > 0).astype(np.int32)
-    return [_Corner(lattice, k * white, m * white) for k, m in product((0, -1), repeat=2)]
-
-
-def _round_field(lattice: Lattice, field: CrossField) -> list[_Corner]:
+def _corners(lattice: Lattice, field: CrossField) -> list[_Corner]:
     """The labels to which a few thresholds round a field."""
-    grid = lattice.instance.grid
-    steps = np.round((lattice.alpha - field.alpha) / HALF).astype(np.int32)
-    alpha, beta, _ = stepped(grid, field.alpha, field.beta, field.p, steps)
-    k, l = (alpha - lattice.alpha) / lattice.h, beta / lattice.h  # noqa: E741 - the letter of the equation
+    alpha, beta, _ = labels_at(field, lattice)
+    k = (alpha - lattice.alpha) / lattice.h - lattice.offset
+    l = (beta - lattice.beta) / lattice.h - lattice.offset  # noqa: E741 - the letter of the equation
     return [
         _Corner(lattice, np.floor(k + s).astype(np.int32), np.floor(l + t).astype(np.int32))
         for s, t in product(_THRESHOLDS, repeat=2)
@@ -88,24 +75,24 @@ def _fill_taken(state: State, theta: Floats) -> None:
         theta[state.start[i] : state.start[i + 1]] = all_taken(i, state)
 
 
-def _pairs(lattice: Lattice, state: State, x: _Corner, y: _Corner) -> Floats:
-    """The cost of each pair with its tables, less its shares, at a corner of each end; shape (m,)."""
+def _pairs(lattice: Lattice, state: State, corner: _Corner) -> Floats:
+    """The cost of each pair with its tables, less its shares, at a corner of both ends; shape (m,)."""
     i, j = state.first, state.second
-    apart = x.alpha[i] - y.alpha[j]
+    apart = corner.alpha[i] - corner.alpha[j]
     cost = np.full(len(i), np.inf)
     for parity in (0, 1):
         a = apart + HALF * parity
         a -= np.pi * np.round(a / np.pi)
-        b = (1 - 2 * parity) * x.beta[i] - y.beta[j]
+        b = (1 - 2 * parity) * corner.beta[i] - corner.beta[j]
         size = a * a + b * b if lattice.norm == 2 else np.abs(a) + np.abs(b)
         cost = np.minimum(cost, 2 * size)
     cost -= lattice.h**2 if lattice.norm == 2 else 0.0
-    cost -= state.shares_first[state.start_first[:-1] + x.label[i]]
-    cost -= state.shares_second[state.start_second[:-1] + y.label[j]]
+    cost -= state.shares_first[state.start_first[:-1] + corner.label[i]]
+    cost -= state.shares_second[state.start_second[:-1] + corner.label[j]]
     clusters = state.clusters
     for numbers in clusters.of_pair.T:
         at = np.flatnonzero(numbers >= 0)
         wide = lattice.alpha_count[j[at]]
-        place = clusters.start[numbers[at]] + x.row[i[at]] * wide + y.row[j[at]]
+        place = clusters.start[numbers[at]] + corner.row[i[at]] * wide + corner.row[j[at]]
         cost[at] += clusters.tables[place]
     return cost

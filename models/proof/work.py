@@ -2,8 +2,9 @@
 
 Lattice after lattice, each of half the spacing, or of the same spacing with fewer labels. On each level the
 dual rises by passes (models/proof/sweep.py), fields are rounded from it (rounding.py), and what cannot hold
-a better field is dropped (pruning.py), until the jumps are forced (forced.py). A better field becomes the
-centre: the lattices begin anew round it.
+a better field is dropped (pruning.py), until the jumps are forced (forced.py). A better field that is found
+on a coarse lattice becomes the centre: the lattices begin anew round it. On a finer lattice little is lost
+where the centre is another field.
 
 The labels of a level are those that the gap of the level before leaves. While passes close that gap, most of
 them can be dropped, and the work of a pass falls faster than the gap. A record of the level justifies that.
@@ -18,7 +19,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import median
 from typing import ClassVar, Final
 
@@ -36,7 +37,7 @@ from ..search.starts import best_start, polyvector_start
 from .certificate import certificate_effort
 from .clusters import table_sizes
 from .forced import Forced, forced
-from .lattice import Lattice, reached
+from .lattice import Lattice, labels_at, reached
 from .pruning import RemainingCells, count_left, finer, narrowed, prolong, remaining_cells
 from .record import EXACT, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
@@ -63,10 +64,10 @@ _RECORDING: Final = 6  # passes: the last two, the bound of a record and the pru
 _WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
-_MANY: Final = 4  # levels after which the field may cause the rest of the gap
+_MANY: Final = 4  # levels after which the field may cause the rest of the gap, but no longer be the centre
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
-_SEARCH: Final = 0.05  # share of the time for that search
+_SEARCH: Final = 0.1  # share of the time for that search
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 
@@ -215,11 +216,12 @@ class Work:
                 return ended or "time"
             lattice = narrowed(left) if rising and not patient else finer(left)
             self._search_once(lattice)
-            if self.energy(self.best) < self.energy(before) * (1 - _BETTER):
+            better = self.energy(self.best) < self.energy(before) * (1 - _BETTER)
+            if better and len(self.chain.ends) <= _MANY:
                 return self.limits.met()
             if _too_large(dual, lattice) or not self._in_time(dual, lattice):
                 if patient and not rising:
-                    return "labels"
+                    return self.limits.met() if better else "labels"
                 if self._closing(dual)():
                     return self.limits.met() or "time"
                 lattice = narrowed(left)
@@ -347,7 +349,8 @@ class Work:
             chain.bound = max(chain.bound, level.bound)
         if not self.limits.over():
             left = remaining_cells(dual, level.bound, energy)
-            what = self.forced(left)
+            _, _, jumps = labels_at(self.best, left.lattice)
+            what = self.forced(replace(left, lattice=replace(left.lattice, p=jumps)))
             chain.forced = int(what.pairs.sum())
             self._fit(what)
         if chain.bound >= self.proven.bound:
