@@ -13,14 +13,18 @@ from pathlib import Path
 from typing import Final
 
 import crossfield as cf
+import numpy as np
 from crossfield.export.formats.registry import generator
 from crossfield.export.solving.compiling import compile_all, compile_clusters
 from crossfield.export.solving.local import Solvers
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedBySolverError
 from crossfield.models.field.field import Norm
 from crossfield.models.formulations.problem import Problem, tightened
+from crossfield.models.formulations.windows import Windows
+from crossfield.models.instance.instance import Instance
 from crossfield.models.proof.certificate import read_certificate
 from crossfield.models.proof.tightening import windows_left
+from crossfield.models.storage import replacing
 
 from ..rows import Row
 from .logs import progress, root_bound
@@ -158,7 +162,17 @@ def _narrowed(run: Run, problem: Problem, watch: Watch, certificates: Path) -> P
         limits = cf.Limits(run.limit, gap=0)
         proof = cf.prove(problem.instance, norm=_norm(run), limits=limits, jobs=1, stop=watch.over)
         cf.write_certificate(proof, path)
-    return tightened(problem, windows_left(read_certificate(path, on=problem.instance)))
+    return tightened(problem, _windows(path, problem.instance))
+
+
+def _windows(path: Path, instance: Instance) -> Windows:
+    """The windows of a certificate, kept next to it: its check may take longer than a run."""
+    kept = path.with_suffix(".windows.npz")
+    if not kept.exists() or kept.stat().st_mtime < path.stat().st_mtime:
+        with replacing(kept) as file:
+            np.savez(file, **asdict(windows_left(read_certificate(path, on=instance))))
+    with np.load(kept) as found:
+        return Windows(**{name: array if array.ndim else array.item() for name, array in found.items()})
 
 
 def _solved(run: Run, problem: Problem, watch: Watch) -> Row:
