@@ -33,18 +33,18 @@ def compiled(work: _Work) -> _Work:
 
 
 def compiled_in_any_order(work: _Work) -> _Work:
-    """As `compiled`, for a function whose result does not depend on the order of its terms, and without nan."""
-    made = _made(work, {"reassoc", "nnan", "nsz"})
+    """As `compiled`, for a function without nan whose result does not depend on the order of its terms."""
+    made = _made(work, fastmath={"reassoc", "nnan", "nsz"})
     _MADE.append(made)
     return made
 
 
 def compiled_if_needed(work: _Work) -> _Work:
     """As `compiled`, for a function that most work does without, and that nobody waits for in advance."""
-    return _made(work, False)
+    return _made(work, fastmath=False)
 
 
-def _made(work: _Work, fastmath: bool | set[str]) -> _Work:
+def _made(work: _Work, *, fastmath: bool | set[str]) -> _Work:
     made: Any = numba.njit(error_model="numpy", nogil=True, fastmath=fastmath)(work)
     with suppress(RuntimeError):  # no folder is writable
         made.enable_caching()

@@ -12,7 +12,7 @@ renaming them, old files cannot be read.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -198,47 +198,55 @@ def beta_costs(x_first: float, y_first: float, state: State, odd: bool, cost: Fl
 def over_beta(given: Floats, cost: Floats, half: Floats) -> None:
     """Fill in the least over y of given[row, y] + cost[y, x], without the y that cannot attain it."""
     half[:] = np.inf
-    least, sums = np.empty(cost.shape[0]), np.empty(cost.shape[0])
-    for y in range(cost.shape[0]):
-        least[y] = least_of(cost[y])
+    terms = _terms(cost)
     for row in range(given.shape[0]):
         begin, end = finite_part(given[row])
         if begin < end:
-            _lower_row(half[row], given[row, begin:end], cost[begin:end], 0, least[begin:end], sums)
+            _lower_row(half[row], given[row, begin:end], terms, begin, 0)
 
 
 @compiled
 def lower_by_product(left: Floats, right: Floats, out: Floats, begin: Starts, end: Starts) -> float:
     """Lower a part of each row of `out` to the (min,+) product of two matrices; return the greatest left."""
-    least, sums = np.empty(right.shape[0]), np.empty(right.shape[0])
-    for y in range(right.shape[0]):
-        least[y] = least_of(right[y])
+    terms = _terms(right)
     most = -np.inf
     for row in range(out.shape[0]):
         if begin[row] < end[row]:
             target = out[row, begin[row] : end[row]]
-            _lower_row(target, left[row], right, begin[row], least, sums)
+            _lower_row(target, left[row], terms, 0, begin[row])
             most = max(most, _most_of(target))
     return most
 
 
-@compiled
-def _lower_row(
-    target: Floats, left: Floats, right: Floats, begin: int, least: Floats, sums: Floats
-) -> None:
-    """Lower the target to the least of left[y] + right[y, begin:], without the y that cannot lower it.
+class Terms(NamedTuple):
+    """The right matrix of a product, the least value of each of its rows, and room for a sum with each."""
 
-    least: for each y, no more than right[y]. sums: room for as many numbers.
-    """
-    lowest = _add_up(left, least, sums)
+    rows: Floats
+    least: Floats
+    sums: Floats
+
+
+@compiled
+def _terms(rows: Floats) -> Terms:
+    least = np.empty(rows.shape[0])
+    for y in range(least.size):
+        least[y] = least_of(rows[y])
+    return Terms(rows, least, np.empty(least.size))
+
+
+@compiled
+def _lower_row(target: Floats, left: Floats, terms: Terms, first: int, begin: int) -> None:
+    """Lower the target to the least of left[y] + rows[first + y, begin:], without y that cannot lower it."""
+    sums, end = terms.sums, begin + target.size
+    lowest = _add_up(left, terms.least[first : first + left.size], sums)
     best = 0
     while sums[best] > lowest:
         best += 1
-    _lower(target, right[best, begin : begin + target.size], left[best])
+    _lower(target, terms.rows[first + best, begin:end], left[best])
     reached = _most_of(target)
     for y in range(left.size):
         if sums[y] < reached and y != best:
-            _lower(target, right[y, begin : begin + target.size], left[y])
+            _lower(target, terms.rows[first + y, begin:end], left[y])
 
 
 @compiled_if_needed
