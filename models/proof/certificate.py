@@ -92,7 +92,7 @@ class Certificate(Claim):
 
     @property
     def forced(self) -> int:
-        """The number of pairs whose jump equals the centre's in every field that could be better."""
+        """The number of pairs whose jump equals the field's in every field that could be better."""
         return self.verdict.forced
 
 
