@@ -28,13 +28,14 @@ import numpy as np
 from ..field.field import CrossField, Norm, relabelled
 from ..field.jumps import free_jumps
 from ..instance.grid import Floats
-from ..instance.instance import Instance
+from ..instance.instance import QUARTER, Instance
 from ..processes.compiled import Crew
 from ..processes.deadline import Deadline, Over, Progress, never
 from ..search.improvement import improved_field
 from ..search.search import search_patches
 from ..search.starts import best_start, polyvector_start
 from .certificate import certificate_effort
+from .check_certificate import MOST_COUNT
 from .clusters import table_sizes
 from .forced import Forced, forced
 from .lattice import Lattice, labels_at, reached
@@ -65,6 +66,7 @@ _WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
 _MANY: Final = 4  # levels after which the field may cause the rest of the gap, but no longer be the centre
+_NEAR: Final = 0.75  # of the greatest distance from the centre that an alpha can have
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
 _SEARCH: Final = 0.1  # share of the time for that search
@@ -217,7 +219,7 @@ class Work:
             lattice = narrowed(left) if rising and not patient else finer(left)
             self._search_once(lattice)
             better = self.energy(self.best) < self.energy(before) * (1 - _BETTER)
-            if better and len(self.chain.ends) <= _MANY:
+            if better and (len(self.chain.ends) <= _MANY or _at_seam(self.best, lattice)):
                 return self.limits.met()
             if _too_large(dual, lattice) or not self._in_time(dual, lattice):
                 if patient and not rising:
@@ -367,10 +369,16 @@ class Work:
 
 
 def _too_large(dual: Dual, lattice: Lattice) -> bool:
-    """Whether the next level of a dual is beyond what memory, time or the digits of an angle allow."""
+    """Whether the next level of a dual is beyond what memory, time, checker or digits of an angle allow."""
     tables = int(table_sizes(lattice, dual.state.clusters.quads).sum())
     many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
+    many = many or max(lattice.alpha_count.max(), lattice.beta_count.max()) > MOST_COUNT
     return lattice.h < np.pi / 2 / _FINEST or many or lattice.work > _MOST_WORK
+
+
+def _at_seam(field: CrossField, lattice: Lattice) -> bool:
+    """Whether a cross of the field is near both ends of the labels, where no box is small."""
+    return bool(np.abs(labels_at(field, lattice)[0] - lattice.alpha).max() > _NEAR * QUARTER)
 
 
 def _centre(field: CrossField) -> CrossField:
