@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import crossfield as cf
+import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
@@ -130,6 +131,20 @@ def test_an_entry_is_written_in_any_format_that_carries_it(built, tmp_path):
     assert (tmp_path / "mine.mps").read_bytes() == (built.folder / "cf_cyl_n005_milp.mps").read_bytes()
     with pytest.raises(cf.UnsupportedByFormatError):
         cf.entry("cf_cyl_n005_parity").write(tmp_path / "mine.lp")
+
+
+@pytest.mark.slow
+def test_a_proof_finds_no_better_point_than_the_known_one():
+    norms = {"minlp-parity": 2, "miqcp-bilinear": "mixed", "milp-mccormick": 1}
+    large = [
+        each
+        for each in cf.entries(where="rung in ['medium', 'large'] and tightened == False")
+        if each.facts["formulation"] in norms
+    ]
+    for entry in np.random.default_rng(0).choice(large, 4, replace=False):
+        proof = cf.prove(entry.instance, norm=norms[entry.facts["formulation"]], work=3_000_000)
+        assert proof.energy >= entry.objective * (1 - 1e-6), f"{entry.name}: {REMEDY}"
+        assert proof.bound <= entry.objective * (1 + 1e-9)
 
 
 def test_a_filter_and_a_rung_select_entries():
