@@ -69,7 +69,7 @@ _MANY: Final = 4  # levels after which the field may cause the rest of the gap, 
 _NEAR: Final = 0.75  # of the greatest distance from the centre that an alpha can have
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
-_SEARCH: Final = 0.1  # share of the time for that search
+_SEARCH: Final = 0.1  # greatest share of the time for that search, no longer than the proof so far
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 
@@ -239,7 +239,8 @@ class Work:
         costly = len(self.chain.ends) == _MANY or lattice.start[-1] > _LARGE
         if not self.searched and costly:
             self.searched = True
-            self._search(_SEARCH)
+            spent = time.monotonic() - self.began
+            self._search(min(_SEARCH, spent / max(self.limits.deadline.left(), spent)))
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for some passes over the lattice that follows, and for its certificate."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy import sparse
@@ -30,13 +30,10 @@ from ..smooth.systems import one_thread
 from .box_qp import bounds, field_at
 
 if TYPE_CHECKING:
-    import casadi
+    import clarabel
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
-_IPOPT: Final[dict[str, Any]] = {
-    "print_level": 0, "sb": "yes", "tol": 1e-11, "mu_strategy": "adaptive", "hessian_constant": "yes",
-    "jac_d_constant": "yes", "bound_relax_factor": 0.0,
-}  # fmt: skip
+_TOLERANCE: Final = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,74 +111,57 @@ def absolute_fit(
     *,
     tilt: Floats | None = None,
 ) -> AbsoluteFit:
-    """The angles x of least energy at jumps p, less tilt x, with lower <= x <= upper, by HiGHS.
+    """The angles x of least energy at jumps p, less tilt x, with lower <= x <= upper, by Clarabel.
 
-    lower, upper, tilt: shapes (2n,). tilt: None for zeros. Raises CrossfieldError when HiGHS ends without a
-    solution, which a program of this kind has.
+    lower, upper, tilt: shapes (2n,). tilt: None for zeros. Raises CrossfieldError when Clarabel ends without
+    a solution, which a program of this kind has.
     """
     terms, tilt = Residuals.at(instance, p, norm), np.zeros(len(lower)) if tilt is None else tilt
-    x, multipliers = (_quadratic if norm == "mixed" else _linear)(terms, lower, upper, tilt)
+    x, multipliers = _best(terms, lower, upper, tilt)
     multipliers = np.where(terms.squared, multipliers, np.clip(multipliers, -1.0, 1.0))
     multipliers[terms.weight == 0] = 0.0
     return AbsoluteFit(x, multipliers, terms.bound(multipliers, lower, upper, tilt))
 
 
-def _linear(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
-    """The best angles and the multipliers of a linear program."""
-    from scipy.optimize import linprog
+def _best(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+    """The angles and the multipliers that solve the program, with a size t >= |r| for each absolute value."""
+    import clarabel
 
-    rows = terms.matrix.shape[0]
-    both = sparse.eye_array(rows)
-    found = linprog(
-        np.concatenate([-tilt, terms.weight, terms.weight]),
-        A_eq=sparse.hstack([terms.matrix, -both, both], format="csc"),
-        b_eq=-terms.constant,
-        bounds=np.stack([np.pad(lower, (0, 2 * rows)), np.append(upper, [np.inf] * (2 * rows))], axis=1),
-        method="highs",
+    n, given = len(lower), terms.weight > 0
+    rows, squares = np.flatnonzero(given & ~terms.squared), np.flatnonzero(given & terms.squared)
+    m, inside = len(rows), sparse.eye_array(n)
+    matrix, constant, weight = terms.matrix[rows], terms.constant[rows], terms.weight[rows]
+    square, goal, force = terms.matrix[squares], terms.constant[squares], 2 * terms.weight[squares]
+    curved = sparse.block_diag([square.T @ sparse.diags_array(force) @ square, sparse.csr_array((m, m))])
+    size, none = sparse.eye_array(m), sparse.csr_array((n, m))
+    program = clarabel.DefaultSolver(
+        sparse.csc_matrix(sparse.triu(curved)),
+        np.append(square.T @ (force * goal) - tilt, weight),
+        sparse.csc_matrix(
+            sparse.block_array([[matrix, -size], [-matrix, -size], [inside, none], [-inside, none]])
+        ),
+        np.concatenate([-constant, constant, upper, -lower]),
+        [clarabel.NonnegativeConeT(2 * (m + n))],
+        _settings(),
     )
-    if found.x is None:
-        raise CrossfieldError(f"HiGHS found no angles for given jumps: {found.message}")
-    return (
-        np.clip(found.x[: len(lower)], lower, upper),
-        -found.eqlin.marginals / np.maximum(terms.weight, 1e-300),
-    )
-
-
-def _quadratic(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
-    """The best angles and the multipliers of a quadratic program, by Ipopt: some 1e-9 from the optimum."""
-    import casadi
-
-    pairs, rest = np.flatnonzero(~terms.squared), np.flatnonzero(terms.squared)
-    n, m = len(lower), len(pairs)
-    x, size = casadi.MX.sym("x", n), casadi.MX.sym("size", m)
-    r, other = (casadi.mtimes(_sparse(terms.matrix[at]), x) + terms.constant[at] for at in (pairs, rest))
-    cost = casadi.dot(terms.weight[pairs], size) + casadi.dot(terms.weight[rest], other * other)
-    program: dict[str, Any] = {
-        "x": casadi.vertcat(x, size), "f": cost - casadi.dot(tilt, x), "g": casadi.vertcat(size - r, size + r)
-    }  # fmt: skip
-    options: dict[str, Any] = {"print_time": False, "ipopt": _IPOPT}
-    solver = casadi.nlpsol("fit", "ipopt", program, options)
-    free = np.full(m, np.inf)
-    found = solver(
-        x0=np.zeros(n + m), lbg=0.0, ubg=np.inf, lbx=np.append(lower, -free), ubx=np.append(upper, free)
-    )
-    if solver.stats()["return_status"] not in ("Solve_Succeeded", "Solved_To_Acceptable_Level"):
-        raise CrossfieldError(f"Ipopt found no angles for given jumps: {solver.stats()['return_status']}")
-    angles = np.clip(np.array(found["x"]).ravel()[:n], lower, upper)
+    found = program.solve()
+    if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+        raise CrossfieldError(f"Clarabel found no angles for given jumps: {found.status}")
+    angles = np.clip(np.array(found.x)[:n], lower, upper)
+    above, below = np.split(np.array(found.z)[: 2 * m], 2)
     multipliers = 2 * (terms.matrix @ angles + terms.constant)
-    above, below = np.split(np.array(found["lam_g"]).ravel(), 2)
-    multipliers[pairs] = (below - above) / terms.weight[pairs]
+    multipliers[rows] = (above - below) / weight
     return angles, multipliers
 
 
-def _sparse(matrix: sparse.csr_array) -> casadi.DM:
-    """A matrix of CasADi."""
-    import casadi
+def _settings() -> clarabel.DefaultSettings:
+    """One thread, and more digits than usual, for they are the proof's."""
+    import clarabel
 
-    by_column = matrix.tocsc()
-    rows, columns = matrix.shape
-    pattern = casadi.Sparsity(rows, columns, by_column.indptr.tolist(), by_column.indices.tolist())
-    return casadi.DM(pattern, by_column.data)
+    found = clarabel.DefaultSettings()
+    found.verbose, found.max_threads = False, 1
+    found.tol_gap_abs = found.tol_gap_rel = found.tol_feas = _TOLERANCE
+    return found
 
 
 @one_thread()
@@ -189,7 +169,8 @@ def fitted_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, 
     """The field of least energy with the jumps of `field`, and its strokes' multipliers, (s,)."""
     instance, m = field.instance, len(field.p)
     fit = absolute_fit(instance, field.p, norm, *bounds(instance))
-    return field_at(instance, fit.x, field.p), fit.multipliers[2 * m : 2 * m + len(instance.theta)]
+    best = min(field_at(instance, fit.x, field.p), field, key=lambda each: each.energy(norm).total)
+    return best, fit.multipliers[2 * m : 2 * m + len(instance.theta)]
 
 
 @one_thread()
