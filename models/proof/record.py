@@ -60,9 +60,9 @@ class LevelRecord(Lattice):
     energy: float
 
     @classmethod
-    def of(cls, dual: Dual, energy: float) -> Self:
-        """The record of a dual, whose shares and tables are first rounded."""
-        quanta, state = dual.quantise(energy - dual.bound()), dual.state
+    def of(cls, dual: Dual, energy: float, least_gap: float = 0.0) -> Self:
+        """The record of a dual, whose shares and tables are first rounded, as for that gap at least."""
+        quanta, state = dual.quantise(max(energy - dual.bound(), least_gap)), dual.state
         shares = state.shares_first, state.shares_second
         return cls.on(dual.lattice, shares, state.clusters, quanta=quanta, bound=dual.bound(), energy=energy)
 

@@ -67,6 +67,7 @@ _DECIMALS: Final = 7  # of centres, which need few: their last digits differ bet
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
 _MANY: Final = 4  # levels after which the field may cause the rest of the gap, but no longer be the centre
 _NEAR: Final = 0.75  # of the greatest distance from the centre that an alpha can have
+_ROUGH: Final = 1e-5  # gap relative to 1 + energy; a first smaller one is rounded like it: few digits may do
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
 _SEARCH: Final = 0.1  # greatest share of the time for that search, no longer than the proof so far
@@ -345,7 +346,8 @@ class Work:
     def _record(self, dual: Dual) -> RemainingCells | None:
         """Record the level and, in time, prune it; the cells that are left."""
         chain, energy = self.chain, self.energy(self.best)
-        level, left = LevelRecord.of(dual, energy), None
+        rough = _ROUGH * (1 + energy)
+        level, left = LevelRecord.of(dual, energy, rough if energy - chain.bound > rough else 0.0), None
         if level.bound > chain.bound or not self.limits.over():
             chain.levels.append(level)
             chain.efforts.append(certificate_effort(dual.lattice, dual.state.clusters.quads))
