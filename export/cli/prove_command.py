@@ -36,6 +36,7 @@ def prove_command(
     start: options.Start = None,
     time_limit: options.SecondsOfProof = 60.0,
     gap: options.ProofGap = 0.0,
+    scheduler: options.Scheduler = None,
     check: options.Check = None,
     printing: options.PrintOptions,
 ) -> None:
@@ -65,6 +66,7 @@ def prove_command(
             start=read_start(start, instance),
             limits=Limits(time_limit, gap).until(deadline),
             certified=True,
+            scheduler=scheduler,
             progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
         )
         show("writing and checking the certificate")
@@ -74,6 +76,8 @@ def prove_command(
         print_notice("the proof is of the gauge strokes; its bound also holds in the gauge box")
     if proof.ended == "interrupted":
         print_notice("interrupted; the best field and bound so far were kept")
+    if proof.ended == "workers":
+        print_notice("a worker of the scheduler was lost; the best field and bound so far were kept")
     if document["status"] == UNPROVEN:
         from ..solving.proven import NOTHING
 

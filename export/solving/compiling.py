@@ -67,8 +67,8 @@ def is_compiled() -> bool:
 def compile_clusters() -> None:
     """Compile the functions that only proofs with clusters call."""
     from ...models.processes.compiled import crew
+    from ...models.proof.dual import Dual
     from ...models.proof.lattice import Lattice
-    from ...models.proof.sweep import Dual
     from ...models.search.greedy import greedy_field
     from ...models.sketch.samples import sample
 

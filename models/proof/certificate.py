@@ -52,6 +52,7 @@ from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict, Way
 from .clusters import clusters_on, table_sizes, table_work
+from .encoding import messages_of, tables_of
 from .lattice import Lattice
 from .record import Claim, LevelRecord, Proof, Status
 from .state import Indices
@@ -292,7 +293,8 @@ def checking_pace(threads: int) -> float:
     at = Lattice.whole(field, 16)
     shares = [np.zeros(at.share_starts(end)[-1]) for end in (instance.grid.first, instance.grid.second)]
     none = clusters_on(at, np.zeros(0, np.int64))
-    level = LevelRecord.on(at, shares, none, quanta=(1.0, 1.0), bound=0.0, energy=0.0)
+    numbers = messages_of(at, shares, 1.0, slice(0, len(pairs))), tables_of(at, none, 1.0)
+    level = LevelRecord.on(at, numbers, bound=0.0, energy=0.0)
     arrays = _arrays(Proof(field, 0.0, 0.0, "gap", 0, (level,), 0.0, "time"), "gap", 0.0)
     began = time.perf_counter()
     with _quick_way(threads) as way:

@@ -1079,12 +1079,16 @@ class Quadratic:
     def bound(self, x: Array) -> float:
         """A lower bound on the piece: the value at x plus the least change that its gradient allows."""
         value, slope = self.value(x), self.slope(x)
-        sketch, angles = self.sketch, MOST_ANGLE + MOST_JUMP
-        error = PRECISION * ROUNDING * (1 + np.tile(sketch.weight, 2) + sketch.w_beta) * angles
+        sketch, weights = self.sketch, np.tile(self.sketch.weight, 2)
+        size = 1 + float(2 * np.abs(x).max() + np.abs(self.goal).max() + HALF * np.abs(self.p).max(initial=0))
+        error = PRECISION * ROUNDING * (1 + weights + sketch.w_beta) * size
         falls = np.maximum(slope * (x - self.low), slope * (x - self.high))
         falls += error * (np.abs(x - self.low) + np.abs(x - self.high))
-        pairs, strokes = 16.0 * len(self.p), 16.0 * float(np.sum(sketch.weight)) + sketch.w_beta * len(x)
-        return value - math.fsum(falls) - PRECISION * angles * (pairs + strokes)
+        # A residual is wrong by three units of `size` at most, its square by 16 times the residual.
+        a, b, r = (np.abs(each) for each in self._residuals(x))
+        terms = math.fsum([*(a + b), *(sketch.weight * r), *(self.above + self.below)])
+        wrong = 16 * terms + sketch.w_beta * float(np.abs(x).sum()) + value
+        return value - math.fsum(falls) - PRECISION * size * wrong
 
     def least(self, x: Array) -> Array:
         """A point near the minimum of the piece, by Newton steps on the angles that no bound holds.

@@ -107,9 +107,9 @@ def suggested(
         return field
     # Code that Numba compiles is loaded only here: it takes a second.
     from ..processes.compiled import all_compiled, crew
+    from .dual import Dual
     from .lattice import Lattice
     from .rounding import Rounding, improve
-    from .sweep import Dual
 
     if left() < _COMPILING and not all_compiled():
         return field

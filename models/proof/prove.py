@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -21,6 +22,7 @@ from .certificate import checking_pace
 from .prove_absolute import WorkIn1Norm, WorkInMixedNorm
 from .record import Proof
 from .work import Work, WorkLimits
+from .workers import strips_on
 
 KINDS: Final[dict[Norm, type[Work]]] = {1: WorkIn1Norm, 2: Work, "mixed": WorkInMixedNorm}
 """The work of a proof, by norm."""
@@ -37,6 +39,7 @@ def prove(
     certified: bool = False,
     seed: int = 0,
     jobs: int = 2,
+    scheduler: str | None = None,
     progress: Progress = silent,
     stop: Stop | None = None,
 ) -> Proof:
@@ -69,6 +72,9 @@ def prove(
         Seed of the search that follows where the lattices leave a gap.
     jobs
         Number of processes of that search.
+    scheduler
+        Address of a dask scheduler, whose workers then hold a strip of the grid each: for grids that one
+        machine cannot hold. Passes take one strip after the other, and are not faster.
     progress
         Receives a line of text every few passes.
     stop
@@ -82,7 +88,7 @@ def prove(
     Raises
     ------
     InputError
-        For another norm, and for too few or too many jobs or threads.
+        For another norm, for too few or too many jobs or threads, and without dask or a scheduler there.
     InstanceError
         For a start on another instance.
 
@@ -97,7 +103,8 @@ def prove(
     given = limits or Limits(math.inf, gap=0.0)
     began = time.monotonic()
     threads = given.threads or jobs
-    with interruptible() as interrupted, crew(threads) as hands:
+    divided = nullcontext() if scheduler is None else strips_on(scheduler)
+    with interruptible() as interrupted, crew(threads) as hands, divided as divide:
         asked = stop_function(stop)
         own = WorkLimits(
             given.deadline(),
@@ -108,6 +115,8 @@ def prove(
             measured=partial(checking_pace, threads),
         )
         kind = KINDS[norm]
-        proving = kind(instance, kind.first(instance, start, own.over), own, hands, (seed, jobs), progress)
+        proving = kind(
+            instance, kind.first(instance, start, own.over), own, hands, (seed, jobs), progress, divide
+        )
         ended = proving.run()
         return replace(proving.proof(time.monotonic() - began, ended), threads=threads)

@@ -1,6 +1,6 @@
 """Pruning of a level: the cells that may hold crosses of fields of at most the energy U.
 
-1. After a forward pass (models/proof/sweep.py), label x of pixel i survives where `bound` + theta_i(x) - min
+1. After a forward pass (models/proof/dual.py), label x of pixel i survives where `bound` + theta_i(x) - min
    theta_i <= U + tolerance. models/proof/check_certificate.py, 3, proves that no more is needed.
 2. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and one of them survives.
 3. The next level has the same centres. If it also has the same spacing, it allows the vertices of the cells
@@ -17,16 +17,18 @@ cell that was dropped here.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER
 from ..processes.compiled import compiled
-from .clusters import prolonged_clusters
 from .lattice import Lattice, Starts, ranges, reached, strip
-from .sweep import Dual
+from .state import State
+
+if TYPE_CHECKING:
+    from .dual import Dual
 
 TOLERANCE: Final = 1e-7  # excess over U with which labels still survive, relative to 1 + U
 
@@ -57,7 +59,7 @@ def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
     """The cells that a level leaves below an energy, after a forward pass of the dual."""
     lattice = dual.lattice
     dual.forward()
-    cells = _left(dual, bound, energy)
+    cells = dual.cells(bound, _most(energy))
     steps = _ends(lattice, cells)
     at = lattice.h * (steps + lattice.offset[:, None])
     return RemainingCells(
@@ -69,14 +71,19 @@ def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
 
 def count_left(dual: Dual, bound: float, energy: float) -> int:
     """The number of cells that the last pass of the dual leaves."""
-    return int(np.count_nonzero(_left(dual, bound, energy)))
+    return int(np.count_nonzero(dual.cells(bound, _most(energy))))
 
 
-def _left(dual: Dual, bound: float, energy: float) -> Bools:
-    most = dual.state.least + (energy + TOLERANCE * (1 + energy) - bound)
-    survives = dual.state.theta <= np.repeat(most, dual.lattice.count)
+def _most(energy: float) -> float:
+    """The greatest energy of a field whose labels survive."""
+    return energy + TOLERANCE * (1 + energy)
+
+
+def cells_left(lattice: Lattice, state: State, excess: float) -> Bools:
+    """The cells with a vertex whose theta exceeds the pixel's least by at most that, after a pass."""
+    survives = state.theta <= np.repeat(state.least + excess, lattice.count)
     cells = np.zeros(len(survives), dtype=bool)
-    _mark_cells(_rectangles(dual.lattice), dual.lattice.allowed, survives, cells)
+    _mark_cells(_rectangles(lattice), lattice.allowed, survives, cells)
     return cells
 
 
@@ -108,17 +115,16 @@ def _covering(left: RemainingCells, new: Lattice, times: int, side: Ints) -> Lat
     return new
 
 
-def prolong(dual: Dual, lattice: Lattice) -> None:
-    """Move the dual to a finer or smaller lattice with the same centres; interpolate shares and tables."""
-    old, grid = dual.lattice, dual.lattice.instance.grid
-    shares = []
-    for ends, values in ((grid.first, dual.state.shares_first), (grid.second, dual.state.shares_second)):
-        found = np.zeros(int(lattice.share_starts(ends)[-1]))
+def prolonged_shares(old: Lattice, state: State, new: Lattice) -> list[Floats]:
+    """Shares at both ends of all pairs, interpolated on a finer or smaller lattice with the same centres."""
+    grid, shares = old.instance.grid, []
+    for ends, values in ((grid.first, state.shares_first), (grid.second, state.shares_second)):
+        found = np.zeros(int(new.share_starts(ends)[-1]))
         was = _rectangles(old), old.share_starts(ends), values
-        now = _rectangles(lattice), lattice.share_starts(ends), found
-        _interpolate(was, now, ends, lattice.h / old.h, (lattice.offset, lattice.allowed))
+        now = _rectangles(new), new.share_starts(ends), found
+        _interpolate(was, now, ends, new.h / old.h, (new.offset, new.allowed))
         shares.append(found)
-    dual.move(lattice, shares, prolonged_clusters(old, dual.state.clusters, lattice))
+    return shares
 
 
 def _ends(lattice: Lattice, cells: Bools) -> Ints:

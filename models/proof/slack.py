@@ -12,29 +12,32 @@ from typing import Final
 
 import numpy as np
 
-from ..field.field import CrossField
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF
 from ..processes.compiled import compiled_if_needed
-from .lattice import Lattice, labels_at
+from .lattice import Lattice
 from .products import all_taken
-from .state import State
+from .state import Indices, State
 
 _THRESHOLDS: Final = (0.25, 0.75)  # of the rounding
 
 
-def quad_slacks(lattice: Lattice, state: State, field: CrossField) -> Floats:
+def quad_slacks(lattice: Lattice, state: State, angles: tuple[Floats, Floats], own: slice) -> Floats:
     """The slack of the four pixels of each quad, and half of the slack of each of their pairs; shape (q,).
 
     Pairs count as after a pass, when their least value is 0. Without a label near the field, a slack is 0.
+    angles: alpha and beta of a field, as from `labels_at`. own: the pixels of the quads that are wanted.
     """
     grid = lattice.instance.grid
-    corners = _corners(lattice, field)
-    theta = np.empty_like(state.theta)
-    _fill_taken(state, theta)
-    least = np.minimum.reduceat(theta, lattice.start[:-1])
-    at_pixel = np.mean([theta[lattice.start[:-1] + corner.label] for corner in corners], axis=0) - least
-    at_pair = np.mean([_pairs(lattice, state, corner) for corner in corners], axis=0) / 2
+    corners = _corners(lattice, *angles)
+    theta = np.empty(lattice.start[own.stop] - lattice.start[own.start])
+    _fill_taken(own.start, own.stop, state, theta)
+    begin, at_pixel = lattice.start[own] - lattice.start[own.start], np.zeros(grid.size)
+    least = np.minimum.reduceat(theta, begin)
+    at_pixel[own] = np.mean([theta[begin + corner.label[own]] for corner in corners], axis=0) - least
+    known = np.flatnonzero((lattice.count[grid.first] > 0) & (lattice.count[grid.second] > 0))
+    at_pair = np.zeros(len(grid.first))
+    at_pair[known] = np.mean([_pairs(lattice, state, corner, known) for corner in corners], axis=0) / 2
     for ends in (grid.first, grid.second):
         np.add.at(at_pixel, ends, at_pair)
     bottom, _, top, _ = grid.quads.T
@@ -57,9 +60,8 @@ class _Corner:
         self.beta = lattice.beta + lattice.h * (column + lattice.beta_first + lattice.offset)
 
 
-def _corners(lattice: Lattice, field: CrossField) -> list[_Corner]:
+def _corners(lattice: Lattice, alpha: Floats, beta: Floats) -> list[_Corner]:
     """The labels to which a few thresholds round a field."""
-    alpha, beta, _ = labels_at(field, lattice)
     k = (alpha - lattice.alpha) / lattice.h - lattice.offset
     l = (beta - lattice.beta) / lattice.h - lattice.offset  # noqa: E741 - the letter of the equation
     return [
@@ -69,15 +71,16 @@ def _corners(lattice: Lattice, field: CrossField) -> list[_Corner]:
 
 
 @compiled_if_needed
-def _fill_taken(state: State, theta: Floats) -> None:
-    """Fill in the cost of each label plus the shares of all pairs there."""
-    for i in range(state.least.size):
-        theta[state.start[i] : state.start[i + 1]] = all_taken(i, state)
+def _fill_taken(first: int, end: int, state: State, theta: Floats) -> None:
+    """Fill in the cost of each label of some pixels plus the shares of all pairs there."""
+    begin = state.start[first]
+    for i in range(first, end):
+        theta[state.start[i] - begin : state.start[i + 1] - begin] = all_taken(i, state)
 
 
-def _pairs(lattice: Lattice, state: State, corner: _Corner) -> Floats:
-    """The cost of each pair with its tables, less its shares, at a corner of both ends; shape (m,)."""
-    i, j = state.first, state.second
+def _pairs(lattice: Lattice, state: State, corner: _Corner, pairs: Indices) -> Floats:
+    """The costs of some pairs with their tables, less their shares, at a corner of both ends."""
+    i, j = state.first[pairs], state.second[pairs]
     apart = corner.alpha[i] - corner.alpha[j]
     cost = np.full(len(i), np.inf)
     for parity in (0, 1):
@@ -87,10 +90,10 @@ def _pairs(lattice: Lattice, state: State, corner: _Corner) -> Floats:
         size = a * a + b * b if lattice.norm == 2 else np.abs(a) + np.abs(b)
         cost = np.minimum(cost, 2 * size)
     cost -= lattice.h**2 if lattice.norm == 2 else 0.0
-    cost -= state.shares_first[state.start_first[:-1] + corner.label[i]]
-    cost -= state.shares_second[state.start_second[:-1] + corner.label[j]]
+    cost -= state.shares_first[state.start_first[pairs] + corner.label[i]]
+    cost -= state.shares_second[state.start_second[pairs] + corner.label[j]]
     clusters = state.clusters
-    for numbers in clusters.of_pair.T:
+    for numbers in clusters.of_pair[pairs].T:
         at = np.flatnonzero(numbers >= 0)
         wide = lattice.alpha_count[j[at]]
         place = clusters.start[numbers[at]] + corner.row[i[at]] * wide + corner.row[j[at]]

@@ -1,7 +1,7 @@
 """The work of a proof: a field, and a bound of its distance from the minimum.
 
 Lattice after lattice, each of half the spacing, or of the same spacing with fewer labels. On each level the
-dual rises by passes (models/proof/sweep.py), fields are rounded from it (rounding.py), and what cannot hold
+dual rises by passes (models/proof/dual.py), fields are rounded from it (rounding.py), and what cannot hold
 a better field is dropped (pruning.py), until the jumps are forced (forced.py). A better field that is found
 on a coarse lattice becomes the centre: the lattices begin anew round it. On a finer lattice little is lost
 where the centre is another field.
@@ -30,6 +30,7 @@ from ..field.jumps import free_jumps
 from ..instance.grid import Floats
 from ..instance.instance import QUARTER, Instance
 from ..processes.compiled import Crew
+from ..processes.control import WorkerError
 from ..processes.deadline import Deadline, Over, Progress, never
 from ..search.improvement import improved_field
 from ..search.search import search_patches
@@ -37,12 +38,12 @@ from ..search.starts import best_start, polyvector_start
 from .certificate import certificate_effort
 from .check_certificate import MOST_COUNT
 from .clusters import table_sizes
+from .dual import Divide, Dual
 from .forced import Forced, forced
 from .lattice import Lattice, labels_at, reached
-from .pruning import RemainingCells, count_left, finer, narrowed, prolong, remaining_cells
+from .pruning import RemainingCells, count_left, finer, narrowed, remaining_cells
 from .record import EXACT, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
-from .sweep import Dual
 
 COARSEST: Final = 16  # steps in pi/2 of the first level
 _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
@@ -59,7 +60,7 @@ _MORE_CLUSTERS: Final = 12  # later
 _QUADS: Final = 0.15  # share of all quads that may become clusters at once
 _STALLED: Final = 0.3  # share of the gap, left by half the spacing, above which there are more; 1/4 is usual
 _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
-MOST_LABELS: Final = 24_000_000  # a level; each takes some 100 bytes
+MOST_LABELS: Final = 24_000_000  # of a strip; each takes some 100 bytes
 _TABLES: Final = 4  # numbers of tables that take as much as a label
 _RECORDING: Final = 6  # passes: the last two, the bound of a record and the pruning take as long
 _WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
@@ -144,7 +145,7 @@ class _Chain:
 
 @dataclass
 class Work:
-    """State of a proof of the 2-norm."""
+    """State of a proof of the 2-norm. divide: None for a lattice in one strip."""
 
     norm: ClassVar[Norm] = 2
     first = staticmethod(first_of)
@@ -157,6 +158,7 @@ class Work:
     hands: Crew
     seed_and_jobs: tuple[int, int]
     progress: Progress
+    divide: Divide | None = None
     chain: _Chain = field(default_factory=_Chain)
     proven: _Chain = field(default_factory=_Chain)
     searched: bool = False
@@ -186,9 +188,13 @@ class Work:
 
     def run(self) -> str:
         """Go through chains of levels until a limit is met or nothing helps; return the reason."""
-        ended = self._descend()
-        while not ended or (ended == "labels" and self._found_more()):
+        try:
             ended = self._descend()
+            while not ended or (ended == "labels" and self._found_more()):
+                ended = self._descend()
+        except WorkerError as error:
+            self.progress(str(error))
+            return "workers"
         return self.limits.met() or ended
 
     def _found_more(self) -> bool:
@@ -208,7 +214,7 @@ class Work:
         if met := self.limits.met():
             return met
         self.chain, before, self.began = _Chain(), self.best, time.monotonic()
-        dual = Dual(self.level(_centre(before)), self.hands)
+        dual = Dual(self.level(_centre(before)), self.hands, self.divide)
         self.limits.keep(self._effort_with(dual, dual.lattice))
         patient, growth = False, _GROWTH
         while True:
@@ -233,7 +239,7 @@ class Work:
             else:
                 patient = patient or not rising
             self.limits.keep(self._effort_with(dual, lattice))
-            prolong(dual, lattice)
+            dual.move(lattice)
 
     def _search_once(self, lattice: Lattice) -> None:
         """Search, if the next level takes long, or the field may cause the rest of the gap."""
@@ -251,7 +257,7 @@ class Work:
 
     def _effort_with(self, dual: Dual, lattice: Lattice) -> float:
         """The effort of a certificate with one more level, which has the clusters of the dual."""
-        more = certificate_effort(lattice, dual.state.clusters.quads)
+        more = certificate_effort(lattice, dual.quads)
         return max(sum(self.proven.efforts), sum(self.chain.efforts) + more)
 
     def _closing(self, dual: Dual) -> Over:
@@ -262,7 +268,7 @@ class Work:
         """Add clusters at the beginning of a spacing, if vortices cause the gap."""
         count = self._wanted_clusters(dual.lattice)
         if count:
-            times = 1 if len(dual.state.clusters.quads) else _BEFORE
+            times = 1 if len(dual.quads) else _BEFORE
             dual.ascend(times, self.limits.over, self._closing(dual))
             dual.add_clusters(count, self.best)
 
@@ -350,7 +356,7 @@ class Work:
         level, left = LevelRecord.of(dual, energy, rough if energy - chain.bound > rough else 0.0), None
         if level.bound > chain.bound or not self.limits.over():
             chain.levels.append(level)
-            chain.efforts.append(certificate_effort(dual.lattice, dual.state.clusters.quads))
+            chain.efforts.append(certificate_effort(dual.lattice, dual.quads))
             chain.bound = max(chain.bound, level.bound)
         if not self.limits.over():
             left = remaining_cells(dual, level.bound, energy)
@@ -373,8 +379,8 @@ class Work:
 
 def _too_large(dual: Dual, lattice: Lattice) -> bool:
     """Whether the next level of a dual is beyond what memory, time, checker or digits of an angle allow."""
-    tables = int(table_sizes(lattice, dual.state.clusters.quads).sum())
-    many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
+    tables = int(table_sizes(lattice, dual.quads).sum())
+    many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS * len(dual.places)
     many = many or max(lattice.alpha_count.max(), lattice.beta_count.max()) > MOST_COUNT
     return lattice.h < np.pi / 2 / _FINEST or many or lattice.work > _MOST_WORK
 

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 from crossfield.models.instance.instance import HALF, QUARTER
 from crossfield.models.proof.clusters import clusters_on
+from crossfield.models.proof.encoding import messages_of, tables_of
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.record import LevelRecord, Proof
 
@@ -128,9 +129,9 @@ class Table:
         )
         shares = [np.concatenate([*each, []]) for each in (first, second)]
         clusters = clusters_on(lattice, np.zeros(0, int))
-        return LevelRecord.on(
-            lattice, shares, clusters, quanta=(QUANTUM, QUANTUM), bound=bound, energy=energy
-        )
+        messages = messages_of(lattice, shares, QUANTUM, slice(0, len(self.field.p)))
+        arrays = messages, tables_of(lattice, clusters, QUANTUM)
+        return LevelRecord.on(lattice, arrays, bound=bound, energy=energy)
 
 
 def whole(field, h, i, offset):

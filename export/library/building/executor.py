@@ -7,11 +7,12 @@ one repeats it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import contextmanager
 from typing import Any, Final, TypeVar
 
-from ....models.errors import CrossfieldError, InputError
+from ....models.errors import CrossfieldError
+from ....models.processes.cluster import cluster
 from ....models.processes.control import WorkerError
 from ....models.processes.side_by_side import workers
 
@@ -19,7 +20,6 @@ T = TypeVar("T")
 
 _AHEAD: Final = 64  # tasks submitted to a cluster at once: enough for its workers, at constant memory
 _TRIES: Final = 3  # of a task whose dask worker died
-_PATIENCE: Final = "10s"  # to reach a scheduler
 
 
 class BuildError(CrossfieldError):
@@ -43,34 +43,8 @@ def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
 
 @contextmanager
 def _cluster(address: str) -> Iterator[Executor]:
-    try:
-        import distributed
-    except ModuleNotFoundError as error:
-        raise InputError(
-            "a scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
-        ) from error
-    try:
-        client: Any = distributed.Client(  # type: ignore[no-untyped-call]
-            address, timeout=_PATIENCE, set_as_default=False
-        )
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(
-            f"no scheduler answers at {address[:100]}; start one with `dask scheduler`, "
-            "and give its address, say tcp://host:8786"
-        ) from error
-    try:
+    with cluster(address) as client:
         yield client.get_executor(pure=False, retries=_TRIES)
-    except distributed.KilledWorker as error:
-        raise BuildError(
-            "a task ended several workers, probably for lack of memory; see their logs and build again, "
-            "complete files are kept"
-        ) from error
-    except (CancelledError, distributed.comm.core.CommClosedError) as error:
-        raise BuildError(
-            f"the scheduler at {address[:100]} is gone; start it and build again (complete files are kept)"
-        ) from error
-    finally:
-        client.close()
 
 
 class Tasks:

@@ -8,10 +8,10 @@ import pytest
 from crossfield.models.instance.instance import HALF, Instance
 from crossfield.models.processes.compiled import crew
 from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.prove_absolute import forced_absolute
 from crossfield.models.proof.pruning import RemainingCells
-from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.absolute_fit import Residuals, absolute_fit, fitted_absolute
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance

@@ -10,9 +10,9 @@ from crossfield.models.field.field import relabelled
 from crossfield.models.instance.instance import HALF, Instance
 from crossfield.models.processes.compiled import crew
 from crossfield.models.processes.deadline import never
+from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import finer, prolong, remaining_cells
-from crossfield.models.proof.sweep import Dual
+from crossfield.models.proof.pruning import finer, remaining_cells
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 from labellings import discrete, least_labelling
@@ -65,7 +65,8 @@ def test_any_shares_give_a_bound():
             instance = small(seed)
             lattice = Lattice.whole(first_field(instance), 4)
             dual, rng = Dual(lattice, hands), np.random.default_rng(seed)
-            for shares in (dual.state.shares_first, dual.state.shares_second):
+            state = dual.places[0].strip.state
+            for shares in (state.shares_first, state.shares_second):
                 shares[:] = rng.normal(0, 3, len(shares))
             assert dual.bound() <= least_labelling(*discrete(lattice))
 
@@ -85,7 +86,7 @@ def test_any_tables_of_clusters_give_a_bound():
             instance = random_instance(seed, ((2, 2), (2, 3), (3, 2))[seed % 3])
             lattice = Lattice.whole(first_field(instance), 4)
             dual = with_clusters(lattice, hands)
-            state = dual.state
+            state = dual.places[0].strip.state
             for values in (state.shares_first, state.shares_second, state.clusters.tables):
                 values[:] = rng.normal(0, 0.3, len(values))
             assert dual.bound() <= least_labelling(*discrete(lattice))
@@ -121,7 +122,7 @@ def test_threads_change_no_bit():
             dual = Dual(lattice, hands)
             dual.ascend(2)
             dual.add_clusters(5, first_field(instance))
-            state = dual.state
+            state = dual.places[0].strip.state
             found.append(
                 (dual.ascend(2), dual.bound(), state.shares_first.tobytes(), state.clusters.tables.tobytes())
             )
@@ -192,5 +193,5 @@ def test_pruning_keeps_every_field_of_no_more_energy():
                     field = relabelled(instance, alpha, beta, best.p)
                     if field.energy().total <= energy:
                         assert holds(lattice, (field.alpha, field.beta)), seed
-                prolong(dual, lattice)
+                dual.move(lattice)
     assert dropped > 0

@@ -6,8 +6,8 @@ import pytest
 from crossfield.models.processes.compiled import crew
 from crossfield.models.proof import work
 from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.starts import first_field
 
 pytestmark = pytest.mark.numeric

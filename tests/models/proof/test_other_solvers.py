@@ -8,8 +8,8 @@ import pytest
 from crossfield.export.formats.registry import write
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.processes.compiled import crew
+from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance, sketch
 from labellings import discrete

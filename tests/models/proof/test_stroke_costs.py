@@ -6,9 +6,9 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.processes.compiled import crew
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import _arrays
+from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.record import LevelRecord, Proof
-from crossfield.models.proof.sweep import Dual
 
 
 def test_a_centre_whose_other_line_carries_the_stroke_has_a_certificate(tmp_path):

@@ -1,0 +1,324 @@
+"""The state of a strip, some rows of a lattice, and the work on it; see models/proof/dual.py.
+
+A strip has the labels of its own pixels and of the rows above and below. Passes change the shares of its own
+pixels only. So that its pairs to other strips have the shares of both ends, it receives those of the other
+ends from the strips beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..array_archive import Arrays
+from ..instance.grid import Bools, Floats, Grid
+from ..processes.compiled import Crew, compiled
+from ..processes.deadline import Over, never
+from .clusters import (
+    cluster_fronts,
+    clusters_on,
+    extended,
+    least_of_clusters,
+    prolonged_clusters,
+    update_clusters,
+)
+from .decoding import Crosses, decode
+from .encoding import messages_of, tables_of
+from .lattice import Lattice, Starts
+from .products import all_taken, pair_minimum, pixel_pass
+from .pruning import cells_left, prolonged_shares
+from .slack import quad_slacks
+from .state import Clusters, Indices, State
+
+_ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
+
+
+class Part(NamedTuple):
+    """A strip's part of a lattice: the lattice without labels elsewhere, and the strip's own pixels."""
+
+    lattice: Lattice
+    own: slice
+
+
+class Passed(NamedTuple):
+    """Result of a pass: the least theta of each own pixel, and the shares for the strips above and below."""
+
+    least: Floats
+    above: Floats
+    below: Floats
+
+
+def part_of(lattice: Lattice, own: slice) -> Part:
+    """The part of a lattice for a strip with those pixels, which are whole rows."""
+    grid, count = lattice.instance.grid, len(lattice.count)
+    if own == slice(0, count):
+        return Part(lattice, own)
+    rows = grid.rows[own.start] - 1, grid.rows[own.stop - 1] + 2
+    begin, end = np.searchsorted(grid.rows, rows)
+    inside = np.zeros(count, dtype=np.int32)
+    inside[begin:end] = 1
+    labels = slice(lattice.start[begin], lattice.start[end])
+    return Part(
+        replace(
+            lattice,
+            alpha_count=lattice.alpha_count * inside,
+            beta_count=lattice.beta_count * inside,
+            allowed=lattice.allowed[labels],
+        ),
+        own,
+    )
+
+
+class Strip:
+    """The shares on a strip, zero and without clusters at first."""
+
+    state: State
+    _before: list[NDArray[np.float32]]  # the direction of a change needs no more digits
+
+    def __init__(self, part: Part, crew: Crew) -> None:
+        """Start on a part of a lattice, with the threads of a crew."""
+        self.lattice, self.own, self.crew = part.lattice, part.own, crew
+        grid = self.lattice.instance.grid
+        mine = np.zeros(grid.size, dtype=bool)
+        mine[self.own] = True
+        self.pairs = slice(*np.searchsorted(grid.first, [self.own.start, self.own.stop]).tolist())
+        # Pairs to the strips above and below: the first pixel of a pair is the lower one.
+        above = np.flatnonzero(mine[grid.first] & ~mine[grid.second])
+        below = np.flatnonzero(~mine[grid.first] & mine[grid.second])
+        self._crossing = (above, below)
+        self._fronts = [front[mine[front]] for front in fronts(grid)]
+        shares = [np.zeros(int(self.lattice.share_starts(ends)[-1])) for ends in (grid.first, grid.second)]
+        self._begin(shares, clusters_on(self.lattice, np.zeros(0, np.int64)))
+
+    def _begin(self, shares: Sequence[Floats], clusters: Clusters) -> None:
+        self.state = _state(self.lattice, shares, clusters)
+        self.__dict__.pop("_ends", None)
+        self._take_clusters()
+        self._parts = [self.crew.parts(self.lattice.count[front]) for front in self._fronts]
+
+    def move(self, lattice: Lattice) -> None:
+        """Interpolate shares and tables to a finer or smaller lattice with the same centres."""
+        old, state = self.lattice, self.state
+        shares = prolonged_shares(old, state, lattice)
+        clusters = prolonged_clusters(old, state.clusters, lattice)
+        self.lattice = lattice
+        del self.state, state  # the new arrays need its memory
+        self._begin(shares, clusters)
+
+    @cached_property
+    def _ends(self) -> tuple[tuple[Starts, Starts], tuple[Starts, Starts]]:
+        """Places of the shares above and below: those at the own ends, and those at the other ends."""
+        state = self.state
+        above, below = self._crossing
+        first = [_places(state.start_first, pairs) for pairs in (above, below)]
+        second = [_places(state.start_second, pairs) for pairs in (above, below)]
+        return (first[0], second[1]), (second[0], first[1])
+
+    def take(self, edge: Floats, *, above: bool) -> None:
+        """Receive the shares at the other ends of the pairs to the strip above or below."""
+        _, (upper, lower) = self._ends
+        if above:
+            self.state.shares_second[upper] = edge
+        else:
+            self.state.shares_first[lower] = edge
+
+    def sweep(self, earlier: int, over: Over = never) -> Passed | None:
+        """Do a pass over the own pixels; earlier: 0 forwards, 2 backwards. None if time cuts it off."""
+
+        def work(pixels: Indices) -> None:
+            _pass_pixels(pixels, earlier, self.state)
+
+        way = 1 if earlier == 0 else -1
+        if self.lattice.start[-1] < _ALONE:
+            work(np.concatenate(self._fronts[::way]))
+        else:
+            for front, parts in zip(self._fronts[::way], self._parts[::way], strict=True):
+                if over():
+                    return None
+                self.crew.run(work, [front[part] for part in parts])
+        (upper, lower), _ = self._ends
+        state = self.state
+        return Passed(state.least[self.own], state.shares_first[upper], state.shares_second[lower])
+
+    def extrapolate(self, part: float) -> None:
+        """Move shares and tables by a part of their last change, which the first call begins to follow."""
+        moved = self._values
+        if not self._before:
+            self._before = [values.astype(np.float32) for values in moved]
+            return
+        for values, before in zip(moved, self._before, strict=True):
+            parts = [(values[at], before[at]) for at in self.crew.equal_parts(len(values))]
+            self.crew.run(lambda each: _carry_on(*each, part), parts)
+
+    @property
+    def _values(self) -> tuple[Floats, Floats, Floats]:
+        return (self.state.shares_first, self.state.shares_second, self.state.clusters.tables)
+
+    def inside(self) -> Bools:
+        """Whether each quad of the grid is of own pixels alone."""
+        grid = self.lattice.instance.grid
+        bottom, _, top, _ = grid.quads.T
+        found: Bools = (grid.first[top] >= self.own.start) & (grid.second[bottom] < self.own.stop)
+        return found
+
+    def slacks(self, alpha: Floats, beta: Floats) -> Floats:
+        """The slacks of own quads as `quad_slacks` has them; 0 for others."""
+        slack = quad_slacks(self.lattice, self.state, (alpha, beta), self.own)
+        return np.where(self.inside(), slack, 0.0)
+
+    def add_clusters(self, quads: Indices) -> Floats:
+        """Have clusters on those quads of own pixels, new ones with zero tables; the least of each."""
+        added = clusters_on(self.lattice, quads)
+        self.state = self.state._replace(clusters=extended(self.state.clusters, added))
+        self._take_clusters()
+        return self.least_of_clusters()
+
+    def _take_clusters(self) -> None:
+        self._before = []
+        self._cluster_fronts = cluster_fronts(self.lattice.instance.grid, self.state.clusters)
+
+    def update_clusters(self, way: int) -> None:
+        """Update all clusters; way: -1 for the reverse order."""
+        for front in self._cluster_fronts[::way]:
+            self.crew.run(
+                lambda numbers: update_clusters(numbers, self.state),
+                [front[k : k + 1] for k in range(len(front))],
+            )
+
+    def least_of_clusters(self) -> Floats:
+        """The least of the negative tables of each cluster."""
+        count = len(self.state.clusters.quads)
+        if not count:
+            return np.zeros(0)
+        found = np.zeros(count)
+        self.crew.run(
+            lambda part: least_of_clusters(part.start, part.stop, self.state, found),
+            self.crew.equal_parts(count),
+        )
+        return found
+
+    def greatest(self) -> tuple[float, float]:
+        """The greatest size of a share or a number of a table, and of a finite cost of a pixel."""
+        unary = self.state.unary
+        return max(map(_most, self._values)), _most(unary[np.isfinite(unary)])
+
+    def quantise(self, of_shares: float, of_tables: float) -> None:
+        """Round shares and tables to whole multiples of these powers of two."""
+        for values, quantum in zip(self._values, (of_shares, of_shares, of_tables), strict=True):
+            np.multiply(values, 1 / quantum, out=values)
+            np.round(values, out=values)
+            np.multiply(values, quantum, out=values)
+
+    def minima(self) -> list[Floats]:
+        """The least D + shares of own pixels, the least c - shares of own pairs, and those of clusters."""
+        pixels, pairs = np.zeros(len(self.lattice.count)), np.zeros(len(self.state.first))
+        for work, found, own in ((_pixel_minima, pixels, self.own), (_pair_minima, pairs, self.pairs)):
+            many = self.crew.equal_parts(own.stop - own.start)
+            parts = [slice(own.start + part.start, own.start + part.stop) for part in many]
+            self.crew.run(lambda part: work(part.start, part.stop, self.state, found), parts)  # noqa: B023
+        return [pixels[self.own], pairs[self.pairs], self.least_of_clusters()]
+
+    def cells(self, excess: float) -> Bools:
+        """The cells of own pixels where a vertex's theta exceeds the least by at most `excess`, flat."""
+        found = cells_left(self.lattice, self.state, excess)
+        begin, end = self.lattice.start[[self.own.start, self.own.stop]]
+        return found[begin:end]
+
+    def decoded(self, crosses: Crosses, *, forwards: bool) -> Crosses:
+        """The crosses with those of the own pixels replaced by what the shares suggest."""
+        order = np.arange(self.own.start, self.own.stop)[:: 1 if forwards else -1].copy()
+        return decode(order, self.state, crosses)
+
+    def arrays(self, of_shares: float, of_tables: float) -> tuple[Arrays, Arrays]:
+        """Messages of the own pairs, and tables, as whole numbers of their scales."""
+        shares = self.state.shares_first, self.state.shares_second
+        messages = messages_of(self.lattice, shares, of_shares, self.pairs)
+        return messages, tables_of(self.lattice, self.state.clusters, of_tables)
+
+
+def _places(starts: Starts, pairs: Starts) -> Starts:
+    """The places of the shares of some pairs."""
+    return np.concatenate([np.zeros(0, np.int64), *(np.arange(starts[e], starts[e + 1]) for e in pairs)])
+
+
+@compiled
+def _carry_on(values: Floats, before: NDArray[np.float32], part: float) -> None:
+    """Extrapolate by a part of the change since the previous pass, and store the values as they were."""
+    for x in range(values.size):
+        now = values[x]
+        values[x] = now + part * (now - before[x])
+        before[x] = now
+
+
+def _state(lattice: Lattice, shares: Sequence[Floats], clusters: Clusters) -> State:
+    grid = lattice.instance.grid
+    unary = lattice.unary_costs()
+    start_first, start_second = lattice.share_starts(grid.first), lattice.share_starts(grid.second)
+    return State(
+        lattice.h,
+        lattice.alpha + lattice.h * (lattice.alpha_first + lattice.offset),
+        lattice.beta + lattice.h * (lattice.beta_first + lattice.offset),
+        lattice.alpha_count,
+        lattice.beta_count,
+        lattice.start,
+        unary,
+        grid.first.astype(np.int64),
+        grid.second.astype(np.int64),
+        lattice.p & 1,
+        start_first,
+        start_second,
+        _around(grid),
+        shares[0],
+        shares[1],
+        unary.copy(),
+        np.zeros(grid.size),
+        2 if lattice.norm == 2 else 1,
+        clusters,
+    )
+
+
+def _around(grid: Grid) -> Indices:
+    """The pairs of each pixel with its upper, left, lower and right neighbour, -1 for none; shape (n, 4)."""
+    upper, right = (np.pad(table, 1, constant_values=-1) for table in grid.pair_number)
+    row, column = grid.rows + 1, grid.columns + 1
+    pairs = (upper[row, column], right[row, column - 1], upper[row + 1, column], right[row, column])
+    return np.stack(pairs, axis=1).astype(np.int64)
+
+
+def fronts(grid: Grid) -> list[Indices]:
+    """The pixels of each anti-diagonal. No two of one diagonal form a pair; earlier pixels come sooner."""
+    diagonal = grid.rows + grid.columns
+    order = np.argsort(diagonal, kind="stable")
+    _, begin = np.unique(diagonal[order], return_index=True)
+    return np.split(order, begin[1:])
+
+
+def _most(values: Floats) -> float:
+    """The greatest size, without an array of all sizes."""
+    return float(max(values.max(initial=0.0), -values.min(initial=0.0)))
+
+
+@compiled
+def _pass_pixels(pixels: Indices, earlier: int, state: State) -> None:
+    """Do a pass over some pixels, one after the other; earlier: 0 forwards, 2 backwards."""
+    for i in pixels:
+        pixel_pass(i, earlier, state)
+
+
+@compiled
+def _pair_minima(begin: int, end: int, state: State, found: Floats) -> None:
+    """Fill in the least c - shares of some pairs."""
+    for pair in range(begin, end):
+        found[pair] = pair_minimum(pair, state)
+
+
+@compiled
+def _pixel_minima(begin: int, end: int, state: State, found: Floats) -> None:
+    """Fill in the least D + sum of the shares of some pixels."""
+    for i in range(begin, end):
+        found[i] = all_taken(i, state).min()
