@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -97,7 +96,7 @@ class Strip:
 
     def _begin(self, shares: Sequence[Floats], clusters: Clusters) -> None:
         self.state = _state(self.lattice, shares, clusters)
-        self.__dict__.pop("_ends", None)
+        self._find_edges()
         self._take_clusters()
         self._parts = [self.crew.parts(self.lattice.count[front]) for front in self._fronts]
 
@@ -110,18 +109,15 @@ class Strip:
         del self.state, state  # the new arrays need its memory
         self._begin(shares, clusters)
 
-    @cached_property
-    def _ends(self) -> tuple[tuple[Starts, Starts], tuple[Starts, Starts]]:
-        """Places of the shares above and below: those at the own ends, and those at the other ends."""
-        state = self.state
-        above, below = self._crossing
-        first = [_places(state.start_first, pairs) for pairs in (above, below)]
-        second = [_places(state.start_second, pairs) for pairs in (above, below)]
-        return (first[0], second[1]), (second[0], first[1])
+    def _find_edges(self) -> None:
+        """Find the places of shares of the pairs above and below: at the own ends, and at the others."""
+        (above, below), state = self._crossing, self.state
+        self._mine = _places(state.start_first, above), _places(state.start_second, below)
+        self._theirs = _places(state.start_second, above), _places(state.start_first, below)
 
     def take(self, edge: Floats, *, above: bool) -> None:
         """Receive the shares at the other ends of the pairs to the strip above or below."""
-        _, (upper, lower) = self._ends
+        upper, lower = self._theirs
         if above:
             self.state.shares_second[upper] = edge
         else:
@@ -141,8 +137,7 @@ class Strip:
                 if over():
                     return None
                 self.crew.run(work, [front[part] for part in parts])
-        (upper, lower), _ = self._ends
-        state = self.state
+        (upper, lower), state = self._mine, self.state
         return Passed(state.least[self.own], state.shares_first[upper], state.shares_second[lower])
 
     def extrapolate(self, part: float) -> None:
