@@ -211,7 +211,7 @@ def machine() -> Facts:
     model = re.search(r"model name\s*:\s*(.+)", info.read_text()) if info.exists() else None
     return {
         "processor": model[1] if model else platform.machine(),
-        "cores": os.cpu_count(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
         "python": platform.python_version(),
         "load": os.getloadavg()[0],
     }
@@ -242,6 +242,7 @@ ENDS: Final = {
     "labels": "open: too many labels",
     "interrupted": "open: interrupted",
     "gap": "open: requested gap reached",
+    "optimal": "optimal but for rounding",
 }
 """Reasons for the end of a proof without an optimum."""
 
@@ -397,14 +398,20 @@ def where(rows: dict[str, Facts]) -> str:
     machines = [row["machine"] for row in rows.values()]
     first, loads = machines[0], [each["load"] for each in machines]
     return (
-        f"{first['processor']}, {first['cores']} cores, Python {first['python']}, 2 threads. The load "
-        f"average was {min(loads):.1f} to {max(loads):.1f}; above the number of cores, seconds are too long."
+        f"{first['processor']}, {counted(first['cores'])}, Python {first['python']}, 2 threads. The load "
+        f"average of the machine was {min(loads):.1f} to {max(loads):.1f}; above the number of its cores, "
+        "seconds are too long."
     )
+
+
+def counted(cores: int) -> str:
+    """The number of cores in words."""
+    return "one core" if cores == 1 else f"{cores} cores"
 
 
 def page(kept: Kept) -> str:
     """The text of docs/proofs.md."""
-    tables = ("samples", "paper", "middle", "sketches", "fine")
+    tables = ("samples", "paper", "middle", "sketches", "fine", "large")
     parts = {part: kept[part] for part in (*tables, "solvers", "limits")}
     texts = {
         "generated": generated("python docs/proofs.py"),

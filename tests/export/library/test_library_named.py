@@ -136,12 +136,12 @@ def test_an_entry_is_written_in_any_format_that_carries_it(built, tmp_path):
 @pytest.mark.slow
 def test_a_proof_finds_no_better_point_than_the_known_one():
     norms = {"minlp-parity": 2, "miqcp-bilinear": "mixed", "milp-mccormick": 1}
-    medium = [
+    drawn = [
         each
-        for each in cf.entries(where="rung == 'medium' and tightened == False")
+        for each in cf.entries(where="(rung == 'medium' or rung == 'large') and tightened == False")
         if each.facts["formulation"] in norms
     ]
-    for entry in np.random.default_rng(0).choice(medium, 3, replace=False):
+    for entry in np.random.default_rng(0).choice(drawn, 5, replace=False):
         proof = cf.prove(entry.instance, norm=norms[entry.facts["formulation"]], work=2_000_000)
         assert proof.energy >= entry.objective * (1 - 1e-6), f"{entry.name}: {REMEDY}"
         assert proof.bound <= entry.objective * (1 + 1e-9)
