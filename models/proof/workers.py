@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..instance.grid import Grid
 from ..processes.cluster import cluster
 from ..processes.compiled import Crew
@@ -28,24 +29,28 @@ from .strip import Part, Passed, Strip, part_of
 def strips_on(scheduler: str) -> Iterator[Divide]:
     """Yield a function that divides a lattice into strips, one on each worker of a dask scheduler.
 
-    Raises InputError without dask or a scheduler at that address; WorkerError when a worker is lost.
+    Raises InputError without dask, and without a scheduler or workers at that address; WorkerError when a
+    worker is lost.
     """
     with cluster(scheduler) as client, client.as_current():
+        if not client.nthreads():
+            raise InputError(
+                f"the scheduler at {scheduler[:100]} has no worker; start some with `dask worker`"
+            )
         yield lambda lattice: _begun(client, lattice)
 
 
 def _begun(client: Any, lattice: Lattice) -> list[Place]:
-    threads = {
-        name: each["nthreads"] for name, each in client.scheduler_info(n_workers=-1)["workers"].items()
-    }
-    if not threads:
-        raise WorkerError("the scheduler has no worker; start some with `dask worker ADDRESS`")
-    chosen = zip(strips(lattice.instance.grid, len(threads)), sorted(threads), strict=False)
-    asked = [
-        (own, client.submit(_StripThere, part_of(lattice, own), threads[name], workers=[name], actor=True))
-        for own, name in chosen
-    ]
-    return [_There(own, actor.result()) for own, actor in asked]
+    """The strips of a lattice, each on a worker."""
+    with _reached():
+        threads = client.nthreads()
+        if not threads:
+            raise WorkerError("all workers are lost")
+        asked = []
+        for own, name in zip(strips(lattice.instance.grid, len(threads)), sorted(threads), strict=False):
+            given = part_of(lattice, own), threads[name]
+            asked.append((own, client.submit(_StripThere, *given, workers=[name], actor=True)))
+        return [_There(own, actor.result()) for own, actor in asked]
 
 
 def strips(grid: Grid, count: int) -> list[slice]:

@@ -117,6 +117,8 @@ def test_a_lost_worker_ends_a_proof_with_what_is_proven(tmp_path):
 
 
 @pytest.mark.needs("distributed")
-def test_an_address_without_a_scheduler_is_refused():
+def test_an_address_without_a_scheduler_or_workers_is_refused(tmp_path):
     with pytest.raises(cf.InputError, match="no scheduler answers at nonsense"):
         cf.prove(cf.sample("mouse", 5), scheduler="nonsense")
+    with cluster(tmp_path, workers=0) as (address, _), pytest.raises(cf.InputError, match="has no worker"):
+        cf.prove(cf.sample("mouse", 5), scheduler=address)
