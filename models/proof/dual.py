@@ -39,8 +39,10 @@ from ..processes.deadline import Over, never
 from .clusters import table_work
 from .decoding import Crosses
 from .lattice import Lattice, labels_at
+from .pruning import RemainingCells, boxed
 from .strip import Passed, Strip, part_of
 
+_TOLERANCE: Final = 1e-7  # excess over the energy with which labels still survive, relative to 1 + it
 _LOST: Final = 0.1  # share of the gap that rounding may cost at most; a fifth of it is usual
 _TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
 _ROUNDING: Final = 32 * 2.0**-53
@@ -229,9 +231,17 @@ class Dual:
         largest = 64 + costs + 4 * shares
         return math.fsum([*terms, -_ROUNDING * len(terms) * largest])
 
-    def cells(self, bound: float, least: float) -> Bools:
-        """The cells that the last pass leaves below an energy; see models/proof/pruning.py."""
-        return np.concatenate(self._all("cells", least - bound))
+    def remaining_cells(self, bound: float, energy: float) -> RemainingCells:
+        """The cells that the level leaves below an energy, by a forward pass; see models/proof/pruning.py."""
+        self.forward()
+        return boxed(self.lattice, self._cells(bound, energy))
+
+    def count_left(self, bound: float, energy: float) -> int:
+        """The number of cells that the last pass leaves."""
+        return int(np.count_nonzero(self._cells(bound, energy)))
+
+    def _cells(self, bound: float, energy: float) -> Bools:
+        return np.concatenate(self._all("cells", energy + _TOLERANCE * (1 + energy) - bound))
 
     def decoded(self, *, forwards: bool) -> tuple[Floats, Floats]:
         """Alpha and beta (n,) of the crosses that the shares suggest; forwards after a backward pass."""

@@ -17,7 +17,7 @@ cell that was dropped here.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,11 +26,6 @@ from ..instance.instance import QUARTER
 from ..processes.compiled import compiled
 from .lattice import Lattice, Starts, ranges, reached, strip
 from .state import State
-
-if TYPE_CHECKING:
-    from .dual import Dual
-
-TOLERANCE: Final = 1e-7  # excess over U with which labels still survive, relative to 1 + U
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +50,8 @@ class RemainingCells:
         return low, np.concatenate([self.alpha_high, self.beta_high])
 
 
-def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
-    """The cells that a level leaves below an energy, after a forward pass of the dual."""
-    lattice = dual.lattice
-    dual.forward()
-    cells = dual.cells(bound, _most(energy))
+def boxed(lattice: Lattice, cells: Bools) -> RemainingCells:
+    """Cells that are left on a lattice, with the boxes round them."""
     steps = _ends(lattice, cells)
     at = lattice.h * (steps + lattice.offset[:, None])
     return RemainingCells(
@@ -67,16 +59,6 @@ def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
         lattice.alpha + at[:, 0], lattice.alpha + at[:, 1],
         np.maximum(lattice.beta + at[:, 2], -QUARTER), np.minimum(lattice.beta + at[:, 3], QUARTER),
     )  # fmt: skip
-
-
-def count_left(dual: Dual, bound: float, energy: float) -> int:
-    """The number of cells that the last pass of the dual leaves."""
-    return int(np.count_nonzero(dual.cells(bound, _most(energy))))
-
-
-def _most(energy: float) -> float:
-    """The greatest energy of a field whose labels survive."""
-    return energy + TOLERANCE * (1 + energy)
 
 
 def cells_left(lattice: Lattice, state: State, excess: float) -> Bools:

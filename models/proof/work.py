@@ -41,7 +41,7 @@ from .clusters import table_sizes
 from .dual import Divide, Dual
 from .forced import Forced, forced
 from .lattice import Lattice, labels_at, reached
-from .pruning import RemainingCells, count_left, finer, narrowed, remaining_cells
+from .pruning import RemainingCells, finer, narrowed
 from .record import EXACT, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
 
@@ -341,7 +341,7 @@ class Work:
     def _may_narrow(self, dual: Dual, bound: float) -> bool:
         """Whether passes over the labels that are left are worth a record of the level."""
         labels, energy = dual.lattice.allowed.sum(), self.energy(self.best)
-        few = labels > _MANY_LABELS and count_left(dual, bound, energy) <= _NARROWED * labels
+        few = labels > _MANY_LABELS and dual.count_left(bound, energy) <= _NARROWED * labels
         return few and self._in_time(dual, dual.lattice)
 
     def _report(self, bound: float, labels: int) -> None:
@@ -359,7 +359,7 @@ class Work:
             chain.efforts.append(certificate_effort(dual.lattice, dual.quads))
             chain.bound = max(chain.bound, level.bound)
         if not self.limits.over():
-            left = remaining_cells(dual, level.bound, energy)
+            left = dual.remaining_cells(level.bound, energy)
             _, _, jumps = labels_at(self.best, left.lattice)
             what = self.forced(replace(left, lattice=replace(left.lattice, p=jumps)))
             chain.forced = int(what.pairs.sum())

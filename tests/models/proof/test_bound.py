@@ -12,7 +12,7 @@ from crossfield.models.processes.compiled import crew
 from crossfield.models.processes.deadline import never
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import finer, remaining_cells
+from crossfield.models.proof.pruning import finer
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 from labellings import discrete, least_labelling
@@ -182,7 +182,7 @@ def test_pruning_keeps_every_field_of_no_more_energy():
                 dual.quantise()
                 bound = dual.bound()
                 assert bound <= best.energy().total
-                lattice = finer(remaining_cells(dual, bound, energy))
+                lattice = finer(dual.remaining_cells(bound, energy))
                 dropped += (~lattice.allowed).sum()
                 assert holds(lattice, (best.alpha, best.beta))
                 for _ in range(20):

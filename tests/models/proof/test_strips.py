@@ -9,7 +9,7 @@ from clusters import cluster
 from crossfield.models.processes.compiled import crew
 from crossfield.models.proof.dual import Dual, Here
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import finer, remaining_cells
+from crossfield.models.proof.pruning import finer
 from crossfield.models.proof.strip import Strip, part_of
 from crossfield.models.proof.workers import strips
 from crossfield.models.search.starts import first_field
@@ -28,7 +28,7 @@ def numbers_of(dual, energy):
     crosses = [each.tobytes() for forwards in (True, False) for each in dual.decoded(forwards=forwards)]
     quanta = dual.quantise(1e-3)
     arrays = [each.tobytes() for part in dual.arrays(quanta) for each in part.values()]
-    left = remaining_cells(dual, dual.bound(), energy)
+    left = dual.remaining_cells(dual.bound(), energy)
     return (bound, dual.bound(), quanta, crosses, arrays, left.cells.tobytes()), left
 
 
