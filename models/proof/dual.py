@@ -195,7 +195,7 @@ class Dual:
         return self._pass_seconds + self._table_seconds
 
     def seconds_on(self, lattice: Lattice) -> float:
-        """The same on another lattice, after a pass over this one."""
+        """Expected seconds of these on another lattice, estimated from the last pass over this one."""
         return sum(self._seconds_on(lattice))
 
     def _seconds_on(self, lattice: Lattice) -> tuple[float, float]:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
 _TOLERANCE: Final = 1e-11
+_DECIMALS: Final = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +112,10 @@ def absolute_fit(
     *,
     tilt: Floats | None = None,
 ) -> AbsoluteFit:
-    """The angles x of least energy at jumps p, less tilt x, with lower <= x <= upper, by Clarabel.
+    """Compute the angles that minimise the energy minus tilt x in a box, with Clarabel.
 
-    lower, upper, tilt: shapes (2n,). tilt: None for zeros. Raises CrossfieldError when Clarabel ends without
-    a solution, which a program of this kind has.
+    p: jumps, shape (m,). lower, upper: the box of x = (alpha, beta) in radians, shapes (2n,). tilt: shape
+    (2n,), None for zeros. Raises CrossfieldError when Clarabel finds no solution; one always exists.
     """
     terms, tilt = Residuals.at(instance, p, norm), np.zeros(len(lower)) if tilt is None else tilt
     x, multipliers = _best(terms, lower, upper, tilt)
@@ -166,10 +167,13 @@ def _settings() -> clarabel.DefaultSettings:
 
 @one_thread()
 def fitted_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, Floats]:
-    """The field of least energy with the jumps of `field`, and its strokes' multipliers, (s,)."""
-    instance, m = field.instance, len(field.p)
-    fit = absolute_fit(instance, field.p, norm, *bounds(instance))
-    best = min(field_at(instance, fit.x, field.p), field, key=lambda each: each.energy(norm).total)
+    """Return the field of least energy for the jumps of `field`, and the multipliers of its strokes, (s,)."""
+    instance, m, within = field.instance, len(field.p), bounds(field.instance)
+    fit = absolute_fit(instance, field.p, norm, *within)
+    # Rounding makes equal angles equal, which the solver returns with its error.
+    rounded = np.clip(np.round(fit.x, _DECIMALS), *within)
+    found = [field_at(instance, x, field.p) for x in (rounded, fit.x)]
+    best = min(*found, field, key=lambda each: each.energy(norm).total)
     return best, fit.multipliers[2 * m : 2 * m + len(instance.theta)]
 
 

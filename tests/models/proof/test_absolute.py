@@ -49,8 +49,7 @@ def test_certificates_are_confirmed_by_a_second_checker(norm, seed, strokes, tmp
     assert written.status == proof.status == "optimal"
     assert written.norm == norm
     bound = check(arrays_of(path))
-    assert written.bound <= bound <= written.energy
-    assert written.energy == pytest.approx(proof.field.energy(norm).total, rel=1e-12)
+    assert written.bound <= bound <= written.energy == proof.field.energy(norm).total
     read = cf.read_certificate(path)
     assert (read.norm, read.status, read.bound) == (norm, "optimal", written.bound)
 
