@@ -48,6 +48,7 @@ from ..instance.file import arrays_of, of_arrays
 from ..instance.grid import Floats
 from ..instance.instance import Instance
 from ..processes.deadline import Over, Stop, stop_function
+from ..processes.side_by_side import cores
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict, Way
@@ -176,12 +177,20 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
                 f"is a certificate of another instance ({field.instance.summary}), not of {on.summary}",
                 file=path,
             )
-        verdict = check_certificate.check(arrays)
+        verdict = _checked(arrays)
     except check_certificate.RefusedError as error:
         raise InputError(f"is refused as a certificate: {error}", file=path) from error
     except check_certificate.UnreadableError as error:
         raise InputError(f"is not a certificate: {error}", file=path) from error
     return Certificate(field, verdict.energy, head["bound"], head["status"], verdict)
+
+
+def _checked(arrays: Arrays) -> Verdict:
+    """Verdict of the checker, which takes the quick way where loading it takes less time than it saves."""
+    if sum(array.size for array in arrays.values()) < check_certificate.LARGE:
+        return check_certificate.check(arrays)
+    with _quick_way(cores()) as way:
+        return check_certificate.check(arrays, way=way)
 
 
 def _field(arrays: Arrays) -> CrossField:

@@ -1,9 +1,12 @@
 """Check a certificate of a cross field with no code of its prover: `python check_certificate.py FILE`.
 
-This file needs only Python 3.9 or newer and NumPy. It recomputes everything from the instance in float64: the
-energy U of the field, and at every level of the lattice the costs, a bound, the cells that it excludes, and
-that the next level covers the rest. Exit code 0: the claim is proven. 1: it is not; a line names the place.
-2: the file is not a certificate.
+This file needs only Python 3.9 or newer and NumPy. It checks the levels of a large certificate in one process
+for each processor, and by compiled loops where Numba is installed. With --plain it does without both; the
+numbers are the same.
+
+It recomputes everything from the instance in float64: the energy U of the field, and at every level of the
+lattice the costs, a bound, the cells that it excludes, and that the next level covers the rest. Exit code 0:
+the claim is proven. 1: it is not; a line names the place. 2: the file is not a certificate.
 
 "Optimal" means: no field has an energy below U by more than the number printed, which is at most OPTIMAL
 times the greater of 1 and U. "Gap" means: no field has an energy below the bound.
@@ -121,14 +124,17 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import multiprocessing
 import os
 import re
+import signal
 import struct
 import sys
 import zlib
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -151,6 +157,7 @@ MOST_WEIGHT = 1e6
 MOST_WHOLE = 2.0**53  # of a message
 BLOCK = 1 << 16  # numbers of a product that NumPy handles at once
 ROWS = 32  # of a product, from which terms are left out together
+LARGE = 1_000_000  # numbers in a certificate from which it pays to compile
 
 INSTANCE_PARTS = ("head", "origin", "mask", "stroke_pixels", "theta", "w")
 PARTS = ("head", "alpha", "beta", "p", *(f"instance_{part}" for part in INSTANCE_PARTS))
@@ -831,15 +838,60 @@ def _min_plus(left: Array, right: Array) -> Array:
     return out
 
 
+def compiled() -> Product:
+    """`min_plus` compiled by Numba: the same numbers, as minima do not depend on the order of their terms.
+
+    Without Numba, `min_plus` itself.
+    """
+    try:
+        from numba import njit
+    except ImportError:
+        return min_plus
+    product = njit(nogil=True)(_product)
+
+    def of_rows(left: Array, right: Array) -> Array:
+        return product(np.ascontiguousarray(left), np.ascontiguousarray(right))
+
+    of_rows(np.zeros((1, 1)), np.zeros((1, 1)))  # compiles
+    return of_rows
+
+
+def _product(left: Array, right: Array) -> Array:
+    """The (min,+) product in loops, for Numba, without the terms that are nowhere less than the best one."""
+    count, many = right.shape
+    least, sums = np.empty(count), np.empty(count)
+    out = np.empty((len(left), many))
+    for k in range(count):
+        least[k] = right[k].min()
+    for x in range(len(left)):
+        best, row = 0, out[x]
+        for k in range(count):
+            sums[k] = left[x, k] + least[k]
+            if sums[k] < sums[best]:
+                best = k
+        row[:] = left[x, best] + right[best]
+        most = row.max()
+        for k in range(count):
+            if sums[k] < most:
+                plus = left[x, k]
+                for y in range(many):
+                    row[y] = min(row[y], plus + right[k, y])
+    return out
+
+
 # The pass --------------------------------------------------------------------------------------------------
 
 
 @dataclass
 class Way:
-    """How to compute: the (min,+) product of two matrices, and a function like `map` for independent work."""
+    """How to compute: the (min,+) product of two matrices, and functions like `map` for independent work.
+
+    each: for the pixels of a diagonal. levels: for the levels.
+    """
 
     product: Product = min_plus
     each: Callable[[Callable[[int], Any], list[int]], Any] = map
+    levels: Callable[[Callable[[int], Any], range], Iterable[Any]] = map
 
 
 PLAIN = Way()
@@ -1272,26 +1324,36 @@ def _descend(
     arrays: dict[str, Array], sketch: Sketch, most: float, over: Over, way: Way
 ) -> tuple[list[float], Array, Level]:
     """The bounds of all levels, the boxes round the cells left after the last one, and the first level."""
-    first = level = level_of(arrays, 0, sketch)
-    need_whole_strip(first, sketch)
+
+    def left_by(number: int) -> tuple[Level, float, list[Array]]:
+        """A level without its messages, which take much memory, its bound, and the cells that it leaves."""
+        level = level_of(arrays, number, sketch)
+        passed = Pass(level, sketch, way).run(over)
+        bare = replace(level, messages=(), clusters=[], tables={})
+        return bare, passed.bound, surviving(level, passed, most)
+
+    levels: list[Level] = []
     bounds: list[float] = []
     cells: list[Array] = []
     try:
-        for number in range(_levels(head_of(arrays))):
-            finer = level_of(arrays, number, sketch) if number else first
-            centred = (finer.alpha == first.alpha) & (finer.beta == first.beta)
-            _need(centred, f"level_{number}_alpha or beta", "is not that of the first level")
-            if number:
-                need_covered(level, cells, finer, sketch, number)
-            found = Pass(finer, sketch, way).run(over)
-            bounds.append(found.bound)
-            level, cells = finer, surviving(finer, found, most)
+        for level, bound, kept in way.levels(left_by, range(_levels(head_of(arrays)))):
+            number = len(levels)
+            if not number:
+                need_whole_strip(level, sketch)
+            else:
+                centred = (level.alpha == levels[0].alpha) & (level.beta == levels[0].beta)
+                _need(centred, f"level_{number}_alpha or beta", "is not that of the first level")
+                need_covered(levels[-1], cells, level, sketch, number)
+            levels.append(level)
+            bounds.append(bound)
+            cells = kept
     except StoppedError:
         if not bounds:
             raise
     left = all(kept.any() for kept in cells)
     _need(left, "the last level", "has a pixel without a cell, not even that of the field")
-    return bounds, boxes_of(level, cells, sketch, 2 * (len(bounds) + 1) * SLIVER), first
+    margin = 2 * (len(bounds) + 1) * SLIVER
+    return bounds, boxes_of(levels[-1], cells, sketch, margin), levels[0]
 
 
 def _compare(head: dict[str, Any], verdict: Verdict, error: float) -> None:
@@ -1311,14 +1373,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the verdict and return the exit code."""
     parser = argparse.ArgumentParser(description="Check a certificate of a cross field.")
     parser.add_argument("file", help="a certificate (.npz)")
-    path = parser.parse_args(arguments).file
+    parser.add_argument("--plain", action="store_true", help="one process, and no package but NumPy")
+    given = parser.parse_args(arguments)
     try:
-        verdict = checked(path)
+        verdict = checked(given.file, plain=given.plain)
     except RefusedError as error:
         print(f"refused: {error}")
         return 1
     except UnreadableError as error:
-        print(f"unreadable: {path} {error}")
+        print(f"unreadable: {given.file} {error}")
         return 2
     for number, bound in enumerate(verdict.levels):
         print(f"level {number}: bound {bound:.9f}")
@@ -1331,11 +1394,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def checked(path: str) -> Verdict:
-    """The verdict on the certificate in a file, with a thread on each processor."""
+def checked(path: str, *, plain: bool = False) -> Verdict:
+    """The verdict on the certificate in a file; plain: by NumPy alone, in this process."""
     arrays = read(path)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return check(arrays, way=Way(each=pool.map))
+    if plain or sum(array.size for array in arrays.values()) < LARGE:
+        return check(arrays)
+    way = Way(compiled())
+    try:
+        return check(arrays, way=replace(way, levels=side_by_side))
+    except BrokenProcessPool:  # perhaps for want of memory
+        return check(arrays, way=way)
+
+
+def side_by_side(work: Callable[[int], Any], numbers: range) -> Iterable[Any]:
+    """As `map`, in one process for each processor, if processes can fork here."""
+    if "fork" not in multiprocessing.get_all_start_methods():
+        return map(work, numbers)
+    allowed = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))
+    count = min(len(allowed(0)), len(numbers))
+    fork = multiprocessing.get_context("fork")
+    with ProcessPoolExecutor(count, fork, initializer=_inherit, initargs=(work,)) as pool:
+        # Later levels tend to be larger: begun first, they end together with the small ones.
+        return [*pool.map(_inherited, numbers[::-1])][::-1]
+
+
+INHERITED: list[Callable[[int], Any]] = []  # by a process, whose parent could not send a function with arrays
+
+
+def _inherit(work: Callable[[int], Any]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    INHERITED.append(work)
+
+
+def _inherited(number: int) -> Any:
+    return INHERITED[0](number)
 
 
 if __name__ == "__main__":

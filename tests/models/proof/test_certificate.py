@@ -349,7 +349,7 @@ def test_the_checker_is_one_file_on_numpy_and_the_standard_library(written, tmp_
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0
             imported.add(str(node.module).split(".")[0])
-    assert imported - {"numpy"} <= sys.stdlib_module_names
+    assert imported - {"numpy", "numba"} <= sys.stdlib_module_names
     alone = tmp_path / "alone.py"
     alone.write_bytes(PROGRAM.read_bytes())
     path, arrays = written(1)
@@ -371,6 +371,50 @@ def test_the_checker_is_one_file_on_numpy_and_the_standard_library(written, tmp_
         done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
         assert (done.returncode, done.stderr) == (code, "")
         assert line in done.stdout
+
+
+LARGE = """
+import os, sys
+sys.path.insert(0, sys.argv.pop(1))
+import check_certificate as checker
+checker.LARGE, parent, run, seen = 0, os.getpid(), checker.Pass.run, []
+
+def watched(self, over):
+    if os.getpid() == parent:
+        seen.append(self.level.h)
+    elif DIES:
+        os._exit(9)
+    return run(self, over)
+
+checker.Pass.run = watched
+code = checker.main(sys.argv[1:])
+print(len(seen), "levels in the first process")
+sys.exit(code)
+"""
+
+
+@pytest.mark.parametrize("dies, here", [(False, 0), (True, 4)])
+def test_a_large_certificate_is_checked_side_by_side_with_the_same_result(written, dies, here):
+    """And if the system ends a process, by one process alone."""
+    path, _ = written(3)
+    large, plain = (
+        subprocess.run([sys.executable, *command, path], capture_output=True, text=True, check=False)
+        for command in (["-c", LARGE.replace("DIES", str(dies)), PROGRAM.parent], [PROGRAM, "--plain"])
+    )
+    assert (large.returncode, large.stderr) == (0, "")
+    assert large.stdout == plain.stdout + f"{here} levels in the first process\n"
+
+
+def test_compiled_products_are_the_same_numbers():
+    rng = np.random.default_rng(4)
+    product = check_certificate.compiled()
+    assert product is not check_certificate.min_plus
+    for rows, terms, columns in ((1, 1, 1), (3, 7, 5), (70, 40, 90)):
+        left, right = rng.normal(size=(rows, terms)), rng.normal(size=(terms, columns))
+        left[rng.random(left.shape) < 0.3] = np.inf
+        np.testing.assert_array_equal(
+            product(left, right.T.copy().T), check_certificate.min_plus(left, right)
+        )
 
 
 def free_energy(instance, alpha, beta):
