@@ -102,6 +102,7 @@ class Strip:
 
     def move(self, lattice: Lattice) -> None:
         """Interpolate shares and tables to a finer or smaller lattice with the same centres."""
+        self._before = []  # first of all, for memory
         old, state = self.lattice, self.state
         shares = prolonged_shares(old, state, lattice)
         clusters = prolonged_clusters(old, state.clusters, lattice)
@@ -203,7 +204,8 @@ class Strip:
         return max(map(_most, self._values)), _most(unary[np.isfinite(unary)])
 
     def quantise(self, of_shares: float, of_tables: float) -> None:
-        """Round shares and tables to whole multiples of these powers of two."""
+        """Round shares and tables to whole multiples of these powers of two, and forget their change."""
+        self._before = []  # a level is recorded next, which takes memory
         for values, quantum in zip(self._values, (of_shares, of_shares, of_tables), strict=True):
             np.multiply(values, 1 / quantum, out=values)
             np.round(values, out=values)
