@@ -1,4 +1,4 @@
-"""What the page shows of an instance, a field and a surface, as JSON with arrays in base64."""
+"""The data of an instance, a field and a surface for the page, as JSON with arrays in base64."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def lines_step(found: CrossField) -> dict[str, Any]:
 
 
 def surface_step(data: bytes, found: Drawn, field: CrossField) -> dict[str, Any]:
-    """What the page shows of the surface of a field."""
+    """The data of the surface of a field for the page."""
     document = Document.of_bytes(data)
     lifted = surface_of(document, field)
     return _surface_view(found, lifted)

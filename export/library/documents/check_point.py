@@ -393,7 +393,7 @@ def read_point(path: str) -> Point:
 
 
 def _taker(point: Point, first: str) -> Callable[[str, list[str]], None]:
-    """What takes the lines of a file into a point, by the first line."""
+    """The function that reads the lines of a file into a point, by the first line."""
     if first.strip() == "Model status":
         return HighsSolution(point).take
     if CBC_HEAD.match(first):

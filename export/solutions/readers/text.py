@@ -286,7 +286,7 @@ class Cursor:
         return self.data[self.before : end].strip()
 
     def after(self, label: bytes, expected: str) -> bytes:
-        """What follows a label on the next line, stripped. Raises SolutionError for another label."""
+        """The text after a label on the next line, stripped. Raises SolutionError for another label."""
         line = self.line(expected)
         if not line.startswith(label):
             raise self.fault(f"{shown(line)} stands where {expected} should")
