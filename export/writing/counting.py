@@ -16,7 +16,14 @@ import sympy as sp
 
 from ...models.errors import ConsistencyError
 from ...models.formulations.declaration import Family
-from ...models.formulations.families import Monomial, Monomials, PlacedFamily, beyond_noise, monomials
+from ...models.formulations.families import (
+    Monomial,
+    Monomials,
+    PlacedFamily,
+    add_at,
+    beyond_noise,
+    monomials,
+)
 from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import elements
 from ...models.instance.grid import Floats
@@ -33,19 +40,13 @@ def check(written: Counter[str], expected: Mapping[str, int]) -> None:
 
 
 class Expected:
-    """Counts of a problem, from a copy of it that shares no computed array with the written one.
+    """Counts of a problem, from its twin, which shares no computed array with the written one.
 
     Up to `degree` the objective's families are written as coefficients; those beyond it as declared.
     """
 
     def __init__(self, problem: Problem, degree: int = 2) -> None:
-        self._problem = Problem(
-            problem.instance,
-            problem.formulation,
-            problem.jumps,
-            problem.pinned,
-            problem.windows,
-        )
+        self._problem = problem.twin
         self._degree = degree
 
     @property
@@ -174,9 +175,9 @@ def _costs_of(terms: list[Monomial], *, noise: bool) -> int:
     block = first.family.block(first.symbols[0])
     total, scale = np.zeros(block.count), np.zeros(block.count)
     for term in terms:
-        at = term.factors[0] - block.offset
-        np.add.at(total, at, term.coefficient)
-        np.add.at(scale, at, term.family.scale)
+        inside = term.family.inside(term.symbols[0])
+        add_at(total, inside, term.coefficient)
+        add_at(scale, inside, term.family.scale)
     return int(np.count_nonzero(total if noise else beyond_noise(total, scale)))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import builtins
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, reduce
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -144,7 +144,8 @@ class PlacedFamily:
         if symbol in SCALARS:
             return getattr(self.problem.instance, SCALARS[symbol])
         name, kind = SLOTS[self.family.over][symbol]
-        return self.problem.data[name][way(self.problem.instance, kind)][self.elements]
+        values = self.problem.data[name][way(self.problem.instance, kind)]
+        return values if self.everywhere else values[self.elements]
 
     @cached_property
     def terms(self) -> tuple[Monomial, ...] | None:
@@ -166,10 +167,8 @@ class PlacedFamily:
     @cached_property
     def scale(self) -> Floats:
         """The largest coefficient of each element's monomials, (count,): the scale of rounding errors."""
-        scale = np.zeros(self.count)
-        for term in self.terms or ():
-            scale = np.maximum(scale, np.abs(term.coefficient))
-        return scale
+        sizes = sorted((np.abs(term.coefficient) for term in self.terms or ()), key=np.ndim)
+        return np.broadcast_to(reduce(np.maximum, sizes, np.zeros(())), (self.count,))
 
     @cached_property
     def limit(self) -> Floats:
@@ -198,13 +197,14 @@ def block_costs(terms: list[Monomial], block: Block) -> tuple[Ints, Floats]:
     total, scale = np.zeros(block.count), np.zeros(block.count)
     for term in terms:
         inside = term.family.inside(term.symbols[0])
-        _add(total, inside, term.coefficient)
-        _add(scale, inside, term.family.scale)
+        add_at(total, inside, term.coefficient)
+        add_at(scale, inside, term.family.scale)
     kept = np.nonzero(beyond_noise(total, scale))[0]
     return (block.offset + kept).astype(np.int32)[:, None], total[kept]
 
 
-def _add(sums: Floats, inside: Ints | None, values: Coefficient) -> None:
+def add_at(sums: Floats, inside: Ints | None, values: Coefficient) -> None:
+    """Add values to these elements of sums; None: to all, in their order."""
     if inside is None:
         sums += values
     else:

@@ -42,17 +42,23 @@ def element_names(instance: Instance, tag: str, over: IndexSet) -> Bytes:
     """Names `tag_row_column[_u|_r]` of all elements of an index set, shape (count, width), no padding."""
     grid, at = instance.grid, pixel_of(instance, over)
     labels = digits(np.arange(max(grid.height, grid.width)), _digits(instance))
-    parts = [f"{tag}_", labels[grid.rows[at]], "_", labels[grid.columns[at]]]
+    parts: dict[str, Any] = {
+        "tag": np.bytes_(f"{tag}_"),
+        "row": _items(labels)[grid.rows[at]],
+        "between": np.bytes_("_"),
+        "column": _items(labels)[grid.columns[at]],
+    }
     if over == "pairs":
-        parts.append(np.frombuffer(b"_r_u", np.uint8).reshape(2, 2)[grid.upward.astype(np.intp)])
-    return np.concatenate(
-        [_repeated(part, len(at)) if isinstance(part, str) else part for part in parts], axis=1
-    )
+        parts["side"] = np.array([b"_r", b"_u"])[grid.upward.astype(np.intp)]
+    names = np.empty(len(at), [(name, part.dtype) for name, part in parts.items()])
+    for name, part in parts.items():
+        names[name] = part
+    return names.view(np.uint8).reshape(len(at), names.itemsize)
 
 
-def _repeated(text: str, count: int) -> Bytes:
-    word = np.frombuffer(text.encode(), np.uint8)
-    return np.broadcast_to(word, (count, len(word)))
+def _items(texts: Bytes) -> NDArray[np.void]:
+    """Texts as items, which NumPy moves as a whole."""
+    return np.ascontiguousarray(texts).view(f"V{texts.shape[1]}")[:, 0]
 
 
 def name_length(instance: Instance, tag: str, over: IndexSet) -> int:
