@@ -11,6 +11,10 @@ pair (i, j) that changes by d
 So the gain of every change of one jump is a short formula in off-diagonal entries of G, and making a change
 costs one update of G. Angles outside the patch stay as they are; the energy is the energy of the whole field.
 
+When the jumps of all pairs of a pixel change by one, its stroke passes from line u to line v. In the labels
+from before, only -W u^2 + W v^2 is added, with u = alpha + beta - theta and v = alpha - beta - theta -+ pi/2.
+So this gain is a formula in the entries of G at that pixel.
+
 Updates lose digits. Where the parities of all jumps fit together and every stroke has the same sign of beta,
 (alpha + c, beta -+ c) costs w_beta alone. Then H has an eigenvalue of about w_beta, and a jump that ends this
 state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is computed
@@ -22,6 +26,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -88,6 +93,27 @@ class Patch:
     def unknowns(self) -> Ints:
         """Places of the patch's angles in (alpha, beta), shape (2k,)."""
         return np.concatenate([self.pixels, self.pixels + self.instance.grid.size])
+
+    @cached_property
+    def strokes(self) -> Ints:
+        """Numbers of the strokes that lie inside with all pairs of their pixels, shape (t,)."""
+        grid, at = self.instance.grid, self.instance.stroke_index
+        number = np.full(grid.size, -1)
+        number[self.pixels] = np.arange(len(self.pixels))
+        pairs = np.bincount(np.concatenate([grid.first, grid.second]), minlength=grid.size)[at]
+        inside = np.bincount(np.concatenate([self.first, self.second]), minlength=len(self.pixels))
+        return np.nonzero((number[at] >= 0) & (inside[number[at]] == pairs))[0].astype(np.int32)
+
+    @cached_property
+    def stroke_pixels(self) -> Ints:
+        """Local numbers of their pixels, shape (t,)."""
+        return np.searchsorted(self.pixels, self.instance.stroke_index[self.strokes]).astype(np.int32)
+
+    def turned(self, own: Ints) -> tuple[Ints, Ints]:
+        """The pairs, and the steps of their jumps, that turn the labels of pixels by own (k,) quarters."""
+        steps = own[self.first] - own[self.second]
+        pairs = np.nonzero(steps)[0].astype(np.int32)
+        return pairs, steps[pairs]
 
 
 class PatchEnergy:
@@ -203,6 +229,32 @@ class Landscape:
             believed = np.isfinite(gains) & (ratio > 0) & (gains >= -self.energy * (1 + _DRIFT) - _DRIFT)
         gains[~believed] = np.inf
         return gains
+
+    def turn_gains(self) -> Floats:
+        """Change of the energy when one stroke passes to line v by the shorter turn, (t,); inf if unknown."""
+        instance, g, at = self.patch.instance, self._inverse, self.patch.stroke_pixels
+        off, beta_at = self._off(), at + len(self.patch.pixels)
+        alphas, betas, mixed = g[at, at], g[beta_at, beta_at], 2 * g[at, beta_at]
+        u, v = off + self._x[beta_at], off - HALF * np.sign(off) - self._x[beta_at]
+        with np.errstate(all="ignore"):
+            beside = 1 / (instance.stroke_coefficient * instance.w[self.patch.strokes])
+            first, second = alphas + betas + mixed - beside, alphas + betas - mixed + beside
+            both = alphas - betas
+            gains: Floats = (second * u * u - 2 * both * u * v + first * v * v) / (first * second - both**2)
+            believed = np.isfinite(gains) & (first < 0) & (gains >= -self.energy * (1 + _DRIFT) - _DRIFT)
+        gains[~believed] = np.inf
+        return gains
+
+    def _off(self) -> Floats:
+        """Offsets alpha - theta of the patch's strokes, shape (t,)."""
+        off: Floats = self._x[self.patch.stroke_pixels] - self.patch.instance.target[self.patch.strokes]
+        return off
+
+    def turn(self, stroke: int) -> None:
+        """Let line v carry the stroke with this place in `turn_gains`, by the shorter turn."""
+        own = np.zeros(len(self.patch.pixels), dtype=np.int32)
+        own[self.patch.stroke_pixels[stroke]] = np.sign(self._off()[stroke])
+        self.change(*self.patch.turned(own))
 
     def change(self, pairs: Ints, steps: Ints) -> None:
         """Add steps (c,) to the jumps of the patch's pairs with those local numbers, each at most once."""

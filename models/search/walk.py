@@ -2,14 +2,17 @@
 
 After a perturbation the walk is a short tabu search (Glover, ORSA J. Computing 1, 1989). Every step makes the
 best change of one jump, uphill too, but not of a jump that has just changed, unless that gives a new lowest
-point.
+point. Some walks turn one stroke after the other instead: where strokes of two families lie close together,
+only many turns at once lower the energy.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -27,6 +30,8 @@ Change = tuple[Ints, Ints]
 LOWER: Final = 1e-7  # energy by which a field has to be lower to count as better: less may be rounding
 
 _FRUITLESS: Final = 4  # changes of one jump without a new lowest point that end a walk
+_FRUITLESS_TURNS: Final = 12  # turns of one stroke
+_PLAIN: Final = 4  # perturbations before each walk of turns
 _MOST_STEPS: Final = 1000  # of a walk; 5 to 60 are usual
 _REST: Final = (4, 12)  # changes for which a jump stays fixed once it has changed
 _LONGEST: Final = 16  # quads of a path
@@ -67,7 +72,7 @@ def explore(task: Task) -> Explored:
 
 
 def _explore(task: Task, over: Over) -> Explored:
-    rng = np.random.default_rng(task.seed)
+    rng, turning = np.random.default_rng(task.seed), np.random.default_rng((*task.seed, 1))
     patch = Patch.of(task.instance, task.free)
     land = Landscape(patch, task.x, task.p)
     home, perturbations = land.saved(), Perturbations(patch, task.curve)
@@ -75,50 +80,74 @@ def _explore(task: Task, over: Over) -> Explored:
     # Solved in the patch alone, the angles may be lower already; jumps have to improve on that.
     least = min(given, land.point.energy)
     best: Point | None = None
-    for _ in range(task.perturbations if len(patch.pairs) else 0):
-        lower = _perturbed(land, perturbations.draw(rng, land.p), rng, home.energy - LOWER, over)
-        if lower is not None and lower.point.energy < least - LOWER:
-            land, home, best = lower, lower.saved(), lower.point
-            least = best.energy
-        elif over():
-            break
-        else:
-            land.restore(home)
+    for number in range(task.perturbations if len(patch.pairs) else 0):
+        trials = [partial(_perturbed, perturbations.draw(rng, land.p), rng)]
+        if number % _PLAIN == 0 and len(patch.strokes):
+            trials.append(partial(_turned, turning))
+        for trial in trials:
+            lower = _lower(land, trial, home.energy - LOWER, over)
+            if lower is not None and lower.point.energy < least - LOWER:
+                land, home, best = lower, lower.saved(), lower.point
+                least = best.energy
+            elif over():
+                return Explored(best, whole=False)
+            else:
+                land.restore(home)
     return Explored(best, whole=not over())
 
 
-def _perturbed(
-    land: Landscape, perturbation: Change, rng: np.random.Generator, goal: float, over: Over
-) -> Landscape | None:
-    """The landscape at the lowest point below `goal` of the walk after a perturbation; None without one."""
+Trial = Callable[[Landscape, float, Over], Ints | None]
+"""A walk from a landscape: the jumps (m,) of its lowest point below a goal; None without one."""
+
+
+def _lower(land: Landscape, trial: Trial, goal: float, over: Over) -> Landscape | None:
+    """The landscape at the lowest point below `goal` that a trial finds; None without one."""
     with suppress(np.linalg.LinAlgError):
-        land.change(*perturbation)
-        jumps = _walk(land, rng, goal, over)
+        jumps = trial(land, goal, over)
         # Computed anew, because rounding of many updates must not accumulate.
         return None if jumps is None else Landscape(land.patch, land.angles, jumps)
     return None
 
 
-def _walk(land: Landscape, rng: np.random.Generator, goal: float, over: Over) -> Ints | None:
+def _perturbed(
+    perturbation: Change, rng: np.random.Generator, land: Landscape, goal: float, over: Over
+) -> Ints | None:
+    """A walk that changes jumps after a perturbation."""
+    land.change(*perturbation)
+    return _walk(land, rng, goal, over)
+
+
+def _turned(rng: np.random.Generator, land: Landscape, goal: float, over: Over) -> Ints | None:
+    """A walk that turns strokes, the first one at random."""
+    land.turn(int(rng.integers(len(land.patch.strokes))))
+    return _walk(land, rng, goal, over, turning=True)
+
+
+def _walk(
+    land: Landscape, rng: np.random.Generator, goal: float, over: Over, *, turning: bool = False
+) -> Ints | None:
     """The jumps (m,) of the lowest point below `goal` of a walk from the landscape's present state."""
-    resting = np.zeros(len(land.patch.pairs), dtype=np.int64)
+    resting = np.zeros(len(land.patch.strokes if turning else land.patch.pairs), dtype=np.int64)
     low, found = land.energy, None
     fruitless = 0
     for now in range(1, _MOST_STEPS + 1):
-        gains = land.gains()
+        gains = land.turn_gains()[None] if turning else land.gains()
         barred = (resting >= now) & (land.energy + gains >= low - LOWER)
         gains[barred] = np.inf
-        row, pair = np.unravel_index(np.argmin(gains), gains.shape)
-        if np.isinf(gains[row, pair]) or over():
+        row, place = np.unravel_index(np.argmin(gains), gains.shape)
+        if np.isinf(gains[row, place]) or over():
             break
-        land.change(np.array([pair]), STEPS[[row]])
-        resting[pair] = now + rng.integers(*_REST)
+        if turning:
+            land.turn(int(place))
+        else:
+            land.change(np.array([place]), STEPS[[row]])
+        resting[place] = now + rng.integers(*_REST)
         fruitless += 1
         if land.energy < low - LOWER:
             low, fruitless = land.energy, 0
         if land.energy < goal:
             goal, found = land.energy - LOWER, land.p.copy()
-        if fruitless == _FRUITLESS:
+        if fruitless == (_FRUITLESS_TURNS if turning else _FRUITLESS):
             break
     return found
 
@@ -192,7 +221,4 @@ class Perturbations:
         inside = (away <= radius) & (self._curve >= 0)
         if rng.random() < 0.7:
             inside &= self._curve == self._curve[centre]
-        own: Ints = inside.astype(np.int32) * np.int32(rng.choice([-1, 1]))
-        steps = own[self._patch.first] - own[self._patch.second]
-        pairs = np.nonzero(steps)[0].astype(np.int32)
-        return pairs, steps[pairs]
+        return self._patch.turned(inside.astype(np.int32) * np.int32(rng.choice([-1, 1])))
