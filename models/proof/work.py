@@ -51,14 +51,14 @@ _PASSES: Final = 3  # forwards and backwards between two roundings
 _BEFORE: Final = 9  # forwards and backwards before the gap shows where the first clusters are needed
 _SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on, if labels do not grow
 _SLOWEST: Final = 0.005  # the same on the last level
-_GROWTH: Final = 3.0  # of the number of labels from level to level, expected at first: it makes passes pay
+_HALVES: Final = 4  # labels at half the spacing for each one that is left
 _NARROWED: Final = 0.5  # share of the labels that are left, at which passes go on over these only
 _MANY_LABELS: Final = 600_000  # with fewer, passes take less time than one more level of the certificate
 _MOST_ROUNDS: Final = 40  # a level
 _CLUSTERS: Final = 24  # quads that become clusters first
 _MORE_CLUSTERS: Final = 12  # later
 _QUADS: Final = 0.15  # share of all quads that may become clusters at once
-_STALLED: Final = 0.3  # share of the gap, left by half the spacing, above which there are more; 1/4 is usual
+_STALLED: Final = 0.25  # share of the gap, left by half the spacing, above which there are more
 _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
 MOST_LABELS: Final = 24_000_000  # of a strip; each takes some 100 bytes
 _TABLES: Final = 4  # numbers of tables that take as much as a label
@@ -66,12 +66,13 @@ _RECORDING: Final = 6  # passes: the last two, the bound of a record and the pru
 _WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
+_EARLY: Final = 2  # levels before a first search: few proofs end sooner
 _MANY: Final = 4  # levels after which the field may cause the rest of the gap, but no longer be the centre
 _NEAR: Final = 0.75  # of the greatest distance from the centre that an alpha can have
 _ROUGH: Final = 1e-5  # gap relative to 1 + energy; a first smaller one is rounded like it: few digits may do
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
-_SEARCH: Final = 0.1  # greatest share of the time for that search, no longer than the proof so far
+_SEARCH: Final = 0.05  # greatest share of the time for that search, no longer than the proof so far
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 
@@ -161,7 +162,6 @@ class Work:
     divide: Divide | None = None
     chain: _Chain = field(default_factory=_Chain)
     proven: _Chain = field(default_factory=_Chain)
-    searched: bool = False
     searches: int = 0
     began: float = 0.0
 
@@ -216,10 +216,10 @@ class Work:
         self.chain, before, self.began = _Chain(), self.best, time.monotonic()
         dual = Dual(self.level(_centre(before)), self.hands, self.divide)
         self.limits.keep(self._effort_with(dual, dual.lattice))
-        patient, growth = False, _GROWTH
+        patient = False
         while True:
             self._add_clusters(dual)
-            rising = self._ascend(dual, _SLOWEST if patient else _SLOW / growth**2)
+            rising = self._ascend(dual, patient=patient)
             left = self._record(dual)
             if (ended := self._ended()) or left is None:
                 return ended or "time"
@@ -234,18 +234,14 @@ class Work:
                 if self._closing(dual)():
                     return self.limits.met() or "time"
                 lattice = narrowed(left)
-            if lattice.h < dual.lattice.h:
-                patient, growth = False, max(1.0, lattice.allowed.sum() / dual.lattice.allowed.sum())
-            else:
-                patient = patient or not rising
+            patient = lattice.h == dual.lattice.h and (patient or not rising)
             self.limits.keep(self._effort_with(dual, lattice))
             dual.move(lattice)
 
     def _search_once(self, lattice: Lattice) -> None:
-        """Search, if the next level takes long, or the field may cause the rest of the gap."""
-        costly = len(self.chain.ends) == _MANY or lattice.start[-1] > _LARGE
-        if not self.searched and costly:
-            self.searched = True
+        """Search early, and if the next level takes long, or the field may cause the rest of the gap."""
+        ends, large = len(self.chain.ends), lattice.start[-1] > _LARGE
+        if (self.searches == 0 and ends >= _EARLY) or (self.searches == 1 and (ends == _MANY or large)):
             spent = time.monotonic() - self.began
             self._search(min(_SEARCH, spent / max(self.limits.deadline.left(), spent)))
 
@@ -316,11 +312,11 @@ class Work:
     def _offer(self, found: CrossField) -> None:
         self.best = min(self.best, found, key=self.energy)
 
-    def _ascend(self, dual: Dual, slow: float) -> bool:
+    def _ascend(self, dual: Dual, *, patient: bool) -> bool:
         """Raise the dual of a level, and round fields from it, until the bound's rise is slow.
 
         Returns whether it is not, but the gap has become so small that passes over fewer labels are worth a
-        record.
+        record. patient: whether there is no finer level.
         """
         rounding, closing = Rounding(dual, self.improve), self._closing(dual)
         rises = [np.inf, np.inf]
@@ -331,12 +327,19 @@ class Work:
             energy = self.energy(self.best)
             self._report(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
             rises = [rises[1], (bound - reached) / max(energy - bound, 1e-300)]
+            slow = _SLOWEST if patient else self._slow(dual, bound)
             if closing() or self._exact(bound) or max(rises) <= slow:
                 break
             if self._may_narrow(dual, bound):
                 return True
             reached = bound
         return False
+
+    def _slow(self, dual: Dual, bound: float) -> float:
+        """The share of the gap below which a rise is slow: passes pay if the next level has many labels."""
+        left = dual.count_left(bound, self.energy(self.best))
+        growth = _HALVES * left / int(dual.lattice.allowed.sum())
+        return _SLOW / max(1.0, growth) ** 2
 
     def _may_narrow(self, dual: Dual, bound: float) -> bool:
         """Whether passes over the labels that are left are worth a record of the level."""
