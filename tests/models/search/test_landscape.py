@@ -10,7 +10,8 @@ import pytest
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import GAUGES
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.search.box_qp import free_bounds
+from crossfield.models.search.box_qp import free_bounds, least_in_box
+from crossfield.models.search.energy import energy_at
 from crossfield.models.search.improvement import pixel_curves
 from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
 from crossfield.models.search.search import _Hunt
@@ -85,6 +86,11 @@ def walked(instance, seed, perturbations, steps):
             row, pair = np.unravel_index(np.argmin(gains), gains.shape)
             land.change(np.array([pair]), STEPS[[row]])
             assert_as_defined(land)
+        for _ in range(steps if len(patch.strokes) else 0):
+            gains = land.turn_gains()
+            assert (land.energy + gains >= -1e-7 * (1 + land.energy)).all()
+            land.turn(int(np.argmin(gains)))
+            assert_as_defined(land)
 
 
 def explored(instance, seed, perturbations):
@@ -125,6 +131,29 @@ def test_energies_on_odd_instances_are_those_of_their_definition(seed):
 )
 def test_a_walk_that_leaves_and_enters_a_soft_state_keeps_its_energy(name, size, seed):
     walked(cf.sample(name, size), seed, perturbations=60, steps=6)
+
+
+def unbounded(instance, x, p):
+    """The least energy of all angles without bounds, by a solve of the whole system."""
+    infinite = np.full(len(x), np.inf)
+    return definition(instance, least_in_box(energy_at(instance, p), x, -infinite, infinite), p)
+
+
+def test_the_gain_of_a_turn_is_the_change_of_the_least_energy():
+    instance = cf.sample("saddle", 8)
+    field = first_field(instance)
+    patch = Patch.of(instance, np.ones(instance.grid.size, bool))
+    land = Landscape(patch, np.concatenate([field.alpha, field.beta]), field.p)
+    home, gains = land.saved(), land.turn_gains()
+    before = unbounded(instance, land.angles, land.p)
+    assert home.energy == pytest.approx(before, rel=1e-6)  # no bound holds an angle
+    changes = []
+    for stroke in range(len(gains)):
+        land.turn(stroke)
+        changes.append(unbounded(instance, land.angles, land.p) - before)
+        land.restore(home)
+    assert len(gains) == len(instance.theta)
+    assert gains == pytest.approx(np.array(changes), rel=1e-6)
 
 
 @pytest.mark.slow
