@@ -41,7 +41,7 @@ from typing import Final, cast
 
 import numpy as np
 
-from ..array_archive import Arrays, pack_arrays
+from ..array_archive import Arrays, Packing
 from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField, Norm
 from ..instance.file import arrays_of, of_arrays
@@ -61,7 +61,7 @@ from .state import Indices
 _PREFIX: Final = "instance_"
 _ADDITIONS: Final = 6e6  # of the checker, per unit of effort
 _LABELS: Final = 8_000.0  # compressed per unit of effort, or numbers of tables
-_SPARE_TIME: Final = 1.4  # factor for the rest of a check, and for a load that rises meanwhile
+_SPARE_TIME: Final = 1.1  # factor for the rest of a check, and for a load that rises meanwhile
 _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
 
@@ -131,13 +131,19 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
     path = Path(path)
     if not proof.levels:
         raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
-    arrays = _arrays(proof, "gap", 0.0)
-    verdict = _confirmed(arrays, path, stop_function(stop), proof.threads)
+    packing, arrays = Packing(), _arrays(proof)
+    with ThreadPoolExecutor(1) as beside:
+        packed = beside.submit(packing.add, arrays)
+        verdict = _confirmed(arrays | _head(proof, "gap", 0.0), path, stop_function(stop), proof.threads)
+        packed.result()
     status = cast("Status", verdict.status)
     bound = max(0.0, verdict.bound - _SPARE * (1 + verdict.bound))
-    kept = len(verdict.levels)
-    confirmed = replace(proof, levels=proof.levels[:kept])
-    write_bytes(path, pack_arrays(_arrays(confirmed, status, bound)))
+    confirmed = replace(proof, levels=proof.levels[: len(verdict.levels)])
+    if confirmed.levels != proof.levels:
+        packing = Packing()
+        packing.add(_arrays(confirmed))
+    packing.add(_head(confirmed, status, bound))
+    write_bytes(path, packing.finish())
     return Certificate(proof.field, verdict.energy, bound, status, verdict)
 
 
@@ -229,9 +235,8 @@ def _quick_way(threads: int) -> Iterator[Way]:
         yield Way(product, pool.map if threads > 1 else map)
 
 
-def _arrays(proof: Proof, status: Status, bound: float) -> Arrays:
-    """The arrays of a proof's certificate."""
-    field = proof.field
+def _head(proof: Proof, status: Status, bound: float) -> Arrays:
+    """The head of a certificate that claims this status and bound."""
     head = {
         "format": check_certificate.FORMAT,
         "version": check_certificate.VERSION,
@@ -241,12 +246,13 @@ def _arrays(proof: Proof, status: Status, bound: float) -> Arrays:
         "levels": len(proof.levels),
         "norm": proof.norm,
     }
-    arrays: Arrays = {
-        "head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8),
-        "alpha": field.alpha,
-        "beta": field.beta,
-        "p": field.p,
-    }
+    return {"head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)}
+
+
+def _arrays(proof: Proof) -> Arrays:
+    """The arrays of a proof's certificate without its head."""
+    field = proof.field
+    arrays: Arrays = {"alpha": field.alpha, "beta": field.beta, "p": field.p}
     arrays |= {_PREFIX + name: array for name, array in arrays_of(field.instance).items()}
     if proof.norm != 2:
         arrays |= _slopes(proof)
@@ -304,7 +310,8 @@ def checking_pace(threads: int) -> float:
     none = clusters_on(at, np.zeros(0, np.int64))
     numbers = messages_of(at, shares, 1.0, slice(0, len(pairs))), tables_of(at, none, 1.0)
     level = LevelRecord.on(at, numbers, bound=0.0, energy=0.0)
-    arrays = _arrays(Proof(field, 0.0, 0.0, "gap", 0, (level,), 0.0, "time"), "gap", 0.0)
+    proof = Proof(field, 0.0, 0.0, "gap", 0, (level,), 0.0, "time")
+    arrays = _arrays(proof) | _head(proof, "gap", 0.0)
     began = time.perf_counter()
     with _quick_way(threads) as way:
         check_certificate.check(arrays, way=way)
