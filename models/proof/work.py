@@ -66,14 +66,15 @@ _RECORDING: Final = 6  # passes: the last two, the bound of a record and the pru
 _WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
-_EARLY: Final = 2  # levels before a first search: few proofs end sooner
-_WIDE: Final = 0.01  # relative gap, for the same reason
+_EARLY: Final = 1  # levels before a first search
+_WIDE: Final = 0.01  # relative gap with which an early search pays
 _MANY: Final = 4  # levels after which the field may cause the rest of the gap, but no longer be the centre
 _NEAR: Final = 0.75  # of the greatest distance from the centre that an alpha can have
 _ROUGH: Final = 1e-5  # gap relative to 1 + energy; a first smaller one is rounded like it: few digits may do
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
 _SEARCH: Final = 0.03  # greatest share of the time for that search, no longer than the proof so far
+_LONGER: Final = 2  # times as long as an early search that a later one has to be
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 
@@ -164,6 +165,7 @@ class Work:
     chain: _Chain = field(default_factory=_Chain)
     proven: _Chain = field(default_factory=_Chain)
     searches: int = 0
+    searching: float = 0.0
     began: float = 0.0
 
     def improved(self, field: CrossField, over: Over = never) -> CrossField:
@@ -245,8 +247,12 @@ class Work:
         wide = self.energy(self.best) - self.chain.bound > _WIDE * self.energy(self.best)
         late = self.searches <= 1 and (ends == _MANY or large)
         if late or (self.searches == 0 and ends >= _EARLY and wide):
-            spent = time.monotonic() - self.began
-            self._search(min(_SEARCH, spent / max(self.limits.deadline.left(), spent)))
+            began = time.monotonic()
+            spent, left = began - self.began, self.limits.deadline.left()
+            if np.isfinite(left) and min(_SEARCH * left, spent) < _LONGER * self.searching:
+                return
+            self._search(min(_SEARCH, spent / max(left, spent)))
+            self.searching = time.monotonic() - began
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for some passes over the lattice that follows, and for its certificate."""
