@@ -5,7 +5,7 @@ import numpy as np
 from crossfield.models.field.field import CrossField
 from crossfield.models.processes.compiled import crew
 from crossfield.models.proof import check_certificate
-from crossfield.models.proof.certificate import _arrays
+from crossfield.models.proof.certificate import _arrays, _head
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.record import LevelRecord, Proof
@@ -26,7 +26,7 @@ def test_every_label_costs_what_the_checker_computes():
     with crew(1) as hands:
         level = LevelRecord.of(Dual(Lattice.whole(field, 16), hands), field.energy().total)
     proof = Proof(field, field.energy().total, 0.0, "gap", 0, (level,), 0.0, "labels")
-    arrays = _arrays(proof, "gap", 0.0)
+    arrays = _arrays(proof) | _head(proof, "gap", 0.0)
     sketch = check_certificate.sketch_of(arrays)
     same = check_certificate.level_of(arrays, 0, sketch)
     mine = np.split(level.unary_costs(), level.start[1:-1])
