@@ -61,7 +61,7 @@ from .state import Indices
 _PREFIX: Final = "instance_"
 _ADDITIONS: Final = 6e6  # of the checker, per unit of effort
 _LABELS: Final = 8_000.0  # compressed per unit of effort, or numbers of tables
-_SPARE_TIME: Final = 1.1  # factor for the rest of a check, and for a load that rises meanwhile
+_SPARE_TIME: Final = 1.1  # safety factor, because the load of the machine may rise before the check
 _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
 

@@ -157,7 +157,7 @@ MOST_WEIGHT = 1e6
 MOST_WHOLE = 2.0**53  # of a message
 BLOCK = 1 << 16  # numbers of a product that NumPy handles at once
 ROWS = 32  # of a product, from which terms are left out together
-LARGE = 1_000_000  # numbers in a certificate from which it pays to compile
+LARGE = 10_000_000  # numbers in a certificate from which compiling, some 2 s, saves time
 
 INSTANCE_PARTS = ("head", "origin", "mask", "stroke_pixels", "theta", "w")
 PARTS = ("head", "alpha", "beta", "p", *(f"instance_{part}" for part in INSTANCE_PARTS))

@@ -66,15 +66,14 @@ _RECORDING: Final = 6  # passes: the last two, the bound of a record and the pru
 _WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
-_EARLY: Final = 1  # levels before a first search
-_WIDE: Final = 0.01  # relative gap with which an early search pays
+_WIDE: Final = 0.01  # relative gap above which a search follows the first level
 _MANY: Final = 4  # levels after which the field may cause the rest of the gap, but no longer be the centre
 _NEAR: Final = 0.75  # of the greatest distance from the centre that an alpha can have
 _ROUGH: Final = 1e-5  # gap relative to 1 + energy; a first smaller one is rounded like it: few digits may do
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
 _SEARCH: Final = 0.03  # greatest share of the time for that search, no longer than the proof so far
-_LONGER: Final = 2  # times as long as an early search that a later one has to be
+_LONGER: Final = 2  # duration of a later search, relative to the first one, below which it is left out
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 
@@ -148,7 +147,10 @@ class _Chain:
 
 @dataclass
 class Work:
-    """State of a proof of the 2-norm. divide: None for a lattice in one strip."""
+    """State of a proof of the 2-norm.
+
+    divide: None for a lattice in one strip. searched: seconds of the last search between levels.
+    """
 
     norm: ClassVar[Norm] = 2
     first = staticmethod(first_of)
@@ -165,7 +167,7 @@ class Work:
     chain: _Chain = field(default_factory=_Chain)
     proven: _Chain = field(default_factory=_Chain)
     searches: int = 0
-    searching: float = 0.0
+    searched: float = 0.0
     began: float = 0.0
 
     def improved(self, field: CrossField, over: Over = never) -> CrossField:
@@ -227,7 +229,7 @@ class Work:
             if (ended := self._ended()) or left is None:
                 return ended or "time"
             lattice = narrowed(left) if rising and not patient else finer(left)
-            self._search_once(lattice)
+            self._search_between(lattice)
             better = self.energy(self.best) < self.energy(before) * (1 - _BETTER)
             if better and (len(self.chain.ends) <= _MANY or _at_seam(self.best, lattice)):
                 return self.limits.met()
@@ -241,18 +243,20 @@ class Work:
             self.limits.keep(self._effort_with(dual, lattice))
             dual.move(lattice)
 
-    def _search_once(self, lattice: Lattice) -> None:
-        """Search early, and if the next level takes long, or the field may cause the rest of the gap."""
-        ends, large = len(self.chain.ends), lattice.start[-1] > _LARGE
-        wide = self.energy(self.best) - self.chain.bound > _WIDE * self.energy(self.best)
-        late = self.searches <= 1 and (ends == _MANY or large)
-        if late or (self.searches == 0 and ends >= _EARLY and wide):
-            began = time.monotonic()
-            spent, left = began - self.began, self.limits.deadline.left()
-            if np.isfinite(left) and min(_SEARCH * left, spent) < _LONGER * self.searching:
-                return
+    def _search_between(self, lattice: Lattice) -> None:
+        """Search after the first level if the gap is wide, and before a level that takes long.
+
+        After some levels, the field may cause the rest of the gap: then search, too.
+        """
+        energy, began = self.energy(self.best), time.monotonic()
+        wide = energy - self.chain.bound > _WIDE * energy
+        late = len(self.chain.ends) == _MANY or lattice.start[-1] > _LARGE
+        if not (self.searches == 0 and wide) and not (self.searches <= 1 and late):
+            return
+        spent, left = began - self.began, self.limits.deadline.left()
+        if np.isinf(left) or min(_SEARCH * left, spent) >= _LONGER * self.searched:
             self._search(min(_SEARCH, spent / max(left, spent)))
-            self.searching = time.monotonic() - began
+            self.searched = time.monotonic() - began
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for some passes over the lattice that follows, and for its certificate."""

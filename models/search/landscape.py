@@ -233,9 +233,9 @@ class Landscape:
     def turn_gains(self) -> Floats:
         """Change of the energy when one stroke passes to line v by the shorter turn, (t,); inf if unknown."""
         instance, g, at = self.patch.instance, self._inverse, self.patch.stroke_pixels
-        off, beta_at = self._off(), at + len(self.patch.pixels)
+        beta_at, (off, side) = at + len(self.patch.pixels), self._leaning()
         alphas, betas, mixed = g[at, at], g[beta_at, beta_at], 2 * g[at, beta_at]
-        u, v = off + self._x[beta_at], off - HALF * np.sign(off) - self._x[beta_at]
+        u, v = off + self._x[beta_at], off - HALF * side - self._x[beta_at]
         with np.errstate(all="ignore"):
             beside = 1 / (instance.stroke_coefficient * instance.w[self.patch.strokes])
             first, second = alphas + betas + mixed - beside, alphas + betas - mixed + beside
@@ -245,15 +245,15 @@ class Landscape:
         gains[~believed] = np.inf
         return gains
 
-    def _off(self) -> Floats:
-        """Offsets alpha - theta of the patch's strokes, shape (t,)."""
-        off: Floats = self._x[self.patch.stroke_pixels] - self.patch.instance.target[self.patch.strokes]
-        return off
+    def _leaning(self) -> tuple[Floats, Ints]:
+        """Offsets alpha - theta of the patch's strokes, and the directions of the shorter turns, (t,)."""
+        off = self._x[self.patch.stroke_pixels] - self.patch.instance.target[self.patch.strokes]
+        return off, np.where(off < 0, -1, 1).astype(np.int32)
 
     def turn(self, stroke: int) -> None:
         """Let line v carry the stroke with this place in `turn_gains`, by the shorter turn."""
         own = np.zeros(len(self.patch.pixels), dtype=np.int32)
-        own[self.patch.stroke_pixels[stroke]] = np.sign(self._off()[stroke])
+        own[self.patch.stroke_pixels[stroke]] = self._leaning()[1][stroke]
         self.change(*self.patch.turned(own))
 
     def change(self, pairs: Ints, steps: Ints) -> None:
