@@ -59,15 +59,16 @@ class Sketch:
 
 
 def sketches(folder: Path | None) -> list[Sketch]:
-    """Every sample, and every drawing of a folder; a picture called NAME_mask.png is the mask of NAME.png."""
-    found = [Sketch(name, name) for name in SAMPLES]
-    for path in sorted(folder.iterdir()) if folder else ():
-        if path.suffix in SUFFIXES and not path.stem.endswith("_mask"):
+    """Every sample, and every drawing of a folder."""
+    return [*(Sketch(name, name) for name in SAMPLES), *(drawings_of(folder) if folder else ())]
+
+
+def drawings_of(folder: Path, suffixes: tuple[str, ...] = SUFFIXES) -> Iterator[Sketch]:
+    """Every drawing of a folder; a picture called NAME_mask.png is the mask of NAME.png."""
+    for path in sorted(folder.iterdir()):
+        if path.suffix in suffixes and not path.stem.endswith("_mask"):
             mask = path.with_name(f"{path.stem}_mask.png")
-            found.append(
-                Sketch(path.name, str(path), mask if path.suffix == ".png" and mask.exists() else None)
-            )
-    return found
+            yield Sketch(path.name, str(path), mask if path.suffix == ".png" and mask.exists() else None)
 
 
 def answered(command: list[str], folder: Path, name: str) -> dict[str, Any]:

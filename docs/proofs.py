@@ -5,10 +5,11 @@
 
 With --measure, parts are measured first, and their rows in docs/proofs.json replaced: `samples` (size 24),
 `paper` (two of them under the weights of the paper), `middle` (two at size 32), `fine` (size 48), `large`
-(size 128), `sketches` (drawings of a folder, size 24), `optima` (small instances, compared with other
-solvers), `solvers` (MIP solvers, cold and tightened) and `pictures`. --names selects from a part, --seconds
-replaces its time limit. With --work, fields and certificates stay in that folder. The part `limits` measures
-how well time limits hold, also next to busy processes.
+(size 128), `sketches` (drawings of a folder, size 24), `collections` (a folder of collections of drawings,
+as docs/public_drawings.py makes it, size 24), `optima` (small instances, compared with other solvers),
+`solvers` (MIP solvers, cold and tightened) and `pictures`. --names selects from a part, --seconds replaces
+its time limit. With --work, fields and certificates stay in that folder. The part `limits` measures how well
+time limits hold, also next to busy processes.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import median
 from typing import Any, Final
 
 import proof_pictures
@@ -37,8 +39,9 @@ from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.work import MOST_LABELS
 from crossfield.models.sketch.samples import SAMPLES, sample
-from drawings import PROVERS, Sketch, answered, optimum, sketches, tiny
+from drawings import PROVERS, SUFFIXES, Sketch, answered, drawings_of, optimum, sketches, tiny
 from make import generated, markdown
+from public_drawings import COLLECTIONS
 
 DOCS: Final = Path(__file__).resolve().parent
 KEPT: Final = DOCS / "proofs.json"
@@ -56,11 +59,15 @@ HARDEST: Final = ("mouse", "singular")
 """Samples of other sizes and weights."""
 MIP_SAMPLES: Final = ("bottle", "cylinder_bend", "mouse", "saddle", "singular")
 SECONDS: Final = {
-    "samples": 60.0, "paper": 60.0, "sketches": 60.0, "middle": 180.0, "fine": 300.0, "large": 1800.0,
-    "optima": 60.0, "solvers": 60.0, "pictures": 120.0,
+    "samples": 60.0, "paper": 60.0, "sketches": 60.0, "collections": 60.0, "middle": 180.0, "fine": 300.0,
+    "large": 1800.0, "optima": 60.0, "solvers": 60.0, "pictures": 120.0,
 }  # fmt: skip
 LIMITS: Final = {24: 10.0, 32: 30.0, 48: 60.0}
 """Time limits, by size, that end proofs of a sample before its optimum."""
+OF_COLLECTIONS: Final = (
+    "energy", "bound", "gap", "status", "pixels", "pairs", "labels", "levels", "seconds", "check", "limit"
+)  # fmt: skip
+"""Facts of a proof that are kept for drawings of collections."""
 BESIDE: Final = (0, 2)
 """Numbers of busy processes."""
 Facts = dict[str, Any]
@@ -133,6 +140,16 @@ def drawings(request: Request) -> Iterator[tuple[str, Facts]]:
             yield sketch.name, proven(sketch, SIZE, request)
 
 
+def collections(request: Request) -> Iterator[tuple[str, Facts]]:
+    """The drawings of a folder of collections at size 24, without certificates, which take much space."""
+    for folder in sorted(request.sketches.iterdir()) if request.sketches else ():
+        for sketch in drawings_of(folder, (*SUFFIXES, ".curves")):
+            if request.wants(name := f"{folder.name}/{sketch.name}"):
+                with tempfile.TemporaryDirectory(dir=request.work) as work:
+                    facts = proven(sketch, SIZE, replace(request, work=Path(work)))
+                yield name, {key: facts[key] for key in OF_COLLECTIONS}
+
+
 def optima(request: Request) -> Iterator[tuple[str, Facts]]:
     """Small instances, compared with the optimum that another solver proves."""
     for instance in tiny():
@@ -198,6 +215,7 @@ PARTS: Final[dict[str, Measurement]] = {
     "fine": samples_at(FINE),
     "large": samples_at(LARGE),
     "sketches": drawings,
+    "collections": collections,
     "optima": optima,
     "solvers": solvers,
     "pictures": pictures,
@@ -271,6 +289,38 @@ def proof_table(rows: dict[str, Facts]) -> str:
             ]
         )
     return markdown(PROOF_COLUMNS, cells)
+
+
+def collections_table(rows: dict[str, Facts]) -> str:
+    """How many drawings of each collection are proven optimal, on one core and on two, and the gaps."""
+    columns = (
+        "collection", "repository", "drawings", "optimal on one core", "optimal on one or two",
+        "gap at most 3 %", "greatest gap", "s, median", "check, s, at most",
+    )  # fmt: skip
+    cells = []
+    for name, collection in COLLECTIONS.items():
+        mine = [row for key, row in rows.items() if key.startswith(f"{name}/")]
+        cells.append([name, collection.repository, *_counts(mine)])
+    return markdown(columns, [*cells, ["all", "", *_counts(list(rows.values()))]])
+
+
+def _counts(rows: list[Facts]) -> list[str]:
+    proven = [row for row in rows if row["status"] == "optimal"]
+    return [
+        str(len(rows)),
+        str(sum(row["machine"]["cores"] == 1 for row in proven)),
+        str(len(proven)),
+        str(sum(row["gap"] <= 0.03 for row in rows)),
+        percent(max(row["gap"] for row in rows)),
+        f"{median(row['seconds'] for row in rows):.0f}",
+        f"{max(row['check'] for row in rows):.0f}",
+    ]
+
+
+def open_drawings(rows: dict[str, Facts]) -> str:
+    """The drawings that are left open, and their gaps."""
+    left = sorted((row["gap"], name) for name, row in rows.items() if row["status"] == "gap")
+    return ", ".join(f"{name.partition('/')[2]} {percent(gap)}" for gap, name in left)
 
 
 def percent(share: float) -> str:
@@ -422,6 +472,13 @@ def page(kept: Kept) -> str:
         "limits": limits_table(kept["limits"]),
         **{f"{part}_limit": f"{max(row['limit'] for row in kept[part].values()):g}" for part in tables},
         "solvers_limit": f"{SECONDS['solvers']:g}",
+    }
+    texts |= {
+        "collections": collections_table(kept["collections"]),
+        "collections_open": open_drawings(kept["collections"]),
+        "collections_limit": f"{SECONDS['collections']:g}",
+        "collections_again": str(sum(row["machine"]["cores"] > 1 for row in kept["collections"].values())),
+        "collections_processor": next(iter(kept["collections"].values()))["machine"]["processor"],
     }
     texts |= {part: proof_table(kept[part]) for part in tables}
     texts |= {f"{part}_machine": where(rows) for part, rows in parts.items()}
