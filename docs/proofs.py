@@ -8,8 +8,8 @@ With --measure, parts are measured first, and their rows in docs/proofs.json rep
 (size 128), `sketches` (drawings of a folder, size 24), `collections` (a folder of collections of drawings,
 as docs/public_drawings.py makes it, size 24), `optima` (small instances, compared with other solvers),
 `solvers` (MIP solvers, cold and tightened) and `pictures`. --names selects from a part, --seconds replaces
-its time limit. With --work, fields and certificates stay in that folder. The part `limits` measures how well
-time limits hold, also next to busy processes.
+its time limit. With --work, fields and certificates stay in that folder, but not those of collections. The
+part `limits` measures how well time limits hold, also next to busy processes.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def drawings(request: Request) -> Iterator[tuple[str, Facts]]:
 
 
 def collections(request: Request) -> Iterator[tuple[str, Facts]]:
-    """The drawings of a folder of collections at size 24, without certificates, which take much space."""
+    """The drawings of a folder of collections at size 24; certificates, which are large, are not kept."""
     for folder in sorted(request.sketches.iterdir()) if request.sketches else ():
         for sketch in drawings_of(folder, (*SUFFIXES, ".curves")):
             if request.wants(name := f"{folder.name}/{sketch.name}"):
@@ -463,6 +463,7 @@ def page(kept: Kept) -> str:
     """The text of docs/proofs.md."""
     tables = ("samples", "paper", "middle", "sketches", "fine", "large")
     parts = {part: kept[part] for part in (*tables, "solvers", "limits")}
+    found = kept["collections"]
     texts = {
         "generated": generated("python docs/proofs.py"),
         "short": in_short(kept),
@@ -470,15 +471,17 @@ def page(kept: Kept) -> str:
         "optima": optima_table(kept["optima"]),
         "solvers": solvers_table(kept["solvers"]),
         "limits": limits_table(kept["limits"]),
-        **{f"{part}_limit": f"{max(row['limit'] for row in kept[part].values()):g}" for part in tables},
+        **{
+            f"{part}_limit": f"{max(row['limit'] for row in kept[part].values()):g}"
+            for part in (*tables, "collections")
+        },
         "solvers_limit": f"{SECONDS['solvers']:g}",
     }
     texts |= {
-        "collections": collections_table(kept["collections"]),
-        "collections_open": open_drawings(kept["collections"]),
-        "collections_limit": f"{SECONDS['collections']:g}",
-        "collections_again": str(sum(row["machine"]["cores"] > 1 for row in kept["collections"].values())),
-        "collections_processor": next(iter(kept["collections"].values()))["machine"]["processor"],
+        "collections": collections_table(found),
+        "collections_open": open_drawings(found),
+        "collections_again": str(sum(row["machine"]["cores"] > 1 for row in found.values())),
+        "collections_processor": next(iter(found.values()))["machine"]["processor"],
     }
     texts |= {part: proof_table(kept[part]) for part in tables}
     texts |= {f"{part}_machine": where(rows) for part, rows in parts.items()}

@@ -41,9 +41,14 @@ COLLECTIONS: Final = {
 }
 
 
+def clone_of(clones: Path, collection: Collection) -> Path:
+    """The folder of the repository's clone."""
+    return clones / collection.repository.rpartition("/")[2]
+
+
 def files(clones: Path, collection: Collection) -> Iterator[Path]:
     """The files of a collection, in the order of their paths."""
-    root = clones / collection.repository.rpartition("/")[2]
+    root = clone_of(clones, collection)
     for pattern in collection.patterns:
         for path in sorted(root.glob(pattern)):
             if not any(part in path.name for part in collection.without):
@@ -73,4 +78,7 @@ if __name__ == "__main__":
     parser.add_argument("clones", type=Path, help="folder of the clones")
     parser.add_argument("folder", type=Path, help="folder of the drawings")
     given = parser.parse_args()
+    for each in COLLECTIONS.values():
+        if not (folder := clone_of(given.clones, each)).is_dir():
+            parser.error(f"there is no {folder}: clone {each.repository} from GitHub into it")
     collect(given.clones, given.folder)

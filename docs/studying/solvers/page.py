@@ -276,19 +276,19 @@ def _listed(rows: list[Row]) -> str:
 
 
 def answer(rows: list[Row], plan: Plan) -> list[str]:
-    """Answer on the reach of solvers: a sentence per number of pairs with all cold runs done."""
+    """Answer on the reach of solvers: the limits, then each number of pairs with all cold runs done."""
     found = groups(rows, plan)
     cold = [kind for kind in KINDS if kind[2] == "cold"]
     sentences = []
     for count, names in plan.instances.items():
         if all(len(found[count][kind]) == len(names) for kind in cold):
             solved = [f"{title(kind[1])} on `{kind[0]}` {counted(found[count][kind])}" for kind in cold]
-            sentences.append(
-                f"In {plan.limit:g} s on one thread, from a cold start, solvers prove these optima of "
-                f"instances with about {count} pairs of pixels: {', '.join(solved)}."
-            )
-    unfinished = f"{len(rows)} of {plan.size} planned runs are done, and no number of pairs is complete."
-    return sentences or [f"The measurement is under way: {unfinished}"]
+            sentences.append(f"About {count} pairs of pixels: {', '.join(solved)}.")
+    if not sentences:
+        unfinished = f"{len(rows)} of {plan.size} planned runs are done, and no number of pairs is complete."
+        return [f"The measurement is under way: {unfinished}"]
+    limits = f"in {plan.limit:g} s on one thread, from a cold start"
+    return [f"The following numbers of instances are proven optimal {limits}.", *sentences]
 
 
 def tables(rows: list[Row], plan: Plan) -> dict[str, Table]:
