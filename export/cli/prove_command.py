@@ -78,6 +78,12 @@ def prove_command(
         print_notice("interrupted; the best field and bound so far were kept")
     if proof.ended == "workers":
         print_notice("a worker of the scheduler was lost; the best field and bound so far were kept")
+    checked = len(document["levels"])
+    if 0 < checked < len(proof.levels):
+        print_notice(
+            f"the check ended early: the certificate has {checked} of {len(proof.levels)} levels, and its "
+            "bound is theirs; with a greater --time-limit it has more"
+        )
     if document["status"] == UNPROVEN:
         from ..solving.proven import NOTHING
 

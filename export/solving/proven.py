@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 NOTHING: Final = "nothing was proven within the time limit: the bound is 0, and there is no certificate"
 """Statement of a proof without a result."""
 
-_CHECKING: Final = 0.9  # share of the time for a certificate; packing takes the rest
+_LATE: Final = 0.5  # seconds by which a check may exceed the time limit, rather than drop levels
+_LATE_SHARE: Final = 0.05  # of the proof's time, by which it may exceed it as well
 
 
 @dataclass(frozen=True)
@@ -51,19 +52,21 @@ class Proven:
 def certified(proof: Proof | None, path: Path, deadline: Deadline, stop: Over = never) -> Certificate | None:
     """Write the certificate of a proof to `path`, if it proves something.
 
-    With little time the certificate proves less. If nothing is proven or no time is left, there is none, and
-    a file of an earlier call is removed. stop: returns whether the user requests the end. Raises InputError
-    for a proof that the checker refuses, and OutputError when the file cannot be written.
+    A proof keeps time for its certificate. If that is not enough, the certificate may end after the deadline,
+    by half a second and 5 % of the time of the proof. With still less time it proves less. If nothing is
+    proven or no time is left, there is none, and a file of an earlier call is removed. stop: returns whether
+    the user requests the end. Raises InputError for a proof that the checker refuses, and OutputError when
+    the file cannot be written.
     """
     path.unlink(missing_ok=True)
     if proof is None or not proof.levels:
         return None
-    if proof.bound <= 0 < proof.energy or deadline.passed():
+    last = deadline.later(_LATE + _LATE_SHARE * proof.seconds)
+    if proof.bound <= 0 < proof.energy or last.passed():
         return None
     from ...models.proof.certificate import write_certificate
 
-    checking = deadline.share(_CHECKING)
     try:
-        return write_certificate(proof, path, stop=lambda: checking.passed() or stop())
+        return write_certificate(proof, path, stop=lambda: last.passed() or stop())
     except SolverError:
         return None

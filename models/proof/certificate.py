@@ -59,9 +59,10 @@ from .record import Claim, LevelRecord, Proof, Status
 from .state import Indices
 
 _PREFIX: Final = "instance_"
-_ADDITIONS: Final = 6e6  # of the checker, per unit of effort
-_LABELS: Final = 8_000.0  # compressed per unit of effort, or numbers of tables
-_SPARE_TIME: Final = 1.1  # safety factor, because the load of the machine may rise before the check
+_ADDITIONS: Final = 2.4e6  # of the checker, per unit of effort
+_LABELS: Final = 1_600.0  # checked and compressed per unit of effort
+_NUMBERS: Final = 7_000.0  # of tables, compressed per unit of effort
+_SPARE_TIME: Final = 1.2  # safety factor, because the load of the machine may rise before the check
 _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
 
@@ -290,11 +291,12 @@ def _of_level(level: LevelRecord) -> Arrays:
 def certificate_effort(level: Lattice, quads: Indices) -> float:
     """The expected effort of checking and writing one level of a certificate, with clusters on those quads.
 
-    The unit is a pixel of a level with few labels, whose check takes about 1.2 ms.
+    The unit is a pixel of a level with few labels, whose check takes about 0.4 ms.
     """
     additions = level.work + table_work(level, quads) / 2
-    numbers = level.allowed.size + int(table_sizes(level, quads).sum())
-    return _SPARE_TIME * (len(level.alpha) + additions / _ADDITIONS + numbers / _LABELS)
+    numbers = float(table_sizes(level, quads).sum())
+    effort = len(level.alpha) + additions / _ADDITIONS + level.allowed.size / _LABELS + numbers / _NUMBERS
+    return _SPARE_TIME * effort
 
 
 def checking_pace(threads: int) -> float:
