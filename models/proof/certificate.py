@@ -226,7 +226,7 @@ def _confirmed(arrays: Arrays, path: Path, over: Over, threads: int) -> Verdict:
 @contextmanager
 def _quick_way(threads: int) -> Iterator[Way]:
     """The checker's way with compiled products, whose least sums are the same numbers, and with threads."""
-    from .products import min_plus  # loads compiled functions
+    from .min_plus import min_plus  # loads compiled functions
 
     def product(left: Floats, right: Floats) -> Floats:
         found: Floats = min_plus(np.ascontiguousarray(left), np.ascontiguousarray(right))

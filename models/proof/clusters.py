@@ -24,7 +24,9 @@ from numpy.typing import NDArray
 from ..instance.grid import Floats, Grid
 from ..processes.compiled import compiled_if_needed
 from .lattice import Lattice, starts
-from .products import alpha_costs, beta_costs, min_plus, over_beta, share_of
+from .min_plus import min_plus
+from .over_beta import betas, least_cost, over_beta
+from .products import alpha_costs, share_of
 from .state import Clusters, Indices, State
 
 IndexTable = NDArray[np.int64]  # of two axes
@@ -175,17 +177,17 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
     mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     own, other = _given(pair, i, mine, state), _given(pair, j, others, state)
     in_alpha = np.empty((state.alpha_count[i], state.alpha_count[j]))
-    in_beta = np.empty((other.shape[1], own.shape[1]))
     half = np.empty((other.shape[0], own.shape[1]))
     best = np.empty((own.shape[0], other.shape[0]))
     best[:] = np.inf
     least, most = _least(own) + _least(other), np.inf
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
+        betas_i, betas_j = betas(pair, i, state, odd)
         cheapest = alpha_costs(pair, i, state, odd, in_alpha)
-        cheapest += beta_costs(state.beta[i], state.beta[j], state, odd, in_beta)
+        cheapest += least_cost(betas_i, betas_j, (own.shape[1], other.shape[1]), state.power)
         if cheapest + least < most:
-            over_beta(other, in_beta, half)
+            over_beta(other, betas_i, betas_j, state.power, half)
             most = _lower_to(best, min_plus(own, _turned(half)), in_alpha, mine, others)
     _add(best, _negative(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
     return best

@@ -104,7 +104,7 @@ class Dual:
 
     def move(self, lattice: Lattice) -> None:
         """Go on, with interpolated shares and tables, on a finer or smaller lattice with the same centres."""
-        self._pass_seconds, self._table_seconds = self._seconds_on(lattice)
+        self._pass_seconds, self._table_seconds = self.seconds_on(lattice)
         self.lattice = lattice
         asked = [place.ask("move", part_of(lattice, place.pixels).lattice) for place in self.places]
         for answer in asked:
@@ -189,17 +189,9 @@ class Dual:
         self._pass_seconds = time.monotonic() - began
         return math.fsum([*np.concatenate(least), *self._least_of_clusters])
 
-    @property
-    def seconds(self) -> float:
-        """Expected seconds of a pass and an update of the clusters."""
-        return self._pass_seconds + self._table_seconds
-
-    def seconds_on(self, lattice: Lattice) -> float:
-        """Expected seconds of these on another lattice, estimated from the last pass over this one."""
-        return sum(self._seconds_on(lattice))
-
-    def _seconds_on(self, lattice: Lattice) -> tuple[float, float]:
-        passes = lattice.work / max(self.lattice.work, 1.0)
+    def seconds_on(self, lattice: Lattice) -> tuple[float, float]:
+        """Expected seconds of a pass, and of an update of the clusters, estimated from the last ones here."""
+        passes = lattice.pass_work / max(self.lattice.pass_work, 1.0)
         tables = table_work(lattice, self.quads) / max(table_work(self.lattice, self.quads), 1.0)
         return self._pass_seconds * passes, self._table_seconds * tables
 

@@ -31,6 +31,7 @@ from ..smooth.systems import stroke_weight
 
 Starts = NDArray[np.int64]  # places in flat arrays, as of the starts of blocks and the end of the last one
 
+_LINEAR: Final = 128.0  # additions that take as long as a label's part of the product over beta
 _AT_ONCE: Final = 200_000  # labels whose costs are computed together, for some 100 bytes each
 
 
@@ -116,10 +117,18 @@ class Lattice:
 
     @property
     def work(self) -> float:
-        """Greatest number of additions of a pass: the size of all (min,+) products over one angle."""
+        """Greatest number of additions of a check: the size of all (min,+) products over one angle."""
         i, j = self.instance.grid.first, self.instance.grid.second
         rows, columns = self.alpha_count.astype(np.float64), self.beta_count.astype(np.float64)
         return float(2 * (rows[j] * columns[i] * (columns[j] + rows[i])).sum())
+
+    @property
+    def pass_work(self) -> float:
+        """The work of a pass, in additions of the product over alpha."""
+        i, j = self.instance.grid.first, self.instance.grid.second
+        rows, columns = self.alpha_count.astype(np.float64), self.beta_count.astype(np.float64)
+        over_beta = _LINEAR if self.norm == 2 else columns[j]
+        return float(2 * (rows[j] * columns[i] * (over_beta + rows[i])).sum())
 
     def share_starts(self, end: Ints) -> Starts:
         """Starts of the pairs' shares at one end (`first` or `second` of the grid), flat; shape (m + 1,)."""

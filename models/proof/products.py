@@ -1,24 +1,24 @@
 """The compiled code for one pixel and one pair: (min,+) products of labels with a pair's cost.
 
 For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha and one in beta. So the
-product is one over beta and then one over alpha: O(N^3) for N^2 labels. A^2 is the least over all jumps of
-that parity: A is taken modulo pi.
+product is one over beta (models/proof/over_beta.py) and then one over alpha: O(N^3) for N^2 labels. A^2 is
+the least over all jumps of that parity: A is taken modulo pi.
 
-A pass over the sample `mouse` at 24 pixels with 34 x 33 labels each takes 24 ms on one thread. NumPy over
-anti-diagonals takes 108 ms for the products alone, because it cannot skip labels. The first call compiles for
-some 15 s; cached code loads in 0.3 s. The names of `State` and `Rectangles` are part of the cache: after
-renaming them, old files cannot be read.
+The first call compiles for some 20 s; cached code loads in 0.3 s. Cached code is not renewed when only
+functions in other files that it calls have changed: delete `*.nbi` then. The names of `State` and
+`Rectangles` are part of the cache: after renaming them, old files cannot be read.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from ..instance.grid import Floats
-from ..processes.compiled import compiled, compiled_if_needed, compiled_in_any_order
-from .lattice import Starts
+from ..processes.compiled import compiled
+from .min_plus import finite_part, least_of, lower_by_product
+from .over_beta import betas, least_cost, over_beta
 from .state import State
 
 _HALF: Final = float(np.pi / 2)
@@ -119,15 +119,15 @@ def product(pair: int, i: int, state: State, out: Floats) -> None:
     for row in range(found.shape[0]):
         begin[row], end[row] = finite_part(unary[row])
     in_alpha = np.empty((found.shape[0], rows))
-    in_beta = np.empty((columns, found.shape[1]))
     half = np.empty((rows, found.shape[1]))
     least, reached = least_of(source), np.inf
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
+        mine, other = betas(pair, i, state, odd)
         cheapest = alpha_costs(pair, i, state, odd, in_alpha)
-        cheapest += beta_costs(state.beta[i], state.beta[j], state, odd, in_beta)
+        cheapest += least_cost(mine, other, (half.shape[1], columns), state.power)
         if cheapest + least < reached:
-            over_beta(given, in_beta, half)
+            over_beta(given, mine, other, state.power, half)
             reached = lower_by_product(in_alpha, half, found, begin, end)
     if state.power == 2:
         for x in range(out.size):
@@ -180,135 +180,7 @@ def _add_table(number: int, upright: bool, state: State, cost: Floats) -> None:
 
 
 @compiled
-def beta_costs(x_first: float, y_first: float, state: State, odd: bool, cost: Floats) -> float:
-    """Fill in 2 B^2 or 2 |B| for labels y of one end and x of the other; return the least."""
-    least = np.inf
-    for y in range(cost.shape[0]):
-        other = y_first + state.h * y
-        if odd:
-            other = -other
-        for x in range(cost.shape[1]):
-            away = x_first + state.h * x - other
-            cost[y, x] = 2 * sized(away, state.power)
-            least = min(least, cost[y, x])
-    return least
-
-
-@compiled
-def over_beta(given: Floats, cost: Floats, half: Floats) -> None:
-    """Fill in the least over y of given[row, y] + cost[y, x], without the y that cannot attain it."""
-    half[:] = np.inf
-    terms = _terms(cost)
-    for row in range(given.shape[0]):
-        begin, end = finite_part(given[row])
-        if begin < end:
-            _lower_row(half[row], given[row, begin:end], terms, begin, 0)
-
-
-@compiled
-def lower_by_product(left: Floats, right: Floats, out: Floats, begin: Starts, end: Starts) -> float:
-    """Lower a part of each row of `out` to the (min,+) product of two matrices; return the greatest left."""
-    terms = _terms(right)
-    most = -np.inf
-    for row in range(out.shape[0]):
-        if begin[row] < end[row]:
-            target = out[row, begin[row] : end[row]]
-            _lower_row(target, left[row], terms, 0, begin[row])
-            most = max(most, _most_of(target))
-    return most
-
-
-class Terms(NamedTuple):
-    """The right matrix of a product, the least value of each of its rows, and room for a sum with each."""
-
-    rows: Floats
-    least: Floats
-    sums: Floats
-
-
-@compiled
-def _terms(rows: Floats) -> Terms:
-    least = np.empty(rows.shape[0])
-    for y in range(least.size):
-        least[y] = least_of(rows[y])
-    return Terms(rows, least, np.empty(least.size))
-
-
-@compiled
-def _lower_row(target: Floats, left: Floats, terms: Terms, first: int, begin: int) -> None:
-    """Lower the target to the least of left[y] + rows[first + y, begin:], without y that cannot lower it."""
-    sums, end = terms.sums, begin + target.size
-    lowest = _add_up(left, terms.least[first : first + left.size], sums)
-    best = 0
-    while sums[best] > lowest:
-        best += 1
-    _lower(target, terms.rows[first + best, begin:end], left[best])
-    reached = _most_of(target)
-    for y in range(left.size):
-        if sums[y] < reached and y != best:
-            _lower(target, terms.rows[first + y, begin:end], left[y])
-
-
-@compiled_if_needed
-def min_plus(left: Floats, right: Floats) -> Floats:
-    """The (min,+) product of two matrices."""
-    out = np.empty((left.shape[0], right.shape[1]))
-    out[:] = np.inf
-    lower_by_product(left, right, out, np.zeros(len(out), np.int64), np.full(len(out), out.shape[1]))
-    return out
-
-
-@compiled
-def finite_part(values: Floats) -> tuple[int, int]:
-    """The places of the first value below infinity, and after the last one; twice 0 without any."""
-    end = values.size
-    while end > 0 and values[end - 1] == np.inf:
-        end -= 1
-    begin = 0
-    while begin < end and values[begin] == np.inf:
-        begin += 1
-    return begin, end
-
-
-@compiled
 def copy(values: Floats, target: Floats) -> None:
     """Fill in the target."""
     for x in range(target.size):
         target[x] = values[x]
-
-
-# Minima do not depend on the order of their terms; in any order, processors find several at once.
-
-
-@compiled_in_any_order
-def least_of(values: Floats) -> float:
-    """The least value; infinity without any."""
-    least = np.inf
-    for x in range(values.size):
-        least = min(least, values[x])
-    return least
-
-
-@compiled_in_any_order
-def _most_of(values: Floats) -> float:
-    most = -np.inf
-    for x in range(values.size):
-        most = max(most, values[x])
-    return most
-
-
-@compiled_in_any_order
-def _add_up(values: Floats, others: Floats, sums: Floats) -> float:
-    """Fill in the sums of two arrays; return the least."""
-    least = np.inf
-    for x in range(values.size):
-        sums[x] = values[x] + others[x]
-        least = min(least, sums[x])
-    return least
-
-
-@compiled_in_any_order
-def _lower(target: Floats, values: Floats, plus: float) -> None:
-    """Lower the target to the values + plus."""
-    for x in range(target.size):
-        target[x] = min(target[x], values[x] + plus)

@@ -59,11 +59,12 @@ _CLUSTERS: Final = 24  # quads that become clusters first
 _MORE_CLUSTERS: Final = 12  # later
 _QUADS: Final = 0.15  # share of all quads that may become clusters at once
 _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above which there are more
-_MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
+_MOST_WORK: Final = 2e11  # additions of a pass, some 20 s
 MOST_LABELS: Final = 24_000_000  # of a strip; each takes some 100 bytes
 _TABLES: Final = 4  # numbers of tables that take as much as a label
-_RECORDING: Final = 6  # passes: the last two, the bound of a record and the pruning take as long
-_WORTH: Final = 2 * _RECORDING  # passes; a level with less time is not begun
+_RECORDING: Final = 5  # passes: the bound of a record and the pruning take as long
+_PAIR: Final = 2  # passes that may follow when there is time to begin them
+_WORTH: Final = 12  # passes with clusters; a level with time for fewer is not begun
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
 _WIDE: Final = 0.01  # relative gap above which a search follows the first level
@@ -260,7 +261,7 @@ class Work:
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for some passes over the lattice that follows, and for its certificate."""
-        passes = _WORTH * dual.seconds_on(lattice)
+        passes = _seconds_of(_WORTH, dual, lattice)
         certificate = self._effort_with(dual, lattice) * self.limits.pace if self.limits.certified else 0.0
         return not self.limits.over(passes + max(0.0, certificate - self.limits.kept))
 
@@ -271,7 +272,7 @@ class Work:
 
     def _closing(self, dual: Dual) -> Over:
         """A function that returns whether only the time to record the level is left."""
-        return lambda: self.limits.over(_RECORDING * dual.seconds)
+        return lambda: self.limits.over(_seconds_of(_PAIR, dual, dual.lattice))
 
     def _add_clusters(self, dual: Dual) -> None:
         """Add clusters at the beginning of a spacing, if vortices cause the gap."""
@@ -393,12 +394,18 @@ class Work:
             self.chain.bound = max(self.chain.bound, min(least, self.chain.levels[-1].energy))
 
 
+def _seconds_of(passes: int, dual: Dual, lattice: Lattice) -> float:
+    """Expected seconds of some passes with updates of the clusters on a lattice, and of its record."""
+    one, tables = dual.seconds_on(lattice)
+    return passes * (one + tables) + _RECORDING * one
+
+
 def _too_large(dual: Dual, lattice: Lattice) -> bool:
     """Whether the next level of a dual is beyond what memory, time, checker or digits of an angle allow."""
     tables = int(table_sizes(lattice, dual.quads).sum())
     many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS * len(dual.places)
     many = many or max(lattice.alpha_count.max(), lattice.beta_count.max()) > MOST_COUNT
-    return lattice.h < np.pi / 2 / _FINEST or many or lattice.work > _MOST_WORK
+    return lattice.h < np.pi / 2 / _FINEST or many or lattice.pass_work > _MOST_WORK
 
 
 def _at_seam(field: CrossField, lattice: Lattice) -> bool:
