@@ -83,6 +83,15 @@ def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_certificate_may_be_late_by_a_little(tmp_path):
+    proof, path = cf.prove(cf.sample("mouse", 6)), tmp_path / "certificate.npz"
+    some = 0.5 + 0.05 * proof.seconds
+    late = certified(proof, path, Deadline(0.0, lambda: 0.9 * some))
+    assert (late.status, len(late.verdict.levels)) == ("optimal", len(proof.levels))
+    assert certified(proof, path, Deadline(0.0, lambda: 1.1 * some)) is None
+    assert not path.exists()
+
+
 @pytest.mark.parametrize("norm", ["1", "2"])
 def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsys):
     stale = tmp_path / "mouse.proof.certificate.npz"
