@@ -26,7 +26,7 @@ from ..processes.compiled import compiled_if_needed
 from .lattice import Lattice, starts
 from .min_plus import min_plus
 from .over_beta import betas, least_cost, over_beta
-from .products import alpha_costs, share_of
+from .products import alpha_costs, ends_of, share_of
 from .state import Clusters, Indices, State
 
 IndexTable = NDArray[np.int64]  # of two axes
@@ -151,21 +151,14 @@ def _rows(number: int, state: State) -> IndexTable:
     for place in range(4):
         pair = bottom if place < 2 else top
         i = state.first[pair] if place in (0, 3) else state.second[pair]
-        _fill_allowed(i, state, found[place])
-    return found
-
-
-@compiled_if_needed
-def _fill_allowed(i: int, state: State, found: Indices) -> None:
-    """Fill in the number of alphas of a pixel that have an allowed label, and these alphas."""
-    columns, count = state.beta_count[i], 0
-    for row in range(state.alpha_count[i]):
-        for at in range(state.start[i] + row * columns, state.start[i] + (row + 1) * columns):
-            if state.unary[at] < np.inf:
+        begin, end = ends_of(i, state)
+        count = 0
+        for row in range(begin.size):
+            if begin[row] < end[row]:
                 count += 1
-                found[count] = row
-                break
-    found[0] = count
+                found[place, count] = row
+        found[place, 0] = count
+    return found
 
 
 @compiled_if_needed
@@ -176,6 +169,7 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
     i, j = state.first[pair], state.second[pair]
     mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     own, other = _given(pair, i, mine, state), _given(pair, j, others, state)
+    ends = np.zeros(other.shape[0], np.int64), np.full(other.shape[0], other.shape[1])
     in_alpha = np.empty((state.alpha_count[i], state.alpha_count[j]))
     half = np.empty((other.shape[0], own.shape[1]))
     best = np.empty((own.shape[0], other.shape[0]))
@@ -187,7 +181,7 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
         cheapest = alpha_costs(pair, i, state, odd, in_alpha)
         cheapest += least_cost(betas_i, betas_j, (own.shape[1], other.shape[1]), state.power)
         if cheapest + least < most:
-            over_beta(other, betas_i, betas_j, state.power, half)
+            over_beta(other, ends, betas_i, betas_j, state.power, half)
             most = _lower_to(best, min_plus(own, _turned(half)), in_alpha, mine, others)
     _add(best, _negative(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
     return best

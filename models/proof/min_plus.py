@@ -8,26 +8,15 @@ import numpy as np
 
 from ..instance.grid import Floats
 from ..processes.compiled import compiled, compiled_if_needed, compiled_in_any_order
-from .lattice import Starts
 
 _NEAR: Final = 1  # terms on both sides of the best one of a row that come before the others
 
 
-@compiled
-def lower_by_product(left: Floats, right: Floats, out: Floats, begin: Starts, end: Starts) -> float:
-    """Lower a part of each row of `out` to the (min,+) product of two matrices; return the greatest left."""
-    terms = terms_of(right)
-    most = -np.inf
-    for row in range(out.shape[0]):
-        if begin[row] < end[row]:
-            target = out[row, begin[row] : end[row]]
-            lower_row(target, left[row], terms, 0, begin[row])
-            most = max(most, _most_of(target))
-    return most
-
-
 class Terms(NamedTuple):
-    """The right matrix of a product, the least value of each of its rows, and room for a sum with each."""
+    """The right matrix of a product, a lower bound of each of its rows, and room for a sum with each.
+
+    Rows whose bound is inf are not used.
+    """
 
     rows: Floats
     least: Floats
@@ -44,8 +33,11 @@ def terms_of(rows: Floats) -> Terms:
 
 
 @compiled
-def lower_row(target: Floats, left: Floats, terms: Terms, first: int, begin: int) -> None:
-    """Lower the target to the least of left[y] + rows[first + y, begin:], without y that cannot lower it."""
+def lower_row(target: Floats, left: Floats, terms: Terms, first: int, begin: int) -> float:
+    """Lower the target to the least of left[y] + rows[first + y, begin:], without y that cannot lower it.
+
+    Returns the greatest that is left.
+    """
     sums, end = terms.sums, begin + target.size
     lowest = _add_up(left, terms.least[first : first + left.size], sums)
     best = 0
@@ -53,11 +45,13 @@ def lower_row(target: Floats, left: Floats, terms: Terms, first: int, begin: int
         best += 1
     near, far = max(best - _NEAR, 0), min(best + _NEAR + 1, left.size)
     for y in range(near, far):
-        _lower(target, terms.rows[first + y, begin:end], left[y])
+        if sums[y] < np.inf:
+            _lower(target, terms.rows[first + y, begin:end], left[y])
     reached = _most_of(target)
     for y in range(left.size):
         if sums[y] < reached and not near <= y < far:
             _lower(target, terms.rows[first + y, begin:end], left[y])
+    return _most_of(target)
 
 
 @compiled_if_needed
@@ -65,20 +59,10 @@ def min_plus(left: Floats, right: Floats) -> Floats:
     """The (min,+) product of two matrices."""
     out = np.empty((left.shape[0], right.shape[1]))
     out[:] = np.inf
-    lower_by_product(left, right, out, np.zeros(len(out), np.int64), np.full(len(out), out.shape[1]))
+    terms = terms_of(right)
+    for row in range(out.shape[0]):
+        lower_row(out[row], left[row], terms, 0, 0)
     return out
-
-
-@compiled
-def finite_part(values: Floats) -> tuple[int, int]:
-    """The places of the first value below infinity, and after the last one; twice 0 without any."""
-    end = values.size
-    while end > 0 and values[end - 1] == np.inf:
-        end -= 1
-    begin = 0
-    while begin < end and values[begin] == np.inf:
-        begin += 1
-    return begin, end
 
 
 # Minima do not depend on the order of their terms; in any order, processors find several at once.

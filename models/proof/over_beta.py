@@ -13,11 +13,14 @@ from numpy.typing import NDArray
 
 from ..instance.grid import Floats
 from ..processes.compiled import compiled
-from .min_plus import finite_part, lower_row, terms_of
-from .state import State
+from .min_plus import lower_row, terms_of
+from .state import Indices, State
 
 Line = tuple[float, float]
 """First value and step of equally spaced numbers."""
+
+Ends = tuple[Indices, Indices]
+"""For each row of a matrix, the first column in use and the one after the last."""
 
 
 class _Room(NamedTuple):
@@ -49,38 +52,48 @@ def least_cost(mine: Line, other: Line, counts: tuple[int, int], power: int) -> 
 
 
 @compiled
-def over_beta(given: Floats, mine: Line, other: Line, power: int, out: Floats) -> None:
-    """Fill in the least over y of given[row, y] + 2 B^2 or 2 |B|, at betas x of one end."""
+def over_beta(given: Floats, ends: Ends, mine: Line, other: Line, power: int, out: Floats) -> None:
+    """Fill in the least over y of given[row, y] + 2 B^2 or 2 |B|, at betas x of one end.
+
+    Rows of which no column is in use are left as they are.
+    """
     if power == 2:
         backwards = other[1] < 0
         first = other[0] + other[1] * (given.shape[1] - 1) if backwards else other[0]
-        _over_squares(given, (first - mine[0]) / mine[1], 2 * mine[1] * mine[1], backwards, out)
+        _over_squares(given, ends, (first - mine[0]) / mine[1], 2 * mine[1] * mine[1], backwards, out)
     else:
-        _over_sizes(given, mine, other, out)
+        _over_sizes(given, ends, mine, other, out)
 
 
 @compiled
-def _over_squares(given: Floats, apart: float, weight: float, backwards: bool, out: Floats) -> None:
+def _over_squares(
+    given: Floats, ends: Ends, apart: float, weight: float, backwards: bool, out: Floats
+) -> None:
     """Fill in the least over y of given[row, y] + weight (x - y - apart)^2, counting y backwards or not."""
     columns = given.shape[1]
     room = _Room(np.empty(columns), np.empty(columns, np.int64), np.empty(columns + 1), np.empty(columns))
     for y in range(1, columns):
         room.slopes[y] = 0.5 / (weight * y)
     for row in range(given.shape[0]):
-        for y in range(columns):
+        begin, end = ends[0][row], ends[1][row]
+        if begin == end:
+            continue
+        if backwards:
+            begin, end = columns - end, columns - begin
+        for y in range(begin, end):
             room.values[y] = given[row, columns - 1 - y if backwards else y]
-        if _find_envelope(room) > 0:
+        if _find_envelope(room, begin, end) > 0:
             _fill_in(room, apart, weight, out[row])
         else:
             out[row] = np.inf
 
 
 @compiled
-def _find_envelope(room: _Room) -> int:
-    """Find the parabolas of finite value that are the least somewhere; return their number."""
+def _find_envelope(room: _Room, first: int, end: int) -> int:
+    """Find those of some parabolas of finite value that are the least somewhere; return their number."""
     values, kept, begins = room.values, room.kept, room.begins
     count = 0
-    for y in range(values.size):
+    for y in range(first, end):
         if values[y] == np.inf:
             continue
         begin = -np.inf
@@ -109,15 +122,15 @@ def _fill_in(room: _Room, apart: float, weight: float, out: Floats) -> None:
 
 
 @compiled
-def _over_sizes(given: Floats, mine: Line, other: Line, out: Floats) -> None:
+def _over_sizes(given: Floats, ends: Ends, mine: Line, other: Line, out: Floats) -> None:
     """Fill in the least over y of given[row, y] + 2 |x - y|."""
     cost = np.empty((given.shape[1], out.shape[1]))
     for y in range(cost.shape[0]):
         for x in range(cost.shape[1]):
             cost[y, x] = 2 * abs(mine[0] + mine[1] * x - (other[0] + other[1] * y))
-    out[:] = np.inf
     terms = terms_of(cost)
     for row in range(given.shape[0]):
-        begin, end = finite_part(given[row])
+        begin, end = ends[0][row], ends[1][row]
         if begin < end:
+            out[row] = np.inf
             lower_row(out[row], given[row, begin:end], terms, begin, 0)

@@ -17,8 +17,8 @@ import numpy as np
 
 from ..instance.grid import Floats
 from ..processes.compiled import compiled
-from .min_plus import finite_part, least_of, lower_by_product
-from .over_beta import betas, least_cost, over_beta
+from .min_plus import Terms, least_of, lower_row
+from .over_beta import Ends, betas, least_cost, over_beta
 from .state import State
 
 _HALF: Final = float(np.pi / 2)
@@ -29,9 +29,8 @@ _PI: Final = float(np.pi)
 def pixel_pass(i: int, earlier: int, state: State) -> None:
     """Take from pairs to earlier pixels, columns from `earlier` of `around`; pass on to the other two."""
     begin, end = state.start[i], state.start[i + 1]
-    mine, unary = state.theta[begin:end], state.unary[begin:end]
-    for x in range(mine.size):
-        mine[x] = unary[x]
+    mine, ends, columns = state.theta[begin:end], ends_of(i, state), state.beta_count[i]
+    _copy_used(state.unary[begin:end], ends, columns, mine)
     taken, given = 0, 0
     for column in range(4):
         pair = state.around[i, column]
@@ -41,25 +40,51 @@ def pixel_pass(i: int, earlier: int, state: State) -> None:
         if column // 2 == earlier // 2:
             taken += 1
             product(pair, i, state, share)
-            for x in range(mine.size):
-                share[x] = share[x] if mine[x] < np.inf else 0.0
         else:
             given += 1
-        add(mine, share)
-    least = mine.min()
+        _add_used(share, ends, columns, mine)
+    least = _least_used(mine, ends, columns)
     state.least[i] = least
     for column in range(2 - earlier, 4 - earlier):
         pair = state.around[i, column]
         if pair >= 0:
-            _hand_on(share_of(pair, i, state), mine, least, 1.0 / max(taken, given))
+            _hand_on(mine, ends, columns, (least, 1.0 / max(taken, given)), share_of(pair, i, state))
 
 
 @compiled
-def _hand_on(share: Floats, theta: Floats, least: float, part: float) -> None:
-    """Deduct a part of theta from the share of a pair."""
-    for x in range(share.size):
-        if theta[x] < np.inf:
-            share[x] -= part * (theta[x] - least)
+def _copy_used(values: Floats, ends: Ends, columns: int, target: Floats) -> None:
+    """Fill in the used part of the target."""
+    for row in range(ends[0].size):
+        for x in range(row * columns + ends[0][row], row * columns + ends[1][row]):
+            target[x] = values[x]
+
+
+@compiled
+def _add_used(values: Floats, ends: Ends, columns: int, target: Floats) -> None:
+    """Add the values to the used part of the target."""
+    for row in range(ends[0].size):
+        for x in range(row * columns + ends[0][row], row * columns + ends[1][row]):
+            target[x] += values[x]
+
+
+@compiled
+def _least_used(values: Floats, ends: Ends, columns: int) -> float:
+    """The least value that is used."""
+    least = np.inf
+    for row in range(ends[0].size):
+        if ends[0][row] < ends[1][row]:
+            least = min(least, least_of(values[row * columns + ends[0][row] : row * columns + ends[1][row]]))
+    return least
+
+
+@compiled
+def _hand_on(theta: Floats, ends: Ends, columns: int, least_and_part: tuple[float, float], share: Floats) -> None:
+    """Deduct a part of theta less its least value from the share of a pair."""
+    least, part = least_and_part
+    for row in range(ends[0].size):
+        for x in range(row * columns + ends[0][row], row * columns + ends[1][row]):
+            if theta[x] < np.inf:
+                share[x] -= part * (theta[x] - least)
 
 
 @compiled
@@ -95,43 +120,78 @@ def pair_minimum(pair: int, state: State) -> float:
     most = np.empty(share.size)
     product(pair, i, state, most)
     unary = state.unary[state.start[i] : state.start[i + 1]]
-    least = np.inf
-    for x in range(share.size):
-        if unary[x] < np.inf:
-            least = min(least, most[x] - share[x])
+    begin, end = ends_of(i, state)
+    least, columns = np.inf, state.beta_count[i]
+    for row in range(begin.size):
+        for x in range(row * columns + begin[row], row * columns + end[row]):
+            if unary[x] < np.inf:
+                least = min(least, most[x] - share[x])
     return least
 
 
 @compiled
 def product(pair: int, i: int, state: State, out: Floats) -> None:
-    """Greatest share of a pair at the labels x of its end i: min over y of c(x, y) - share(y)."""
-    j = state.second[pair] if state.first[pair] == i else state.first[pair]
-    rows, columns = state.alpha_count[j], state.beta_count[j]
-    source = -share_of(pair, j, state)
-    unary = state.unary[state.start[j] : state.start[j + 1]]
-    for y in range(source.size):
-        source[y] = source[y] if unary[y] < np.inf else np.inf
-    given = source.reshape((rows, columns))
-    found = out.reshape((state.alpha_count[i], state.beta_count[i]))
-    found[:] = np.inf
-    begin, end = np.empty(found.shape[0], np.int64), np.empty(found.shape[0], np.int64)
-    unary = state.unary[state.start[i] : state.start[i + 1]].reshape(found.shape)
-    for row in range(found.shape[0]):
-        begin[row], end[row] = finite_part(unary[row])
-    in_alpha = np.empty((found.shape[0], rows))
-    half = np.empty((rows, found.shape[1]))
-    least, reached = least_of(source), np.inf
+    """Greatest share of a pair at the labels x of its end i: min over y of c(x, y) - share(y).
+
+    It is 0 at labels that are not allowed, between others.
+    """
+    j = state.first[pair] + state.second[pair] - i
+    rows, columns = state.alpha_count[i], state.beta_count[i]
+    given = np.empty((state.alpha_count[j], state.beta_count[j]))
+    terms = Terms(np.empty((given.shape[0], columns)), np.empty(given.shape[0]), np.empty(given.shape[0]))
+    fill_given(pair, j, state, given, terms.least)
+    begin, end = ends_of(i, state)
+    for row in range(rows):
+        for x in range(row * columns + begin[row], row * columns + end[row]):
+            out[x] = np.inf
+    least, reached = least_of(terms.least), np.inf
+    of_steps = np.empty(rows + given.shape[0] - 1)
+    tabled = state.clusters.of_pair[pair, 0] >= 0
+    in_alpha = np.empty((rows if tabled else 0, given.shape[0]))
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
         mine, other = betas(pair, i, state, odd)
-        cheapest = alpha_costs(pair, i, state, odd, in_alpha)
-        cheapest += least_cost(mine, other, (half.shape[1], columns), state.power)
-        if cheapest + least < reached:
-            over_beta(given, mine, other, state.power, half)
-            reached = lower_by_product(in_alpha, half, found, begin, end)
-    if state.power == 2:
-        for x in range(out.size):
-            out[x] -= state.h * state.h
+        if tabled:
+            cheapest = alpha_costs(pair, i, state, odd, in_alpha)
+        else:
+            cheapest = step_costs(pair, i, state, odd, of_steps)
+        cheapest += least_cost(mine, other, (columns, given.shape[1]), state.power)
+        if cheapest + least >= reached:
+            continue
+        over_beta(given, ends_of(j, state), mine, other, state.power, terms.rows)
+        reached = -np.inf
+        for row in range(rows):
+            if begin[row] < end[row]:
+                left = in_alpha[row] if tabled else of_steps[rows - 1 - row : of_steps.size - row]
+                target = out[row * columns + begin[row] : row * columns + end[row]]
+                reached = max(reached, lower_row(target, left, terms, 0, begin[row]))
+    unary, less = state.unary[state.start[i] : state.start[i + 1]], state.h**2 if state.power == 2 else 0.0
+    for row in range(rows):
+        for x in range(row * columns + begin[row], row * columns + end[row]):
+            out[x] = out[x] - less if unary[x] < np.inf else 0.0
+
+
+@compiled
+def ends_of(i: int, state: State) -> Ends:
+    """The first allowed label of each row of a pixel, and the one after the last."""
+    low, high = state.row_start[i], state.row_start[i + 1]
+    return state.begin[low:high], state.end[low:high]
+
+
+@compiled
+def fill_given(pair: int, j: int, state: State, given: Floats, least: Floats) -> None:
+    """Fill in minus the shares of a pair at its end j, inf at labels that are not allowed, and the least of rows.
+
+    Columns that are not in use are left as they are.
+    """
+    share, unary = share_of(pair, j, state), state.unary[state.start[j] : state.start[j + 1]]
+    begin, end = ends_of(j, state)
+    for row in range(given.shape[0]):
+        least[row] = np.inf
+        for y in range(begin[row], end[row]):
+            at = row * given.shape[1] + y
+            given[row, y] = -share[at] if unary[at] < np.inf else np.inf
+            least[row] = min(least[row], given[row, y])
 
 
 @compiled
@@ -141,21 +201,31 @@ def sized(residual: float, power: int) -> float:
 
 
 @compiled
+def step_costs(pair: int, i: int, state: State, odd: bool, of_steps: Floats) -> float:
+    """Fill in 2 A^2 or 2 |A| for labels x of end i and y of the other end; return the least.
+
+    By x - y, from the last x to minus the last y.
+    """
+    j, last = state.first[pair] + state.second[pair] - i, state.alpha_count[i] - 1
+    a = state.alpha[i] - state.alpha[j]
+    if odd:
+        a += _HALF
+    for place in range(of_steps.size):
+        away = a + state.h * (last - place)
+        away -= _PI * np.round(away / _PI)
+        of_steps[place] = 2 * sized(away, state.power)
+    return least_of(of_steps)
+
+
+@compiled
 def alpha_costs(pair: int, i: int, state: State, odd: bool, cost: Floats) -> float:
     """Fill in 2 A^2 or 2 |A|, plus the tables of the pair, at labels x of end i and y of the other end.
 
     Returns the least.
     """
-    j = state.first[pair] + state.second[pair] - i
-    a = state.alpha[i] - state.alpha[j]
-    if odd:
-        a += _HALF
     last = cost.shape[0] - 1
-    of_steps = np.empty(last + cost.shape[1])  # for x - y from the last x to minus the last y
-    for place in range(of_steps.size):
-        away = a + state.h * (last - place)
-        away -= _PI * np.round(away / _PI)
-        of_steps[place] = 2 * sized(away, state.power)
+    of_steps = np.empty(last + cost.shape[1])
+    step_costs(pair, i, state, odd, of_steps)
     for x in range(cost.shape[0]):
         copy(of_steps[last - x : last - x + cost.shape[1]], cost[x])
     for place in range(2):

@@ -24,7 +24,7 @@ import numpy as np
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER
 from ..processes.compiled import compiled
-from .lattice import Lattice, Starts, ranges, reached, strip
+from .lattice import Lattice, Starts, ranges, reached, starts, strip
 from .state import State
 
 
@@ -109,6 +109,17 @@ def prolonged_shares(old: Lattice, state: State, new: Lattice) -> list[Floats]:
     return shares
 
 
+def rows_of(lattice: Lattice) -> tuple[Starts, Starts, Starts]:
+    """The start of the rows of each pixel, one for each alpha, and the ends of the allowed labels of each row.
+
+    Ends are the first label and the one after the last; twice 0 in a row without any.
+    """
+    start = starts(lattice.alpha_count)
+    begin, end = np.zeros(start[-1], np.int64), np.zeros(start[-1], np.int64)
+    _find_rows(_rectangles(lattice), lattice.allowed, start, begin, end)
+    return start, begin, end
+
+
 def _ends(lattice: Lattice, cells: Bools) -> Ints:
     """Least and greatest k, then l, of the vertices of each pixel's cells, shape (n, 4)."""
     ends = np.zeros((len(lattice.count), 4), np.int32)
@@ -143,6 +154,18 @@ def _mark_cells(at: Rectangles, allowed: Bools, survives: Bools, cells: Bools) -
                 whole = allowed[low] and allowed[low + 1] and allowed[high] and allowed[high + 1]
                 some = survives[low] or survives[low + 1] or survives[high] or survives[high + 1]
                 cells[low] = whole and some
+
+
+@compiled
+def _find_rows(at: Rectangles, allowed: Bools, start: Starts, begin: Starts, end: Starts) -> None:
+    """Find the first allowed label of each row, and the one after the last."""
+    for i in range(len(at.rows)):
+        for row in range(start[i], start[i + 1]):
+            label = at.start[i] + (row - start[i]) * at.columns[i]
+            for x in range(at.columns[i]):
+                if allowed[label + x]:
+                    begin[row] = begin[row] if end[row] else x
+                    end[row] = x + 1
 
 
 @compiled

@@ -34,6 +34,9 @@ class State(NamedTuple):
     alpha_count: Ints
     beta_count: Ints
     start: Starts
+    row_start: Starts  # (n + 1,): start of the rows of each pixel, one for each alpha
+    begin: Indices  # of each row: its first allowed label
+    end: Indices  # and the one after the last, twice 0 for none
     unary: Floats
     first: Indices
     second: Indices
@@ -41,7 +44,7 @@ class State(NamedTuple):
     start_first: Starts
     start_second: Starts
     around: Indices  # pairs to the upper, left, lower, right neighbour of each pixel, or -1
-    shares_first: Floats
+    shares_first: Floats  # here and below, numbers outside of begin and end are not used
     shares_second: Floats
     theta: Floats  # as the last pass found it at each pixel
     least: Floats  # of each pixel's theta

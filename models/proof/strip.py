@@ -30,7 +30,7 @@ from .decoding import Crosses, decode
 from .encoding import messages_of, tables_of
 from .lattice import Lattice, Starts
 from .products import all_taken, pair_minimum, pixel_pass
-from .pruning import cells_left, prolonged_shares
+from .pruning import cells_left, prolonged_shares, rows_of
 from .slack import quad_slacks
 from .state import Clusters, Indices, State
 
@@ -147,9 +147,11 @@ class Strip:
         if not self._before:
             self._before = [values.astype(np.float32) for values in moved]
             return
-        for values, before in zip(moved, self._before, strict=True):
-            parts = [(values[at], before[at]) for at in self.crew.equal_parts(len(values))]
-            self.crew.run(lambda each: _carry_on(*each, part), parts)
+        parts = self.crew.equal_parts(len(self.state.first))
+        first, second, tables = zip(moved, self._before, strict=True)
+        self.crew.run(lambda pairs: _carry_shares(pairs.start, pairs.stop, self.state, first, 0, part), parts)
+        self.crew.run(lambda pairs: _carry_shares(pairs.start, pairs.stop, self.state, second, 1, part), parts)
+        _carry_on(*tables, part)
 
     @property
     def _values(self) -> tuple[Floats, Floats, Floats]:
@@ -244,6 +246,21 @@ def _places(starts: Starts, pairs: Starts) -> Starts:
 
 
 @compiled
+def _carry_shares(
+    begin: int, end: int, state: State, moved: tuple[Floats, NDArray[np.float32]], at: int, part: float
+) -> None:
+    """Extrapolate the shares of some pairs; at: 0 at their first, 1 at their second pixels."""
+    values, before = moved
+    for pair in range(begin, end):
+        i = state.first[pair] if at == 0 else state.second[pair]
+        start = state.start_first[pair] if at == 0 else state.start_second[pair]
+        for row in range(state.row_start[i], state.row_start[i + 1]):
+            label = start + (row - state.row_start[i]) * state.beta_count[i]
+            low, high = label + state.begin[row], label + state.end[row]
+            _carry_on(values[low:high], before[low:high], part)
+
+
+@compiled
 def _carry_on(values: Floats, before: NDArray[np.float32], part: float) -> None:
     """Extrapolate by a part of the change since the previous pass, and store the values as they were."""
     for x in range(values.size):
@@ -255,6 +272,7 @@ def _carry_on(values: Floats, before: NDArray[np.float32], part: float) -> None:
 def _state(lattice: Lattice, shares: Sequence[Floats], clusters: Clusters) -> State:
     grid = lattice.instance.grid
     unary = lattice.unary_costs()
+    row_start, begin, end = rows_of(lattice)
     start_first, start_second = lattice.share_starts(grid.first), lattice.share_starts(grid.second)
     return State(
         lattice.h,
@@ -263,6 +281,9 @@ def _state(lattice: Lattice, shares: Sequence[Floats], clusters: Clusters) -> St
         lattice.alpha_count,
         lattice.beta_count,
         lattice.start,
+        row_start,
+        begin,
+        end,
         unary,
         grid.first.astype(np.int64),
         grid.second.astype(np.int64),

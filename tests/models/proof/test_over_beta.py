@@ -14,8 +14,12 @@ def test_products_over_beta_are_the_least_over_all_labels(power, seed):
     given = rng.choice([0.1, 10.0]) * rng.normal(size=(7, rng.integers(2, 40)))
     given[rng.random(given.shape) < rng.choice([0.0, 0.5])] = np.inf
     given[3] = np.inf
-    out = np.empty((7, rng.integers(2, 40)))
-    over_beta(given, mine, other, power, out)
+    begin, end = rng.integers(0, given.shape[1], (2, 7))
+    used = (np.arange(given.shape[1]) >= begin[:, None]) & (np.arange(given.shape[1]) < end[:, None])
+    given[~used] = np.nan
+    out = np.full((7, rng.integers(2, 40)), np.inf)
+    over_beta(given, (begin, np.maximum(begin, end)), mine, other, power, out)
+    given[~used] = np.inf
     x, y = (
         first + step * np.arange(n) for (first, step), n in ((mine, out.shape[1]), (other, given.shape[1]))
     )
