@@ -25,7 +25,7 @@ from ..instance.grid import Floats, Grid
 from ..processes.compiled import compiled_if_needed
 from .lattice import Lattice, starts
 from .min_plus import min_plus
-from .over_beta import betas, least_cost, over_beta
+from .over_beta import Ends, betas, least_cost, over_beta
 from .products import alpha_costs, ends_of, share_of
 from .state import Clusters, Indices, State
 
@@ -169,7 +169,7 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
     i, j = state.first[pair], state.second[pair]
     mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     own, other = _given(pair, i, mine, state), _given(pair, j, others, state)
-    ends = np.zeros(other.shape[0], np.int64), np.full(other.shape[0], other.shape[1])
+    ends = _ends_of(j, others, state)
     in_alpha = np.empty((state.alpha_count[i], state.alpha_count[j]))
     half = np.empty((other.shape[0], own.shape[1]))
     best = np.empty((own.shape[0], other.shape[0]))
@@ -194,6 +194,16 @@ def _least(matrix: Floats) -> float:
         for y in range(matrix.shape[1]):
             least = min(least, matrix[x, y])
     return least
+
+
+@compiled_if_needed
+def _ends_of(i: int, rows: Indices, state: State) -> Ends:
+    """The ends of some rows of a pixel, as of `ends_of`."""
+    begin, end = ends_of(i, state)
+    some = np.empty(rows[0], np.int64), np.empty(rows[0], np.int64)
+    for x in range(rows[0]):
+        some[0][x], some[1][x] = begin[rows[x + 1]], end[rows[x + 1]]
+    return some
 
 
 @compiled_if_needed
