@@ -127,8 +127,9 @@ class Lattice:
         """The work of a pass, in additions of the product over alpha."""
         i, j = self.instance.grid.first, self.instance.grid.second
         rows, columns = self.alpha_count.astype(np.float64), self.beta_count.astype(np.float64)
+        allowed = np.add.reduceat(self.allowed, self.start[:-1], dtype=np.int64)
         over_beta = _LINEAR if self.norm == 2 else columns[j]
-        return float(2 * (rows[j] * columns[i] * (over_beta + rows[i])).sum())
+        return float(2 * rows[j] @ (columns[i] * over_beta + allowed[i]))
 
     def share_starts(self, end: Ints) -> Starts:
         """Starts of the pairs' shares at one end (`first` or `second` of the grid), flat; shape (m + 1,)."""
