@@ -237,6 +237,7 @@ def machine() -> Facts:
 
 def measure(part: str, request: Request) -> None:
     """Write the rows of a part to docs/proofs.json as they come."""
+    request.work.mkdir(parents=True, exist_ok=True)
     for name, facts in PARTS[part](request):
         kept = read()
         kept.setdefault(part, {})[name] = facts | {"machine": machine()}

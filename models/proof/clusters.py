@@ -25,7 +25,7 @@ from ..instance.grid import Floats, Grid
 from ..processes.compiled import compiled_if_needed
 from .lattice import Lattice, starts
 from .min_plus import min_plus
-from .over_beta import Ends, betas, least_cost, over_beta
+from .over_beta import Ends, Given, betas, least_cost, over_beta
 from .products import alpha_costs, ends_of, share_of
 from .state import Clusters, Indices, State
 
@@ -169,7 +169,7 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
     i, j = state.first[pair], state.second[pair]
     mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     own, other = _given(pair, i, mine, state), _given(pair, j, others, state)
-    ends = _ends_of(j, others, state)
+    given = Given(other, _ends_of(j, others, state))
     in_alpha = np.empty((state.alpha_count[i], state.alpha_count[j]))
     half = np.empty((other.shape[0], own.shape[1]))
     best = np.empty((own.shape[0], other.shape[0]))
@@ -181,7 +181,7 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
         cheapest = alpha_costs(pair, i, state, odd, in_alpha)
         cheapest += least_cost(betas_i, betas_j, (own.shape[1], other.shape[1]), state.power)
         if cheapest + least < most:
-            over_beta(other, ends, betas_i, betas_j, state.power, half)
+            over_beta(given, betas_i, betas_j, state.power, half)
             most = _lower_to(best, min_plus(own, _turned(half)), in_alpha, mine, others)
     _add(best, _negative(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
     return best

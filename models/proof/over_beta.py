@@ -23,6 +23,13 @@ Ends = tuple[Indices, Indices]
 """For each row of a matrix, the first column in use and the one after the last."""
 
 
+class Given(NamedTuple):
+    """A matrix by alpha and beta, and the ends of what is in use of its rows."""
+
+    values: Floats
+    ends: Ends
+
+
 class _Room(NamedTuple):
     """Room for parabolas of one width with their centres at 0, 1, ..., and for their envelope.
 
@@ -52,36 +59,34 @@ def least_cost(mine: Line, other: Line, counts: tuple[int, int], power: int) -> 
 
 
 @compiled
-def over_beta(given: Floats, ends: Ends, mine: Line, other: Line, power: int, out: Floats) -> None:
+def over_beta(given: Given, mine: Line, other: Line, power: int, out: Floats) -> None:
     """Fill in the least over y of given[row, y] + 2 B^2 or 2 |B|, at betas x of one end.
 
     Rows of which no column is in use are left as they are.
     """
     if power == 2:
         backwards = other[1] < 0
-        first = other[0] + other[1] * (given.shape[1] - 1) if backwards else other[0]
-        _over_squares(given, ends, (first - mine[0]) / mine[1], 2 * mine[1] * mine[1], backwards, out)
+        first = other[0] + other[1] * (given.values.shape[1] - 1) if backwards else other[0]
+        _over_squares(given, (first - mine[0]) / mine[1], 2 * mine[1] * mine[1], backwards, out)
     else:
-        _over_sizes(given, ends, mine, other, out)
+        _over_sizes(given, mine, other, out)
 
 
 @compiled
-def _over_squares(
-    given: Floats, ends: Ends, apart: float, weight: float, backwards: bool, out: Floats
-) -> None:
+def _over_squares(given: Given, apart: float, weight: float, backwards: bool, out: Floats) -> None:
     """Fill in the least over y of given[row, y] + weight (x - y - apart)^2, counting y backwards or not."""
-    columns = given.shape[1]
+    columns, ends = given.values.shape[1], given.ends
     room = _Room(np.empty(columns), np.empty(columns, np.int64), np.empty(columns + 1), np.empty(columns))
     for y in range(1, columns):
         room.slopes[y] = 0.5 / (weight * y)
-    for row in range(given.shape[0]):
+    for row in range(given.values.shape[0]):
         begin, end = ends[0][row], ends[1][row]
         if begin == end:
             continue
         if backwards:
             begin, end = columns - end, columns - begin
         for y in range(begin, end):
-            room.values[y] = given[row, columns - 1 - y if backwards else y]
+            room.values[y] = given.values[row, columns - 1 - y if backwards else y]
         if _find_envelope(room, begin, end) > 0:
             _fill_in(room, apart, weight, out[row])
         else:
@@ -122,15 +127,15 @@ def _fill_in(room: _Room, apart: float, weight: float, out: Floats) -> None:
 
 
 @compiled
-def _over_sizes(given: Floats, ends: Ends, mine: Line, other: Line, out: Floats) -> None:
+def _over_sizes(given: Given, mine: Line, other: Line, out: Floats) -> None:
     """Fill in the least over y of given[row, y] + 2 |x - y|."""
-    cost = np.empty((given.shape[1], out.shape[1]))
+    cost = np.empty((given.values.shape[1], out.shape[1]))
     for y in range(cost.shape[0]):
         for x in range(cost.shape[1]):
             cost[y, x] = 2 * abs(mine[0] + mine[1] * x - (other[0] + other[1] * y))
     terms = terms_of(cost)
-    for row in range(given.shape[0]):
-        begin, end = ends[0][row], ends[1][row]
+    for row in range(given.values.shape[0]):
+        begin, end = given.ends[0][row], given.ends[1][row]
         if begin < end:
             out[row] = np.inf
-            lower_row(out[row], given[row, begin:end], terms, begin, 0)
+            lower_row(out[row], given.values[row, begin:end], terms, begin, 0)

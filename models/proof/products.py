@@ -18,7 +18,7 @@ import numpy as np
 from ..instance.grid import Floats
 from ..processes.compiled import compiled
 from .min_plus import Terms, least_of, lower_row
-from .over_beta import Ends, betas, least_cost, over_beta
+from .over_beta import Ends, Given, betas, least_cost, over_beta
 from .state import State
 
 _HALF: Final = float(np.pi / 2)
@@ -78,7 +78,9 @@ def _least_used(values: Floats, ends: Ends, columns: int) -> float:
 
 
 @compiled
-def _hand_on(theta: Floats, ends: Ends, columns: int, least_and_part: tuple[float, float], share: Floats) -> None:
+def _hand_on(
+    theta: Floats, ends: Ends, columns: int, least_and_part: tuple[float, float], share: Floats
+) -> None:
     """Deduct a part of theta less its least value from the share of a pair."""
     least, part = least_and_part
     for row in range(ends[0].size):
@@ -137,17 +139,18 @@ def product(pair: int, i: int, state: State, out: Floats) -> None:
     """
     j = state.first[pair] + state.second[pair] - i
     rows, columns = state.alpha_count[i], state.beta_count[i]
-    given = np.empty((state.alpha_count[j], state.beta_count[j]))
-    terms = Terms(np.empty((given.shape[0], columns)), np.empty(given.shape[0]), np.empty(given.shape[0]))
-    fill_given(pair, j, state, given, terms.least)
+    given = Given(np.empty((state.alpha_count[j], state.beta_count[j])), ends_of(j, state))
+    others, columns_j = given.values.shape
+    terms = Terms(np.empty((others, columns)), np.empty(others), np.empty(others))
+    _fill_given(pair, j, state, given, terms.least)
     begin, end = ends_of(i, state)
     for row in range(rows):
         for x in range(row * columns + begin[row], row * columns + end[row]):
             out[x] = np.inf
     least, reached = least_of(terms.least), np.inf
-    of_steps = np.empty(rows + given.shape[0] - 1)
+    of_steps = np.empty(rows + others - 1)
     tabled = state.clusters.of_pair[pair, 0] >= 0
-    in_alpha = np.empty((rows if tabled else 0, given.shape[0]))
+    in_alpha = np.empty((rows if tabled else 0, others))
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
         mine, other = betas(pair, i, state, odd)
@@ -155,10 +158,10 @@ def product(pair: int, i: int, state: State, out: Floats) -> None:
             cheapest = alpha_costs(pair, i, state, odd, in_alpha)
         else:
             cheapest = step_costs(pair, i, state, odd, of_steps)
-        cheapest += least_cost(mine, other, (columns, given.shape[1]), state.power)
+        cheapest += least_cost(mine, other, (columns, columns_j), state.power)
         if cheapest + least >= reached:
             continue
-        over_beta(given, ends_of(j, state), mine, other, state.power, terms.rows)
+        over_beta(given, mine, other, state.power, terms.rows)
         reached = -np.inf
         for row in range(rows):
             if begin[row] < end[row]:
@@ -179,19 +182,19 @@ def ends_of(i: int, state: State) -> Ends:
 
 
 @compiled
-def fill_given(pair: int, j: int, state: State, given: Floats, least: Floats) -> None:
-    """Fill in minus the shares of a pair at its end j, inf at labels that are not allowed, and the least of rows.
+def _fill_given(pair: int, j: int, state: State, given: Given, least: Floats) -> None:
+    """Fill in minus the shares of a pair at its end j, inf at labels that are not allowed.
 
-    Columns that are not in use are left as they are.
+    Only what is in use is filled in. least: receives the least number of each row, inf without any.
     """
     share, unary = share_of(pair, j, state), state.unary[state.start[j] : state.start[j + 1]]
-    begin, end = ends_of(j, state)
-    for row in range(given.shape[0]):
+    (begin, end), values = given.ends, given.values
+    for row in range(values.shape[0]):
         least[row] = np.inf
         for y in range(begin[row], end[row]):
-            at = row * given.shape[1] + y
-            given[row, y] = -share[at] if unary[at] < np.inf else np.inf
-            least[row] = min(least[row], given[row, y])
+            at = row * values.shape[1] + y
+            values[row, y] = -share[at] if unary[at] < np.inf else np.inf
+            least[row] = min(least[row], values[row, y])
 
 
 @compiled

@@ -110,9 +110,9 @@ def prolonged_shares(old: Lattice, state: State, new: Lattice) -> list[Floats]:
 
 
 def rows_of(lattice: Lattice) -> tuple[Starts, Starts, Starts]:
-    """The start of the rows of each pixel, one for each alpha, and the ends of the allowed labels of each row.
+    """Where the rows of each pixel start, one for each alpha, and where the allowed labels of each row are.
 
-    Ends are the first label and the one after the last; twice 0 in a row without any.
+    These are the first label and the one after the last; twice 0 in a row without any.
     """
     start = starts(lattice.alpha_count)
     begin, end = np.zeros(start[-1], np.int64), np.zeros(start[-1], np.int64)

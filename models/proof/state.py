@@ -44,9 +44,9 @@ class State(NamedTuple):
     start_first: Starts
     start_second: Starts
     around: Indices  # pairs to the upper, left, lower, right neighbour of each pixel, or -1
-    shares_first: Floats  # here and below, numbers outside of begin and end are not used
+    shares_first: Floats  # numbers before `begin` and after `end` are not used
     shares_second: Floats
-    theta: Floats  # as the last pass found it at each pixel
+    theta: Floats  # as the last pass found it at each pixel; there inf
     least: Floats  # of each pixel's theta
     power: int  # of the residuals of pairs: 1 or 2
     clusters: Clusters

@@ -147,10 +147,14 @@ class Strip:
         if not self._before:
             self._before = [values.astype(np.float32) for values in moved]
             return
-        parts = self.crew.equal_parts(len(self.state.first))
         first, second, tables = zip(moved, self._before, strict=True)
-        self.crew.run(lambda pairs: _carry_shares(pairs.start, pairs.stop, self.state, first, 0, part), parts)
-        self.crew.run(lambda pairs: _carry_shares(pairs.start, pairs.stop, self.state, second, 1, part), parts)
+        parts = self.crew.equal_parts(len(self.state.first))
+        for at, shares in enumerate((first, second)):
+
+            def carry(pairs: slice) -> None:
+                _carry_shares((pairs.start, pairs.stop), self.state, shares, at, part)  # noqa: B023
+
+            self.crew.run(carry, parts)
         _carry_on(*tables, part)
 
     @property
@@ -247,11 +251,11 @@ def _places(starts: Starts, pairs: Starts) -> Starts:
 
 @compiled
 def _carry_shares(
-    begin: int, end: int, state: State, moved: tuple[Floats, NDArray[np.float32]], at: int, part: float
+    pairs: tuple[int, int], state: State, moved: tuple[Floats, NDArray[np.float32]], at: int, part: float
 ) -> None:
-    """Extrapolate the shares of some pairs; at: 0 at their first, 1 at their second pixels."""
+    """Extrapolate the shares of consecutive pairs; at: 0 at their first, 1 at their second pixels."""
     values, before = moved
-    for pair in range(begin, end):
+    for pair in range(pairs[0], pairs[1]):
         i = state.first[pair] if at == 0 else state.second[pair]
         start = state.start_first[pair] if at == 0 else state.start_second[pair]
         for row in range(state.row_start[i], state.row_start[i + 1]):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from crossfield.models.proof.over_beta import least_cost, over_beta
+from crossfield.models.proof.over_beta import Given, least_cost, over_beta
 
 
 @pytest.mark.parametrize("power", [1, 2])
@@ -18,7 +18,7 @@ def test_products_over_beta_are_the_least_over_all_labels(power, seed):
     used = (np.arange(given.shape[1]) >= begin[:, None]) & (np.arange(given.shape[1]) < end[:, None])
     given[~used] = np.nan
     out = np.full((7, rng.integers(2, 40)), np.inf)
-    over_beta(given, (begin, np.maximum(begin, end)), mine, other, power, out)
+    over_beta(Given(given, (begin, np.maximum(begin, end))), mine, other, power, out)
     given[~used] = np.inf
     x, y = (
         first + step * np.arange(n) for (first, step), n in ((mine, out.shape[1]), (other, given.shape[1]))
