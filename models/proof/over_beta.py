@@ -24,7 +24,7 @@ Ends = tuple[Indices, Indices]
 
 
 class Given(NamedTuple):
-    """A matrix by alpha and beta, and the ends of what is in use of its rows."""
+    """A matrix by alpha and beta, and the part of each row that is in use."""
 
     values: Floats
     ends: Ends

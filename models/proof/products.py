@@ -135,7 +135,7 @@ def pair_minimum(pair: int, state: State) -> float:
 def product(pair: int, i: int, state: State, out: Floats) -> None:
     """Greatest share of a pair at the labels x of its end i: min over y of c(x, y) - share(y).
 
-    It is 0 at labels that are not allowed, between others.
+    Labels that are not allowed get 0 between allowed ones of their row, and elsewhere keep their number.
     """
     j = state.first[pair] + state.second[pair] - i
     rows, columns = state.alpha_count[i], state.beta_count[i]

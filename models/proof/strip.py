@@ -29,10 +29,13 @@ from .clusters import (
 from .decoding import Crosses, decode
 from .encoding import messages_of, tables_of
 from .lattice import Lattice, Starts
-from .products import all_taken, pair_minimum, pixel_pass
+from .over_beta import Ends
+from .products import all_taken, ends_of, pair_minimum, pixel_pass, share_of
 from .pruning import cells_left, prolonged_shares, rows_of
 from .slack import quad_slacks
 from .state import Clusters, Indices, State
+
+Singles = NDArray[np.float32]
 
 _ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
 
@@ -77,7 +80,7 @@ class Strip:
     """The shares on a strip, zero and without clusters at first."""
 
     state: State
-    _before: list[NDArray[np.float32]]  # the direction of a change needs no more digits
+    _before: list[Singles]  # the direction of a change needs no more digits
 
     def __init__(self, part: Part, crew: Crew) -> None:
         """Start on a part of a lattice, with the threads of a crew."""
@@ -147,15 +150,13 @@ class Strip:
         if not self._before:
             self._before = [values.astype(np.float32) for values in moved]
             return
-        first, second, tables = zip(moved, self._before, strict=True)
-        parts = self.crew.equal_parts(len(self.state.first))
-        for at, shares in enumerate((first, second)):
-
-            def carry(pairs: slice) -> None:
-                _carry_shares((pairs.start, pairs.stop), self.state, shares, at, part)  # noqa: B023
-
-            self.crew.run(carry, parts)
-        _carry_on(*tables, part)
+        first, second, was = self._before
+        tables, state = self.state.clusters.tables, self.state
+        self.crew.run(
+            lambda pairs: _carry_shares(pairs, state, (first, second), part),
+            [(at.start, at.stop) for at in self.crew.equal_parts(len(state.first))],
+        )
+        self.crew.run(lambda at: _carry_on(tables[at], was[at], part), self.crew.equal_parts(len(tables)))
 
     @property
     def _values(self) -> tuple[Floats, Floats, Floats]:
@@ -250,23 +251,27 @@ def _places(starts: Starts, pairs: Starts) -> Starts:
 
 
 @compiled
-def _carry_shares(
-    pairs: tuple[int, int], state: State, moved: tuple[Floats, NDArray[np.float32]], at: int, part: float
-) -> None:
-    """Extrapolate the shares of consecutive pairs; at: 0 at their first, 1 at their second pixels."""
-    values, before = moved
+def _carry_shares(pairs: tuple[int, int], state: State, before: tuple[Singles, Singles], part: float) -> None:
+    """Extrapolate the shares of consecutive pairs. before: those at their first and their second pixels."""
     for pair in range(pairs[0], pairs[1]):
-        i = state.first[pair] if at == 0 else state.second[pair]
-        start = state.start_first[pair] if at == 0 else state.start_second[pair]
-        for row in range(state.row_start[i], state.row_start[i + 1]):
-            label = start + (row - state.row_start[i]) * state.beta_count[i]
-            low, high = label + state.begin[row], label + state.end[row]
-            _carry_on(values[low:high], before[low:high], part)
+        i, j = state.first[pair], state.second[pair]
+        was = before[0][state.start_first[pair] : state.start_first[pair + 1]]
+        _carry_used(share_of(pair, i, state), was, ends_of(i, state), state.beta_count[i], part)
+        was = before[1][state.start_second[pair] : state.start_second[pair + 1]]
+        _carry_used(share_of(pair, j, state), was, ends_of(j, state), state.beta_count[j], part)
 
 
 @compiled
-def _carry_on(values: Floats, before: NDArray[np.float32], part: float) -> None:
-    """Extrapolate by a part of the change since the previous pass, and store the values as they were."""
+def _carry_used(values: Floats, before: Singles, ends: Ends, columns: int, part: float) -> None:
+    """Extrapolate the used part of the shares of a pair at one pixel."""
+    for row in range(ends[0].size):
+        begin, end = row * columns + ends[0][row], row * columns + ends[1][row]
+        _carry_on(values[begin:end], before[begin:end], part)
+
+
+@compiled
+def _carry_on(values: Floats, before: Singles, part: float) -> None:
+    """Extrapolate numbers by a part of their last change, and store them as they were."""
     for x in range(values.size):
         now = values[x]
         values[x] = now + part * (now - before[x])

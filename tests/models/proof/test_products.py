@@ -1,0 +1,59 @@
+"""The greatest share of a pair where some labels are not allowed, compared with dense costs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from crossfield.models.processes.compiled import crew
+from crossfield.models.proof.clusters import clusters_on
+from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.products import pair_minimum, product, share_of
+from crossfield.models.proof.strip import Strip, part_of
+from crossfield.models.search.starts import first_field
+from exhaustive import random_instance
+from labellings import discrete
+
+pytestmark = pytest.mark.numeric
+
+
+def with_holes(lattice, rng):
+    """The lattice with some rows of labels, and with half of the other labels."""
+    rows = rng.random(lattice.alpha_count.sum()) < 0.7
+    wide = np.repeat(lattice.beta_count, lattice.alpha_count)
+    allowed = np.repeat(rows, wide) & (rng.random(lattice.start[-1]) < 0.5)
+    allowed[lattice.start[:-1] + 1] = True  # one of each pixel
+    return replace(lattice, allowed=allowed)
+
+
+def dense_tables(state, pair, lattice):
+    """The tables of a pair at all labels of its pixels."""
+    i, j = state.first[pair], state.second[pair]
+    rows, columns = (np.arange(lattice.count[end]) // lattice.beta_count[end] for end in (i, j))
+    found, clusters = np.zeros((len(rows), len(columns))), state.clusters
+    for number in clusters.of_pair[pair][clusters.of_pair[pair] >= 0]:
+        table = clusters.tables[clusters.start[number] : clusters.start[number + 1]]
+        found += table.reshape(lattice.alpha_count[i], -1)[np.ix_(rows, columns)]
+    return found
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_shares_and_minima_of_pairs_are_those_over_the_allowed_labels(seed):
+    rng = np.random.default_rng(seed)
+    instance = random_instance(seed, ((2, 2), (2, 3))[seed % 2])
+    lattice = with_holes(Lattice.whole(first_field(instance), 6), rng)
+    allowed = np.split(lattice.allowed, lattice.start[1:-1])
+    with crew(1) as hands:
+        state = Strip(part_of(lattice, slice(0, instance.grid.size)), hands).state
+    state = state._replace(clusters=clusters_on(lattice, np.arange(seed % 3 > 0)))
+    for values in (state.shares_first, state.shares_second, state.clusters.tables):
+        values[:] = rng.normal(0, 0.5, len(values))
+    for pair, (i, j, bare) in enumerate(discrete(lattice)[1]):
+        cost = bare + dense_tables(state, pair, lattice)
+        for mine, other, costs in ((i, j, cost), (j, i, cost.T)):
+            out = np.full(lattice.count[mine], np.nan)
+            product(pair, mine, state, out)
+            most = (costs - share_of(pair, other, state))[:, allowed[other]].min(axis=1)
+            np.testing.assert_allclose(out[allowed[mine]], most[allowed[mine]], rtol=0, atol=1e-12)
+        rest = cost - share_of(pair, i, state)[:, None] - share_of(pair, j, state)
+        least = rest[np.ix_(allowed[i], allowed[j])].min()
+        assert pair_minimum(pair, state) == pytest.approx(least, abs=1e-12)
