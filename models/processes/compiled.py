@@ -22,6 +22,7 @@ from .side_by_side import checked
 _Part = TypeVar("_Part")
 _Work = TypeVar("_Work", bound=Callable[..., Any])
 _MADE: Final[list[Any]] = []
+_ANY_ORDER: Final = {"reassoc", "nnan", "nsz"}
 _PARTS: Final = 2  # of shared work for each thread: one that takes longer than expected then costs less
 
 
@@ -34,14 +35,14 @@ def compiled(work: _Work) -> _Work:
 
 def compiled_in_any_order(work: _Work) -> _Work:
     """As `compiled`, for a function without nan whose result does not depend on the order of its terms."""
-    made = _made(work, fastmath={"reassoc", "nnan", "nsz"})
+    made = _made(work, fastmath=_ANY_ORDER)
     _MADE.append(made)
     return made
 
 
-def compiled_if_needed(work: _Work) -> _Work:
+def compiled_if_needed(work: _Work, *, in_any_order: bool = False) -> _Work:
     """As `compiled`, for a function that most work does without, and that nobody waits for in advance."""
-    return _made(work, fastmath=False)
+    return _made(work, fastmath=_ANY_ORDER if in_any_order else False)
 
 
 def _made(work: _Work, *, fastmath: bool | set[str]) -> _Work:

@@ -10,9 +10,9 @@ level, with the prefixes `level_0_`, `level_1_`, ...:
     allowed             a bit for each label
     scale       (m,)    of each pair's message
     wide        (m,)    whether its whole numbers are among steps_32 rather than steps_16
-    steps_16, steps_32  the messages one after the other: what a pair gives to the labels of its earlier
-                        pixel, each number less the one before, which compresses well; sums are modulo 2^32;
-                        in other norms than 2, steps_32 and steps_64, modulo 2^64
+    steps_16, steps_32  the messages one after the other: what a pair gives to the allowed labels of its
+                        earlier pixel, each number less the one before, which compresses well; sums are
+                        modulo 2^32; in other norms than 2, steps_32 and steps_64, modulo 2^64
     quads       (q,)    clusters: the lower left pixels of their quads, ascending
     table_scale (4q,)   of each table
     table_steps         the tables of each cluster one after the other, as whole numbers of their scales, each
@@ -36,6 +36,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Final, cast
 
@@ -45,24 +46,25 @@ from ..array_archive import Arrays, Packing
 from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField, Norm
 from ..instance.file import arrays_of, of_arrays
-from ..instance.grid import Floats
 from ..instance.instance import Instance
 from ..processes.deadline import Over, Stop, stop_function
 from ..processes.side_by_side import cores
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict, Way
-from .clusters import clusters_on, table_sizes, table_work
+from .clusters import clusters_on, table_sizes
 from .encoding import messages_of, tables_of
 from .lattice import Lattice
 from .record import Claim, LevelRecord, Proof, Status
 from .state import Indices
 
 _PREFIX: Final = "instance_"
-_ADDITIONS: Final = 2.4e6  # of the checker, per unit of effort
-_LABELS: Final = 1_600.0  # checked and compressed per unit of effort
-_NUMBERS: Final = 7_000.0  # of tables, compressed per unit of effort
-_SPARE_TIME: Final = 1.2  # safety factor, because the load of the machine may rise before the check
+_PIXEL: Final = 0.75  # effort for each pixel, besides that for its labels
+_LABELS: Final = 1_200.0  # allowed ones, checked and compressed per unit of effort
+_COSTS: Final = 37_000.0  # of pairs in alpha or in beta, per unit of effort
+_TERMS: Final = 480_000.0  # an alpha of one pixel and an allowed label of its neighbour, per unit of effort
+_NUMBERS: Final = 380.0  # of tables, per unit of effort
+_SPARE_TIME: Final = 1.5  # for compressing beside the check, and because the load may rise before it
 _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
 
@@ -226,14 +228,16 @@ def _confirmed(arrays: Arrays, path: Path, over: Over, threads: int) -> Verdict:
 @contextmanager
 def _quick_way(threads: int) -> Iterator[Way]:
     """The checker's way with compiled products, whose least sums are the same numbers, and with threads."""
-    from .min_plus import min_plus  # loads compiled functions
-
-    def product(left: Floats, right: Floats) -> Floats:
-        found: Floats = min_plus(np.ascontiguousarray(left), np.ascontiguousarray(right))
-        return found
-
     with ThreadPoolExecutor(threads) as pool:
-        yield Way(product, pool.map if threads > 1 else map)
+        yield Way(_compiled_product(), pool.map if threads > 1 else map)
+
+
+@cache
+def _compiled_product() -> check_certificate.Product:
+    """The checker's product in loops, compiled once."""
+    from ..processes.compiled import compiled_if_needed  # loads Numba
+
+    return check_certificate.in_loops(partial(compiled_if_needed, in_any_order=True))
 
 
 def _head(proof: Proof, status: Status, bound: float) -> Arrays:
@@ -293,10 +297,12 @@ def certificate_effort(level: Lattice, quads: Indices) -> float:
 
     The unit is a pixel of a level with few labels, whose check takes about 0.4 ms.
     """
-    additions = level.work + table_work(level, quads) / 2
-    numbers = float(table_sizes(level, quads).sum())
-    effort = len(level.alpha) + additions / _ADDITIONS + level.allowed.size / _LABELS + numbers / _NUMBERS
-    return _SPARE_TIME * effort
+    i, j = level.instance.grid.first, level.instance.grid.second
+    rows, columns = level.alpha_count.astype(np.float64), level.beta_count.astype(np.float64)
+    costs = float(rows[i] @ rows[j] + columns[i] @ columns[j])
+    effort = _PIXEL * len(rows) + float(level.allowed_count.sum()) / _LABELS + costs / _COSTS
+    effort += float(level.allowed_count[i] @ rows[j]) / _TERMS
+    return _SPARE_TIME * (effort + float(table_sizes(level, quads).sum()) / _NUMBERS)
 
 
 def checking_pace(threads: int) -> float:

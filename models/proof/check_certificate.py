@@ -139,7 +139,7 @@ from typing import Any
 
 import numpy as np
 
-FORMAT, VERSION = "crossfield-certificate", 2
+FORMAT, VERSION = "crossfield-certificate", 3
 HALF, QUARTER = math.pi / 2, math.pi / 4
 OPTIMAL = 1e-8
 PRECISION = 2.0**-52
@@ -156,8 +156,10 @@ MOST_JUMP = 64
 MOST_WEIGHT = 1e6
 MOST_WHOLE = 2.0**53  # of a message
 BLOCK = 1 << 16  # numbers of a product that NumPy handles at once
-ROWS = 32  # of a product, from which terms are left out together
-LARGE = 10_000_000  # numbers in a certificate from which compiling, some 2 s, saves time
+ROWS = 32  # of a product, from which NumPy leaves out terms together
+WIDE = 16  # columns of a product that loops compute together
+ANY_ORDER = {"reassoc", "nnan", "nsz"}  # minima do not depend on the order of their terms
+LARGE = 3_000_000  # numbers in a certificate from which compiling, some 2 s, saves time
 
 INSTANCE_PARTS = ("head", "origin", "mask", "stroke_pixels", "theta", "w")
 PARTS = ("head", "alpha", "beta", "p", *(f"instance_{part}" for part in INSTANCE_PARTS))
@@ -174,7 +176,8 @@ HEAD = re.compile(
 Array = Any
 Field = tuple[Array, Array, Array]
 Over = Callable[[], bool]
-Product = Callable[[Array, Array], Array]
+Spans = tuple[Array, Array]
+Product = Callable[[Array, Array, Array, Spans], Array]
 
 
 class RefusedError(Exception):
@@ -232,7 +235,10 @@ class Level:
     ranges (n, 4): steps, as first and count of alpha, first and count of beta; allowed (a, b) of each pixel;
     the message of each pair is to its earlier pixel: `Messages`, or arrays. clusters: the tables of quads;
     tables: their sum at each pair that has some, by alphas of its first and of its second pixel.
-    rows, columns: numbers of the alphas and betas of each pixel that have an allowed label.
+    rows, columns: numbers of the alphas and betas of each pixel that have an allowed label. used: `allowed`
+    at these alone; spans: for each of those rows, the first allowed column and the one after the last.
+
+    All other numbers of labels are those of the allowed ones alone, in their order.
     """
 
     h: float
@@ -248,14 +254,20 @@ class Level:
         self.rows, self.columns = (
             [np.flatnonzero(allowed.any(axis=axis)) for allowed in self.allowed] for axis in (1, 0)
         )
+        some = zip(self.allowed, self.rows, self.columns)
+        self.used = [allowed[np.ix_(rows, columns)] for allowed, rows, columns in some]
+        self.spans = [
+            np.stack([used.argmax(axis=1), used.shape[1] - used[:, ::-1].argmax(axis=1)], axis=1)
+            for used in self.used
+        ]
 
 
 @dataclass
 class Passed:
     """Result of a pass over a level.
 
-    A bound of F on its domain, the right side of 3. at each label of each pixel, and the greatest error of
-    both.
+    A bound of F on its domain, the right side of 3. at each allowed label of each pixel, and the greatest
+    error of both.
     """
 
     bound: float
@@ -443,7 +455,7 @@ def _given(arrays: dict[str, Array], name: str, kind: str, *shape: int | None) -
         size is None or size == found for size, found in zip(shape, array.shape)
     )
     if array.dtype != np.dtype(kind) or not fits:
-        raise UnreadableError(f"{name} has another kind or shape than the mask asks for")
+        raise UnreadableError(f"{name} has another kind or shape than other arrays ask for")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         raise RefusedError(f"{name} holds something that is no number")
     return array
@@ -621,7 +633,8 @@ def level_of(arrays: dict[str, Array], number: int, sketch: Sketch) -> Level:
     for cluster in clusters:
         for e, table in zip(cluster.pairs, cluster.tables):
             tables[e] = tables[e] + table if e in tables else table
-    return Level(h, alpha, beta, ranges, allowed, Messages(arrays, at, sketch, shapes), clusters, tables)
+    messages = Messages(arrays, at, sketch, np.array([int(each.sum()) for each in allowed]))
+    return Level(h, alpha, beta, ranges, allowed, messages, clusters, tables)
 
 
 def _clusters(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) -> list[Cluster]:
@@ -658,10 +671,10 @@ class Messages(Sequence[Array]):
     Each is computed whenever it is asked for, because all of them together take much memory.
     """
 
-    def __init__(self, arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) -> None:
+    def __init__(self, arrays: dict[str, Array], at: str, sketch: Sketch, labels: Array) -> None:
+        """Find the steps of each pair. labels (n,): number of the allowed labels of each pixel."""
         self.name, self.norm = f"{at}steps", sketch.norm
-        self.shapes = shapes[np.minimum(sketch.first, sketch.second)]
-        counts = self.shapes.prod(axis=1)
+        counts = labels[np.minimum(sketch.first, sketch.second)]
         self.scale = _given(arrays, f"{at}scale", "<f8", len(counts))
         _need((self.scale >= 0) & (self.scale <= 1), f"{at}scale", "is not in [0, 1]")
         wide = _given(arrays, f"{at}wide", "|b1", len(counts))
@@ -681,7 +694,8 @@ class Messages(Sequence[Array]):
         if self.norm == 2:
             whole = whole.astype(np.int32)  # modulo 2^32
         _need(np.abs(whole / MOST_WHOLE).max() <= 1, self.name, "lead too far")
-        return (whole * self.scale[e]).reshape(self.shapes[e])
+        message: Array = whole * self.scale[e]
+        return message
 
 
 def _cut(flat: Array, shapes: Array) -> list[Array]:
@@ -709,23 +723,25 @@ def kept(level: Level, sketch: Sketch, i: int) -> tuple[Array, Array]:
 
 
 def unary(level: Level, sketch: Sketch, i: int) -> tuple[Array, float]:
-    """The cost D of each label of pixel i, inf for labels that are not allowed, and the size of its terms."""
+    """The cost D of each label of pixel i, and the size of its terms."""
     alpha, beta = positions(level, sketch, i)
     h, weight = level.h, float(sketch.weight[i])
+    k, l = np.nonzero(level.allowed[i])  # noqa: E741 - the letters of the equation
     skew = np.abs(beta) if sketch.norm == 1 else beta * beta - h * h / 4
-    cost = sketch.w_beta * skew[None, :] + np.zeros((len(alpha), 1))
+    cost = (sketch.w_beta * skew)[l]
     size = 2.0 + float(np.abs(alpha).max() + np.abs(beta).max())
     if weight > 0:
-        cost = cost + weight * _misfit(level, sketch, i, alpha, beta)
-    return np.where(level.allowed[i], cost, np.inf), (weight + sketch.w_beta) * size * size
+        cost = cost + weight * _misfit(level, sketch, i, k, l)
+    return cost, (weight + sketch.w_beta) * size * size
 
 
-def _misfit(level: Level, sketch: Sketch, i: int, alpha: Array, beta: Array) -> Array:
-    """The least over lines and turns of R^2 and its deduction, or of d, at each label of pixel i."""
+def _misfit(level: Level, sketch: Sketch, i: int, k: Array, l: Array) -> Array:  # noqa: E741
+    """The least over lines and turns of R^2 and its deduction, or of d, at labels of pixel i."""
+    alpha, beta = (places[at] for places, at in zip(positions(level, sketch, i), (k, l)))
     theta, half = float(sketch.target[i]), level.h * level.h / 2
     own = round((float(level.alpha[i] + level.beta[i]) - theta) / math.pi)
-    u = alpha[:, None] + beta[None, :] - theta
-    v = alpha[:, None] + HALF - beta[None, :] - theta
+    u = alpha + beta - theta
+    v = alpha + HALF - beta - theta
     if sketch.norm != 2:
         u, v = (line - math.pi * np.round(line / math.pi) for line in (u, v))
         return _near_slope(u, v, float(sketch.slope[i]), level.h, sketch.norm)
@@ -733,8 +749,7 @@ def _misfit(level: Level, sketch: Sketch, i: int, alpha: Array, beta: Array) -> 
     nearest = np.abs(u - math.pi * turns)
     other = np.where(turns == own, math.pi - nearest, nearest)
     best = np.minimum(other, np.abs(v - math.pi * np.round(v / math.pi))) ** 2 - half
-    corner = level.ranges[i, 0] + level.ranges[i, 2] + int(2 * sketch.offset[i])
-    steps = np.abs(corner + np.arange(len(alpha))[:, None] + np.arange(len(beta)))
+    steps = np.abs(level.ranges[i, 0] + level.ranges[i, 2] + int(2 * sketch.offset[i]) + k + l)
     lost = np.where(steps <= 1, 2 * half * steps, half)
     return np.minimum(best, (u - math.pi * own) ** 2 - lost)
 
@@ -765,23 +780,25 @@ class Pair:
 
     def __init__(self, level: Level, sketch: Sketch, e: int) -> None:
         i, j = int(sketch.first[e]), int(sketch.second[e])
-        self.earlier, self.later = ((level.rows[x], level.columns[x]) for x in sorted((i, j)))
+        self.used, self.spans = zip(*((level.used[x], level.spans[x]) for x in sorted((i, j))))
         (alpha_i, beta_i), (alpha_j, beta_j) = kept(level, sketch, i), kept(level, sketch, j)
-        tables = level.tables.get(e, np.zeros(level.ranges[[i, j], 1]))[np.ix_(level.rows[i], level.rows[j])]
-        span = jumps(alpha_i, alpha_j)
-        apart = alpha_i[:, None] - alpha_j[None, :]
-        self.parts = []
-        for parity in (0, 1):
-            squared = sketch.norm == 2
-            a = [2 * sized(apart + HALF * p, squared)[0] for p in span if p % 2 == parity]
-            b = 2 * sized((1 - 2 * parity) * beta_i[:, None] - beta_j[None, :], squared)[0]
-            if a:
-                along = np.min(a, axis=0) - squared * level.h * level.h + tables
-                self.parts.append((along, b) if i < j else (along.T, b.T))
+        span, apart = jumps(alpha_i, alpha_j), alpha_i[:, None] - alpha_j[None, :]
         reach = [float(np.abs(each).max()) for each in (alpha_i, alpha_j, beta_i, beta_j)]
         self.size = (1.0 + sum(reach) + HALF * max(abs(p) for p in span)) ** 2
-        self.size += float(np.abs(tables).max())
-        self.shape = tuple(level.ranges[max(i, j), 1::2])
+        tables: Any = 0.0
+        if e in level.tables:
+            tables = level.tables[e][np.ix_(level.rows[i], level.rows[j])]
+            self.size += float(np.abs(tables).max())
+        squared = sketch.norm == 2
+        self.parts = []
+        for parity in (0, 1):
+            a = [np.abs(apart + HALF * p) for p in span if p % 2 == parity]
+            b = np.abs((1 - 2 * parity) * beta_i[:, None] - beta_j[None, :])
+            if a:
+                least = a[0] if len(a) == 1 else np.minimum.reduce(a)
+                along, b = (2 * (each * each if squared else each) for each in (least, b))
+                along = along - squared * level.h * level.h + tables
+                self.parts.append((along, b) if i < j else (along.T, b.T))
         self._drop_idle()
 
     def _drop_idle(self) -> None:
@@ -792,43 +809,57 @@ class Pair:
                 if least >= sum(float(part.max()) for part in self.parts[better]):
                     self.parts.pop(worse)
 
-    def to_later(self, *given: Array, product: Product) -> list[Array]:
-        """The least given(x) + c(x, y) over labels x of the earlier pixel, for each label y of the later one.
-
-        One such array for each array of `given`; 0 at the alphas and betas y without an allowed label.
-        """
-        stacked = np.concatenate([each[np.ix_(*self.earlier)] for each in given])
-        halves = [np.split(product(stacked, b), len(given)) for _, b in self.parts]
-        ends = [product(along.T, np.hstack(half)) for (along, _), half in zip(self.parts, halves)]
-        found = np.zeros((len(given), *self.shape))
-        for whole, least in zip(found, np.split(np.minimum.reduce(ends), len(given), axis=1)):
-            whole[np.ix_(*self.later)] = least
-        return list(found)
+    def to_later(self, given: Array, product: Product) -> Array:
+        """The least given(x) + c(x, y) over x of the earlier pixel, for each label y of the later one."""
+        (used, other), (spans, wanted) = self.used, self.spans
+        spread = np.full(used.shape, np.inf)
+        spread[used] = given
+        ends = [product(along.T, spread, b, (spans, wanted))[other] for along, b in self.parts]
+        least: Array = np.minimum.reduce(ends)
+        return least
 
 
-def min_plus(left: Array, right: Array) -> Array:
-    """The (min,+) product of two matrices; NumPy is quicker along the longer side, and with few calls.
+def whole(rows: int, columns: int) -> Array:
+    """Spans of rows that are all in use."""
+    return np.tile([0, columns], (rows, 1))
 
-    Some rows at a time, without the terms that are nowhere less than the best one of its row.
+
+def twice(along: Array, left: Array, right: Array, spans: Spans) -> Array:
+    """The (min,+) product of three matrices, by NumPy.
+
+    spans: (rows, 2) each, those of the rows of `left` outside which they are inf, and those of the product
+    outside which any number will do.
     """
-    if left.shape[0] > right.shape[1]:
-        turned: Array = min_plus(np.ascontiguousarray(right.T), np.ascontiguousarray(left.T)).T
-        return turned
-    least, most = right.min(axis=1), right.max(axis=1)
-    out = np.empty((left.shape[0], right.shape[1]))
+    finite, wanted = spans
+    half = min_plus(left, right, finite, whole(len(left), right.shape[1]))
+    return min_plus(along, half, whole(*along.shape), wanted)
+
+
+def min_plus(left: Array, right: Array, finite: Array, wanted: Array) -> Array:
+    """The (min,+) product of two matrices, by NumPy; finite, wanted: as of `twice`.
+
+    Some rows are computed at a time, without the terms that are nowhere less than the best one of its row.
+    """
+    out = np.full((len(left), right.shape[1]), np.inf)
     for begin in range(0, len(left), ROWS):
-        part = left[begin : begin + ROWS]
+        rows = slice(begin, begin + ROWS)
+        (k, end), (first, last) = ((each[rows, 0].min(), each[rows, 1].max()) for each in (finite, wanted))
+        part, terms = left[rows, k:end], right[k:end, first:last]
+        least, most = terms.min(axis=1), terms.max(axis=1)
         lowest = part + least
         best = lowest.argmin(axis=1)
         enough = part[np.arange(len(part)), best] + most[best]
         some = (lowest < enough[:, None]).any(axis=0)
         some[best] = True
-        out[begin : begin + ROWS] = _min_plus(part[:, some], right[some])
+        out[rows, first:last] = _min_plus(part[:, some], terms[some])
     return out
 
 
 def _min_plus(left: Array, right: Array) -> Array:
-    """The product with all terms."""
+    """The product with all terms; NumPy is quicker along the longer side, and with few calls."""
+    if left.shape[0] > right.shape[1]:
+        turned: Array = _min_plus(np.ascontiguousarray(right.T), np.ascontiguousarray(left.T)).T
+        return turned
     columns, many = np.ascontiguousarray(left.T)[:, :, None], max(1, BLOCK // (len(left) * right.shape[1]))
     work = np.empty((min(many, len(right)), len(left), right.shape[1]))
     out = np.full(work.shape[1:], np.inf)
@@ -839,44 +870,89 @@ def _min_plus(left: Array, right: Array) -> Array:
 
 
 def compiled() -> Product:
-    """`min_plus` compiled by Numba: the same numbers, as minima do not depend on the order of their terms.
+    """`twice` compiled by Numba: the same numbers, as minima do not depend on the order of their terms.
 
-    Without Numba, `min_plus` itself.
+    Without Numba, `twice` itself.
     """
     try:
         from numba import njit
     except ImportError:
-        return min_plus
-    product = njit(nogil=True)(_product)
-
-    def of_rows(left: Array, right: Array) -> Array:
-        return product(np.ascontiguousarray(left), np.ascontiguousarray(right))
-
-    of_rows(np.zeros((1, 1)), np.zeros((1, 1)))  # compiles
-    return of_rows
+        return twice
+    product = in_loops(njit(nogil=True, error_model="numpy", fastmath=ANY_ORDER))
+    one = np.zeros((1, 1))
+    product(one, one, one, (whole(1, 1), whole(1, 1)))  # compiles
+    return product
 
 
-def _product(left: Array, right: Array) -> Array:
-    """The (min,+) product in loops, for Numba, without the terms that are nowhere less than the best one."""
+def in_loops(compile_: Callable[[Any], Any]) -> Product:
+    """The product by `fill_in`, compiled."""
+    fill = compile_(fill_in)
+
+    def product(along: Array, left: Array, right: Array, spans: Spans) -> Array:
+        out = np.full((len(along), right.shape[1]), np.inf)
+        fill(tuple(np.ascontiguousarray(each) for each in (along, left, right)), spans, out)
+        return out
+
+    return product
+
+
+def fill_in(  # noqa: C901, PLR0912 - calls in the inner loops would take as long as these
+    matrices: tuple[Array, Array, Array], spans: Spans, out: Array
+) -> None:
+    """Fill in the product of `twice` in loops, for Numba.
+
+    WIDE columns are computed together. Terms that are nowhere less than others of these are left out, and of
+    the product of `left` and `right`, what no other term needs.
+    """
+    (along, left, right), (finite, wanted) = matrices, spans
     count, many = right.shape
-    least, sums = np.empty(count), np.empty(count)
-    out = np.empty((len(left), many))
+    blocks = (many + WIDE - 1) // WIDE
+    parts, least = np.full((blocks, count, WIDE), np.inf), np.full((blocks, count), np.inf)
+    floor = np.full(count, np.inf)
     for k in range(count):
-        least[k] = right[k].min()
+        for y in range(many):
+            parts[y // WIDE, k, y % WIDE] = right[k, y]
+            least[y // WIDE, k] = min(least[y // WIDE, k], right[k, y])
+            floor[k] = min(floor[k], right[k, y])
+    halves, done = np.empty((blocks, len(left), WIDE)), np.zeros((blocks, len(left)), np.bool_)
+    lowest, sums, row = np.full(len(left), np.inf), np.empty(len(left)), np.empty(WIDE)
     for x in range(len(left)):
-        best, row = 0, out[x]
-        for k in range(count):
-            sums[k] = left[x, k] + least[k]
-            if sums[k] < sums[best]:
-                best = k
-        row[:] = left[x, best] + right[best]
-        most = row.max()
-        for k in range(count):
-            if sums[k] < most:
-                plus = left[x, k]
-                for y in range(many):
-                    row[y] = min(row[y], plus + right[k, y])
-    return out
+        for k in range(finite[x, 0], finite[x, 1]):
+            lowest[x] = min(lowest[x], left[x, k] + floor[k])
+    for z in range(len(along)):
+        best, found = 0, np.inf
+        for x in range(len(left)):
+            sums[x] = along[z, x] + lowest[x]
+            found = min(found, sums[x])
+        while sums[best] > found:
+            best += 1
+        first, last = wanted[z]
+        for block in range(first // WIDE, (last + WIDE - 1) // WIDE):
+            begin, end = max(first - block * WIDE, 0), min(last - block * WIDE, WIDE)
+            row[:] = np.inf
+            most = np.inf
+            for turn in range(len(left) + 1):
+                x = turn - 1 if turn else best
+                if sums[x] >= most:
+                    continue
+                half = halves[block, x]
+                if not done[block, x]:
+                    done[block, x] = True
+                    half[:] = np.inf
+                    reached = np.inf
+                    for k in range(finite[x, 0], finite[x, 1]):
+                        if left[x, k] + least[block, k] < reached:
+                            reached = -np.inf
+                            for y in range(WIDE):
+                                half[y] = min(half[y], left[x, k] + parts[block, k, y])
+                                reached = max(reached, half[y])
+                most = -np.inf
+                for y in range(WIDE):
+                    row[y] = min(row[y], along[z, x] + half[y])
+                for y in range(begin, end):
+                    most = max(most, row[y])
+            for y in range(begin, end):
+                out[z, block * WIDE + y] = row[y]
 
 
 # The pass --------------------------------------------------------------------------------------------------
@@ -884,12 +960,12 @@ def _product(left: Array, right: Array) -> Array:
 
 @dataclass
 class Way:
-    """How to compute: the (min,+) product of two matrices, and functions like `map` for independent work.
+    """How to compute: a product like `twice`, and functions like `map` for independent work.
 
     each: for the pixels of a diagonal. levels: for the levels.
     """
 
-    product: Product = min_plus
+    product: Product = twice
     each: Callable[[Callable[[int], Any], list[int]], Any] = map
     levels: Callable[[Callable[[int], Any], range], Iterable[Any]] = map
 
@@ -941,10 +1017,10 @@ class Pass:
         """The least cost of a quad over the alphas that have an allowed label."""
         a, b, c, d = (self.level.rows[i] for i in cluster.pixels)
         ab, bc, dc, ad = (-table for table in cluster.tables)
-        upper = self.way.product(ab[np.ix_(a, b)], bc[np.ix_(b, c)])
-        lower = self.way.product(ad[np.ix_(a, d)], dc[np.ix_(d, c)])
+        left, right, along = ab[np.ix_(a, b)], bc[np.ix_(b, c)], ad.T[np.ix_(d, a)]
+        spans = whole(*left.shape), whole(len(along), right.shape[1])
         self._err(sum(float(np.abs(table).max()) for table in cluster.tables))
-        return float((upper + lower).min())
+        return float((self.way.product(along, left, right, spans) + dc[np.ix_(d, c)]).min())
 
     def _theta(self, cost: Array, size: float, shares: list[Array]) -> tuple[Array, float]:
         """Excess of theta over its minimum at each label of a pixel, and the minimum.
@@ -959,10 +1035,8 @@ class Pass:
     def _send(self, e: int, held: Array, handed: Array) -> None:
         """Send the message of pair e to its later pixel, without and with what its earlier pixel hands on."""
         pair, given = Pair(self.level, self.sketch, e), handed - held
-        allowed = np.isfinite(given)
-        messages = (np.where(allowed, -held, np.inf), given)
-        self.before[e], self.after[e] = pair.to_later(*messages, product=self.way.product)
-        greatest = float(np.abs(given[allowed]).max() + np.abs(held).max() + np.abs(self.after[e]).max())
+        self.before[e], self.after[e] = (pair.to_later(each, self.way.product) for each in (-held, given))
+        greatest = float(np.abs(given).max() + np.abs(held).max() + np.abs(self.after[e]).max())
         self._err(pair.size + greatest)
 
     def _err(self, size: float) -> None:
@@ -973,8 +1047,9 @@ def surviving(level: Level, passed: Passed, most: float) -> list[Array]:
     """The cells (a - 1, b - 1) of each pixel in which a field of energy up to `most` may have its cross."""
     kept = []
     for allowed, least in zip(level.allowed, passed.least):
-        cells = corners(allowed, np.logical_and) & corners(least <= most + passed.error, np.logical_or)
-        kept.append(cells)
+        alive = np.zeros_like(allowed)
+        alive[allowed] = least <= most + passed.error
+        kept.append(corners(allowed, np.logical_and) & corners(alive, np.logical_or))
     return kept
 
 

@@ -12,7 +12,7 @@ from ..array_archive import Arrays
 from ..field.field import Norm
 from ..instance.grid import Floats
 from .check_certificate import STEP_PARTS
-from .lattice import Lattice, Starts
+from .lattice import Lattice, Starts, starts
 from .state import Clusters
 
 _MOST_16: Final = 2**15 - 1
@@ -26,22 +26,21 @@ def messages_of(lattice: Lattice, shares: Sequence[Floats], quantum: float, pair
     """The messages from some pairs to their earlier pixels, as whole numbers of their scales.
 
     They are the shares, unless these take more bits than the certificate has. shares: those at the first
-    pixels of all pairs, and those at the second ones, in the grid's order, alpha-major, 0 at labels that are
-    not allowed; whole multiples of the quantum, a power of two. pairs: consecutive ones.
+    pixels of all pairs, and those at the second ones, in the grid's order, alpha-major; whole multiples of
+    the quantum, a power of two. pairs: consecutive ones.
     """
     grid = lattice.instance.grid
-    starts_first, starts_second = lattice.share_starts(grid.first), lattice.share_starts(grid.second)
+    ends = (grid.first, grid.second)
+    starts_of, earlier = [lattice.share_starts(end) for end in ends], np.minimum(*ends)
+    side = (grid.second == earlier).astype(np.int64)  # of each pair, on which its earlier pixel is
     parts = []
-    for block in _blocks(starts_first, pairs):
-        first, second = grid.first[block], grid.second[block]
-        is_first = first < second
-        begin = lattice.share_starts(np.minimum(first, second))
-        flat, mine = np.empty(begin[-1]), np.repeat(is_first, np.diff(begin))
-        given = shares[0][_span(starts_first, block)]
-        flat[mine] = given[np.repeat(is_first, lattice.count[first])]
-        given = shares[1][_span(starts_second, block)]
-        flat[~mine] = given[np.repeat(~is_first, lattice.count[second])]
-        parts.append(_whole(flat, begin, quantum, lattice.norm))
+    for block in _blocks(starts_of[0], pairs):
+        flat = [np.zeros(0)]
+        for e, i, which in zip(block.tolist(), earlier[block].tolist(), side[block].tolist(), strict=True):
+            share = shares[which][starts_of[which][e] : starts_of[which][e + 1]]
+            flat.append(share[lattice.allowed[lattice.start[i] : lattice.start[i + 1]]])
+        begin = starts(lattice.allowed_count[earlier[block]])
+        parts.append(_whole(np.concatenate(flat), begin, quantum, lattice.norm))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -49,11 +48,6 @@ def _blocks(starts: Starts, pairs: slice) -> list[NDArray[np.int64]]:
     """The pairs in consecutive blocks with some labels each; one block if there are no pairs."""
     numbers = np.arange(pairs.start, pairs.stop)
     return np.split(numbers, np.flatnonzero(np.diff(starts[numbers] // _AT_ONCE)) + 1)
-
-
-def _span(starts: Starts, pairs: NDArray[np.int64]) -> slice:
-    """The shares of consecutive pairs."""
-    return slice(starts[pairs[0]], starts[pairs[-1] + 1]) if len(pairs) else slice(0)
 
 
 def _whole(flat: Floats, begin: Starts, quantum: float, norm: Norm) -> Arrays:

@@ -94,6 +94,13 @@ class Lattice:
         return self.alpha_count * self.beta_count
 
     @cached_property
+    def allowed_count(self) -> Starts:
+        """Number of allowed labels of each pixel, shape (n,)."""
+        found, some = np.zeros(len(self.count), np.int64), self.count > 0
+        found[some] = np.add.reduceat(self.allowed, self.start[:-1][some], dtype=np.int64)
+        return found
+
+    @cached_property
     def start(self) -> Starts:
         """Start of each pixel's labels in flat arrays, shape (n + 1,)."""
         return starts(self.count)
@@ -116,20 +123,12 @@ class Lattice:
         return self.alpha[pixel] + self.h * (k + offset), self.beta[pixel] + self.h * (l + offset)
 
     @property
-    def work(self) -> float:
-        """Greatest number of additions of a check: the size of all (min,+) products over one angle."""
-        i, j = self.instance.grid.first, self.instance.grid.second
-        rows, columns = self.alpha_count.astype(np.float64), self.beta_count.astype(np.float64)
-        return float(2 * (rows[j] * columns[i] * (columns[j] + rows[i])).sum())
-
-    @property
     def pass_work(self) -> float:
         """The work of a pass, in additions of the product over alpha."""
         i, j = self.instance.grid.first, self.instance.grid.second
         rows, columns = self.alpha_count.astype(np.float64), self.beta_count.astype(np.float64)
-        allowed = np.add.reduceat(self.allowed, self.start[:-1], dtype=np.int64)
         over_beta = _LINEAR if self.norm == 2 else columns[j]
-        return float(2 * rows[j] @ (columns[i] * over_beta + allowed[i]))
+        return float(2 * rows[j] @ (columns[i] * over_beta + self.allowed_count[i]))
 
     def share_starts(self, end: Ints) -> Starts:
         """Starts of the pairs' shares at one end (`first` or `second` of the grid), flat; shape (m + 1,)."""

@@ -220,17 +220,17 @@ def level_of(arrays, number, problem):
 
     scale, wide = take(arrays, f"{at}scale", "<f8", m), take(arrays, f"{at}wide", "?", m)
     need(((scale >= 0) & (scale <= 1)).all(), f"{at}scale: outside [0, 1]")
-    earlier = problem.pairs.min(axis=1)
+    earlier, labels = problem.pairs.min(axis=1), np.array([each.sum() for each in allowed])
     shares = [np.zeros(0)] * m
     bits = (16, 32) if problem.norm == 2 else (32, 64)
     for narrow, width in zip((True, False), bits, strict=True):
         chosen = np.flatnonzero(wide != narrow)
         kind, used = f"<i{width // 8}", 0
-        steps = take(arrays, f"{at}steps_{width}", kind, sizes[earlier[chosen]].sum())
+        steps = take(arrays, f"{at}steps_{width}", kind, labels[earlier[chosen]].sum())
         for e in chosen:
-            i = earlier[e]
-            sums = steps[used : used + sizes[i]].cumsum(dtype=f"<i{bits[1] // 8}")  # modulo 2^32 or 2^64
-            shares[e], used = scale[e] * sums[allowed[i].ravel()], used + sizes[i]
+            own = steps[used : used + labels[earlier[e]]]
+            shares[e] = scale[e] * own.cumsum(dtype=f"<i{bits[1] // 8}")  # modulo 2^32 or 2^64
+            used += len(own)
     offset = 0.5 * (problem.pixels.sum(axis=1) % 2)
     if problem.norm != 2:
         offset = 0 * offset
@@ -522,8 +522,8 @@ def check(arrays):
     arrays = dict(arrays)  # each reader below removes its array
     head = head_of(arrays, "head")
     version = head.get("version")
-    known = head.get("format") == "crossfield-certificate" and type(version) is int and version == 2
-    need(known, "head: no certificate of version 2")
+    known = head.get("format") == "crossfield-certificate" and type(version) is int and version == 3
+    need(known, "head: no certificate of version 3")
     need(head.get("status") in {"optimal", "gap"}, "head: the status is neither optimal nor gap")
     norm = head.get("norm")
     need(type(norm) in {int, str} and norm in {1, 2, "mixed"}, "head: the norm")

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from allowed_labels import with_allowed
 from archives import forged, members_of, npy, of_numpy, packed
 from crossfield.export.cli.app import invoke
 from crossfield.models.array_archive import pack_arrays
@@ -186,8 +187,8 @@ def test_a_changed_byte_of_the_file_is_told_or_changes_nothing(written, tmp_path
 
 def test_certificates_of_other_versions_are_refused(written):
     _, arrays = written(1)
-    for version in (0, 1, 3, True, "2", 2.0):
-        assert "is no crossfield-certificate of version 2" in refusal(with_head(arrays, version=version))
+    for version in (0, 1, 2, 4, True, "3", 3.0):
+        assert "is no crossfield-certificate of version 3" in refusal(with_head(arrays, version=version))
 
 
 def test_what_is_refused_says_where(written):
@@ -196,6 +197,8 @@ def test_what_is_refused_says_where(written):
     level = last.removesuffix("_allowed")
     second = arrays["level_1_ranges"].copy()
     second[2, 0] += 1
+    without_first = np.unpackbits(arrays["level_0_allowed"])
+    without_first[0] = 0
     cases = {
         "level 1, pixel 0": arrays | {"level_0_scale": arrays["level_0_scale"] * 0.5},
         "is claimed as optimal": with_head(arrays, levels=1, bound=0.0),
@@ -205,7 +208,8 @@ def test_what_is_refused_says_where(written):
         "levels is not in": with_head(arrays, levels=0),
         "level 1, pixel 2": arrays | {"level_1_ranges": second},
         f"{level}_allowed of pixel[0]": arrays | {last: np.zeros_like(arrays[last])},
-        "level_0_allowed of pixel 0": arrays | {"level_0_allowed": flipped(arrays["level_0_allowed"], 0)},
+        "level_0_steps_32 has another": arrays | {"level_0_allowed": np.packbits(without_first)},
+        "level_0_allowed of pixel 0": with_allowed(arrays, 0, without_first),
         "alpha[1] is outside": arrays | {"alpha": arrays["alpha"] + [0, 2, 0, 0]},
         "beta[3] is beyond": arrays | {"beta": arrays["beta"] + [0, 0, 0, 1]},
         "level_0_h holds something": arrays | {"level_0_h": np.array([np.nan])},
@@ -218,21 +222,18 @@ def test_what_is_refused_says_where(written):
         assert "\n" not in text
 
 
-def flipped(array, at):
-    array = array.copy()
-    array[at] ^= 128
-    return array
-
-
-def test_levels_that_do_not_follow_are_not_written(tmp_path):
+def test_levels_that_do_not_follow_are_not_written(written, tmp_path):
     """A prover that drops cells of a better field is detected, and the old file stays."""
-    proof = proven(1)
+    proof, (_, arrays) = proven(1), written(1)
     path = tmp_path / "it.npz"
     path.write_bytes(b"kept")
     label = 2  # any that has to be there
     allowed = proof.levels[1].allowed.copy()
     allowed[label] = False
-    levels = (proof.levels[0], replace(proof.levels[1], allowed=allowed), *proof.levels[2:])
+    fewer = with_allowed(arrays, 1, allowed)
+    messages = {name: fewer[f"level_1_{name}"] for name in proof.levels[1].messages}
+    less = replace(proof.levels[1], allowed=allowed, messages=messages)
+    levels = (proof.levels[0], less, *proof.levels[2:])
     with pytest.raises(InputError, match=r"it\.npz: would hold a proof that is not valid: level 1, pixel 0"):
         write_certificate(replace(proof, levels=levels), path)
     assert path.read_bytes() == b"kept"
@@ -408,13 +409,25 @@ def test_a_large_certificate_is_checked_side_by_side_with_the_same_result(writte
 def test_compiled_products_are_the_same_numbers():
     rng = np.random.default_rng(4)
     product = check_certificate.compiled()
-    assert product is not check_certificate.min_plus
+    assert product is not check_certificate.twice
     for rows, terms, columns in ((1, 1, 1), (3, 7, 5), (70, 40, 90)):
-        left, right = rng.normal(size=(rows, terms)), rng.normal(size=(terms, columns))
-        left[rng.random(left.shape) < 0.3] = np.inf
-        np.testing.assert_array_equal(
-            product(left, right.T.copy().T), check_certificate.min_plus(left, right)
-        )
+        along, right = rng.normal(size=(rows, rows)), rng.normal(size=(terms, columns))
+        left = rng.normal(size=(rows, terms))
+        finite, wanted = spans(rng, rows, terms), spans(rng, rows, columns)
+        within = (np.arange(terms) >= finite[:, :1]) & (np.arange(terms) < finite[:, 1:])
+        left[~within | (rng.random(left.shape) < 0.3)] = np.inf
+        half = (left[:, :, None] + right).min(axis=1)
+        dense = (along[:, :, None] + half).min(axis=1)
+        for found in (check_certificate.twice, product):
+            least = found(along, left, right.T.copy().T, (finite, wanted))
+            for row, expected, (first, last) in zip(least, dense, wanted, strict=True):
+                np.testing.assert_array_equal(row[first:last], expected[first:last])
+
+
+def spans(rng, rows, columns):
+    """Random parts of rows, none of them empty."""
+    first = rng.integers(0, columns, rows)
+    return np.stack([first, first + 1 + rng.integers(0, columns - first)], axis=1)
 
 
 def free_energy(instance, alpha, beta):
@@ -455,9 +468,7 @@ def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(writ
         instance, sketch_ = proven(seed).field.instance, check_certificate.sketch_of(arrays)
         level = check_certificate.level_of(arrays, 0, sketch_)
         level.messages = [
-            message
-            + rng.normal(0, size, message.shape)
-            + steep * np.arange(message.size).reshape(message.shape)
+            message + rng.normal(0, size, message.shape) + steep * np.arange(message.size)
             for message in level.messages
         ]
         passed = check_certificate.Pass(level, sketch_, check_certificate.PLAIN).run(never)
@@ -472,7 +483,7 @@ def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(writ
             energy = free_energy(instance, np.array(x), np.array(y))
             assert passed.bound <= energy
             for i, (alpha, beta) in enumerate(places):
-                mean = hat(x[i], alpha) @ passed.least[i] @ hat(y[i], beta)
+                mean = hat(x[i], alpha) @ passed.least[i].reshape(len(alpha), -1) @ hat(y[i], beta)
                 closest = min(closest, energy - mean)
                 assert mean <= energy + 1e-12
     assert closest < 0.02

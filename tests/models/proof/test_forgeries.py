@@ -11,6 +11,7 @@ import numpy as np
 import plain_prover
 import pytest
 import second_checker
+from allowed_labels import with_allowed
 from archives import forged, members_of, npy, packed
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
@@ -104,6 +105,9 @@ def changes(arrays, rng):
                 place = np.unravel_index(at, array.shape)
                 array[place] = moved(array[place], way, rng)
                 yield name, arrays | {name: array}
+                if name.endswith("_allowed"):  # with as many shares, too
+                    level = int(name.removeprefix("level_").removesuffix("_allowed"))
+                    yield name, with_allowed(arrays, level, np.unpackbits(array))
     for name in ("head", "instance_head"):
         head = json.loads(arrays[name].tobytes())
         for key, value in head.items():

@@ -138,7 +138,8 @@ def test_the_levels_are_a_chain_round_one_centre_and_its_bound_is_theirs():
         assert len(level.allowed) == size.sum()
         grid = proof.field.instance.grid
         steps = sum(len(level.messages[part]) for part in ("steps_16", "steps_32"))
-        assert steps == size[np.minimum(grid.first, grid.second)].sum()
+        labels = np.add.reduceat(level.allowed, np.cumsum(size) - size, dtype=int)
+        assert steps == labels[np.minimum(grid.first, grid.second)].sum()
         assert len(set(level.messages["scale"])) == 1
         assert level.bound <= proof.energy <= level.energy
         np.testing.assert_array_equal(level.alpha, proof.levels[0].alpha)
