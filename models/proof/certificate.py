@@ -59,11 +59,12 @@ from .record import Claim, LevelRecord, Proof, Status
 from .state import Indices
 
 _PREFIX: Final = "instance_"
-_PIXEL: Final = 0.75  # effort for each pixel, besides that for its labels
-_LABELS: Final = 1_200.0  # allowed ones, checked and compressed per unit of effort
-_COSTS: Final = 37_000.0  # of pairs in alpha or in beta, per unit of effort
-_TERMS: Final = 480_000.0  # an alpha of one pixel and an allowed label of its neighbour, per unit of effort
-_NUMBERS: Final = 380.0  # of tables, per unit of effort
+_PIXEL: Final = 0.7  # effort for each pixel, besides that for its labels
+_LABELS: Final = 1_100.0  # allowed ones, checked and compressed per unit of effort
+_COSTS: Final = 47_000.0  # of pairs in alpha or in beta, per unit of effort
+_TERMS: Final = 340_000.0  # an alpha of one pixel and an allowed label of its neighbour, per unit of effort
+_QUAD: Final = 5.0  # effort for each quad with tables, besides that for their numbers
+_NUMBERS: Final = 1_500.0  # of tables, per unit of effort
 _SPARE_TIME: Final = 1.5  # for compressing beside the check, and because the load may rise before it
 _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
@@ -302,7 +303,8 @@ def certificate_effort(level: Lattice, quads: Indices) -> float:
     costs = float(rows[i] @ rows[j] + columns[i] @ columns[j])
     effort = _PIXEL * len(rows) + float(level.allowed_count.sum()) / _LABELS + costs / _COSTS
     effort += float(level.allowed_count[i] @ rows[j]) / _TERMS
-    return _SPARE_TIME * (effort + float(table_sizes(level, quads).sum()) / _NUMBERS)
+    effort += _QUAD * len(quads) + float(table_sizes(level, quads).sum()) / _NUMBERS
+    return _SPARE_TIME * effort
 
 
 def checking_pace(threads: int) -> float:
