@@ -1,6 +1,6 @@
 """The search that starts from the dual of a coarse lattice where this is lower.
 
-A few passes over the first lattice of a proof consider all pixels at once. They often find the right jumps
+A few passes over the first lattices of a proof consider all pixels at once. They often find the right jumps
 of a whole drawing, which a search patch by patch does not reach from the greedy field.
 """
 
@@ -20,7 +20,8 @@ from ..search.search import Search, search_patches
 
 _FEWEST: Final = 64  # pixels up to which a search alone finds the optimum
 _MOST: Final = 1000  # beyond, the field comes from the grid of half the resolution
-_STEPS: Final = 16  # in pi/2
+_STEPS: Final = (16, 32)  # in pi/2, one lattice after the other
+_FEW: Final = 500  # pixels up to which the second one is worth its time
 _PASSES: Final = 3  # forwards and backwards before fields are rounded
 _ROUNDINGS: Final = 2  # later ones of this lattice find little
 _LEAST_SECONDS: Final = 5.0  # with less, loading compiled code would take a good part of them
@@ -40,9 +41,10 @@ def search(
 ) -> Search:
     """Search for a field of low 2-norm energy, from the greedy field on.
 
-    The result has at most the energy of `start` and, if time allows, of the first field. If the grid, or one
-    of its coarser versions, has 65 to 1000 pixels, the search also starts from the field of a short proof.
-    This takes 5 s or more, or 60 s while compiled code is not in the cache yet.
+    The result has at most the energy of `start` and, if time allows, of the first field. On up to 400 pixels,
+    the first three rounds explore from several starts, and the later ones from the best field. If the grid,
+    or one of its coarser versions, has 65 to 1000 pixels, fields of short proofs are among the starts. This
+    takes 5 s or more, or 60 s while compiled code is not in the cache yet.
 
     Without a time limit the same instance, seed and rounds give the same field on the same kind of processor,
     for any number of jobs and threads. Ctrl-C ends the search with the best field so far.
@@ -98,13 +100,14 @@ def search(
 
 def suggested(
     field: CrossField, left: Callable[[], float], over: Over = never, *, threads: int
-) -> CrossField:
-    """A field of no more energy: itself, or one rounded from the dual of the coarsest lattice round it.
+) -> list[CrossField]:
+    """Fields of no more energy, rounded from the duals of the coarsest lattices round `field`.
 
-    left: returns the seconds that are left. Any number of threads gives the same field.
+    left: returns the seconds that are left. Any number of threads gives the same fields.
     """
+    found: list[CrossField] = []
     if not _FEWEST < field.instance.grid.size <= _MOST or left() < _LEAST_SECONDS:
-        return field
+        return found
     # Code that Numba compiles is loaded only here: it takes a second.
     from ..processes.compiled import all_compiled, crew
     from .dual import Dual
@@ -112,15 +115,17 @@ def suggested(
     from .rounding import Rounding, improve
 
     if left() < _COMPILING and not all_compiled():
-        return field
+        return found
     with crew(threads) as hands:
-        instance, (jumps, _) = field.instance, free_jumps(field.instance.grid, field.alpha, field.beta)
-        centre = relabelled(instance.with_gauge("strokes"), field.alpha, field.beta, jumps)
-        dual = Dual(Lattice.whole(centre, _STEPS), hands)
-        rounding = Rounding(dual, improve)
-        for _ in range(_ROUNDINGS):
-            if over():
-                break
-            dual.ascend(_PASSES, over)
-            field = rounding.lower(field, over)
-    return field
+        for steps in _STEPS[: 2 if field.instance.grid.size <= _FEW else 1]:
+            jumps, _ = free_jumps(field.instance.grid, field.alpha, field.beta)
+            centre = relabelled(field.instance.with_gauge("strokes"), field.alpha, field.beta, jumps)
+            dual = Dual(Lattice.whole(centre, steps), hands)
+            rounding = Rounding(dual, improve)
+            for _ in range(_ROUNDINGS):
+                if over():
+                    break
+                dual.ascend(_PASSES, over)
+                field = rounding.lower(field, over)
+            found.append(field)
+    return found

@@ -28,11 +28,11 @@ from .energy import LinearSolver
 from .improvement import improved_field, pixel_curves, settle
 from .landscape import Point
 from .nearest_stroke import nearest_strokes
-from .starts import best_start, polyvector_start, rounded_energy
+from .starts import different, polyvector_start, rounded_energy, starts
 from .walk import LOWER, Explored, Task, explore
 
-Suggest = Callable[[CrossField, Callable[[], float], Over], CrossField]
-"""Returns a field of no more energy, given the field, a function for the seconds left, and when to end."""
+Suggest = Callable[[CrossField, Callable[[], float], Over], list[CrossField]]
+"""Returns more starts, given the best one, a function for the seconds left, and when to end."""
 
 Explorers = Callable[[list[Task]], list[Explored]]
 """Explores patches in parallel and returns the results in the order of the tasks."""
@@ -43,6 +43,7 @@ _FINE: Final = 0.6  # share of the seconds that is reserved for the grid of high
 _COARSE: Final = 60  # rounds on a grid of lower resolution
 _LATEST: Final = 4  # fields that are brought from there
 _KICKS: Final = 40  # per patch
+_APART: Final = 3  # rounds on a small grid in which each patch is explored from a start of its own
 _SETTLE: Final = 8  # rounds between two improvements of the whole grid
 _IMPROVE: Final = 32  # rounds between two trials of turning whole curves, which reach beyond a patch
 _PATIENCE: Final = 200  # perturbations per pixel without success that end a search
@@ -85,9 +86,9 @@ def search_patches(
     start: CrossField | None = None,
     progress: Progress = silent,
     stop: Over = never,
-    suggest: Suggest = lambda field, *_: field,
+    suggest: Suggest = lambda *_: [],
 ) -> Search:
-    """Search patch by patch, from the best start or from what `suggest` returns for it.
+    """Search patch by patch, from several starts, with those that `suggest` returns for the best one.
 
     `crossfield.search` documents the other parameters, and the errors.
     """
@@ -100,7 +101,7 @@ def search_patches(
         deadline = deadline or Deadline()
         limits = _Limits(deadline, rounds, lambda: pressed() or stop(), suggest)
         closing = _closing(deadline)
-        hunt = _Hunt(instance, seed, _start(instance, start, limits))
+        hunt = _Hunt(instance, seed, _starts(instance, start, limits))
         alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
         try:
             with side_by_side(explore, 1 if alone else jobs) as explorers:
@@ -152,7 +153,7 @@ def _from_coarse(
     if coarse is None:
         return
     sooner = limits.coarse()
-    hunt = _Hunt(coarse, seed, _start(coarse, None, sooner))
+    hunt = _Hunt(coarse, seed, _starts(coarse, None, sooner))
     hunt.run(explorers, sooner, silent)
     for field in hunt.latest(limits.over):
         if limits.over():
@@ -160,16 +161,20 @@ def _from_coarse(
         yield prolonged(field, instance, limits.over)
 
 
-def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best start, or what is suggested from it."""
-    best = best_start(instance, given, limits.over, polyvector_start, lambda each, _: power_field(each))
-    return best if limits.over() else limits.suggest(best, limits.deadline.left, limits.over)
+def _starts(instance: Instance, given: CrossField | None, limits: _Limits) -> list[CrossField]:
+    """All starts, the lowest first."""
+    found = starts(instance, given, limits.over, polyvector_start, lambda each, _: power_field(each))
+    if not limits.over():
+        found += limits.suggest(found[0], limits.deadline.left, limits.over)
+    return different(found)
 
 
 class _Hunt:
     """The present field of a search, and its next trials."""
 
-    def __init__(self, instance: Instance, seed: int, start: CrossField) -> None:
+    def __init__(self, instance: Instance, seed: int, found: list[CrossField]) -> None:
+        """Begin at the first of the starts; on a small grid, explore from the others, too."""
+        start, self._apart = found[0], [FreeField.of(field) for field in found]
         self.round = 0
         self.fruitless = 0
         self.energies = [(0, start.energy().total)]
@@ -194,6 +199,11 @@ class _Hunt:
     def large(self) -> bool:
         """Whether the grid is more than one patch."""
         return self._instance.grid.size > _PATCH * 5 // 4
+
+    @property
+    def _is_apart(self) -> bool:
+        """Whether this round explores from several starts."""
+        return not self.large and self.round < _APART
 
     def latest(self, over: Over) -> list[CrossField]:
         """The last fields that were the best for a round or more, the best first."""
@@ -224,11 +234,19 @@ class _Hunt:
     def tasks(self, deadline: Deadline) -> list[Task]:
         """The tasks of this round, with their deadline."""
         rng = np.random.default_rng((self._seed, self.round))
-        x, p = self._state.x, self._state.p
+        patches = enumerate(zip(self._explored(), self._patches(rng), strict=True))
+        fixed = (self._curve, _KICKS)
         return [
-            Task(self._instance, x, p, free, self._curve, _KICKS, (self._seed, self.round, number), deadline)
-            for number, free in enumerate(self._patches(rng))
+            Task(self._instance, at.x, at.p, free, *fixed, (self._seed, self.round, number), deadline)
+            for number, (at, free) in patches
         ]
+
+    def _explored(self) -> list[FreeField]:
+        """The fields from which the patches of this round are explored."""
+        if not self._is_apart:
+            return [self._state] * _PATCHES
+        first = self.round * _PATCHES
+        return [self._apart[number % len(self._apart)] for number in range(first, first + _PATCHES)]
 
     def _patches(self, rng: np.random.Generator) -> Iterator[Bools]:
         """The patches of a round, alternately around pixels of high energy and others."""
@@ -246,14 +264,28 @@ class _Hunt:
         """Adopt lower points, the lowest first, and update the whole grid now and then."""
         self.fruitless += _KICKS * len(tasks)
         lower = [(task, better) for task, better in zip(tasks, found, strict=True) if better is not None]
-        for task, better in sorted(lower, key=lambda pair: pair[1].energy):
-            self._adopt(task, better, over)
+        if self._is_apart:
+            self._take_apart(found)
+        else:
+            for task, better in sorted(lower, key=lambda pair: pair[1].energy):
+                self._adopt(task, better, over)
         if any(found) and self._unsettled:
             self._latest.append(self._state.field)
         if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.large):
             self._settle(over)
         if self.large and (self.round + 1) % _IMPROVE == 0:
             self.offer(improved_field(self.best(over), stop=over))
+
+    def _take_apart(self, found: list[Point | None]) -> None:
+        """Adopt lower points in the fields that were explored, and the lowest of these."""
+        for at, better in zip(self._explored(), found, strict=True):
+            if better is not None and better.energy < at.energy:
+                at.x, at.p = np.clip(better.x, *self._bounds), better.p
+        best = min(self._apart, key=lambda at: at.energy)
+        if best.energy < self._state.energy - LOWER:
+            self._state = FreeField(self._instance, best.alpha, best.beta, best.p)
+            self._unsettled, self.fruitless = True, 0
+            self.energies.append((self.round, best.energy))
 
     def _adopt(self, task: Task, better: Point, over: Over) -> None:
         """Adopt a patch's angles and jumps if they lower the energy together with other adopted patches."""

@@ -52,12 +52,25 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
 def best_start(
     instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
 ) -> CrossField:
-    """The field of least energy: the first field, the given one and, in time, the others, each improved."""
+    """The field of least energy of `starts`."""
+    return starts(instance, given, over, *others)[0]
+
+
+def starts(
+    instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
+) -> list[CrossField]:
+    """The first field, the given one and, in time, the others, each improved; the lowest first."""
     fields = [first_field(instance, over)]
     if given is not None:
         fields.append(improved_field(given, stop=over))
     fields.extend(improved_field(other(instance, over), stop=over) for other in others if not over())
-    return min(fields, key=rounded_energy)
+    return different(fields)
+
+
+def different(fields: list[CrossField]) -> list[CrossField]:
+    """One field of each energy, the lowest first."""
+    found = {rounded_energy(field): field for field in fields}
+    return [found[energy] for energy in sorted(found)]
 
 
 @one_thread()

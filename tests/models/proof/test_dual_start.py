@@ -21,10 +21,10 @@ def test_a_search_is_never_above_what_a_short_proof_finds():
 
 def test_what_is_suggested_is_left_out_where_it_would_take_a_good_part_of_the_time():
     field = cf.greedy_field(cf.sample("saddle", 24))
-    assert suggested(field, lambda: 4.9, threads=1) is field
-    assert suggested(field, lambda: float("inf"), threads=1) is not field
+    assert suggested(field, lambda: 4.9, threads=1) == []
+    assert suggested(field, lambda: float("inf"), threads=1)
     small = cf.greedy_field(cf.sample("saddle", 8))
-    assert suggested(small, lambda: float("inf"), threads=1) is small
+    assert suggested(small, lambda: float("inf"), threads=1) == []
 
 
 def test_small_searches_load_nothing_that_is_compiled():

@@ -95,7 +95,7 @@ def walked(instance, seed, perturbations, steps):
 
 def explored(instance, seed, perturbations):
     """Results of the patches of a round, checked, and a round of the search."""
-    tasks = _Hunt(instance, seed, first_field(instance)).tasks(Deadline(np.inf))
+    tasks = _Hunt(instance, seed, [first_field(instance)]).tasks(Deadline(np.inf))
     lower, upper = free_bounds(instance)
     for task in tasks:
         better, whole = explore(replace(task, perturbations=perturbations))

@@ -174,6 +174,12 @@ def test_search_gets_below_the_greedy_field():
     assert energies == sorted(energies, reverse=True)
 
 
+def test_a_small_grid_is_searched_from_several_starts():
+    """From the lowest start alone, three rounds lead to 6.914."""
+    found = cf.search(cf.random_instance(9, size=12), rounds=3, jobs=1).field
+    assert found.energy().total < 6.82
+
+
 @pytest.mark.parametrize("gauge", ["strokes", pytest.param("box", marks=pytest.mark.slow)])
 def test_same_seed_gives_the_same_bits_in_one_process_and_in_two(gauge):
     instance = cf.sample("mouse", 10).with_gauge(gauge)
