@@ -482,7 +482,9 @@ def page(kept: Kept) -> str:
         "collections": collections_table(found),
         "collections_open": open_drawings(found),
         "collections_again": str(sum(row["machine"]["cores"] > 1 for row in found.values())),
-        "collections_processor": next(iter(found.values()))["machine"]["processor"],
+        "collections_processor": " and ".join(
+            sorted({row["machine"]["processor"] for row in found.values()}, reverse=True)
+        ),
     }
     texts |= {part: proof_table(kept[part]) for part in tables}
     texts |= {f"{part}_machine": where(rows) for part, rows in parts.items()}
