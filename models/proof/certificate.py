@@ -65,8 +65,8 @@ _COSTS: Final = 47_000.0  # of pairs in alpha or in beta, per unit of effort
 _TERMS: Final = 340_000.0  # an alpha of one pixel and an allowed label of its neighbour, per unit of effort
 _QUAD: Final = 5.0  # effort for each quad with tables, besides that for their numbers
 _NUMBERS: Final = 1_500.0  # of tables, per unit of effort
-_SHARED: Final = 0.5  # speed that each more thread adds; two halve the time of a large level
-_SPARE_TIME: Final = 1.5  # for compressing beside the check, and because the load may rise before it
+_SHARED: Final = 0.5  # gain in speed for each further thread, as a share of the speed of one
+_SPARE_TIME: Final = 1.5  # safety factor: files are compressed, and the machine may become busier
 _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
 
@@ -297,7 +297,7 @@ def _of_level(level: LevelRecord) -> Arrays:
 def certificate_effort(level: Lattice, quads: Indices) -> float:
     """The expected effort of checking and writing one level of a certificate, with clusters on those quads.
 
-    The unit is a pixel of a level with few labels, whose check takes about 0.4 ms.
+    The unit is a pixel of a level with few labels, whose check takes about 0.3 ms.
     """
     i, j = level.instance.grid.first, level.instance.grid.second
     rows, columns = level.alpha_count.astype(np.float64), level.beta_count.astype(np.float64)
@@ -309,10 +309,10 @@ def certificate_effort(level: Lattice, quads: Indices) -> float:
 
 
 def checking_pace(threads: int) -> float:
-    """Expected seconds per unit of the checker's effort, measured in some 20 ms on a tiny level.
+    """The expected seconds per unit of the checker's effort on a number of threads.
 
-    They depend on the machine and its load. One thread is measured: on a tiny level, more only wait for each
-    other.
+    The check of a tiny level, some 20 ms, shows them for this machine and its present load. It runs on one
+    thread, because on a tiny level several threads mostly wait for each other.
     """
     instance = Instance("pace", np.ones((6, 6), dtype=bool), np.array([[0, 0]]), np.zeros(1), np.ones(1))
     zero, pairs = np.zeros(instance.grid.size), np.zeros(len(instance.grid.first), dtype=np.int32)

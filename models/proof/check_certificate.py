@@ -238,7 +238,7 @@ class Level:
     rows, columns: numbers of the alphas and betas of each pixel that have an allowed label. used: `allowed`
     at these alone; spans: for each of those rows, the first allowed column and the one after the last.
 
-    All other numbers of labels are those of the allowed ones alone, in their order.
+    Messages have one number for each allowed label, row by row.
     """
 
     h: float
@@ -723,7 +723,7 @@ def kept(level: Level, sketch: Sketch, i: int) -> tuple[Array, Array]:
 
 
 def unary(level: Level, sketch: Sketch, i: int) -> tuple[Array, float]:
-    """The cost D of each label of pixel i, and the size of its terms."""
+    """The cost D of each allowed label of pixel i, and the size of its terms."""
     alpha, beta = positions(level, sketch, i)
     h, weight = level.h, float(sketch.weight[i])
     k, l = np.nonzero(level.allowed[i])  # noqa: E741 - the letters of the equation
@@ -736,7 +736,10 @@ def unary(level: Level, sketch: Sketch, i: int) -> tuple[Array, float]:
 
 
 def _misfit(level: Level, sketch: Sketch, i: int, k: Array, l: Array) -> Array:  # noqa: E741
-    """The least over lines and turns of R^2 and its deduction, or of d, at labels of pixel i."""
+    """The least over lines and turns of R^2 and its deduction, or of d, at labels (k, l) of pixel i.
+
+    k and l count from the first label of the pixel's range.
+    """
     alpha, beta = (places[at] for places, at in zip(positions(level, sketch, i), (k, l)))
     theta, half = float(sketch.target[i]), level.h * level.h / 2
     own = round((float(level.alpha[i] + level.beta[i]) - theta) / math.pi)
@@ -810,7 +813,10 @@ class Pair:
                     self.parts.pop(worse)
 
     def to_later(self, given: Array, product: Product) -> Array:
-        """The least given(x) + c(x, y) over x of the earlier pixel, for each label y of the later one."""
+        """The least given(x) + c(x, y) over x of the earlier pixel, for each label y of the later one.
+
+        given and the result have one number for each allowed label.
+        """
         (used, other), (spans, wanted) = self.used, self.spans
         spread = np.full(used.shape, np.inf)
         spread[used] = given

@@ -1,4 +1,4 @@
-"""The search that starts from the dual of a coarse lattice where this is lower.
+"""The search that also starts from the duals of coarse lattices.
 
 A few passes over the first lattices of a proof consider all pixels at once. They often find the right jumps
 of a whole drawing, which a search patch by patch does not reach from the greedy field.
@@ -39,12 +39,12 @@ def search(
     progress: Progress = silent,
     stop: Stop | None = None,
 ) -> Search:
-    """Search for a field of low 2-norm energy, from the greedy field on.
+    """Search for a field of low 2-norm energy, from the greedy field and other starts.
 
     The result has at most the energy of `start` and, if time allows, of the first field. On up to 400 pixels,
-    the first three rounds explore from several starts, and the later ones from the best field. If the grid,
-    or one of its coarser versions, has 65 to 1000 pixels, fields of short proofs are among the starts. This
-    takes 5 s or more, or 60 s while compiled code is not in the cache yet.
+    the first three rounds explore from all starts, and the later ones from the best field. If the grid, or
+    one of its coarser versions, has 65 to 1000 pixels, fields of short proofs are among the starts, unless
+    less than 5 s are left, or less than 60 s while compiled code is not in the cache yet.
 
     Without a time limit the same instance, seed and rounds give the same field on the same kind of processor,
     for any number of jobs and threads. Ctrl-C ends the search with the best field so far.
@@ -101,9 +101,11 @@ def search(
 def suggested(
     field: CrossField, left: Callable[[], float], over: Over = never, *, threads: int
 ) -> list[CrossField]:
-    """Fields of no more energy, rounded from the duals of the coarsest lattices round `field`.
+    """Fields of no more energy, rounded from the duals of the coarsest lattices.
 
-    left: returns the seconds that are left. Any number of threads gives the same fields.
+    The first lattice has `field` as its centre, the second one the result of the first. left: returns the
+    seconds that are left. The list is empty for small and large grids, and where they are too few. Any number
+    of threads gives the same fields.
     """
     found: list[CrossField] = []
     if not _FEWEST < field.instance.grid.size <= _MOST or left() < _LEAST_SECONDS:

@@ -234,10 +234,10 @@ class _Hunt:
     def tasks(self, deadline: Deadline) -> list[Task]:
         """The tasks of this round, with their deadline."""
         rng = np.random.default_rng((self._seed, self.round))
+        curve, seed = self._curve, (self._seed, self.round)
         patches = enumerate(zip(self._explored(), self._patches(rng), strict=True))
-        fixed = (self._curve, _KICKS)
         return [
-            Task(self._instance, at.x, at.p, free, *fixed, (self._seed, self.round, number), deadline)
+            Task(self._instance, at.x, at.p, free, curve, _KICKS, (*seed, number), deadline)
             for number, (at, free) in patches
         ]
 
@@ -263,10 +263,10 @@ class _Hunt:
     def _take(self, tasks: list[Task], found: list[Point | None], over: Over) -> None:
         """Adopt lower points, the lowest first, and update the whole grid now and then."""
         self.fruitless += _KICKS * len(tasks)
-        lower = [(task, better) for task, better in zip(tasks, found, strict=True) if better is not None]
         if self._is_apart:
             self._take_apart(found)
         else:
+            lower = [(task, better) for task, better in zip(tasks, found, strict=True) if better is not None]
             for task, better in sorted(lower, key=lambda pair: pair[1].energy):
                 self._adopt(task, better, over)
         if any(found) and self._unsettled:

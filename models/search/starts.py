@@ -52,14 +52,17 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
 def best_start(
     instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
 ) -> CrossField:
-    """The field of least energy of `starts`."""
+    """The start of least energy; see `starts`."""
     return starts(instance, given, over, *others)[0]
 
 
 def starts(
     instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
 ) -> list[CrossField]:
-    """The first field, the given one and, in time, the others, each improved; the lowest first."""
+    """The first field, the given one and, in time, the others, each improved.
+
+    The lowest comes first, and of fields of equal energy only one is returned.
+    """
     fields = [first_field(instance, over)]
     if given is not None:
         fields.append(improved_field(given, stop=over))
@@ -68,8 +71,8 @@ def starts(
 
 
 def different(fields: list[CrossField]) -> list[CrossField]:
-    """One field of each energy, the lowest first."""
-    found = {rounded_energy(field): field for field in fields}
+    """The first field of each energy, the lowest energy first."""
+    found = {rounded_energy(field): field for field in reversed(fields)}
     return [found[energy] for energy in sorted(found)]
 
 
