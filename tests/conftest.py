@@ -99,6 +99,14 @@ def _absent(item):
     return next(filter(None, (absence(*mark.args) for mark in marks)), "")
 
 
+def pytest_collection_finish(session):
+    """Wait until the functions of proofs are compiled: no test may depend on how long that takes."""
+    if session.items:
+        from crossfield.export.solving.compiling import compile_all
+
+        compile_all()
+
+
 def pytest_sessionfinish(session):
     if COMPILING in session.config.stash:
         session.config.stash[COMPILING].wait()
