@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from ..instance.grid import Floats, Grid
 from ..processes.compiled import compiled_if_needed
 from .lattice import Lattice, starts
-from .min_plus import min_plus
-from .over_beta import Ends, Given, betas, least_cost, over_beta
+from .min_plus import least_of, min_plus, min_plus_between
+from .over_beta import Given, betas, least_cost, over_beta
 from .products import alpha_costs, ends_of, share_of
-from .state import Clusters, Indices, State
+from .state import Clusters, Ends, Indices, State
 
 IndexTable = NDArray[np.int64]  # of two axes
 
@@ -174,26 +174,27 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
     half = np.empty((other.shape[0], own.shape[1]))
     best = np.empty((own.shape[0], other.shape[0]))
     best[:] = np.inf
-    least, most = _least(own) + _least(other), np.inf
+    least = _least_of_rows(own), _least_of_rows(other)
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
         betas_i, betas_j = betas(pair, i, state, odd)
-        cheapest = alpha_costs(pair, i, state, odd, in_alpha)
-        cheapest += least_cost(betas_i, betas_j, (own.shape[1], other.shape[1]), state.power)
-        if cheapest + least < most:
+        alpha_costs(pair, i, state, odd, in_alpha)
+        in_beta = least_cost(betas_i, betas_j, (own.shape[1], other.shape[1]), state.power)
+        ends = _may_lower(best, least, in_alpha, (mine, others), in_beta)
+        if (ends[0] < ends[1]).any():
             over_beta(given, betas_i, betas_j, state.power, half)
-            most = _lower_to(best, min_plus(own, _turned(half)), in_alpha, mine, others)
+            found = min_plus_between(own, _turned(half), ends)
+            _lower_to(best, found, in_alpha, (mine, others), ends)
     _add(best, _negative(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
     return best
 
 
 @compiled_if_needed
-def _least(matrix: Floats) -> float:
-    least = np.inf
-    for x in range(matrix.shape[0]):
-        for y in range(matrix.shape[1]):
-            least = min(least, matrix[x, y])
-    return least
+def _least_of_rows(matrix: Floats) -> Floats:
+    found = np.empty(matrix.shape[0])
+    for x in range(found.size):
+        found[x] = least_of(matrix[x])
+    return found
 
 
 @compiled_if_needed
@@ -207,14 +208,31 @@ def _ends_of(i: int, rows: Indices, state: State) -> Ends:
 
 
 @compiled_if_needed
-def _lower_to(best: Floats, found: Floats, in_alpha: Floats, mine: Indices, others: Indices) -> float:
-    """Lower the sums to those of two tables, the second by all alphas; return the greatest that is left."""
-    most = -np.inf
+def _may_lower(
+    best: Floats, least: tuple[Floats, Floats], in_alpha: Floats, rows: tuple[Indices, Indices], plus: float
+) -> Ends:
+    """Where sums of two least numbers, of numbers in alpha and of a constant are below the best ones."""
+    (mine, others), (first, second) = rows, least
+    begins, ends = np.zeros(best.shape[0], np.int64), np.zeros(best.shape[0], np.int64)
     for x in range(best.shape[0]):
-        for y in range(best.shape[1]):
+        begin, end, costs = 0, best.shape[1], in_alpha[mine[x + 1]]
+        while begin < end and first[x] + second[begin] + costs[others[begin + 1]] + plus >= best[x, begin]:
+            begin += 1
+        while begin < end and first[x] + second[end - 1] + costs[others[end]] + plus >= best[x, end - 1]:
+            end -= 1
+        begins[x], ends[x] = begin, end
+    return begins, ends
+
+
+@compiled_if_needed
+def _lower_to(
+    best: Floats, found: Floats, in_alpha: Floats, rows: tuple[Indices, Indices], ends: Ends
+) -> None:
+    """Lower the best sums between the ends to those of two tables, the second by all alphas."""
+    mine, others = rows
+    for x in range(best.shape[0]):
+        for y in range(ends[0][x], ends[1][x]):
             best[x, y] = min(best[x, y], found[x, y] + in_alpha[mine[x + 1], others[y + 1]])
-            most = max(most, best[x, y])
-    return most
 
 
 @compiled_if_needed

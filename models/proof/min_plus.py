@@ -1,4 +1,4 @@
-"""Compiled (min,+) products of matrices, which leave out terms that are nowhere the least."""
+"""Compiled (min,+) products of matrices."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ import numpy as np
 
 from ..instance.grid import Floats
 from ..processes.compiled import compiled, compiled_if_needed, compiled_in_any_order
+from .state import Ends
 
 _NEAR: Final = 1  # terms on both sides of the best one of a row that come before the others
 
 
 class Terms(NamedTuple):
-    """The right matrix of a product, a lower bound of each of its rows, and room for a sum with each.
-
-    Rows whose bound is inf are not used.
-    """
+    """The right matrix of a product, a lower bound of each of its rows, and room for a sum with each."""
 
     rows: Floats
     least: Floats
@@ -38,8 +36,10 @@ def lower_row(target: Floats, left: Floats, terms: Terms, first: int, begin: int
 
     Returns the greatest that is left.
     """
-    sums, end = terms.sums, begin + target.size
+    sums, end, reached = terms.sums, begin + target.size, _most_of(target)
     lowest = _add_up(left, terms.least[first : first + left.size], sums)
+    if lowest >= reached:
+        return reached
     best = 0
     while sums[best] > lowest:
         best += 1
@@ -54,15 +54,71 @@ def lower_row(target: Floats, left: Floats, terms: Terms, first: int, begin: int
     return _most_of(target)
 
 
+@compiled
+def lower_rows(targets: Floats, left: Floats, terms: Terms, at: tuple[int, int]) -> float:
+    """Lower four rows to the least of left[:, y] + rows[y], without y that cannot lower any of them.
+
+    targets (4, t), left (4, n), of terms (n, ...) with n >= 4. at: the columns of the terms that belong to
+    the first columns of the targets. Returns the greatest of these that is left; a target of -inf stays.
+    """
+    sums, many, width = terms.sums, terms.least.size, at[1] - at[0]
+    lowest, reached = _add_up_least(left, terms.least, sums), _most_of_rows(targets, width)
+    if lowest >= reached:
+        return reached
+    best = 0
+    while sums[best] > lowest:
+        best += 1
+    _lower_four(targets, left, terms.rows, (0, max(0, min(best - _NEAR, many - 4))), (0, *at))
+    reached = _most_of_rows(targets, width)
+    for begin in range(0, many, 4):
+        y = min(begin, many - 4)
+        if min(sums[y], sums[y + 1], sums[y + 2], sums[y + 3]) < reached:
+            _lower_four(targets, left, terms.rows, (0, y), (0, *at))
+    return _most_of_rows(targets, width)
+
+
 @compiled_if_needed
 def min_plus(left: Floats, right: Floats) -> Floats:
-    """The (min,+) product of two matrices."""
+    """The (min,+) product of two matrices of which nearly all terms are needed.
+
+    Four rows with four terms at a time, so that few numbers are loaded and stored.
+    """
+    ends = np.zeros(left.shape[0], np.int64), np.full(left.shape[0], right.shape[1])
+    return min_plus_between(left, right, ends)
+
+
+@compiled_if_needed
+def min_plus_between(left: Floats, right: Floats, ends: Ends) -> Floats:
+    """The (min,+) product of two matrices between the ends of each row; elsewhere too great or inf."""
     out = np.empty((left.shape[0], right.shape[1]))
     out[:] = np.inf
-    terms = terms_of(right)
-    for row in range(out.shape[0]):
-        lower_row(out[row], left[row], terms, 0, 0)
+    rows, terms = left.shape
+    if rows < 4 or terms < 4:
+        for row in range(rows):
+            for y in range(terms):
+                _lower(out[row], right[y], left[row, y])
+        return out
+    for begin in range(0, rows, 4):
+        row = min(begin, rows - 4)
+        low, high = ends[0][row : row + 4].min(), ends[1][row : row + 4].max()
+        first, end = _finite(left, row)
+        for y in range(first, end, 4):
+            _lower_four(out, left, right, (row, min(y, terms - 4)), (low, low, high))
     return out
+
+
+@compiled_if_needed
+def _finite(left: Floats, row: int) -> tuple[int, int]:
+    """The first column with a number below inf in four rows of a matrix, and the one after the last."""
+    first, end = left.shape[1], 0
+    for each in range(row, row + 4):
+        y, last = 0, left.shape[1]
+        while y < first and left[each, y] == np.inf:
+            y += 1
+        while last > end and left[each, last - 1] == np.inf:
+            last -= 1
+        first, end = min(first, y), max(end, last)
+    return first, end
 
 
 # Minima do not depend on the order of their terms; in any order, processors find several at once.
@@ -100,3 +156,50 @@ def _lower(target: Floats, values: Floats, plus: float) -> None:
     """Lower the target to the values + plus."""
     for x in range(target.size):
         target[x] = min(target[x], values[x] + plus)
+
+
+@compiled_in_any_order
+def _most_of_rows(rows: Floats, columns: int) -> float:
+    """The greatest value in the first columns of four rows."""
+    most = -np.inf
+    for x in range(columns):
+        most = max(most, rows[0, x], rows[1, x], rows[2, x], rows[3, x])
+    return most
+
+
+@compiled_in_any_order
+def _add_up_least(rows: Floats, others: Floats, sums: Floats) -> float:
+    """Fill in the sums of the least of four rows and of an array; return the least."""
+    least = np.inf
+    for x in range(others.size):
+        sums[x] = min(rows[0, x], rows[1, x], rows[2, x], rows[3, x]) + others[x]
+        least = min(least, sums[x])
+    return least
+
+
+@compiled_in_any_order
+def _lower_four(
+    out: Floats, left: Floats, right: Floats, place: tuple[int, int], at: tuple[int, int, int]
+) -> None:
+    """Lower a part of four rows of a product to four of its terms, which needs few loads and stores.
+
+    place: the first row and the first term. at: the first column of `out`, that of `right`, and the one
+    after its last.
+    """
+    (row, y), (first, begin, end) = place, at
+    width = end - begin
+    o0, o1 = out[row, first : first + width], out[row + 1, first : first + width]
+    o2, o3 = out[row + 2, first : first + width], out[row + 3, first : first + width]
+    r0, r1, r2, r3 = (
+        right[y, begin:end], right[y + 1, begin:end], right[y + 2, begin:end], right[y + 3, begin:end]
+    )  # fmt: skip
+    a0, a1, a2, a3 = left[row, y], left[row, y + 1], left[row, y + 2], left[row, y + 3]
+    b0, b1, b2, b3 = left[row + 1, y], left[row + 1, y + 1], left[row + 1, y + 2], left[row + 1, y + 3]
+    c0, c1, c2, c3 = left[row + 2, y], left[row + 2, y + 1], left[row + 2, y + 2], left[row + 2, y + 3]
+    d0, d1, d2, d3 = left[row + 3, y], left[row + 3, y + 1], left[row + 3, y + 2], left[row + 3, y + 3]
+    for x in range(width):
+        v0, v1, v2, v3 = r0[x], r1[x], r2[x], r3[x]
+        o0[x] = min(o0[x], v0 + a0, v1 + a1, v2 + a2, v3 + a3)
+        o1[x] = min(o1[x], v0 + b0, v1 + b1, v2 + b2, v3 + b3)
+        o2[x] = min(o2[x], v0 + c0, v1 + c1, v2 + c2, v3 + c3)
+        o3[x] = min(o3[x], v0 + d0, v1 + d1, v2 + d2, v3 + d3)

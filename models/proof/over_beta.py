@@ -14,13 +14,10 @@ from numpy.typing import NDArray
 from ..instance.grid import Floats
 from ..processes.compiled import compiled
 from .min_plus import lower_row, terms_of
-from .state import Indices, State
+from .state import Ends, State
 
 Line = tuple[float, float]
 """First value and step of equally spaced numbers."""
-
-Ends = tuple[Indices, Indices]
-"""For each row of a matrix, the first column in use and the one after the last."""
 
 
 class Given(NamedTuple):
@@ -60,10 +57,7 @@ def least_cost(mine: Line, other: Line, counts: tuple[int, int], power: int) -> 
 
 @compiled
 def over_beta(given: Given, mine: Line, other: Line, power: int, out: Floats) -> None:
-    """Fill in the least over y of given[row, y] + 2 B^2 or 2 |B|, at betas x of one end.
-
-    Rows of which no column is in use are left as they are.
-    """
+    """Fill in the least over y of given[row, y] + 2 B^2 or 2 |B|, at betas x of one end."""
     if power == 2:
         backwards = other[1] < 0
         first = other[0] + other[1] * (given.values.shape[1] - 1) if backwards else other[0]
@@ -81,8 +75,6 @@ def _over_squares(given: Given, apart: float, weight: float, backwards: bool, ou
         room.slopes[y] = 0.5 / (weight * y)
     for row in range(given.values.shape[0]):
         begin, end = ends[0][row], ends[1][row]
-        if begin == end:
-            continue
         if backwards:
             begin, end = columns - end, columns - begin
         for y in range(begin, end):
@@ -136,6 +128,6 @@ def _over_sizes(given: Given, mine: Line, other: Line, out: Floats) -> None:
     terms = terms_of(cost)
     for row in range(given.values.shape[0]):
         begin, end = given.ends[0][row], given.ends[1][row]
+        out[row] = np.inf
         if begin < end:
-            out[row] = np.inf
             lower_row(out[row], given.values[row, begin:end], terms, begin, 0)

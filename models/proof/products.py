@@ -6,23 +6,31 @@ the least over all jumps of that parity: A is taken modulo pi.
 
 The first call compiles for some 20 s; cached code loads in 0.3 s. Cached code is not renewed when only
 functions in other files that it calls have changed: delete `*.nbi` then. The names of `State` and
-`Rectangles` are part of the cache: after renaming them, old files cannot be read.
+`Clusters` are part of the cache: after renaming them, old files cannot be read.
 """
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from ..instance.grid import Floats
 from ..processes.compiled import compiled
-from .min_plus import Terms, least_of, lower_row
-from .over_beta import Ends, Given, betas, least_cost, over_beta
-from .state import State
+from .min_plus import Terms, least_of, lower_rows
+from .over_beta import Given, betas, least_cost, over_beta
+from .state import Ends, State
 
 _HALF: Final = float(np.pi / 2)
 _PI: Final = float(np.pi)
+
+
+class Used(NamedTuple):
+    """Numbers of the labels of a pixel, one row for each alpha, and the part of each row that is in use."""
+
+    values: Floats
+    columns: int
+    ends: Ends
 
 
 @compiled
@@ -141,37 +149,76 @@ def product(pair: int, i: int, state: State, out: Floats) -> None:
     rows, columns = state.alpha_count[i], state.beta_count[i]
     given = Given(np.empty((state.alpha_count[j], state.beta_count[j])), ends_of(j, state))
     others, columns_j = given.values.shape
-    terms = Terms(np.empty((others, columns)), np.empty(others), np.empty(others))
+    many = max(others, 4)
+    terms = Terms(np.empty((many, columns)), np.empty(many), np.empty(many))
+    terms.rows[others:], terms.least[others:] = np.inf, np.inf
     _fill_given(pair, j, state, given, terms.least)
-    begin, end = ends_of(i, state)
+    ends = ends_of(i, state)
+    begin, end = ends
     for row in range(rows):
         for x in range(row * columns + begin[row], row * columns + end[row]):
             out[x] = np.inf
     least, reached = least_of(terms.least), np.inf
-    of_steps = np.empty(rows + others - 1)
     tabled = state.clusters.of_pair[pair, 0] >= 0
-    in_alpha = np.empty((rows if tabled else 0, others))
+    in_alpha = np.empty((rows if tabled else 0, others)), np.empty(rows + others - 1)
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
         mine, other = betas(pair, i, state, odd)
         if tabled:
-            cheapest = alpha_costs(pair, i, state, odd, in_alpha)
+            cheapest = alpha_costs(pair, i, state, odd, in_alpha[0])
         else:
-            cheapest = step_costs(pair, i, state, odd, of_steps)
+            cheapest = step_costs(pair, i, state, odd, in_alpha[1])
         cheapest += least_cost(mine, other, (columns, columns_j), state.power)
-        if cheapest + least >= reached:
-            continue
-        over_beta(given, mine, other, state.power, terms.rows)
-        reached = -np.inf
-        for row in range(rows):
-            if begin[row] < end[row]:
-                left = in_alpha[row] if tabled else of_steps[rows - 1 - row : of_steps.size - row]
-                target = out[row * columns + begin[row] : row * columns + end[row]]
-                reached = max(reached, lower_row(target, left, terms, 0, begin[row]))
+        if cheapest + least < reached:
+            over_beta(given, mine, other, state.power, terms.rows)
+            reached = _lower_all(Used(out, columns, ends), in_alpha, terms)
     unary, less = state.unary[state.start[i] : state.start[i + 1]], state.h**2 if state.power == 2 else 0.0
     for row in range(rows):
         for x in range(row * columns + begin[row], row * columns + end[row]):
             out[x] = out[x] - less if unary[x] < np.inf else 0.0
+
+
+@compiled
+def _lower_all(out: Used, in_alpha: tuple[Floats, Floats], terms: Terms) -> float:
+    """Lower all rows to costs in alpha plus the terms; return the greatest that is left.
+
+    in_alpha: the costs of each row, or without any row, those by steps.
+    """
+    rows, many, (whole, of_steps) = out.ends[0].size, terms.least.size, in_alpha
+    left, targets, reached = np.full((4, many), np.inf), np.empty((4, out.columns)), -np.inf
+    for first in range(0, rows, 4):
+        at = _take(out, first, targets)
+        if at[0] < at[1]:
+            for row in range(first, min(first + 4, rows)):
+                steps = of_steps[rows - 1 - row : of_steps.size - row]
+                copy(whole[row] if whole.shape[0] else steps, left[row - first])
+            reached = max(reached, lower_rows(targets, left, terms, at))
+            _put_back(out, first, targets, at[0])
+    return reached
+
+
+@compiled
+def _take(rows: Used, first: int, targets: Floats) -> tuple[int, int]:
+    """Copy the used part of four rows to the targets, -inf elsewhere; return its columns."""
+    (begin, end), last = rows.ends, min(first + 4, rows.ends[0].size)
+    low, high = rows.columns, 0
+    for row in range(first, last):
+        if begin[row] < end[row]:
+            low, high = min(low, begin[row]), max(high, end[row])
+    targets[:, : max(high - low, 0)] = -np.inf
+    for row in range(first, last):
+        for x in range(begin[row], end[row]):
+            targets[row - first, x - low] = rows.values[row * rows.columns + x]
+    return low, high
+
+
+@compiled
+def _put_back(rows: Used, first: int, targets: Floats, low: int) -> None:
+    """Copy the targets back to the used part of four rows, of which the first column is `low`."""
+    begin, end = rows.ends
+    for row in range(first, min(first + 4, begin.size)):
+        for x in range(begin[row], end[row]):
+            rows.values[row * rows.columns + x] = targets[row - first, x - low]
 
 
 @compiled

@@ -13,6 +13,9 @@ from .lattice import Starts
 Indices = NDArray[np.int64]
 """Numbers of pixels and pairs: all of one type, so that each function is compiled once."""
 
+Ends = tuple[Indices, Indices]
+"""For each row of a matrix, the first column in use, and the one after the last."""
+
 
 class Clusters(NamedTuple):
     """Tables on pairs of alphas, four for each quad; see models/proof/clusters.py."""

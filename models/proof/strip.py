@@ -29,11 +29,10 @@ from .clusters import (
 from .decoding import Crosses, decode
 from .encoding import messages_of, tables_of
 from .lattice import Lattice, Starts
-from .over_beta import Ends
 from .products import all_taken, ends_of, pair_minimum, pixel_pass, share_of
 from .pruning import cells_left, prolonged_shares, rows_of
 from .slack import quad_slacks
-from .state import Clusters, Indices, State
+from .state import Clusters, Ends, Indices, State
 
 Singles = NDArray[np.float32]
 
