@@ -74,7 +74,7 @@ _ROUGH: Final = 1e-5  # gap relative to 1 + energy; a first smaller one is round
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
 _SEARCH: Final = 0.03  # greatest share of the time for that search, no longer than the proof so far
-_LATER: Final = 3  # such searches after the first one; each has another seed
+_LATE: Final = 0.1  # share of the time for the search before a level that takes long
 _LONGER: Final = 2  # duration of a later one, relative to the first one, below which it is left out
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
@@ -151,7 +151,7 @@ class _Chain:
 class Work:
     """State of a proof of the 2-norm.
 
-    divide: None for a lattice in one strip. searched: seconds of the first search between levels.
+    divide: None for a lattice in one strip. searched: seconds of the last search between levels.
     """
 
     norm: ClassVar[Norm] = 2
@@ -246,19 +246,20 @@ class Work:
             dual.move(lattice)
 
     def _search_between(self, lattice: Lattice) -> None:
-        """Search after the first level if the gap is wide, and before some levels that take long.
+        """Search after the first level if the gap is wide, and before two levels that take long.
 
         After some levels, the field may cause the rest of the gap: then search, too.
         """
         energy, began = self.energy(self.best), time.monotonic()
-        wide = energy - self.chain.bound > _WIDE * energy
-        late = len(self.chain.ends) == _MANY or lattice.start[-1] > _LARGE
-        if not (self.searches == 0 and wide) and not (self.searches <= _LATER and late):
+        wide, large = energy - self.chain.bound > _WIDE * energy, lattice.start[-1] > _LARGE
+        late = large or len(self.chain.ends) == _MANY
+        if not (self.searches == 0 and wide) and not (self.searches <= 2 and late):
             return
         spent, left = began - self.began, self.limits.deadline.left()
-        if np.isinf(left) or min(_SEARCH * left, spent) >= _LONGER * self.searched:
-            self._search(min(_SEARCH, spent / max(left, spent)))
-            self.searched = self.searched or time.monotonic() - began
+        seconds = _LATE * left if large else min(_SEARCH * left, spent)
+        if np.isinf(left) or seconds >= _LONGER * self.searched:
+            self._search(seconds / left if 0 < left < np.inf else 1.0)
+            self.searched = time.monotonic() - began
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for some passes over the lattice that follows, and for its certificate."""
