@@ -75,7 +75,7 @@ _LARGE: Final = 1_000_000  # labels of a level before which to search, for passe
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
 _SEARCH: Final = 0.03  # greatest share of the time for that search, no longer than the proof so far
 _LATE: Final = 0.1  # share of the time for the search before a level that takes long
-_LONGER: Final = 2  # duration of a later one, relative to the first one, below which it is left out
+_LONGER: Final = 2  # duration of a search, relative to the one before, below which it is left out
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 
@@ -246,9 +246,10 @@ class Work:
             dual.move(lattice)
 
     def _search_between(self, lattice: Lattice) -> None:
-        """Search after the first level if the gap is wide, and before two levels that take long.
+        """Search after the first level if the gap is wide, after some levels, and before one that takes long.
 
-        After some levels, the field may cause the rest of the gap: then search, too.
+        After some levels the field may cause the rest of the gap. A search that would not be much longer
+        than the last one is left out.
         """
         energy, began = self.energy(self.best), time.monotonic()
         wide, large = energy - self.chain.bound > _WIDE * energy, lattice.start[-1] > _LARGE
