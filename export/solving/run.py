@@ -13,6 +13,7 @@ from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock, Deadline, Over, Progress, Stop, never, silent, stop_function
+from ...models.processes.groups import interruptible
 from ...models.processes.limits import Limits
 from ...models.search.starts import first_field
 from ...models.storage import make_folder, write_bytes
@@ -340,19 +341,24 @@ def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progre
     """The report, its pictures drawn, or marked where Ctrl-C or the caller ended that."""
     from ..pictures.draw import LAYERS, draw
 
+    ended = replace(report, interrupted="drawing")
     try:
-        for kind in PICTURES:
-            if stop():
-                return replace(report, interrupted="drawing")
-            progress(f"drawing {kind}")
-            subject = report.instance if kind == "instance" else report.kept.field
-            draw(subject, folder / _picture(kind), kind=kind)
-        for name in OVERLAY:
-            progress(f"drawing {name}")
-            draw(report.kept.field, folder / name, kind=LAYERS, underlay=below)
+        # Ctrl-C between two pictures: as an exception inside of one, it could be lost in a callback.
+        with interruptible() as pressed:
+            for kind in PICTURES:
+                if stop() or pressed():
+                    return ended
+                progress(f"drawing {kind}")
+                subject = report.instance if kind == "instance" else report.kept.field
+                draw(subject, folder / _picture(kind), kind=kind)
+            for name in OVERLAY:
+                if stop() or pressed():
+                    return ended
+                progress(f"drawing {name}")
+                draw(report.kept.field, folder / name, kind=LAYERS, underlay=below)
+            return ended if pressed() else report
     except KeyboardInterrupt:
-        return replace(report, interrupted="drawing")
-    return report
+        return ended
 
 
 def _shaded(report: Report, folder: Path, progress: Progress, stop: Over = never) -> Report:
