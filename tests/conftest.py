@@ -5,7 +5,6 @@ says which tests were left out, and why.
 import os
 import shutil
 import signal
-import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
@@ -31,7 +30,6 @@ settings.load_profile("same")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
-COMPILING = pytest.StashKey[subprocess.Popen]()
 
 
 @pytest.fixture
@@ -56,14 +54,6 @@ def hidden(monkeypatch, tmp_path_factory):
         monkeypatch.setenv("PATH", os.pathsep.join(map(str, folders)))
 
     return hide
-
-
-def pytest_sessionstart(session):
-    """Compile the functions of proofs once, not in every process that runs tests, while they collect them."""
-    if not hasattr(session.config, "workerinput") and not session.config.option.collectonly:
-        program = "from crossfield.export.solving.compiling import compile_all; compile_all()"
-        command = [sys.executable, "-c", program]
-        session.config.stash[COMPILING] = subprocess.Popen(command)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -100,16 +90,14 @@ def _absent(item):
 
 
 def pytest_collection_finish(session):
-    """Wait until the functions of proofs are compiled: no test may depend on how long that takes."""
-    if session.items:
+    """Compiles the functions of proofs, or waits for the process that does: tests have limits of time."""
+    if session.items and not session.config.option.collectonly:
         from crossfield.export.solving.compiling import compile_all
 
         compile_all()
 
 
 def pytest_sessionfinish(session):
-    if COMPILING in session.config.stash:
-        session.config.stash[COMPILING].wait()
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["left_out"] = session.config.stash.get(LEFT_OUT, {})
 

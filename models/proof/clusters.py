@@ -211,7 +211,10 @@ def _ends_of(i: int, rows: Indices, state: State) -> Ends:
 def _may_lower(
     best: Floats, least: tuple[Floats, Floats], in_alpha: Floats, rows: tuple[Indices, Indices], plus: float
 ) -> Ends:
-    """Where sums of two least numbers, of numbers in alpha and of a constant are below the best ones."""
+    """The part of each row where a bound is below the best sum.
+
+    The bound is the sum of two least numbers, of a cost in alpha and of a constant.
+    """
     (mine, others), (first, second) = rows, least
     begins, ends = np.zeros(best.shape[0], np.int64), np.zeros(best.shape[0], np.int64)
     for x in range(best.shape[0]):

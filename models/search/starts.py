@@ -52,7 +52,7 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
 def best_start(
     instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
 ) -> CrossField:
-    """The start of least energy; see `starts`."""
+    """The lowest-energy field that `starts` returns."""
     return starts(instance, given, over, *others)[0]
 
 
