@@ -264,12 +264,14 @@ def run(
     if has_mask(instance):
         write_mask(instance, folder / MASK)
     watch.lap("fields")
-    if not report.interrupted:
-        report = _drawn(report, folder, below, progress, over)
-        watch.lap("pictures")
-    if not report.interrupted:
-        report = _shaded(report, folder, progress, over)
-        watch.lap("surface")
+    # An exception at Ctrl-C could be raised in a callback, where Python discards it.
+    with interruptible() as pressed:
+        if not report.interrupted:
+            report = _drawn(report, folder, below, progress, lambda: over() or pressed())
+            watch.lap("pictures")
+        if not report.interrupted:
+            report = _shaded(report, folder, progress, lambda: over() or pressed())
+            watch.lap("surface")
     report = replace(report, stages=watch.stages)
     document = report.document()
     write_page(folder, document, report.manifests)
@@ -343,22 +345,20 @@ def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progre
 
     ended = replace(report, interrupted="drawing")
     try:
-        # Ctrl-C between two pictures: as an exception inside of one, it could be lost in a callback.
-        with interruptible() as pressed:
-            for kind in PICTURES:
-                if stop() or pressed():
-                    return ended
-                progress(f"drawing {kind}")
-                subject = report.instance if kind == "instance" else report.kept.field
-                draw(subject, folder / _picture(kind), kind=kind)
-            for name in OVERLAY:
-                if stop() or pressed():
-                    return ended
-                progress(f"drawing {name}")
-                draw(report.kept.field, folder / name, kind=LAYERS, underlay=below)
-            return ended if pressed() else report
+        for kind in PICTURES:
+            if stop():
+                return ended
+            progress(f"drawing {kind}")
+            subject = report.instance if kind == "instance" else report.kept.field
+            draw(subject, folder / _picture(kind), kind=kind)
+        for name in OVERLAY:
+            if stop():
+                return ended
+            progress(f"drawing {name}")
+            draw(report.kept.field, folder / name, kind=LAYERS, underlay=below)
     except KeyboardInterrupt:
         return ended
+    return report
 
 
 def _shaded(report: Report, folder: Path, progress: Progress, stop: Over = never) -> Report:
