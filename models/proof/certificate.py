@@ -59,12 +59,12 @@ from .record import Claim, LevelRecord, Proof, Status
 from .state import Indices
 
 _PREFIX: Final = "instance_"
-_PIXEL: Final = 0.7  # effort for each pixel, besides that for its labels
-_LABELS: Final = 1_100.0  # allowed ones, checked and compressed per unit of effort
-_COSTS: Final = 47_000.0  # of pairs in alpha or in beta, per unit of effort
-_TERMS: Final = 340_000.0  # an alpha of one pixel and an allowed label of its neighbour, per unit of effort
-_QUAD: Final = 5.0  # effort for each quad with tables, besides that for their numbers
-_NUMBERS: Final = 1_500.0  # of tables, per unit of effort
+_PIXEL: Final = 1.0  # effort for each pixel, besides that for its labels
+_LABELS: Final = 2_300.0  # allowed ones, checked and compressed per unit of effort
+_COSTS: Final = 25_000.0  # of pairs in alpha or in beta, per unit of effort
+_TERMS: Final = 2_000_000.0  # an alpha of one pixel and an allowed label of its neighbour, per unit of effort
+_QUAD: Final = 2.7  # effort for each quad with tables, besides that for their numbers
+_NUMBERS: Final = 7_000.0  # of tables, per unit of effort
 _SHARED: Final = 0.5  # gain in speed for each further thread, as a share of the speed of one
 _SPARE_TIME: Final = 1.5  # safety factor: files are compressed, and the machine may become busier
 _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise

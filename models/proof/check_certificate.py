@@ -157,7 +157,6 @@ MOST_WEIGHT = 1e6
 MOST_WHOLE = 2.0**53  # of a message
 BLOCK = 1 << 16  # numbers of a product that NumPy handles at once
 ROWS = 32  # of a product, from which NumPy leaves out terms together
-WIDE = 16  # columns of a product that loops compute together
 ANY_ORDER = {"reassoc", "nnan", "nsz"}  # minima do not depend on the order of their terms
 LARGE = 3_000_000  # numbers in a certificate from which compiling, some 2 s, saves time
 
@@ -177,7 +176,7 @@ Array = Any
 Field = tuple[Array, Array, Array]
 Over = Callable[[], bool]
 Spans = tuple[Array, Array]
-Product = Callable[[Array, Array, Array, Spans], Array]
+Product = Callable[[Array, Array, Spans], Array]
 
 
 class RefusedError(Exception):
@@ -817,35 +816,32 @@ class Pair:
 
         given and the result have one number for each allowed label.
         """
-        (used, other), (spans, wanted) = self.used, self.spans
+        (used, other), (finite, wanted) = self.used, self.spans
         spread = np.full(used.shape, np.inf)
         spread[used] = given
-        ends = [product(along.T, spread, b, (spans, wanted))[other] for along, b in self.parts]
+        ends = []
+        for along, b in self.parts:
+            half = product(spread, b, (finite, whole(len(spread), b.shape[1])))
+            ends.append(product(along.T, half, (whole(*along.T.shape), wanted))[other])
         least: Array = np.minimum.reduce(ends)
         return least
 
 
 def whole(rows: int, columns: int) -> Array:
     """Spans of rows that are all in use."""
-    return np.tile([0, columns], (rows, 1))
+    spans = np.zeros((rows, 2), np.int64)
+    spans[:, 1] = columns
+    return spans
 
 
-def twice(along: Array, left: Array, right: Array, spans: Spans) -> Array:
-    """The (min,+) product of three matrices, by NumPy.
+def min_plus(left: Array, right: Array, spans: Spans) -> Array:
+    """The (min,+) product of two matrices, by NumPy.
 
     spans: (rows, 2) each, those of the rows of `left` outside which they are inf, and those of the product
-    outside which any number will do.
+    outside which any number will do. Some rows are computed at a time, without the terms that are nowhere
+    less than the best one of its row.
     """
     finite, wanted = spans
-    half = min_plus(left, right, finite, whole(len(left), right.shape[1]))
-    return min_plus(along, half, whole(*along.shape), wanted)
-
-
-def min_plus(left: Array, right: Array, finite: Array, wanted: Array) -> Array:
-    """The (min,+) product of two matrices, by NumPy; finite, wanted: as of `twice`.
-
-    Some rows are computed at a time, without the terms that are nowhere less than the best one of its row.
-    """
     out = np.full((len(left), right.shape[1]), np.inf)
     for begin in range(0, len(left), ROWS):
         rows = slice(begin, begin + ROWS)
@@ -876,17 +872,17 @@ def _min_plus(left: Array, right: Array) -> Array:
 
 
 def compiled() -> Product:
-    """`twice` compiled by Numba: the same numbers, as minima do not depend on the order of their terms.
+    """`min_plus` compiled by Numba: the same numbers, as minima do not depend on the order of their terms.
 
-    Without Numba, `twice` itself.
+    Without Numba, `min_plus` itself.
     """
     try:
         from numba import njit
     except ImportError:
-        return twice
+        return min_plus
     product = in_loops(njit(nogil=True, error_model="numpy", fastmath=ANY_ORDER))
     one = np.zeros((1, 1))
-    product(one, one, one, (whole(1, 1), whole(1, 1)))  # compiles
+    product(one, one, (whole(1, 1), whole(1, 1)))  # compiles
     return product
 
 
@@ -894,71 +890,67 @@ def in_loops(compile_: Callable[[Any], Any]) -> Product:
     """The product by `fill_in`, compiled."""
     fill = compile_(fill_in)
 
-    def product(along: Array, left: Array, right: Array, spans: Spans) -> Array:
-        out = np.full((len(along), right.shape[1]), np.inf)
-        fill(tuple(np.ascontiguousarray(each) for each in (along, left, right)), spans, out)
+    def product(left: Array, right: Array, spans: Spans) -> Array:
+        out = np.full((len(left), right.shape[1]), np.inf)
+        fill(np.ascontiguousarray(left), np.ascontiguousarray(right), spans, out)
         return out
 
     return product
 
 
 def fill_in(  # noqa: C901, PLR0912 - calls in the inner loops would take as long as these
-    matrices: tuple[Array, Array, Array], spans: Spans, out: Array
+    left: Array, right: Array, spans: Spans, out: Array
 ) -> None:
-    """Fill in the product of `twice` in loops, for Numba.
+    """Fill in the product of `min_plus` in loops, for Numba.
 
-    WIDE columns are computed together. Terms that are nowhere less than others of these are left out, and of
-    the product of `left` and `right`, what no other term needs.
+    Four rows and four terms are computed at a time, so that few numbers are loaded and stored. The terms next
+    to the best one come first; others that are nowhere less are left out.
     """
-    (along, left, right), (finite, wanted) = matrices, spans
-    count, many = right.shape
-    blocks = (many + WIDE - 1) // WIDE
-    parts, least = np.full((blocks, count, WIDE), np.inf), np.full((blocks, count), np.inf)
-    floor = np.full(count, np.inf)
+    (finite, wanted), (rows, count) = spans, left.shape
+    if rows < 4 or count < 4:
+        for x in range(rows):
+            for k in range(finite[x, 0], finite[x, 1]):
+                for y in range(wanted[x, 0], wanted[x, 1]):
+                    out[x, y] = min(out[x, y], left[x, k] + right[k, y])
+        return
+    least, sums = np.full(count, np.inf), np.full(count, np.inf)
     for k in range(count):
-        for y in range(many):
-            parts[y // WIDE, k, y % WIDE] = right[k, y]
-            least[y // WIDE, k] = min(least[y // WIDE, k], right[k, y])
-            floor[k] = min(floor[k], right[k, y])
-    halves, done = np.empty((blocks, len(left), WIDE)), np.zeros((blocks, len(left)), np.bool_)
-    lowest, sums, row = np.full(len(left), np.inf), np.empty(len(left)), np.empty(WIDE)
-    for x in range(len(left)):
-        for k in range(finite[x, 0], finite[x, 1]):
-            lowest[x] = min(lowest[x], left[x, k] + floor[k])
-    for z in range(len(along)):
-        best, found = 0, np.inf
-        for x in range(len(left)):
-            sums[x] = along[z, x] + lowest[x]
-            found = min(found, sums[x])
-        while sums[best] > found:
+        for y in range(right.shape[1]):
+            least[k] = min(least[k], right[k, y])
+    for turn in range(0, rows, 4):
+        x = min(turn, rows - 4)
+        low, high, first, last = count, 0, right.shape[1], 0
+        for z in range(x, x + 4):
+            low, high = min(low, finite[z, 0]), max(high, finite[z, 1])
+            first, last = min(first, wanted[z, 0]), max(last, wanted[z, 1])
+        sums[:], lowest, reached, best = np.inf, np.inf, np.inf, low
+        for k in range(low, high):
+            sums[k] = min(left[x, k], left[x + 1, k], left[x + 2, k], left[x + 3, k]) + least[k]
+            lowest = min(lowest, sums[k])
+        while sums[best] > lowest:
             best += 1
-        first, last = wanted[z]
-        for block in range(first // WIDE, (last + WIDE - 1) // WIDE):
-            begin, end = max(first - block * WIDE, 0), min(last - block * WIDE, WIDE)
-            row[:] = np.inf
-            most = np.inf
-            for turn in range(len(left) + 1):
-                x = turn - 1 if turn else best
-                if sums[x] >= most:
-                    continue
-                half = halves[block, x]
-                if not done[block, x]:
-                    done[block, x] = True
-                    half[:] = np.inf
-                    reached = np.inf
-                    for k in range(finite[x, 0], finite[x, 1]):
-                        if left[x, k] + least[block, k] < reached:
-                            reached = -np.inf
-                            for y in range(WIDE):
-                                half[y] = min(half[y], left[x, k] + parts[block, k, y])
-                                reached = max(reached, half[y])
-                most = -np.inf
-                for y in range(WIDE):
-                    row[y] = min(row[y], along[z, x] + half[y])
-                for y in range(begin, end):
-                    most = max(most, row[y])
-            for y in range(begin, end):
-                out[z, block * WIDE + y] = row[y]
+        o0, o1 = out[x, first:last], out[x + 1, first:last]
+        o2, o3 = out[x + 2, first:last], out[x + 3, first:last]
+        for begin in range(low - 4, high, 4):
+            k = min(begin if begin >= low else max(best - 1, 0), count - 4)
+            if begin >= low and min(sums[k], sums[k + 1], sums[k + 2], sums[k + 3]) >= reached:
+                continue
+            r0, r1 = right[k, first:last], right[k + 1, first:last]
+            r2, r3 = right[k + 2, first:last], right[k + 3, first:last]
+            a0, a1, a2, a3 = left[x, k], left[x, k + 1], left[x, k + 2], left[x, k + 3]
+            b0, b1, b2, b3 = left[x + 1, k], left[x + 1, k + 1], left[x + 1, k + 2], left[x + 1, k + 3]
+            c0, c1, c2, c3 = left[x + 2, k], left[x + 2, k + 1], left[x + 2, k + 2], left[x + 2, k + 3]
+            d0, d1, d2, d3 = left[x + 3, k], left[x + 3, k + 1], left[x + 3, k + 2], left[x + 3, k + 3]
+            for y in range(last - first):
+                v0, v1, v2, v3 = r0[y], r1[y], r2[y], r3[y]
+                o0[y] = min(o0[y], v0 + a0, v1 + a1, v2 + a2, v3 + a3)
+                o1[y] = min(o1[y], v0 + b0, v1 + b1, v2 + b2, v3 + b3)
+                o2[y] = min(o2[y], v0 + c0, v1 + c1, v2 + c2, v3 + c3)
+                o3[y] = min(o3[y], v0 + d0, v1 + d1, v2 + d2, v3 + d3)
+            if begin < low:
+                reached = -np.inf
+                for y in range(last - first):
+                    reached = max(reached, o0[y], o1[y], o2[y], o3[y])
 
 
 # The pass --------------------------------------------------------------------------------------------------
@@ -966,12 +958,12 @@ def fill_in(  # noqa: C901, PLR0912 - calls in the inner loops would take as lon
 
 @dataclass
 class Way:
-    """How to compute: a product like `twice`, and functions like `map` for independent work.
+    """How to compute: a product like `min_plus`, and functions like `map` for independent work.
 
     each: for the pixels of a diagonal. levels: for the levels.
     """
 
-    product: Product = twice
+    product: Product = min_plus
     each: Callable[[Callable[[int], Any], list[int]], Any] = map
     levels: Callable[[Callable[[int], Any], range], Iterable[Any]] = map
 
@@ -1023,10 +1015,13 @@ class Pass:
         """The least cost of a quad over the alphas that have an allowed label."""
         a, b, c, d = (self.level.rows[i] for i in cluster.pixels)
         ab, bc, dc, ad = (-table for table in cluster.tables)
-        left, right, along = ab[np.ix_(a, b)], bc[np.ix_(b, c)], ad.T[np.ix_(d, a)]
-        spans = whole(*left.shape), whole(len(along), right.shape[1])
         self._err(sum(float(np.abs(table).max()) for table in cluster.tables))
-        return float((self.way.product(along, left, right, spans) + dc[np.ix_(d, c)]).min())
+        diagonal = self._product(ab[np.ix_(a, b)], bc[np.ix_(b, c)])
+        return float((self._product(ad.T[np.ix_(d, a)], diagonal) + dc[np.ix_(d, c)]).min())
+
+    def _product(self, left: Array, right: Array) -> Array:
+        """The product of two matrices without infinite numbers."""
+        return self.way.product(left, right, (whole(*left.shape), whole(len(left), right.shape[1])))
 
     def _theta(self, cost: Array, size: float, shares: list[Array]) -> tuple[Array, float]:
         """Excess of theta over its minimum at each label of a pixel, and the minimum.
