@@ -25,7 +25,10 @@ times a scale, and for any values of them the resulting bound is valid.
 In other norms than 2 there are also:
 
     slopes      (n,)    of the stroke terms
-    multipliers (2m + 2n,)  of A, B, R and beta, which prove the least energy on the last boxes
+    multipliers (2m + 2n,)  of A, B, R and beta, which prove the least energy on the last boxes; if these are
+                        cut, those of one piece after the other
+    cuts                only if the boxes are cut: for each piece, before its parts, the pixel where it is
+                        cut, or -1 for a piece that stays whole
 """
 
 from __future__ import annotations
@@ -269,16 +272,20 @@ def _arrays(proof: Proof) -> Arrays:
 
 
 def _slopes(proof: Proof) -> Arrays:
-    """The slopes of strokes and the multipliers, by pairs and pixels; 0 for none."""
-    instance = proof.field.instance
+    """The slopes of strokes, the multipliers by pairs and pixels, 0 for none, and the cuts by pixels."""
+    instance, cuts = proof.field.instance, np.array(proof.cuts, dtype=np.int32)
     n, m, s = instance.grid.size, len(proof.field.p), len(instance.theta)
-    slopes, multipliers = np.zeros(n), np.zeros(2 * m + 2 * n)
+    slopes, multipliers = np.zeros(n), np.zeros((np.count_nonzero(cuts < 0), 2 * m + 2 * n))
     slopes[instance.stroke_index] = proof.levels[0].slopes
-    if (found := proof.multipliers) is not None:
-        multipliers[: 2 * m] = found[: 2 * m]
-        multipliers[2 * m + instance.stroke_index] = found[2 * m : 2 * m + s]
-        multipliers[2 * m + n :] = found[2 * m + s :]
-    return {"slopes": slopes, "multipliers": multipliers}
+    if proof.multipliers is not None:
+        found = proof.multipliers.reshape(len(multipliers), -1)
+        multipliers[:, : 2 * m] = found[:, : 2 * m]
+        multipliers[:, 2 * m + instance.stroke_index] = found[:, 2 * m : 2 * m + s]
+        multipliers[:, 2 * m + n :] = found[:, 2 * m + s :]
+    arrays = {"slopes": slopes, "multipliers": multipliers.ravel()}
+    if len(cuts) > 1:
+        arrays["cuts"] = np.where(cuts < 0, -1, instance.stroke_index[cuts]).astype(np.int32)
+    return arrays
 
 
 def _of_level(level: LevelRecord) -> Arrays:

@@ -106,10 +106,10 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
    Jumps: let g = min(|beta_i|, |beta_j|), negative where (-1)^p beta_i beta_j >= 0. With the other parity
    |B| grows by -2 g, and one step further |A| is at least pi/2 - |A|. So p is a best jump where |A| <=
    pi/2 and |A| + g <= pi/4. Strokes in the norm 1: at a = pi/4 + e and at -pi/4 - e, 0 <= e <= pi/4, the
-   nearest line is nearer than u by at most 2 e. The rest is linear: for any multiplier l, |r| >= l r if
-   |l| <= 1, and r^2 >= l r - l^2/4. The sum over all terms is linear in the angles, and its least value
-   in the boxes is a sum of single terms. The certificate holds the multipliers of A, B, R and beta. Boxes
-   are not cut.
+   nearest line is nearer than u by at most 2 e. Or the box is cut at the edge, and v carries the stroke
+   beyond. The rest is linear: for any multiplier l, |r| >= l r if |l| <= 1, and r^2 >= l r - l^2/4. The sum
+   over all terms is linear in the angles, and its least value in a piece of the boxes is a sum of single
+   terms. The certificate holds the cuts, and the multipliers of A, B, R and beta on each piece.
 
 6. Rounding. Messages may be anything, so errors in them do no harm. What counts is how much an inequality
    of 3. may fail at a pixel or a pair. That is below a small multiple (ROUNDING) of the machine's precision
@@ -165,6 +165,7 @@ PARTS = ("head", "alpha", "beta", "p", *(f"instance_{part}" for part in INSTANCE
 LEVEL_PARTS = ("h", "alpha", "beta", "ranges", "allowed", "scale", "wide")
 STEP_PARTS = {2: ("steps_16", "steps_32"), 1: ("steps_32", "steps_64"), "mixed": ("steps_32", "steps_64")}
 ABSOLUTE_PARTS = ("slopes", "multipliers")  # unless the norm is 2
+CUTS = "cuts"  # also, if boxes are cut
 CLUSTER_PARTS = ("quads", "table_scale", "table_steps")  # of a level
 NAME = re.compile(rb"[a-z0-9_]+\.npy")
 HEAD = re.compile(
@@ -407,6 +408,7 @@ def _need_names(arrays: dict[str, Array]) -> None:
     parts = LEVEL_PARTS + STEP_PARTS[norm] + CLUSTER_PARTS
     levels, whole = _levels(head), PARTS + (() if norm == 2 else ABSOLUTE_PARTS)
     names = set(whole) | {f"level_{number}_{part}" for number in range(levels) for part in parts}
+    names |= {CUTS} & set(arrays) if norm != 2 else set()
     for name in sorted(names - set(arrays)):
         raise UnreadableError(f"has no array {name}")
     for name in sorted(set(arrays) - names):
@@ -1165,6 +1167,18 @@ class Piece:
     lines: Array
     bound: float
 
+    def cut(self, at: int, turned: Array, bound: float) -> list[Piece]:
+        """The parts below, in and above the window of the stroke of pixel `at`, without empty ones."""
+        ends = (-math.inf, turned[at] - QUARTER, turned[at] + QUARTER, math.inf)
+        parts = []
+        for line in (-1, 0, 1):
+            boxes, lines = self.boxes.copy(), self.lines.copy()
+            boxes[at, 0], boxes[at, 1] = max(boxes[at, 0], ends[line + 1]), min(boxes[at, 1], ends[line + 2])
+            lines[at] = line
+            if boxes[at, 0] <= boxes[at, 1]:
+                parts.append(Piece(boxes, lines, bound))
+        return parts
+
 
 class Quadratic:
     """The convex quadratic G of 4. on a piece, at fixed jumps."""
@@ -1257,15 +1271,7 @@ class Quadratic:
         if not over.any():
             return []
         at = int(np.argmax(np.where(over, 1e-12 + self.given(x[len(x) // 2 :]), 0.0)))
-        ends = (-math.inf, turned[at] - QUARTER, turned[at] + QUARTER, math.inf)
-        pieces = []
-        for line in (-1, 0, 1):
-            boxes, lines = self.piece.boxes.copy(), self.piece.lines.copy()
-            boxes[at, 0], boxes[at, 1] = max(boxes[at, 0], ends[line + 1]), min(boxes[at, 1], ends[line + 2])
-            lines[at] = line
-            if boxes[at, 0] <= boxes[at, 1]:
-                pieces.append(Piece(boxes, lines, bound))
-        return pieces
+        return self.piece.cut(at, turned, bound)
 
 
 def relabelled(sketch: Sketch, field: Field, centres: Array) -> tuple[Field, Array]:
@@ -1280,12 +1286,28 @@ def relabelled(sketch: Sketch, field: Field, centres: Array) -> tuple[Field, Arr
     return (alpha, beta, p - steps[sketch.first] + steps[sketch.second]), turned
 
 
-def linear_bound(sketch: Sketch, p: Array, turned: Array, boxes: Array, multipliers: Array) -> float:
-    """A lower bound of F in the boxes by the multipliers of A and B (m,), R and beta (n,); see 5."""
-    i, j, n, m = sketch.first, sketch.second, len(turned), len(p)
+def pieces_bound(sketch: Sketch, p: Array, turned: Array, boxes: Array, steps: tuple[Array, Array]) -> float:
+    """A lower bound of F in the boxes. steps: the cuts, and multipliers of each piece that stays whole."""
+    waiting, found = [Piece(boxes, np.zeros(len(boxes)), -math.inf)], list[float]()
+    cuts, multipliers = steps
+    for at in cuts.tolist():
+        _need(waiting, CUTS, "has a piece too many")
+        piece = waiting.pop()
+        if at < 0:
+            found.append(linear_bound(sketch, p, turned, piece, multipliers[len(found)]))
+        else:
+            waiting += reversed(piece.cut(at, turned, -math.inf))
+    _need(not waiting, CUTS, "leaves a piece without multipliers")
+    return min(found)
+
+
+def linear_bound(sketch: Sketch, p: Array, turned: Array, piece: Piece, multipliers: Array) -> float:
+    """A lower bound of F in a piece by the multipliers of A and B (m,), R and beta (n,); see 5."""
+    i, j, n, m, boxes = sketch.first, sketch.second, len(turned), len(p), piece.boxes
+    by_u, goal = piece.lines == 0, turned + HALF * piece.lines
     of_a, of_b = np.clip(np.split(multipliers[: 2 * m], 2), -1.0, 1.0)
     of_r, of_beta = np.split(multipliers[2 * m :], 2)
-    above, below = np.maximum(beyond_windows(turned, boxes), 0.0) * sketch.weight
+    above, below = np.maximum(beyond_windows(turned, boxes), 0.0) * sketch.weight * by_u
     if sketch.norm == 1:
         of_r, of_beta = np.clip([of_r, of_beta], -1.0, 1.0)
         lost, tilt = 2 * (above + below), np.zeros(n)
@@ -1295,14 +1317,15 @@ def linear_bound(sketch: Sketch, p: Array, turned: Array, boxes: Array, multipli
         tilt = 4 * (above - below)
     along, upright = sketch.weight * of_r, sketch.w_beta * of_beta - tilt
     slope = 2 * (np.bincount(i, of_a, n) - np.bincount(j, of_a, n)) + along
-    skew = 2 * (np.bincount(i, sign(p) * of_b, n) - np.bincount(j, of_b, n)) + along + upright
+    skew = 2 * (np.bincount(i, sign(p) * of_b, n) - np.bincount(j, of_b, n))
+    skew += np.where(by_u, along, -along) + upright
     low, high = np.concatenate(boxes[:, ::2].T), np.concatenate(boxes[:, 1::2].T)
     slopes = np.concatenate([slope, skew])
-    terms = [math.pi * of_a * p, -along * turned, -lost, np.minimum(slopes * low, slopes * high)]
+    terms = [math.pi * of_a * p, -along * goal, -lost, np.minimum(slopes * low, slopes * high)]
     # What may fail is below 16 roundings of every product that enters.
     far = np.maximum(np.abs(low), np.abs(high))[:n]
     size = np.sum(4 * np.abs(of_a) * (far[i] + far[j] + HALF * np.abs(p))) + 4.0 * m
-    size += np.sum(np.abs(along) * (far + 1 + np.abs(turned)) + np.abs(upright) + np.abs(lost))
+    size += np.sum(np.abs(along) * (far + 1 + np.abs(goal)) + np.abs(upright) + np.abs(lost))
     return math.fsum(np.concatenate(terms)) - 16 * PRECISION * float(size)
 
 
@@ -1313,7 +1336,7 @@ def lower_bound(
     boxes: Array,
     enough: float,
     *,
-    multipliers: Array,
+    steps: tuple[Array, Array],
     over: Over,
 ) -> tuple[float, Array]:
     """A lower bound of F in the boxes, -inf where a jump is not forced, and the pairs with forced jumps.
@@ -1329,7 +1352,7 @@ def lower_bound(
     if not held.all() or far.any():
         return -math.inf, held
     if sketch.norm != 2:
-        return linear_bound(sketch, p, turned, boxes, multipliers), held
+        return pieces_bound(sketch, p, turned, boxes, steps), held
     waiting = [Piece(boxes, np.zeros(len(boxes)), -math.inf)]
     found = []
     for _ in range(MOST_PIECES):
@@ -1377,8 +1400,8 @@ def _check(arrays: dict[str, Array], over: Over, way: Way) -> Verdict:
     bounds, boxes, level = _descend(arrays, sketch, energy + error + slack, over, way)
     bound = max(0.0, min(energy - error, max(bounds) - slack))
     enough = energy - error - OPTIMAL / 2 * max(1.0, energy)
-    multipliers = _multipliers(arrays, sketch)
-    convex, held = lower_bound(sketch, field, level, boxes, enough, multipliers=multipliers, over=over)
+    steps = _last_steps(arrays, sketch)
+    convex, held = lower_bound(sketch, field, level, boxes, enough, steps=steps, over=over)
     bound = max(bound, min(convex, energy - error))
     status = "optimal" if energy - bound <= OPTIMAL * max(1.0, energy) else "gap"
     centres = np.stack([level.alpha, level.beta], axis=1)
@@ -1387,13 +1410,23 @@ def _check(arrays: dict[str, Array], over: Over, way: Way) -> Verdict:
     return verdict
 
 
-def _multipliers(arrays: dict[str, Array], sketch: Sketch) -> Array:
-    """The multipliers of A, B, R and beta, shape (2m + 2n,); none in the norm 2."""
+def _last_steps(arrays: dict[str, Array], sketch: Sketch) -> tuple[Array, Array]:
+    """The cuts of boxes, and the multipliers of A, B, R and beta on each piece; not used in the norm 2.
+
+    A cut is the pixel at whose window a piece is cut, or -1 for a piece that stays whole. Each piece comes
+    before its parts. Multipliers have the shape (pieces that stay whole, 2m + 2n).
+    """
+    cuts, each = np.array([-1]), 2 * (len(sketch.first) + len(sketch.offset))
     if sketch.norm == 2:
-        return np.zeros(0)
-    found = _given(arrays, "multipliers", "<f8", 2 * (len(sketch.first) + len(sketch.offset)))
-    _need(np.abs(found) <= MOST_WEIGHT, "multipliers", "is too large")
-    return found
+        return cuts, np.zeros((1, each))
+    if CUTS in arrays:
+        cuts = _given(arrays, CUTS, "<i4", None)
+        _need(1 < len(cuts) <= 2 * MOST_PIECES, CUTS, "has too few or too many pieces")
+        _need((cuts >= -1) & (cuts < len(sketch.offset)), CUTS, "is no pixel")
+    count = int((cuts < 0).sum())
+    found = _given(arrays, "multipliers", "<f8", count * each).reshape(count, each)
+    _need((np.abs(found) <= MOST_WEIGHT).all(axis=1), "multipliers", "is too large")
+    return cuts, found
 
 
 def _descend(

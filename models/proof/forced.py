@@ -12,7 +12,7 @@ there + the least of g (y - x) over y in the boxes.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 from scipy import sparse
@@ -34,13 +34,15 @@ _ROUNDING: Final = 1e-10  # deduction from a bound, relative to 1 + its value: f
 class Least(NamedTuple):
     """The least energy on the boxes: its field, and a bound.
 
-    multipliers: where pairs count with absolute values, the multipliers that prove it; see
-    models/search/absolute_fit.py.
+    Where pairs count with absolute values, multipliers prove it, those of one piece after the other; see
+    models/search/absolute_fit.py. cuts: for each piece, in the order of the search, the stroke where it is
+    cut, or -1 if it stays whole and has multipliers.
     """
 
     field: CrossField
     bound: float
     multipliers: Floats | None = None
+    cuts: tuple[int, ...] = (-1,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,22 +62,36 @@ class Forced:
         """Whether one convex quadratic bounds the energy on the boxes."""
         return bool(self.pairs.all() and self.strokes.all())
 
+    @property
+    def whole(self) -> Piece:
+        """The boxes as one piece."""
+        return Piece(self.left, np.zeros(len(self.strokes), dtype=np.int32))
+
     def least(self, energy: float, over: Over = never) -> Least:
-        """The minimum of the lowest piece, and a bound of all; pieces with a bound of `energy` stay whole."""
-        lines = np.zeros(len(self.strokes), dtype=np.int32)
-        waiting = [(-np.inf, Piece(self.left, lines))]
-        found: list[tuple[float, CrossField]] = []
+        """The minimum of the lowest piece, and a bound of all; pieces with a bound of `energy` stay whole.
+
+        Where multipliers have to prove it, the bound is that of the whole boxes if pieces are missing.
+        """
+        waiting = [(-np.inf, self.whole)]
+        found, whole, cuts = list[Least](), list[Least](), list[int]()
         for _ in range(_MOST_PIECES):
             _, piece = waiting.pop()
-            field, bound = piece.least(over)
-            cut = piece.cut(field) if bound < energy - EXACT / 2 * (1 + energy) else []
-            waiting += [(bound, part) for part in cut]
-            if not cut:
-                found.append((bound, field))
+            found.append(piece.least(over))
+            field, bound, *_ = found[-1]
+            cuts.append(piece.crossed(field) if bound < energy - EXACT / 2 * (1 + energy) else -1)
+            if cuts[-1] < 0:
+                whole.append(found[-1])
+            else:
+                waiting += [(bound, part) for part in reversed(piece.cut(cuts[-1]))]
             if not waiting or over():
                 break
-        best = min(found, key=lambda pair: pair[0], default=(bound, field))
-        return Least(best[1], min([best[0], *(bound for bound, _ in waiting)]))
+        best = min(whole, key=lambda each: each.bound, default=found[-1])
+        if found[0].multipliers is None:
+            return Least(best.field, min([best.bound, *(bound for bound, _ in waiting)]))
+        if waiting:
+            return found[0]._replace(field=best.field)
+        multipliers = [each.multipliers for each in whole if each.multipliers is not None]
+        return Least(best.field, best.bound, np.concatenate(multipliers), tuple(cuts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +105,7 @@ class Piece:
     left: RemainingCells
     lines: Ints
 
-    def least(self, over: Over = never) -> tuple[CrossField, float]:
+    def least(self, over: Over = never) -> Least:
         """The field that minimises the quadratic on the piece, and a lower bound of the energy there."""
         lattice = self.left.lattice
         (lower, upper), quadratic = self.left.bounds, self._quadratic()
@@ -98,24 +114,27 @@ class Piece:
         field = field_at(lattice.instance, x, lattice.p)
         value = field.energy().total - float(self._given(field).sum())
         value += float(np.minimum(gradient * (lower - x), gradient * (upper - x)).sum())
-        return field, value - _ROUNDING * (1 + abs(value))
+        return Least(field, value - _ROUNDING * (1 + abs(value)))
 
-    def cut(self, field: CrossField) -> list[Piece]:
-        """The piece cut at the edges of the window of the stroke with the largest deduction, if any."""
+    def crossed(self, field: CrossField) -> int:
+        """The stroke with the largest deduction whose window the piece exceeds, or -1."""
         above, below = self._beyond()
         if not (above + below).any():
-            return []
-        stroke = int(np.argmax(np.where(above + below > 0, 1e-12 + self._given(field), 0.0)))
+            return -1
+        return int(np.argmax(np.where(above + below > 0, 1e-12 + self._given(field), 0.0)))
+
+    def cut(self, stroke: int) -> list[Self]:
+        """The parts below, in and above the window of a stroke; some may be empty and are left out."""
         instance, left = self.left.lattice.instance, self.left
         target, at = instance.target[stroke], instance.stroke_index[stroke]
         ends = (-np.inf, target - QUARTER, target + QUARTER, np.inf)
         parts = []
-        for line in (-1, 1, 0):
+        for line in (-1, 0, 1):
             low, high, lines = left.alpha_low.copy(), left.alpha_high.copy(), self.lines.copy()
             low[at], high[at] = max(low[at], ends[line + 1]), min(high[at], ends[line + 2])
             lines[stroke] = line
             if low[at] <= high[at]:
-                parts.append(Piece(replace(left, alpha_low=low, alpha_high=high), lines))
+                parts.append(replace(self, left=replace(left, alpha_low=low, alpha_high=high), lines=lines))
         return parts
 
     def _beyond(self) -> tuple[Floats, Floats]:

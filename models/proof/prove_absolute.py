@@ -1,13 +1,14 @@
 """The work of a proof where pairs count with absolute values: in the 1-norm and in the mixed norm.
 
 As in models/proof/work.py, on a lattice common to all pixels. Once a level's boxes leave no choice of jumps,
-a linear or quadratic program gives the energy on them, except for strokes at the edges of their windows. Its
-multipliers prove its least value. models/proof/check_certificate.py, 5, states and proves the lemmas.
+a linear or quadratic program gives the energy on them, except for strokes at the edges of their windows,
+where boxes are cut. Its multipliers prove its least value. models/proof/check_certificate.py, 5, states and
+proves the lemmas.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -18,44 +19,50 @@ from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
 from ..search.absolute_fit import absolute_fit, fitted_absolute, settled_absolute
 from ..search.box_qp import field_at
-from .forced import Forced, Least, at_pairs
+from .forced import Forced, Least, Piece, at_pairs
 from .lattice import Lattice
 from .pruning import RemainingCells
 from .work import COARSEST, Work, first_of
 
 
 class ForcedAbsolute(Forced):
-    """Choices that the boxes force; then a program gives the energy on them."""
+    """Choices that the boxes force; then a program gives the energy on each piece of them."""
 
-    norm: ClassVar[AbsoluteNorm]
+    @property
+    def whole(self) -> Piece:
+        """The boxes as one piece."""
+        return AbsolutePiece(self.left, np.zeros(len(self.strokes), dtype=np.int32))
 
-    def least(self, energy: float, over: Over = never) -> Least:  # noqa: ARG002
-        """The field of least energy with u at all strokes, and a lower bound of the energy on the boxes."""
+
+class AbsolutePiece(Piece):
+    """A part of the boxes where pairs count with absolute values."""
+
+    def least(self, over: Over = never) -> Least:  # noqa: ARG002
+        """The field of least energy with the lines of the piece, and a lower bound of the energy there."""
         instance, p = self.left.lattice.instance, self.left.lattice.p
-        weight, (above, below) = instance.stroke_coefficient * instance.w, beyond(self.left)
+        weight, (above, below) = instance.stroke_coefficient * instance.w, self._beyond()
         tilt, constant = np.zeros(2 * instance.grid.size), 2 * float(weight @ (above + below))
-        if self.norm == "mixed":
+        if self._norm == "mixed":
             tilt[instance.grid.size + instance.stroke_index] = 4 * weight * (above - below)
             constant *= HALF
-        fit = absolute_fit(instance, p, self.norm, *self.left.bounds, tilt=tilt)
+        fit = absolute_fit(instance, p, self._norm, *self.left.bounds, tilt=tilt, lines=self.lines)
         return Least(field_at(instance, fit.x, p), fit.bound - constant, fit.multipliers)
 
+    @property
+    def _norm(self) -> AbsoluteNorm:
+        return cast("AbsoluteNorm", self.left.lattice.norm)
 
-class Forced1Norm(ForcedAbsolute):
-    """Choices that the boxes force in the 1-norm."""
-
-    norm = 1
-
-
-class ForcedMixed(ForcedAbsolute):
-    """Choices that the boxes force in the mixed norm."""
-
-    norm = "mixed"
+    def _given(self, field: CrossField) -> Floats:
+        """Deduction at each stroke whose window the piece exceeds, shape (s,)."""
+        if self._norm == "mixed":
+            return super()._given(field)
+        deduction: Floats = 2 * field.instance.w * np.add(*self._beyond())
+        return deduction
 
 
 def forced_absolute(left: RemainingCells) -> ForcedAbsolute:
     """Choices that are forced on the boxes that are left."""
-    kind, reach = (Forced1Norm, QUARTER) if left.lattice.norm == 1 else (ForcedMixed, HALF)
+    reach = QUARTER if left.lattice.norm == 1 else HALF
     i, j = left.lattice.instance.grid.first, left.lattice.instance.grid.second
     most, even = at_pairs(left)[0], parity_sign(left.lattice.p) > 0
     above, below = np.maximum(left.beta_high, 0.0), np.maximum(-left.beta_low, 0.0)
@@ -64,14 +71,9 @@ def forced_absolute(left: RemainingCells) -> ForcedAbsolute:
     least = np.maximum(np.maximum(left.beta_low, -left.beta_high), 0.0)
     given = np.where(unlike > 0, unlike, -np.minimum(least[i], least[j]))
     pairs = (most <= HALF) & (most + given <= QUARTER)
-    return kind(left, pairs, np.maximum(*beyond(left)) <= reach)
-
-
-def beyond(left: RemainingCells) -> tuple[Floats, Floats]:
-    """Distances by which the boxes exceed the windows of the strokes, shapes (s,)."""
     at, target = left.lattice.instance.stroke_index, left.lattice.instance.target
-    low, high = left.alpha_low[at] - target, left.alpha_high[at] - target
-    return np.maximum(high - QUARTER, 0.0), np.maximum(-QUARTER - low, 0.0)
+    away = np.maximum(left.alpha_high[at] - target, target - left.alpha_low[at])
+    return ForcedAbsolute(left, pairs, away - QUARTER <= reach)
 
 
 class WorkAbsolute(Work):

@@ -89,7 +89,11 @@ class Proof(Claim):
         1, 2 or `mixed`.
     multipliers
         Where pairs count with absolute values and all jumps are forced: the multipliers that prove the least
-        energy on the last boxes, shape (2m + s + n,). See models/search/absolute_fit.py.
+        energy on each piece of the last boxes, one piece after the other, shape (pieces (2m + s + n),). See
+        models/search/absolute_fit.py.
+    cuts
+        The strokes at whose windows the last boxes are cut into pieces, -1 for a piece that stays whole; in
+        the order of `Forced.least` (models/proof/forced.py).
     threads
         Number of threads of the proof, which the check of its certificate takes too.
 
@@ -101,4 +105,5 @@ class Proof(Claim):
     ended: str
     norm: Norm = 2
     multipliers: Floats | None = None
+    cuts: tuple[int, ...] = (-1,)
     threads: int = 1

@@ -140,6 +140,7 @@ class _Chain:
     bound: float = 0.0
     forced: int = 0
     multipliers: Floats | None = None
+    cuts: tuple[int, ...] = (-1,)
 
     @property
     def ends(self) -> list[LevelRecord]:
@@ -190,7 +191,7 @@ class Work:
         status: Status = "optimal" if self._exact(bound) else "gap"
         return Proof(
             self.best, energy, bound, status, self.proven.forced, tuple(self.proven.levels), seconds, ended,
-            self.norm, self.proven.multipliers,
+            self.norm, self.proven.multipliers, self.proven.cuts,
         )  # fmt: skip
 
     def run(self) -> str:
@@ -391,10 +392,12 @@ class Work:
     def _fit(self, what: Forced) -> None:
         """Solve the convex problem that is left, if all is forced."""
         if what.everything:
-            found, least, self.chain.multipliers = what.least(self.energy(self.best), self.limits.over)
+            found, bound, self.chain.multipliers, self.chain.cuts = what.least(
+                self.energy(self.best), self.limits.over
+            )
             jumps = relabelled(self.instance, found.alpha, found.beta, found.p)
             self._offer(self.improved(jumps, self.limits.over))
-            self.chain.bound = max(self.chain.bound, min(least, self.chain.levels[-1].energy))
+            self.chain.bound = max(self.chain.bound, min(bound, self.chain.levels[-1].energy))
 
 
 def _seconds_of(passes: int, dual: Dual, lattice: Lattice) -> float:

@@ -50,19 +50,24 @@ class Residuals:
     squared: Bools
 
     @classmethod
-    def at(cls, instance: Instance, p: Ints, norm: AbsoluteNorm) -> Residuals:
-        """Residuals at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels."""
+    def at(cls, instance: Instance, p: Ints, norm: AbsoluteNorm, lines: Ints | None = None) -> Residuals:
+        """Residuals at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels.
+
+        lines (s,): 0 where line u carries the stroke, None for zeros; -1 and 1 where v does, below and above
+        the window of u.
+        """
         n, first, second = instance.grid.size, instance.grid.first, instance.grid.second
         unit, m, strokes = sparse.eye_array(n, format="csr"), len(first), instance.stroke_terms
+        lines = np.zeros(len(strokes.goal), np.int32) if lines is None else lines
         nothing, at = sparse.csr_array((m, n)), unit[strokes.pixel]
         a = sparse.hstack([unit[first] - unit[second], nothing])
         b = sparse.hstack([nothing, sparse.diags_array(parity_sign(p)) @ unit[first] - unit[second]])
-        r = sparse.hstack([at, at])
+        r = sparse.hstack([at, sparse.diags_array(np.where(lines == 0, 1.0, -1.0)) @ at])
         skew = sparse.hstack([sparse.csr_array((n, n)), unit])
         weight = np.concatenate([np.full(2 * m, 2.0), strokes.weight, np.full(n, instance.skew_coefficient)])
         return cls(
             sparse.vstack([a, b, r, skew], format="csr"),
-            np.concatenate([HALF * p, np.zeros(m), -strokes.goal, np.zeros(n)]),
+            np.concatenate([HALF * p, np.zeros(m), -strokes.goal - HALF * lines, np.zeros(n)]),
             weight,
             (np.arange(len(weight)) >= 2 * m) & (norm == "mixed"),
         )
@@ -111,13 +116,15 @@ def absolute_fit(
     upper: Floats,
     *,
     tilt: Floats | None = None,
+    lines: Ints | None = None,
 ) -> AbsoluteFit:
     """Compute the angles that minimise the energy minus tilt x in a box, with Clarabel.
 
     p: jumps, shape (m,). lower, upper: the box of x = (alpha, beta) in radians, shapes (2n,). tilt: shape
-    (2n,), None for zeros. Raises CrossfieldError when Clarabel finds no solution; one always exists.
+    (2n,), None for zeros. lines: as of `Residuals.at`. Raises CrossfieldError when Clarabel finds no
+    solution; one always exists.
     """
-    terms, tilt = Residuals.at(instance, p, norm), np.zeros(len(lower)) if tilt is None else tilt
+    terms, tilt = Residuals.at(instance, p, norm, lines), np.zeros(len(lower)) if tilt is None else tilt
     x, multipliers = _best(terms, lower, upper, tilt)
     multipliers = np.where(terms.squared, multipliers, np.clip(multipliers, -1.0, 1.0))
     multipliers[terms.weight == 0] = 0.0

@@ -47,7 +47,8 @@ class Problem:
     p: np.ndarray  # [m]
     norm: object  # 1, 2 or "mixed"
     slope: np.ndarray  # [n]: l of the stroke, unless the norm is 2
-    multipliers: np.ndarray  # [2m + 2n], unless the norm is 2
+    cuts: np.ndarray  # [pieces]: pixel of the cut, -1 for a piece that stays whole; unless the norm is 2
+    multipliers: np.ndarray  # [pieces that stay whole, 2m + 2n], unless the norm is 2
 
     def energy(self):
         """Energy U of the field."""
@@ -171,13 +172,18 @@ def problem_of(arrays, norm):
     need(not outside.any(), f"alpha, beta: outside the window at pixel {pixels[outside.argmax()]}")
     need((abs(p) <= 64).all(), "p: too large")
     pairs = np.array(pairs, int).reshape(-1, 2)
-    slope, multipliers = np.zeros(n), np.zeros(2 * (len(pairs) + n))
+    slope, cuts, multipliers = np.zeros(n), np.array([-1]), np.zeros((1, 2 * (len(pairs) + n)))
     if norm != 2:
         slope = take(arrays, "slopes", "<f8", n)
         need((abs(slope) <= (1 if norm == 1 else PI / 2)).all(), "slopes: too steep")
-        multipliers = take(arrays, "multipliers", "<f8", len(multipliers))
+        if "cuts" in arrays:
+            cuts = take(arrays, "cuts", "<i4", None)
+            need(1 < len(cuts) <= 400, "cuts: too few or too many")
+            need(((cuts >= -1) & (cuts < n)).all(), "cuts: no pixel")
+        shape = (cuts < 0).sum(), multipliers.shape[1]
+        multipliers = take(arrays, "multipliers", "<f8", shape[0] * shape[1]).reshape(shape)
     w_beta = number(head, "w_beta", 0, 1e6)
-    return Problem(pixels, pairs, theta, weight, w_beta, alpha, beta, p, norm, slope, multipliers)
+    return Problem(pixels, pairs, theta, weight, w_beta, alpha, beta, p, norm, slope, cuts, multipliers)
 
 
 def quads_of(arrays, at, count, problem):
@@ -433,23 +439,44 @@ def convex_bound(problem, boxes):
     return bound
 
 
-def multiplier_bound(problem, boxes):
-    """Lower bound of F on the boxes by the multipliers of section 9."""
-    n, m, (i, j) = len(boxes), len(problem.pairs), problem.pairs.T
+def multipliers_bound(problem, boxes):
+    """Least bound of the pieces of the boxes that section 9 describes."""
     theta = problem.theta + PI * np.rint((problem.alpha - problem.theta) / PI)
-    beyond = np.maximum([theta - PI / 4 - boxes[:, 0], boxes[:, 1] - theta - PI / 4], 0)  # e below and above
-    below, above = beyond * (problem.weight > 0)
-    absolute = problem.norm == 1
-    far = beyond[:, problem.weight > 0] > (PI / 4 if absolute else PI / 2)
+    away = abs(boxes[:, :2] - theta[:, None]).max(axis=1)[problem.weight > 0]
+    far = away > (PI / 2 if problem.norm == 1 else 3 * PI / 4)
     need(not far.any(), "a box leads too far from its stroke")
+    waiting, found = [(boxes, np.zeros(len(boxes)))], []
+    for i in problem.cuts:
+        need(waiting, "cuts: a piece too many")
+        boxes, side = waiting.pop()
+        if i < 0:
+            found.append(piece_by_multipliers(problem, theta, boxes, side, problem.multipliers[len(found)]))
+            continue
+        ends, parts = [-np.inf, theta[i] - PI / 4, theta[i] + PI / 4, np.inf], []
+        for k in range(3):
+            part, sides = boxes.copy(), side.copy()
+            part[i, 0], part[i, 1] = max(part[i, 0], ends[k]), min(part[i, 1], ends[k + 1])
+            sides[i] = k - 1
+            parts += [(part, sides)] if part[i, 0] <= part[i, 1] else []
+        waiting += parts[::-1]
+    need(not waiting, "cuts: a piece is left")
+    return min(found)
+
+
+def piece_by_multipliers(problem, theta, boxes, side, multipliers):
+    """Lower bound of F on a piece; side: as of `piece_bound`."""
+    n, m, (i, j) = len(boxes), len(problem.pairs), problem.pairs.T
+    beyond = np.maximum([theta - PI / 4 - boxes[:, 0], boxes[:, 1] - theta - PI / 4], 0)  # e below and above
+    below, above = beyond * (problem.weight > 0) * (side == 0)
+    absolute = problem.norm == 1
     rows = np.zeros((2 * m + 2 * n, 2 * n))
     rows[np.arange(m), i], rows[np.arange(m), j] = 1, -1
     rows[np.arange(m, 2 * m), n + i], rows[np.arange(m, 2 * m), n + j] = (-1.0) ** problem.p, -1
-    rows[2 * m : 2 * m + n] = np.concatenate([np.eye(n), np.eye(n)], axis=1)
+    rows[2 * m : 2 * m + n] = np.concatenate([np.eye(n), np.diag(np.where(side, -1.0, 1.0))], axis=1)
     rows[2 * m + n :, n:] = np.eye(n)
-    constant = np.concatenate([PI / 2 * problem.p, np.zeros(m), -theta, np.zeros(n)])
+    constant = np.concatenate([PI / 2 * problem.p, np.zeros(m), -theta - side * PI / 2, np.zeros(n)])
     weights = np.concatenate([np.full(2 * m, 2.0), problem.weight, np.full(n, problem.w_beta)])
-    l, squared = problem.multipliers.copy(), np.arange(2 * m + 2 * n) >= 2 * m  # noqa: E741 - the page's letter
+    l, squared = multipliers.copy(), np.arange(2 * m + 2 * n) >= 2 * m  # noqa: E741 - the page's letter
     squared &= not absolute
     l[~squared] = l[~squared].clip(-1, 1)
     slope, lost = (weights * l) @ rows, (weights * l * l / 4)[squared].sum()
@@ -537,7 +564,7 @@ def check(arrays):
     boxes, field = boxes_of(problem, levels), relabelled(problem, levels[0])
     try:
         check_jumps(field, boxes)
-        last = (convex_bound if norm == 2 else multiplier_bound)(field, boxes)
+        last = (convex_bound if norm == 2 else multipliers_bound)(field, boxes)
         bound = max(bound, float(min(last, energy)))
         why = f"with a bound of {bound}"
     except Refused as refusal:  # the bound of a level may be enough

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from crossfield.models.instance.instance import HALF, Instance
 from crossfield.models.processes.compiled import crew
+from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
@@ -15,7 +16,7 @@ from crossfield.models.proof.pruning import RemainingCells
 from crossfield.models.search.absolute_fit import Residuals, absolute_fit, fitted_absolute
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
-from second_checker import arrays_of, check
+from second_checker import Refused, arrays_of, check
 
 pytestmark = pytest.mark.numeric
 
@@ -40,8 +41,39 @@ def test_bound_and_energy_are_the_optimum_of_another_solver(norm, formulation, s
         assert proof.status == "optimal", seed
 
 
+@pytest.mark.parametrize("norm, shape, strokes, seed", [(1, (3, 3), 9, 34), ("mixed", (3, 3), 5, 5)])
+def test_boxes_are_cut_where_they_exceed_windows(norm, shape, strokes, seed, tmp_path):
+    instance, path = random_instance(seed, shape, strokes), tmp_path / "it.npz"
+    proof = cf.prove(instance, norm=norm, jobs=1)
+    if norm == 1:
+        solution = cf.solve(cf.formulate(instance, "milp-mccormick"), "highs", limits=cf.Limits(100, 1e-9))
+        assert proof.energy == pytest.approx(solution.objective, abs=1e-6)
+    assert write_certificate(proof, path).status == proof.status == "optimal"
+    arrays = arrays_of(path)
+    assert (arrays["cuts"] >= 0).sum() >= 3
+    assert check(arrays) == pytest.approx(proof.energy, abs=1e-8)
+    whole = arrays["multipliers"].reshape((arrays["cuts"] < 0).sum(), -1)[0]
+    uncut = {name: array for name, array in arrays.items() if name != "cuts"} | {"multipliers": whole}
+    with pytest.raises(check_certificate.RefusedError):
+        check_certificate.check(uncut)
+
+
+@pytest.mark.parametrize("cuts", [[-1], [5], [0, -1], [0, 0, -1, -1], [0, -1, -1, -1, -1, -1], [99, -1, -1]])
+def test_other_cuts_than_those_of_the_multipliers_are_refused(cuts, tmp_path):
+    path = tmp_path / "it.npz"
+    write_certificate(cf.prove(random_instance(38, (2, 2), 4), norm=1, jobs=1), path)
+    arrays = arrays_of(path)
+    each = len(arrays["multipliers"]) // (arrays["cuts"] < 0).sum()
+    rows = np.resize(arrays["multipliers"], each * cuts.count(-1))
+    forged = arrays | {"cuts": np.array(cuts, np.int32), "multipliers": rows}
+    with pytest.raises((check_certificate.RefusedError, check_certificate.UnreadableError)):
+        check_certificate.check(forged)
+    with pytest.raises(Refused):
+        check(forged)
+
+
 @NORMS
-@pytest.mark.parametrize("seed, strokes", [(0, 4), (1, 1), (2, 4)])
+@pytest.mark.parametrize("seed, strokes", [(0, 4), (1, 1), (2, 4), (38, 4)])
 def test_certificates_are_confirmed_by_a_second_checker(norm, seed, strokes, tmp_path):
     proof = cf.prove(random_instance(seed, (2, 2), strokes), norm=norm, jobs=1)
     path = tmp_path / "it.npz"

@@ -516,7 +516,7 @@ def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(written):
             level.alpha, level.beta, p = alpha, beta, np.zeros(len(sketch_.first), int)
             given = (alpha, beta, p)
             bound, held = check_certificate.lower_bound(
-                sketch_, given, level, boxes, np.inf, multipliers=np.zeros(0), over=never
+                sketch_, given, level, boxes, np.inf, steps=(np.zeros(0), np.zeros(0)), over=never
             )
             if not held.all() or bound == -np.inf:
                 continue
