@@ -28,7 +28,7 @@ In other norms than 2 there are also:
     multipliers (2m + 2n,)  of A, B, R and beta, which prove the least energy on the last boxes; if these are
                         cut, those of one piece after the other
     cuts                only if the boxes are cut: for each piece, before its parts, the pixel where it is
-                        cut, or -1 for a piece that stays whole
+                        cut into three, or -1 for a piece that stays whole
 """
 
 from __future__ import annotations
@@ -278,7 +278,7 @@ def _slopes(proof: Proof) -> Arrays:
     slopes, multipliers = np.zeros(n), np.zeros((np.count_nonzero(cuts < 0), 2 * m + 2 * n))
     slopes[instance.stroke_index] = proof.levels[0].slopes
     if proof.multipliers is not None:
-        found = proof.multipliers.reshape(len(multipliers), -1)
+        found = np.atleast_2d(proof.multipliers)
         multipliers[:, : 2 * m] = found[:, : 2 * m]
         multipliers[:, 2 * m + instance.stroke_index] = found[:, 2 * m : 2 * m + s]
         multipliers[:, 2 * m + n :] = found[:, 2 * m + s :]

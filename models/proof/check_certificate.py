@@ -72,6 +72,18 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
    bound is the sum of mu. With tables, c is a pair's cost with them, and the minima of the quads are added to
    every right side.
 
+   After the pass, more cells are excluded by trees. All of the pass together is
+
+       F >= sum of mu  +  sum over pixels of E[r_i(x)]  +  sum over pairs of E[s_e(x, y)],
+       r_i = (1 - gamma times the number of later pairs) t_i,   s_e = c_e - (M_e - gamma t_i) - N_e,
+
+   where no r and no s is negative. On a tree of pairs, the distributions of its pairs belong to one joint
+   distribution of all its pixels. So the sum of the means over the tree is at least E[m_i(x_i)], with m_i(x)
+   the least sum over the tree with label x at pixel i. Where the sum of mu + m_i exceeds U at all four
+   vertices of a cell, the cell is excluded, too. m_i follows from messages along the tree. There are two
+   trees for each pixel: its row, without gaps of the mask, with the columns that cross it; and its column,
+   with the rows that cross it.
+
 4. Optimality. The last cells span a box for each pixel. There p is a best jump everywhere if max |A| <= pi/2
    and pi max |A| - pi^2/4 <= 4 min (-1)^p beta_i beta_j: against p +- 1, A'^2 - A^2 >= pi^2/4 - pi |A| and
    B^2 - B'^2 = -4 (-1)^p beta_i beta_j; against others |A| <= pi/2 is enough. Let a = alpha - theta, |a| <= 3
@@ -177,6 +189,7 @@ Array = Any
 Field = tuple[Array, Array, Array]
 Over = Callable[[], bool]
 Spans = tuple[Array, Array]
+Run = tuple[list[int], list[int]]  # pixels, the earlier ones first, and the pairs between them
 Product = Callable[[Array, Array, Spans], Array]
 
 
@@ -199,7 +212,7 @@ class Sketch:
     norm: 1, 2 or "mixed". offset (n,): o. weight, target (n,): W and theta, 0 where there is no stroke. slope
     (n,): l of 5. lower (n,): least alpha of the gauge. earlier, later: numbers of the pairs of each pixel to
     later, to earlier pixels. diagonals: the pixels of each diagonal, from the upper left; none of them form
-    a pair, and earlier pixels are on earlier diagonals.
+    a pair, and earlier pixels are on earlier diagonals. runs: columns and rows of pixels without gaps.
     """
 
     norm: Any
@@ -214,6 +227,7 @@ class Sketch:
     later: list[list[int]]
     earlier: list[list[int]]
     diagonals: list[list[int]]
+    runs: tuple[list[Run], list[Run]]
 
 
 @dataclass
@@ -263,16 +277,19 @@ class Level:
 
 
 @dataclass
-class Passed:
-    """Result of a pass over a level.
+class Test:
+    """A right side of 3. at each allowed label of each pixel, and the greatest error of these numbers."""
 
-    A bound of F on its domain, the right side of 3. at each allowed label of each pixel, and the greatest
-    error of both.
-    """
-
-    bound: float
     least: list[Array]
     error: float
+
+
+@dataclass
+class Passed:
+    """Result of a pass over a level: a bound of F on its domain, and the tests that exclude cells."""
+
+    bound: float
+    tests: list[Test]
 
 
 @dataclass
@@ -515,9 +532,25 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
     diagonals: list[list[int]] = [[] for _ in range(sum(mask.shape) - 1)]
     for i, diagonal in enumerate((rows + columns).tolist()):
         diagonals[diagonal].append(i)
+    runs = _runs(first, second, first > second, n), _runs(first, second, first < second, n)
     return Sketch(
-        norm, offset, slope, first, second, weight, target, lower, w_beta, later, earlier, diagonals
+        norm, offset, slope, first, second, weight, target, lower, w_beta, later, earlier, diagonals, runs
     )
+
+
+def _runs(first: Array, second: Array, chosen: Array, n: int) -> list[Run]:
+    """The runs of the chosen pairs: those to upper neighbours, or those to right ones."""
+    numbers = np.flatnonzero(chosen).tolist()
+    next_of = {min(ends): (e, max(ends)) for e in numbers for ends in [(int(first[e]), int(second[e]))]}
+    runs: list[Run] = []
+    for begin in sorted(set(range(n)) - {j for _, j in next_of.values()}):
+        pixels, pairs = [begin], list[int]()
+        while pixels[-1] in next_of:
+            e, j = next_of[pixels[-1]]
+            pixels.append(j)
+            pairs.append(e)
+        runs.append((pixels, pairs))
+    return runs
 
 
 def _slopes(arrays: dict[str, Array], norm: Any, n: int) -> Array:
@@ -813,18 +846,20 @@ class Pair:
                 if least >= sum(float(part.max()) for part in self.parts[better]):
                     self.parts.pop(worse)
 
-    def to_later(self, given: Array, product: Product) -> Array:
+    def across(self, given: Array, product: Product, *, back: bool = False) -> Array:
         """The least given(x) + c(x, y) over x of the earlier pixel, for each label y of the later one.
 
-        given and the result have one number for each allowed label.
+        given and the result have one number for each allowed label. back: with the pixels exchanged.
         """
-        (used, other), (finite, wanted) = self.used, self.spans
+        way = -1 if back else 1
+        (used, other), (finite, wanted) = self.used[::way], self.spans[::way]
         spread = np.full(used.shape, np.inf)
         spread[used] = given
         ends = []
-        for along, b in self.parts:
+        for part in self.parts:
+            along, b = (part[0], part[1].T) if back else (part[0].T, part[1])
             half = product(spread, b, (finite, whole(len(spread), b.shape[1])))
-            ends.append(product(along.T, half, (whole(*along.T.shape), wanted))[other])
+            ends.append(product(along, half, (whole(*along.shape), wanted))[other])
         least: Array = np.minimum.reduce(ends)
         return least
 
@@ -980,6 +1015,7 @@ class Pass:
         self.level, self.sketch, self.way = level, sketch, way
         self.before: dict[int, Array] = {}  # S of the pairs whose later pixel is still to come
         self.after: dict[int, Array] = {}  # N of the same
+        self.shares: dict[int, Array] = {}  # N of all pairs
         self.errors: list[float] = []
 
     def run(self, stop: Over) -> Passed:
@@ -1000,7 +1036,55 @@ class Pass:
         rights = [
             over + math.fsum([*quads, *least[: i + 1], *waiting[i + 1 :]]) for i, over in enumerate(numbers)
         ]
-        return Passed(math.fsum([*quads, *least]) - error, rights, error)
+        bound = math.fsum([*quads, *least])
+        tests = [Test(rights, error)]
+        for excesses, wrong in self._combs(numbers, stop):
+            tests.append(Test([bound + excess for excess in excesses], error + wrong))
+        return Passed(bound - error, tests)
+
+    def _combs(self, over: list[Array], stop: Over) -> Iterable[tuple[list[Array], float]]:
+        """For both kinds of combs, the excess of each label of each pixel, and the greatest error of all.
+
+        over: t of each pixel.
+        """
+        sketch = self.sketch
+        single = [
+            t * (1 - len(later) / max(1, len(earlier), len(later)))
+            for t, earlier, later in zip(over, sketch.earlier, sketch.later)
+        ]
+        columns, rows = sketch.runs
+        for teeth, spines in ((columns, rows), (rows, columns)):
+            self.errors = []
+            hanging = self._along(teeth, single, over, stop)
+            yield self._along(spines, hanging, over, stop), 2 * math.fsum(self.errors)
+
+    def _along(self, runs: list[Run], given: list[Array], over: list[Array], stop: Over) -> list[Array]:
+        """The excess of each label, plus the least of the rest of its run from both sides."""
+        found = list(given)
+
+        def follow(number: int) -> None:
+            if stop():
+                raise StoppedError
+            pixels, pairs = runs[number]
+            costs = [Pair(self.level, self.sketch, e) for e in pairs]
+            for way in (1, -1):
+                carried = given[pixels[::way][0]]
+                for e, pair, j in zip(pairs[::way], costs[::way], pixels[::way][1:]):
+                    message = self._carried(e, pair, carried, over, back=way < 0)
+                    found[j], carried = found[j] + message, given[j] + message
+
+        list(self.way.each(follow, list(range(len(runs)))))
+        return found
+
+    def _carried(self, e: int, pair: Pair, carried: Array, over: list[Array], *, back: bool) -> Array:
+        """The least of the excess carried to one end of pair e and the pair's, at labels of the other end."""
+        i = min(int(self.sketch.first[e]), int(self.sketch.second[e]))
+        handed = over[i] / max(1, len(self.sketch.earlier[i]), len(self.sketch.later[i]))
+        ends = (self.level.messages[e] - handed, self.shares[e])
+        mine, other = reversed(ends) if back else ends
+        found = pair.across(carried - mine, self.way.product, back=back) - other
+        self._err(pair.size + sum(float(np.abs(each).max()) for each in (carried, *ends, found)))
+        return found
 
     def _visit(self, i: int) -> tuple[Array, float, float]:
         """t_i, mu_i and mu*_i; what the pairs to later pixels send is stored."""
@@ -1038,7 +1122,8 @@ class Pass:
     def _send(self, e: int, held: Array, handed: Array) -> None:
         """Send the message of pair e to its later pixel, without and with what its earlier pixel hands on."""
         pair, given = Pair(self.level, self.sketch, e), handed - held
-        self.before[e], self.after[e] = (pair.to_later(each, self.way.product) for each in (-held, given))
+        self.before[e], self.after[e] = (pair.across(each, self.way.product) for each in (-held, given))
+        self.shares[e] = self.after[e]
         greatest = float(np.abs(given).max() + np.abs(held).max() + np.abs(self.after[e]).max())
         self._err(pair.size + greatest)
 
@@ -1049,10 +1134,13 @@ class Pass:
 def surviving(level: Level, passed: Passed, most: float) -> list[Array]:
     """The cells (a - 1, b - 1) of each pixel in which a field of energy up to `most` may have its cross."""
     kept = []
-    for allowed, least in zip(level.allowed, passed.least):
-        alive = np.zeros_like(allowed)
-        alive[allowed] = least <= most + passed.error
-        kept.append(corners(allowed, np.logical_and) & corners(alive, np.logical_or))
+    for i, allowed in enumerate(level.allowed):
+        cells = corners(allowed, np.logical_and)
+        for test in passed.tests:
+            alive = np.zeros_like(allowed)
+            alive[allowed] = test.least[i] <= most + test.error
+            cells &= corners(alive, np.logical_or)
+        kept.append(cells)
     return kept
 
 
@@ -1168,16 +1256,20 @@ class Piece:
     bound: float
 
     def cut(self, at: int, turned: Array, bound: float) -> list[Piece]:
-        """The parts below, in and above the window of the stroke of pixel `at`, without empty ones."""
+        """The parts below, in and above the window of the stroke of pixel `at`; some may be empty."""
         ends = (-math.inf, turned[at] - QUARTER, turned[at] + QUARTER, math.inf)
         parts = []
         for line in (-1, 0, 1):
             boxes, lines = self.boxes.copy(), self.lines.copy()
             boxes[at, 0], boxes[at, 1] = max(boxes[at, 0], ends[line + 1]), min(boxes[at, 1], ends[line + 2])
             lines[at] = line
-            if boxes[at, 0] <= boxes[at, 1]:
-                parts.append(Piece(boxes, lines, bound))
+            parts.append(Piece(boxes, lines, bound))
         return parts
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether it holds no crosses."""
+        return bool((self.boxes[:, 0] > self.boxes[:, 1]).any())
 
 
 class Quadratic:
@@ -1271,7 +1363,7 @@ class Quadratic:
         if not over.any():
             return []
         at = int(np.argmax(np.where(over, 1e-12 + self.given(x[len(x) // 2 :]), 0.0)))
-        return self.piece.cut(at, turned, bound)
+        return [part for part in self.piece.cut(at, turned, bound) if not part.is_empty]
 
 
 def relabelled(sketch: Sketch, field: Field, centres: Array) -> tuple[Field, Array]:
@@ -1294,7 +1386,8 @@ def pieces_bound(sketch: Sketch, p: Array, turned: Array, boxes: Array, steps: t
         _need(waiting, CUTS, "has a piece too many")
         piece = waiting.pop()
         if at < 0:
-            found.append(linear_bound(sketch, p, turned, piece, multipliers[len(found)]))
+            least = linear_bound(sketch, p, turned, piece, multipliers[len(found)])
+            found.append(math.inf if piece.is_empty else least)
         else:
             waiting += reversed(piece.cut(at, turned, -math.inf))
     _need(not waiting, CUTS, "leaves a piece without multipliers")
@@ -1413,8 +1506,8 @@ def _check(arrays: dict[str, Array], over: Over, way: Way) -> Verdict:
 def _last_steps(arrays: dict[str, Array], sketch: Sketch) -> tuple[Array, Array]:
     """The cuts of boxes, and the multipliers of A, B, R and beta on each piece; not used in the norm 2.
 
-    A cut is the pixel at whose window a piece is cut, or -1 for a piece that stays whole. Each piece comes
-    before its parts. Multipliers have the shape (pieces that stay whole, 2m + 2n).
+    A cut is the pixel at whose window a piece is cut into three, or -1 for a piece that stays whole. Each
+    piece comes before its parts. Multipliers have the shape (pieces that stay whole, 2m + 2n).
     """
     cuts, each = np.array([-1]), 2 * (len(sketch.first) + len(sketch.offset))
     if sketch.norm == 2:

@@ -32,7 +32,7 @@ import numpy as np
 
 from ..array_archive import Arrays
 from ..field.field import CrossField
-from ..instance.grid import Bools, Floats
+from ..instance.grid import Floats
 from ..instance.instance import QUARTER
 from ..processes.compiled import Crew
 from ..processes.deadline import Over, never
@@ -97,10 +97,11 @@ class Dual:
         self._pass_seconds = self._table_seconds = 0.0  # of the last pass that was not cut off
         self._least_of_clusters = np.zeros(0)
         self._times, self._reached = 0, -math.inf
+        self._left_by_combs = 1.0
 
-    def _all(self, name: str, *arguments: Any) -> list[Any]:
+    def _all(self, name: str, *arguments: Any, **named: Any) -> list[Any]:
         """The results of all strips."""
-        return [answer() for answer in [place.ask(name, *arguments) for place in self.places]]
+        return [answer() for answer in [place.ask(name, *arguments, **named) for place in self.places]]
 
     def move(self, lattice: Lattice) -> None:
         """Go on, with interpolated shares and tables, on a finer or smaller lattice with the same centres."""
@@ -226,14 +227,30 @@ class Dual:
     def remaining_cells(self, bound: float, energy: float) -> RemainingCells:
         """The cells that the level leaves below an energy, by a forward pass; see models/proof/pruning.py."""
         self.forward()
-        return boxed(self.lattice, self._cells(bound, energy))
+        excess = _excess(bound, energy)
+        cells = np.concatenate(self._all("cells", excess))
+        before = max(int(np.count_nonzero(cells)), 1)
+        self._all("find_excesses")
+        for teeth_are_columns in (True, False):
+            self._all("begin_comb")
+            for column in (teeth_are_columns, not teeth_are_columns):
+                self._all("turn_comb")
+                for back in (False, True):
+                    self._follow_combs(column=column, back=back)
+            cells &= np.concatenate(self._all("cells_by_comb", excess))
+        self._all("forget_combs")
+        self._left_by_combs = int(np.count_nonzero(cells)) / before
+        return boxed(self.lattice, cells)
+
+    def _follow_combs(self, *, column: bool, back: bool) -> None:
+        edge = np.zeros(0)
+        for place in self.places[:: -1 if back else 1]:
+            edge = place.ask("follow_comb", edge, column=column, back=back)()
 
     def count_left(self, bound: float, energy: float) -> int:
-        """The number of cells that the last pass leaves."""
-        return int(np.count_nonzero(self._cells(bound, energy)))
-
-    def _cells(self, bound: float, energy: float) -> Bools:
-        return np.concatenate(self._all("cells", energy + _TOLERANCE * (1 + energy) - bound))
+        """The number of cells that the last pass leaves, less the share that combs excluded the last time."""
+        left = sum(map(np.count_nonzero, self._all("cells", _excess(bound, energy))))
+        return round(self._left_by_combs * left)
 
     def decoded(self, *, forwards: bool) -> tuple[Floats, Floats]:
         """Alpha and beta (n,) of the crosses that the shares suggest; forwards after a backward pass."""
@@ -250,3 +267,8 @@ class Dual:
 
 def _joined(parts: tuple[Arrays, ...]) -> Arrays:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _excess(bound: float, energy: float) -> float:
+    """The excess over a bound up to which labels survive."""
+    return energy + _TOLERANCE * (1 + energy) - bound

@@ -28,15 +28,16 @@ from .pruning import RemainingCells
 from .record import EXACT
 
 _MOST_PIECES: Final = 60
+_MARGIN: Final = 1e-9  # radians
 _ROUNDING: Final = 1e-10  # deduction from a bound, relative to 1 + its value: float64 loses some 1e-12 in it
 
 
 class Least(NamedTuple):
     """The least energy on the boxes: its field, and a bound.
 
-    Where pairs count with absolute values, multipliers prove it, those of one piece after the other; see
-    models/search/absolute_fit.py. cuts: for each piece, in the order of the search, the stroke where it is
-    cut, or -1 if it stays whole and has multipliers.
+    Where pairs count with absolute values, multipliers (pieces, r) prove it, of each piece that stays whole;
+    see models/search/absolute_fit.py. cuts: for each piece, in the order of the search, the stroke where it
+    is cut into three parts, or -1 if it stays whole.
     """
 
     field: CrossField
@@ -72,26 +73,29 @@ class Forced:
 
         Where multipliers have to prove it, the bound is that of the whole boxes if pieces are missing.
         """
-        waiting = [(-np.inf, self.whole)]
-        found, whole, cuts = list[Least](), list[Least](), list[int]()
-        for _ in range(_MOST_PIECES):
+        waiting: list[tuple[float, Piece | None]] = [(-np.inf, self.whole)]
+        found, whole, cuts = list[Least](), list[Least | None](), list[int]()
+        while waiting and len(found) < _MOST_PIECES and not (found and over()):
             _, piece = waiting.pop()
+            cuts.append(-1)
+            if piece is None:
+                whole.append(None)
+                continue
             found.append(piece.least(over))
-            field, bound, *_ = found[-1]
-            cuts.append(piece.crossed(field) if bound < energy - EXACT / 2 * (1 + energy) else -1)
+            if found[-1].bound < energy - EXACT / 2 * (1 + energy):
+                cuts[-1] = piece.crossed(found[-1].field)
             if cuts[-1] < 0:
                 whole.append(found[-1])
             else:
-                waiting += [(bound, part) for part in reversed(piece.cut(cuts[-1]))]
-            if not waiting or over():
-                break
-        best = min(whole, key=lambda each: each.bound, default=found[-1])
-        if found[0].multipliers is None:
-            return Least(best.field, min([best.bound, *(bound for bound, _ in waiting)]))
+                waiting += [(found[-1].bound, part) for part in reversed(piece.cut(cuts[-1]))]
+        best = min(filter(None, whole), key=lambda each: each.bound, default=found[-1])
+        first = found[0].multipliers
+        if first is None:
+            return Least(best.field, min([best.bound, *(bound for bound, part in waiting if part)]))
         if waiting:
             return found[0]._replace(field=best.field)
-        multipliers = [each.multipliers for each in whole if each.multipliers is not None]
-        return Least(best.field, best.bound, np.concatenate(multipliers), tuple(cuts))
+        of_pieces = [first * 0.0 if each is None else np.asarray(each.multipliers) for each in whole]
+        return Least(best.field, best.bound, np.stack(of_pieces), tuple(cuts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,18 +127,23 @@ class Piece:
             return -1
         return int(np.argmax(np.where(above + below > 0, 1e-12 + self._given(field), 0.0)))
 
-    def cut(self, stroke: int) -> list[Self]:
-        """The parts below, in and above the window of a stroke; some may be empty and are left out."""
+    def cut(self, stroke: int) -> list[Self | None]:
+        """The parts below, in and above the window of a stroke, None for an empty one."""
         instance, left = self.left.lattice.instance, self.left
         target, at = instance.target[stroke], instance.stroke_index[stroke]
         ends = (-np.inf, target - QUARTER, target + QUARTER, np.inf)
-        parts = []
+        parts: list[Self | None] = []
         for line in (-1, 0, 1):
             low, high, lines = left.alpha_low.copy(), left.alpha_high.copy(), self.lines.copy()
-            low[at], high[at] = max(low[at], ends[line + 1]), min(high[at], ends[line + 2])
+            high[at] = min(high[at], ends[line + 2])
+            low[at] = max(low[at], ends[line + 1])
             lines[stroke] = line
-            if low[at] <= high[at]:
-                parts.append(replace(self, left=replace(left, alpha_low=low, alpha_high=high), lines=lines))
+            # The checker's boxes are wider by less than this: a part that is empty here may not be there.
+            if low[at] > high[at] + _MARGIN:
+                parts.append(None)
+                continue
+            low[at] = min(low[at], high[at])
+            parts.append(replace(self, left=replace(left, alpha_low=low, alpha_high=high), lines=lines))
         return parts
 
     def _beyond(self) -> tuple[Floats, Floats]:

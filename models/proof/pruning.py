@@ -1,8 +1,10 @@
 """Pruning of a level: the cells that may hold crosses of fields of at most the energy U.
 
 1. After a forward pass (models/proof/dual.py), label x of pixel i survives where `bound` + theta_i(x) - min
-   theta_i <= U + tolerance. models/proof/check_certificate.py, 3, proves that no more is needed.
-2. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and one of them survives.
+   theta_i <= U + tolerance, and in two further tests where `bound` + the excess of a comb (combs.py) is.
+   models/proof/check_certificate.py, 3, proves the tests.
+2. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and in each test one of them
+   survives.
 3. The next level has the same centres. If it also has the same spacing, it allows the vertices of the cells
    that are left. If it has half the spacing, it allows every label whose cells meet a cell that is left,
    except labels beyond the cells that cover |beta| <= pi/4. In its steps, cell (k, l) begins at
@@ -61,9 +63,8 @@ def boxed(lattice: Lattice, cells: Bools) -> RemainingCells:
     )  # fmt: skip
 
 
-def cells_left(lattice: Lattice, state: State, excess: float) -> Bools:
-    """The cells with a vertex whose theta exceeds the pixel's least by at most that, after a pass."""
-    survives = state.theta <= np.repeat(state.least + excess, lattice.count)
+def cells_left(lattice: Lattice, survives: Bools) -> Bools:
+    """The cells whose vertices are allowed and of which one survives; both flat like the labels."""
     cells = np.zeros(len(survives), dtype=bool)
     _mark_cells(_rectangles(lattice), lattice.allowed, survives, cells)
     return cells

@@ -89,11 +89,11 @@ class Proof(Claim):
         1, 2 or `mixed`.
     multipliers
         Where pairs count with absolute values and all jumps are forced: the multipliers that prove the least
-        energy on each piece of the last boxes, one piece after the other, shape (pieces (2m + s + n),). See
-        models/search/absolute_fit.py.
+        energy on each piece of the last boxes that stays whole, shape (pieces, 2m + s + n); 0 for an empty
+        one. See models/search/absolute_fit.py.
     cuts
-        The strokes at whose windows the last boxes are cut into pieces, -1 for a piece that stays whole; in
-        the order of `Forced.least` (models/proof/forced.py).
+        For each piece, before its parts, the stroke at whose window it is cut into three, or -1 if it stays
+        whole.
     threads
         Number of threads of the proof, which the check of its certificate takes too.
 

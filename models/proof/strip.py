@@ -26,6 +26,7 @@ from .clusters import (
     prolonged_clusters,
     update_clusters,
 )
+from .combs import Combs
 from .decoding import Crosses, decode
 from .encoding import messages_of, tables_of
 from .lattice import Lattice, Starts
@@ -80,6 +81,7 @@ class Strip:
 
     state: State
     _before: list[Singles]  # the direction of a change needs no more digits
+    _combs: Combs
 
     def __init__(self, part: Part, crew: Crew) -> None:
         """Start on a part of a lattice, with the threads of a crew."""
@@ -228,9 +230,35 @@ class Strip:
 
     def cells(self, excess: float) -> Bools:
         """The cells of own pixels where a vertex's theta exceeds the least by at most `excess`, flat."""
-        found = cells_left(self.lattice, self.state, excess)
+        return self._cells(self.state.theta <= np.repeat(self.state.least + excess, self.lattice.count))
+
+    def cells_by_comb(self, excess: float) -> Bools:
+        """The cells of own pixels where a vertex's excess on the comb is at most `excess`, flat."""
+        return self._cells(self._combs.excesses <= excess)
+
+    def _cells(self, survives: Bools) -> Bools:
         begin, end = self.lattice.start[[self.own.start, self.own.stop]]
-        return found[begin:end]
+        return cells_left(self.lattice, survives)[begin:end]
+
+    def find_excesses(self) -> None:
+        """Begin combs after a forward pass."""
+        self._combs = Combs(self.state, self.own, self.crew)
+
+    def begin_comb(self) -> None:
+        """Begin another comb."""
+        self._combs.begin()
+
+    def turn_comb(self) -> None:
+        """Follow the comb in another direction from now on."""
+        self._combs.turn()
+
+    def follow_comb(self, edge: Floats, *, column: bool, back: bool) -> Floats:
+        """Follow the comb, as `Combs.follow`."""
+        return self._combs.follow(edge, column=column, back=back)
+
+    def forget_combs(self) -> None:
+        """Free the memory of combs."""
+        del self._combs
 
     def decoded(self, crosses: Crosses, *, forwards: bool) -> Crosses:
         """The crosses with those of the own pixels replaced by what the shares suggest."""

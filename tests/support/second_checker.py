@@ -322,7 +322,7 @@ def examine(problem, level, slack):
     for (i, _), a in zip(pairs, level.shares, strict=True):
         before[i] = before[i] + a
     quads = sum(quad_least(level, *quad) for quad in level.quads)
-    after, size = list(before), sum(abs(cost).max() for cost in before)
+    after, size, slacks = list(before), sum(abs(cost).max() for cost in before), Slacks(level, pairs)
     size += sum(abs(table).max() for _, tables in level.quads for table in tables)
     for i in range(n):
         rest = after[i] - after[i].min()
@@ -332,21 +332,71 @@ def examine(problem, level, slack):
             costs = pair_costs(level, i, j)
             shares = (costs - a[:, None]).min(axis=0)
             a = a - rest / max(len(forward), len(backward))
-            before[j], after[j] = before[j] + shares, after[j] + (costs - a[:, None]).min(axis=0)
+            slacks.shares[e] = a, (costs - a[:, None]).min(axis=0)
+            before[j], after[j] = before[j] + shares, after[j] + slacks.shares[e][1]
             size += abs(a).max() + abs(shares).max() + costs.max()
     error = 1e-14 * size + slack
     lowest = np.array([[theta.min() for theta in each] for each in (after, before)])
+    whole = quads + lowest[0].sum()
+    rest = [
+        (after[i] - lowest[0, i]) * (1 - (pairs[:, 0] == i).sum() / max(1, *(pairs == i).sum(axis=0)))
+        for i in range(n)
+    ]
+    upright = problem.pairs[:, 0] > problem.pairs[:, 1]
+    combs = [on_combs(rest, slacks, teeth) for teeth in (upright, ~upright)]
     for i in range(n):
         bound = quads + lowest[0, : i + 1].sum() + lowest[1, i + 1 :].sum()
+        tests = [bound + after[i] - lowest[0, i], *(whole + comb[i] for comb in combs)]
+        level.left.append(remaining(level, i, [test <= problem.energy() + 2 * error for test in tests]))
+    level.bound = whole - error
+
+
+class Slacks:
+    """The costs of pairs less their shares after the pass, which are not negative."""
+
+    def __init__(self, level, pairs):
+        self.level, self.pairs, self.shares, self.known = level, pairs, {}, {}
+
+    def of(self, e):
+        """The table of pair e; small ones are kept."""
+        if e not in self.known:
+            a, b = self.shares[e]
+            table = pair_costs(self.level, *self.pairs[e]) - a[:, None] - b
+            if table.size > 200_000:
+                return table
+            self.known[e] = table
+        return self.known[e]
+
+
+def on_combs(rest, slacks, teeth):
+    """The least sum of `rest` and slacks on the comb of each pixel, for each of its labels.
+
+    teeth: which pairs lie along the teeth; the others lie along the spines.
+    """
+    at = [np.flatnonzero((slacks.pairs == i).any(axis=1)) for i in range(len(rest))]
+    known = {}
+
+    def message(e, i):
+        """The least sum over the part of the comb behind pair e, for each label of its pixel i."""
+        if (e, i) not in known:
+            first, second = slacks.pairs[e]
+            k = first + second - i
+            beyond = rest[k] + sum(message(f, k) for f in at[k] if f != e and (teeth[f] or not teeth[e]))
+            table = slacks.of(e) if k == first else slacks.of(e).T
+            known[e, i] = (beyond[:, None] + table).min(axis=0)
+        return known[e, i]
+
+    return [rest[i] + sum(message(e, i) for e in at[i]) for i in range(len(rest))]
+
+
+def remaining(level, i, tests):
+    """Cells of the domain with a good corner in each test, cut at |beta| = pi/4: rows (a0, a1, b0, b1)."""
+    cells = all_four(level.allowed[i])
+    for test in tests:
         good = np.zeros_like(level.allowed[i])
-        good[level.allowed[i]] = bound + after[i] - after[i].min() <= problem.energy() + error
-        level.left.append(remaining(level, i, good))
-    level.bound = quads + lowest[0].sum() - error
-
-
-def remaining(level, i, good):
-    """Cells of the domain with a good corner, cut at |beta| = pi/4: rows (a0, a1, b0, b1)."""
-    k, low = np.nonzero(all_four(level.allowed[i]) & ~all_four(~good))
+        good[level.allowed[i]] = test
+        cells = cells & ~all_four(~good)
+    k, low = np.nonzero(cells)
     alpha, beta = level.places(i)
     ends = alpha[k], alpha[k + 1], np.maximum(beta[low], -PI / 4), np.minimum(beta[low + 1], PI / 4)
     return np.stack(ends, axis=1)[ends[3] - ends[2] > 2 * SLIVER]
@@ -450,14 +500,15 @@ def multipliers_bound(problem, boxes):
         need(waiting, "cuts: a piece too many")
         boxes, side = waiting.pop()
         if i < 0:
-            found.append(piece_by_multipliers(problem, theta, boxes, side, problem.multipliers[len(found)]))
+            least = piece_by_multipliers(problem, theta, boxes, side, problem.multipliers[len(found)])
+            found.append(np.inf if (boxes[:, 0] > boxes[:, 1]).any() else least)
             continue
         ends, parts = [-np.inf, theta[i] - PI / 4, theta[i] + PI / 4, np.inf], []
         for k in range(3):
             part, sides = boxes.copy(), side.copy()
             part[i, 0], part[i, 1] = max(part[i, 0], ends[k]), min(part[i, 1], ends[k + 1])
             sides[i] = k - 1
-            parts += [(part, sides)] if part[i, 0] <= part[i, 1] else []
+            parts.append((part, sides))
         waiting += parts[::-1]
     need(not waiting, "cuts: a piece is left")
     return min(found)
