@@ -29,7 +29,7 @@ def test_shares_that_are_carried_on_rise_faster():
 def test_where_no_finer_level_fits_the_rest_goes_to_the_search(monkeypatch, tmp_path):
     """The bound rises once more on the labels that are left, and the certificate has one more level."""
     instance = cf.sample("ring", 12)
-    monkeypatch.setattr(work, "MOST_LABELS", 40_000)
+    monkeypatch.setattr(work, "MOST_LABELS", 30_000)
     proof = cf.prove(instance, jobs=1)
     assert proof.ended == "labels"
     assert [round(np.pi / 2 / level.h) for level in proof.levels] == [16, 32, 32]
