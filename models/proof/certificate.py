@@ -35,9 +35,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -51,7 +49,6 @@ from ..field.field import CrossField, Norm
 from ..instance.file import arrays_of, of_arrays
 from ..instance.instance import Instance
 from ..processes.deadline import Over, Stop, stop_function
-from ..processes.side_by_side import cores
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict, Way
@@ -68,7 +65,6 @@ _COSTS: Final = 25_000.0  # of pairs in alpha or in beta, per unit of effort
 _TERMS: Final = 2_000_000.0  # an alpha of one pixel and an allowed label of its neighbour, per unit of effort
 _QUAD: Final = 2.7  # effort for each quad with tables, besides that for their numbers
 _NUMBERS: Final = 7_000.0  # of tables, per unit of effort
-_SHARED: Final = 0.5  # gain in speed for each further thread, as a share of the speed of one
 _SPARE_TIME: Final = 1.5  # safety factor: files are compressed, and the machine may become busier
 _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
@@ -142,7 +138,7 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
     packing, arrays = Packing(), _arrays(proof)
     with ThreadPoolExecutor(1) as beside:
         packed = beside.submit(packing.add, arrays)
-        verdict = _confirmed(arrays | _head(proof, "gap", 0.0), path, stop_function(stop), proof.threads)
+        verdict = _confirmed(arrays | _head(proof, "gap", 0.0), path, stop_function(stop))
         packed.result()
     status = cast("Status", verdict.status)
     bound = max(0.0, verdict.bound - _SPARE * (1 + verdict.bound))
@@ -203,8 +199,7 @@ def _checked(arrays: Arrays) -> Verdict:
     """Verdict of the checker, which takes the quick way where loading it takes less time than it saves."""
     if sum(array.size for array in arrays.values()) < check_certificate.LARGE:
         return check_certificate.check(arrays)
-    with _quick_way(cores()) as way:
-        return check_certificate.check(arrays, way=way)
+    return check_certificate.check(arrays, way=_quick_way())
 
 
 def _field(arrays: Arrays) -> CrossField:
@@ -218,11 +213,10 @@ def _field(arrays: Arrays) -> CrossField:
     return field
 
 
-def _confirmed(arrays: Arrays, path: Path, over: Over, threads: int) -> Verdict:
+def _confirmed(arrays: Arrays, path: Path, over: Over) -> Verdict:
     """Verdict of the checker on arrays that are to be written. Raises InputError, SolverError."""
     try:
-        with _quick_way(threads) as way:
-            return check_certificate.check(arrays, over, way)
+        return check_certificate.check(arrays, over, _quick_way())
     except check_certificate.StoppedError as error:
         reason = "is not written: the time was over before the coarsest level of the proof was checked"
         raise SolverError(reason, file=path) from error
@@ -230,19 +224,15 @@ def _confirmed(arrays: Arrays, path: Path, over: Over, threads: int) -> Verdict:
         raise InputError(f"would hold a proof that is not valid: {error}", file=path) from error
 
 
-@contextmanager
-def _quick_way(threads: int) -> Iterator[Way]:
-    """The checker's way with compiled products, whose least sums are the same numbers, and with threads."""
-    with ThreadPoolExecutor(threads) as pool:
-        yield Way(_compiled_product(), pool.map if threads > 1 else map)
-
-
 @cache
-def _compiled_product() -> check_certificate.Product:
-    """The checker's product in loops, compiled once."""
+def _quick_way() -> Way:
+    """The checker's way with compiled products, whose least sums are the same numbers.
+
+    It is on one thread: most of the work is in many short calls of NumPy, and two threads take longer.
+    """
     from ..processes.compiled import compiled_if_needed  # loads Numba
 
-    return check_certificate.in_loops(partial(compiled_if_needed, in_any_order=True))
+    return Way(check_certificate.in_loops(partial(compiled_if_needed, in_any_order=True)))
 
 
 def _head(proof: Proof, status: Status, bound: float) -> Arrays:
@@ -315,11 +305,10 @@ def certificate_effort(level: Lattice, quads: Indices) -> float:
     return _SPARE_TIME * effort
 
 
-def checking_pace(threads: int) -> float:
-    """The expected seconds per unit of the checker's effort on a number of threads.
+def checking_pace() -> float:
+    """The expected seconds per unit of the checker's effort.
 
-    The check of a tiny level, some 20 ms, shows them for this machine and its present load. It runs on one
-    thread, because on a tiny level several threads mostly wait for each other.
+    The check of a tiny level, some 20 ms, shows them for this machine and its present load.
     """
     instance = Instance("pace", np.ones((6, 6), dtype=bool), np.array([[0, 0]]), np.zeros(1), np.ones(1))
     zero, pairs = np.zeros(instance.grid.size), np.zeros(len(instance.grid.first), dtype=np.int32)
@@ -332,7 +321,6 @@ def checking_pace(threads: int) -> float:
     proof = Proof(field, 0.0, 0.0, "gap", 0, (level,), 0.0, "time")
     arrays = _arrays(proof) | _head(proof, "gap", 0.0)
     began = time.perf_counter()
-    with _quick_way(1) as way:
-        check_certificate.check(arrays, way=way)
-    seconds = (time.perf_counter() - began) / (1 + _SHARED * (threads - 1))
+    check_certificate.check(arrays, way=_quick_way())
+    seconds = time.perf_counter() - began
     return seconds / (certificate_effort(at, none.quads) / _SPARE_TIME)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 import time
 from contextlib import nullcontext
-from dataclasses import replace
-from functools import partial
 from typing import Final
 
 from ..errors import InputError
@@ -102,9 +100,8 @@ def prove(
     checked(jobs)
     given = limits or Limits(math.inf, gap=0.0)
     began = time.monotonic()
-    threads = given.threads or jobs
     divided = nullcontext() if scheduler is None else strips_on(scheduler)
-    with interruptible() as interrupted, crew(threads) as hands, divided as divide:
+    with interruptible() as interrupted, crew(given.threads or jobs) as hands, divided as divide:
         asked = stop_function(stop)
         own = WorkLimits(
             given.deadline(),
@@ -112,11 +109,11 @@ def prove(
             given.gap,
             certified,
             work or math.inf,
-            measured=partial(checking_pace, threads),
+            measured=checking_pace,
         )
         kind = KINDS[norm]
         proving = kind(
             instance, kind.first(instance, start, own.over), own, hands, (seed, jobs), progress, divide
         )
         ended = proving.run()
-        return replace(proving.proof(time.monotonic() - began, ended), threads=threads)
+        return proving.proof(time.monotonic() - began, ended)

@@ -94,8 +94,6 @@ class Proof(Claim):
     cuts
         For each piece, before its parts, the stroke at whose window it is cut into three, or -1 if it stays
         whole.
-    threads
-        Number of threads of the proof, which the check of its certificate takes too.
 
     """
 
@@ -106,4 +104,3 @@ class Proof(Claim):
     norm: Norm = 2
     multipliers: Floats | None = None
     cuts: tuple[int, ...] = (-1,)
-    threads: int = 1
