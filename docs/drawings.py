@@ -72,23 +72,26 @@ def drawings_of(folder: Path, suffixes: tuple[str, ...] = SUFFIXES) -> Iterator[
 
 
 def answered(command: list[str], folder: Path, name: str) -> dict[str, Any]:
-    """The JSON output of a command of crossfield, with `memory`, the most bytes that its processes held.
+    """The JSON output of a command of crossfield.
 
-    The folder keeps it with the command's files; the next call reads it from there.
+    With `memory`, the most bytes that its processes held, and `whole`, its wall time in seconds. The folder
+    keeps it with the command's files; the next call reads it from there.
     """
     kept = folder / "facts.json"
     if kept.exists():
         return dict(json.loads(kept.read_text()))
-    whole = [sys.executable, "-m", "crossfield", *command]
-    with subprocess.Popen(whole, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+    begin = time.perf_counter()
+    command = [sys.executable, "-m", "crossfield", *command]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         most = 0
         while process.poll() is None:
             most = max(most, memory_of(process.pid))
             time.sleep(0.25)
         answer = process.communicate()[0]
+    whole = time.perf_counter() - begin
     if process.returncode:
         raise SystemExit(f"{name}: exit code {process.returncode}")
-    facts = dict(json.loads(answer)) | {"memory": most}
+    facts = dict(json.loads(answer)) | {"memory": most, "whole": whole}
     kept.write_text(json.dumps(facts, indent=1) + "\n")
     return facts
 
