@@ -294,7 +294,7 @@ def _of_level(level: LevelRecord) -> Arrays:
 def certificate_effort(level: Lattice, quads: Indices) -> float:
     """The expected effort of checking and writing one level of a certificate, with clusters on those quads.
 
-    The unit is a pixel of a level with few labels, whose check takes about 0.3 ms.
+    The unit is a pixel of a level with few labels, whose check takes about 0.6 ms.
     """
     i, j = level.instance.grid.first, level.instance.grid.second
     rows, columns = level.alpha_count.astype(np.float64), level.beta_count.astype(np.float64)

@@ -72,7 +72,7 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
    bound is the sum of mu. With tables, c is a pair's cost with them, and the minima of the quads are added to
    every right side.
 
-   After the pass, more cells are excluded by trees. All of the pass together is
+   After the pass, trees exclude more cells. The whole pass gives
 
        F >= sum of mu  +  sum over pixels of E[r_i(x)]  +  sum over pairs of E[s_e(x, y)],
        r_i = (1 - gamma times the number of later pairs) t_i,   s_e = c_e - (M_e - gamma t_i) - N_e,
@@ -211,8 +211,7 @@ class Sketch:
 
     norm: 1, 2 or "mixed". offset (n,): o. weight, target (n,): W and theta, 0 where there is no stroke. slope
     (n,): l of 5. lower (n,): least alpha of the gauge. earlier, later: numbers of the pairs of each pixel to
-    later, to earlier pixels. diagonals: the pixels of each diagonal, from the upper left; none of them form
-    a pair, and earlier pixels are on earlier diagonals. runs: columns and rows of pixels without gaps.
+    later, to earlier pixels. runs: columns and rows of pixels without gaps.
     """
 
     norm: Any
@@ -226,7 +225,6 @@ class Sketch:
     w_beta: float
     later: list[list[int]]
     earlier: list[list[int]]
-    diagonals: list[list[int]]
     runs: tuple[list[Run], list[Run]]
 
 
@@ -529,13 +527,8 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
     norm, white = norm_of(claim), (rows + columns) % 2 == 1
     offset = 0.5 * white if norm == 2 else np.zeros(n)
     slope = _slopes(arrays, norm, n)
-    diagonals: list[list[int]] = [[] for _ in range(sum(mask.shape) - 1)]
-    for i, diagonal in enumerate((rows + columns).tolist()):
-        diagonals[diagonal].append(i)
     runs = _runs(first, second, first > second, n), _runs(first, second, first < second, n)
-    return Sketch(
-        norm, offset, slope, first, second, weight, target, lower, w_beta, later, earlier, diagonals, runs
-    )
+    return Sketch(norm, offset, slope, first, second, weight, target, lower, w_beta, later, earlier, runs)
 
 
 def _runs(first: Array, second: Array, chosen: Array, n: int) -> list[Run]:
@@ -995,13 +988,9 @@ def fill_in(  # noqa: C901, PLR0912 - calls in the inner loops would take as lon
 
 @dataclass
 class Way:
-    """How to compute: a product like `min_plus`, and functions like `map` for independent work.
-
-    each: for the pixels of a diagonal. levels: for the levels.
-    """
+    """How to compute: a product like `min_plus`, and a function like `map` for the levels."""
 
     product: Product = min_plus
-    each: Callable[[Callable[[int], Any], list[int]], Any] = map
     levels: Callable[[Callable[[int], Any], range], Iterable[Any]] = map
 
 
@@ -1014,23 +1003,21 @@ class Pass:
     def __init__(self, level: Level, sketch: Sketch, way: Way) -> None:
         self.level, self.sketch, self.way = level, sketch, way
         self.before: dict[int, Array] = {}  # S of the pairs whose later pixel is still to come
-        self.after: dict[int, Array] = {}  # N of the same
         self.shares: dict[int, Array] = {}  # N of all pairs
         self.errors: list[float] = []
 
     def run(self, stop: Over) -> Passed:
         """Do the pass. Raises StoppedError when it has to end before the last pixel."""
-        n = len(self.sketch.offset)
-        numbers: list[Array] = [None] * n
-        least, waiting = [0.0] * n, [0.0] * n
-
-        def visit(i: int) -> None:
+        numbers: list[Array] = []
+        least: list[float] = []
+        waiting: list[float] = []
+        for i in range(len(self.sketch.offset)):
             if stop():
                 raise StoppedError
-            numbers[i], least[i], waiting[i] = self._visit(i)
-
-        for diagonal in self.sketch.diagonals:
-            list(self.way.each(visit, diagonal))
+            over, mu, before = self._visit(i)
+            numbers.append(over)
+            least.append(mu)
+            waiting.append(before)
         quads = [self._quad(cluster) for cluster in self.level.clusters]
         error = 2 * math.fsum(self.errors)
         rights = [
@@ -1061,19 +1048,15 @@ class Pass:
     def _along(self, runs: list[Run], given: list[Array], over: list[Array], stop: Over) -> list[Array]:
         """The excess of each label, plus the least of the rest of its run from both sides."""
         found = list(given)
-
-        def follow(number: int) -> None:
+        for pixels, pairs in runs:
             if stop():
                 raise StoppedError
-            pixels, pairs = runs[number]
             costs = [Pair(self.level, self.sketch, e) for e in pairs]
             for way in (1, -1):
                 carried = given[pixels[::way][0]]
                 for e, pair, j in zip(pairs[::way], costs[::way], pixels[::way][1:]):
                     message = self._carried(e, pair, carried, over, back=way < 0)
                     found[j], carried = found[j] + message, given[j] + message
-
-        list(self.way.each(follow, list(range(len(runs)))))
         return found
 
     def _carried(self, e: int, pair: Pair, carried: Array, over: list[Array], *, back: bool) -> Array:
@@ -1092,7 +1075,7 @@ class Pass:
         cost, size = unary(self.level, self.sketch, i)
         held = [self.level.messages[e] for e in later]
         _, waiting = self._theta(cost, size, held + [self.before.pop(e) for e in earlier])
-        over, least = self._theta(cost, size, held + [self.after.pop(e) for e in earlier])
+        over, least = self._theta(cost, size, held + [self.shares[e] for e in earlier])
         for e, message in zip(later, held):
             self._send(e, message, over / max(1, len(earlier), len(later)))
         return over, least, waiting
@@ -1122,9 +1105,8 @@ class Pass:
     def _send(self, e: int, held: Array, handed: Array) -> None:
         """Send the message of pair e to its later pixel, without and with what its earlier pixel hands on."""
         pair, given = Pair(self.level, self.sketch, e), handed - held
-        self.before[e], self.after[e] = (pair.across(each, self.way.product) for each in (-held, given))
-        self.shares[e] = self.after[e]
-        greatest = float(np.abs(given).max() + np.abs(held).max() + np.abs(self.after[e]).max())
+        self.before[e], self.shares[e] = (pair.across(each, self.way.product) for each in (-held, given))
+        greatest = float(np.abs(given).max() + np.abs(held).max() + np.abs(self.shares[e]).max())
         self._err(pair.size + greatest)
 
     def _err(self, size: float) -> None:
