@@ -346,8 +346,9 @@ def examine(problem, level, slack):
     combs = [on_combs(rest, slacks, teeth) for teeth in (upright, ~upright)]
     for i in range(n):
         bound = quads + lowest[0, : i + 1].sum() + lowest[1, i + 1 :].sum()
-        tests = [bound + after[i] - lowest[0, i], *(whole + comb[i] for comb in combs)]
-        level.left.append(remaining(level, i, [test <= problem.energy() + 2 * error for test in tests]))
+        tests = [bound + after[i] - lowest[0, i] <= problem.energy() + error]
+        tests += [whole + comb[i] <= problem.energy() + 2 * error for comb in combs]  # whose sums err as well
+        level.left.append(remaining(level, i, tests))
     level.bound = whole - error
 
 
