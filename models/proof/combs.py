@@ -24,9 +24,10 @@ _ROW: Final = (1, 3)
 
 
 class Combs:
-    """The least excess with each label fixed, on growing parts of a comb; of the labels of a strip, flat.
+    """The least excess of each label of a strip on a comb, flat, computed in two turns.
 
-    At first, the part is the pixel alone. Numbers at labels that are not allowed have no meaning.
+    After `turn(first=True)` and `follow`, it is the least excess on the teeth; after `turn(first=False)` and
+    `follow`, that on the whole comb. Numbers at labels that are not allowed have no meaning.
     """
 
     def __init__(self, state: State, own: slice, crew: Crew) -> None:
@@ -39,19 +40,16 @@ class Combs:
         )
         self.excesses = self._given = self._single
 
-    def begin(self) -> None:
-        """Begin another comb, with the pixel alone."""
-        self.excesses = self._single
-
-    def turn(self) -> None:
-        """From now on, follow pairs of another direction."""
-        self._given, self.excesses = self.excesses, self.excesses.copy()
+    def turn(self, *, first: bool) -> None:
+        """Start to follow pairs of another direction; first: of a new comb."""
+        self._given = self._single if first else self.excesses
+        self.excesses = self._given.copy()
 
     def follow(self, edge: Floats, *, column: bool, back: bool) -> Floats:
-        """Add what the pixels before each one in its column or row allow at least; back: those after it.
+        """Add the least excess of the pixels before each pixel in its column or row; back: of those after it.
 
-        edge: what the strip before this one returned. Returns the excesses carried to the last own pixels of
-        columns that go on in the next strip.
+        edge: the result for the strip before this one, empty for the first. Returns the excesses at the last
+        own pixels of columns that continue in the next strip, flat.
         """
         before, after = (_COLUMN if column else _ROW)[:: -1 if back else 1]
         (first, sources), (last, targets) = self._ends(before), self._ends(after)

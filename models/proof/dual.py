@@ -230,11 +230,11 @@ class Dual:
         excess = _excess(bound, energy)
         cells = np.concatenate(self._all("cells", excess))
         before = max(int(np.count_nonzero(cells)), 1)
-        self._all("find_excesses")
+        self._all("begin_combs")
         for teeth_are_columns in (True, False):
-            self._all("begin_comb")
-            for column in (teeth_are_columns, not teeth_are_columns):
-                self._all("turn_comb")
+            for first in (True, False):
+                self._all("turn_comb", first=first)
+                column = first == teeth_are_columns
                 for back in (False, True):
                     self._follow_combs(column=column, back=back)
             cells &= np.concatenate(self._all("cells_by_comb", excess))
@@ -248,7 +248,7 @@ class Dual:
             edge = place.ask("follow_comb", edge, column=column, back=back)()
 
     def count_left(self, bound: float, energy: float) -> int:
-        """The number of cells that the last pass leaves, less the share that combs excluded the last time."""
+        """The number of cells that the last pass leaves, times the share that combs left the last time."""
         left = sum(map(np.count_nonzero, self._all("cells", _excess(bound, energy))))
         return round(self._left_by_combs * left)
 

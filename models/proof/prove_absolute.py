@@ -38,7 +38,7 @@ class AbsolutePiece(Piece):
     """A part of the boxes where pairs count with absolute values."""
 
     def least(self, over: Over = never) -> Least:  # noqa: ARG002
-        """The field of least energy with the lines of the piece, and a lower bound of the energy there."""
+        """Minimum-energy field with the lines of the piece, and a lower bound on the energy there."""
         instance, p = self.left.lattice.instance, self.left.lattice.p
         weight, (above, below) = instance.stroke_coefficient * instance.w, self._beyond()
         tilt, constant = np.zeros(2 * instance.grid.size), 2 * float(weight @ (above + below))

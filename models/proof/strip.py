@@ -240,24 +240,20 @@ class Strip:
         begin, end = self.lattice.start[[self.own.start, self.own.stop]]
         return cells_left(self.lattice, survives)[begin:end]
 
-    def find_excesses(self) -> None:
-        """Begin combs after a forward pass."""
+    def begin_combs(self) -> None:
+        """Find the excesses of single pixels, after a forward pass."""
         self._combs = Combs(self.state, self.own, self.crew)
 
-    def begin_comb(self) -> None:
-        """Begin another comb."""
-        self._combs.begin()
-
-    def turn_comb(self) -> None:
-        """Follow the comb in another direction from now on."""
-        self._combs.turn()
+    def turn_comb(self, *, first: bool) -> None:
+        """Start to follow pairs of another direction, as `Combs.turn`."""
+        self._combs.turn(first=first)
 
     def follow_comb(self, edge: Floats, *, column: bool, back: bool) -> Floats:
         """Follow the comb, as `Combs.follow`."""
         return self._combs.follow(edge, column=column, back=back)
 
     def forget_combs(self) -> None:
-        """Free the memory of combs."""
+        """Release the memory of combs."""
         del self._combs
 
     def decoded(self, crosses: Crosses, *, forwards: bool) -> Crosses:
