@@ -22,6 +22,12 @@ The share of a pair's later pixel is not stored, because the best one follows fr
 (models/proof/check_certificate.py, 3). So half of a level's shares are enough. They are whole numbers
 times a scale, and for any values of them the resulting bound is valid.
 
+If cells were cut into parts, there is also:
+
+    branches    (levels, 4) for each level, what it covers: the level that left these cells; the pixel of the
+                cut, or -1 for all cells; 0 for the cells below a step of alpha, 1 for those above, 2 and 3
+                the same for beta; the step
+
 In other norms than 2 there are also:
 
     slopes      (n,)    of the stroke terms
@@ -142,8 +148,9 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
         packed.result()
     status = cast("Status", verdict.status)
     bound = max(0.0, verdict.bound - _SPARE * (1 + verdict.bound))
-    confirmed = replace(proof, levels=proof.levels[: len(verdict.levels)])
-    if confirmed.levels != proof.levels:
+    checked = len(verdict.levels)
+    confirmed = replace(proof, levels=proof.levels[:checked], branches=proof.branches[:checked])
+    if checked < len(proof.levels):
         packing = Packing()
         packing.add(_arrays(confirmed))
     packing.add(_head(confirmed, status, bound))
@@ -256,6 +263,8 @@ def _arrays(proof: Proof) -> Arrays:
     arrays |= {_PREFIX + name: array for name, array in arrays_of(field.instance).items()}
     if proof.norm != 2:
         arrays |= _slopes(proof)
+    if any(branch.pixel >= 0 for branch in proof.branches):
+        arrays["branches"] = np.array(proof.branches, dtype=np.int32)
     for number, level in enumerate(proof.levels):
         arrays |= {f"level_{number}_{name}": array for name, array in _of_level(level).items()}
     return arrays

@@ -158,7 +158,7 @@ PRECISION = 2.0**-52
 ROUNDING = 64.0
 SLIVER = 2e-14
 MOST_BYTES = 1 << 31  # of a file, and of all its arrays
-MOST_LEVELS = 64
+MOST_LEVELS = 256
 MOST_SIDE = 9999
 MOST_PIECES = 200  # of the boxes
 MOST_COUNT = 4096  # labels of a pixel in alpha, and in beta
@@ -178,6 +178,7 @@ LEVEL_PARTS = ("h", "alpha", "beta", "ranges", "allowed", "scale", "wide")
 STEP_PARTS = {2: ("steps_16", "steps_32"), 1: ("steps_32", "steps_64"), "mixed": ("steps_32", "steps_64")}
 ABSOLUTE_PARTS = ("slopes", "multipliers")  # unless the norm is 2
 CUTS = "cuts"  # also, if boxes are cut
+BRANCHES = "branches"  # if the levels are no chain
 CLUSTER_PARTS = ("quads", "table_scale", "table_steps")  # of a level
 NAME = re.compile(rb"[a-z0-9_]+\.npy")
 HEAD = re.compile(
@@ -288,6 +289,19 @@ class Passed:
 
     bound: float
     tests: list[Test]
+
+
+@dataclass
+class Region:
+    """A level after its pass: its bound, and the boxes of `boxes_of`, None if it leaves a pixel no cell.
+
+    parts: the levels that together cover what it leaves; empty without such ones.
+    """
+
+    level: Level
+    bound: float
+    boxes: tuple[Array, Array] | None
+    parts: Sequence[int] = ()
 
 
 @dataclass
@@ -423,7 +437,7 @@ def _need_names(arrays: dict[str, Array]) -> None:
     parts = LEVEL_PARTS + STEP_PARTS[norm] + CLUSTER_PARTS
     levels, whole = _levels(head), PARTS + (() if norm == 2 else ABSOLUTE_PARTS)
     names = set(whole) | {f"level_{number}_{part}" for number in range(levels) for part in parts}
-    names |= {CUTS} & set(arrays) if norm != 2 else set()
+    names |= {BRANCHES if norm == 2 else CUTS} & set(arrays)
     for name in sorted(names - set(arrays)):
         raise UnreadableError(f"has no array {name}")
     for name in sorted(set(arrays) - names):
@@ -1179,20 +1193,32 @@ def _held(domain: Array, rows: tuple[Array, Array], columns: tuple[Array, Array]
     return held
 
 
-def boxes_of(level: Level, cells: list[Array], sketch: Sketch, margin: float) -> Array:
-    """The smallest box round the cells of each pixel within |beta| <= pi/4, wider by a margin; shape (n, 4).
+def boxes_of(level: Level, cells: list[Array], sketch: Sketch, margin: float) -> tuple[Array, Array]:
+    """Boxes round the cells of each pixel within |beta| <= pi/4, wider by a margin; twice (n, 4).
 
-    Columns: alpha from, to, beta from, to.
+    Columns: alpha from, to, beta from, to. The first ones have the labels of the level. In the second ones
+    the cells above a gap in alpha have their other label, (alpha - pi/2, -beta), if the box is narrower then:
+    so crosses at both ends of the strip, where it is glued, are close.
     """
-    boxes = np.zeros((len(cells), 4))
+    found = np.zeros((2, len(cells), 4))
     for i, kept in enumerate(cells):
-        sides = []
-        for places, index in zip(positions(level, sketch, i), np.nonzero(kept)):
-            sides += [float(places[index.min()]), float(places[index.max() + 1])]
-        boxes[i] = sides
-    boxes += np.array([-margin, margin, -margin, margin])
-    boxes[:, 2:] = np.clip(boxes[:, 2:], -QUARTER, QUARTER)
-    return boxes
+        (alpha, beta), (a, b) = positions(level, sketch, i), np.nonzero(kept)
+        found[:, i] = alpha[a.min()], alpha[a.max() + 1], beta[b.min()], beta[b.max() + 1]
+        rows = np.unique(a)
+        if len(rows) == rows[-1] - rows[0] + 1:
+            continue
+        gap = int(np.diff(rows).argmax())
+        last, next_ = alpha[rows[gap] + 1], alpha[rows[gap + 1]]
+        sides = min(found[0, i, 0], next_ - HALF), max(last, found[0, i, 1] - HALF)
+        if sides[1] - sides[0] < found[0, i, 1] - found[0, i, 0]:
+            above = a > rows[gap]
+            (low, high), (least, most) = (
+                (beta[b[of].min()], beta[b[of].max() + 1]) for of in (~above, above)
+            )
+            found[1, i] = *sides, min(low, -most), max(high, -least)
+    found += np.array([-margin, margin, -margin, margin])
+    found[:, :, 2:] = np.clip(found[:, :, 2:], -QUARTER, QUARTER)
+    return found[0], found[1]
 
 
 # Optimality ------------------------------------------------------------------------------------------------
@@ -1404,31 +1430,39 @@ def linear_bound(sketch: Sketch, p: Array, turned: Array, piece: Piece, multipli
     return math.fsum(np.concatenate(terms)) - 16 * PRECISION * float(size)
 
 
+def best_jumps(sketch: Sketch, alpha: Array, beta: Array) -> Array:
+    """The best jump of each pair at some angles, in the norm 2; shape (m,)."""
+    i, j = sketch.first, sketch.second
+    near = np.round((alpha[j] - alpha[i]) / HALF).astype(np.int64) + np.array([[0], [-1], [1]])
+    a, b = alpha[i] - alpha[j] + HALF * near, sign(near) * beta[i] - beta[j]
+    found: Array = near[np.argmin(a * a + b * b, axis=0), np.arange(near.shape[1])]
+    return found
+
+
 def lower_bound(
     sketch: Sketch,
-    field: Field,
-    level: Level,
+    labels: tuple[Field, Array],
     boxes: Array,
     enough: float,
     *,
     steps: tuple[Array, Array],
     over: Over,
-) -> tuple[float, Array]:
-    """A lower bound of F in the boxes, -inf where a jump is not forced, and the pairs with forced jumps.
+) -> float:
+    """A lower bound of F in the boxes, -inf where a jump is not forced.
 
+    labels: jumps to be forced, angles near the best ones, and directions of the strokes, as of `relabelled`.
     Boxes that cross edges of windows are cut until the bound is `enough`, there are MOST_PIECES, or time is
     over.
     """
-    centres = np.stack([level.alpha, level.beta], axis=1)
-    (alpha, beta, p), turned = relabelled(sketch, field, centres)
-    held = forced(sketch, p, boxes)
+    (alpha, beta, p), turned = labels
     reach = QUARTER if sketch.norm == 1 else HALF
     far = (beyond_windows(turned, boxes) > reach - 1e-9) & (sketch.weight > 0)
-    if not held.all() or far.any():
-        return -math.inf, held
+    if not forced(sketch, p, boxes).all() or far.any():
+        return -math.inf
     if sketch.norm != 2:
-        return pieces_bound(sketch, p, turned, boxes, steps), held
-    waiting = [Piece(boxes, np.zeros(len(boxes)), -math.inf)]
+        return pieces_bound(sketch, p, turned, boxes, steps)
+    above, below = beyond_windows(turned, boxes[:, [1, 0, 2, 3]]) >= 0  # the whole box is beyond
+    waiting = [Piece(boxes, above.astype(np.int64) - below, -math.inf)]
     found = []
     for _ in range(MOST_PIECES):
         if over():
@@ -1445,7 +1479,7 @@ def lower_bound(
             found.append(bound)
         if not waiting:
             break
-    return min([*found, *(piece.bound for piece in waiting)]), held
+    return min([*found, *(piece.bound for piece in waiting)])
 
 
 # The whole -------------------------------------------------------------------------------------------------
@@ -1472,17 +1506,53 @@ def _check(arrays: dict[str, Array], over: Over, way: Way) -> Verdict:
     energy, error = energy_of(sketch, *field)
     count = _levels(head)
     slack = slack_of(sketch, count)
-    bounds, boxes, level = _descend(arrays, sketch, energy + error + slack, over, way)
-    bound = max(0.0, min(energy - error, max(bounds) - slack))
-    enough = energy - error - OPTIMAL / 2 * max(1.0, energy)
+    most, enough = energy + error + slack, energy - error - OPTIMAL / 2 * max(1.0, energy)
     steps = _last_steps(arrays, sketch)
-    convex, held = lower_bound(sketch, field, level, boxes, enough, steps=steps, over=over)
-    bound = max(bound, min(convex, energy - error))
+    regions = _descend(arrays, sketch, most, over, way)
+    centres = np.stack([regions[0].level.alpha, regions[0].level.beta], axis=1)
+    own = relabelled(sketch, field, centres)
+
+    def last(boxes: tuple[Array, Array]) -> float:
+        """A lower bound of F in one of two equivalent sets of boxes."""
+        found = lower_bound(sketch, own, boxes[0], enough, steps=steps, over=over)
+        if found > -math.inf or sketch.norm != 2:
+            return found
+        alpha, beta = boxes[1].reshape(-1, 2, 2).mean(axis=2).T
+        turned = sketch.target + math.pi * np.round((alpha - sketch.target) / math.pi)
+        labels = (alpha, beta, best_jumps(sketch, alpha, beta)), turned
+        return lower_bound(sketch, labels, boxes[1], enough, steps=steps, over=over)
+
+    proven, boxes = _settled(regions, 0, last, (slack, most))
+    _need(boxes is not None, "the last level", "leaves nothing, not even the field")
+    bound = max(0.0, min(proven, energy - error))
     status = "optimal" if energy - bound <= OPTIMAL * max(1.0, energy) else "gap"
-    centres = np.stack([level.alpha, level.beta], axis=1)
+    held = forced(sketch, own[0][2], boxes)
+    bounds = [region.bound for region in regions]
     verdict = Verdict(status, sketch.norm, energy, bound, boxes, centres, held, bounds)
     _compare(head, verdict, error)
     return verdict
+
+
+def _settled(
+    regions: list[Region],
+    number: int,
+    last: Callable[[tuple[Array, Array]], float],
+    slack_and_most: tuple[float, float],
+) -> tuple[float, Array | None]:
+    """A lower bound of F in the domain of a level, and boxes round all fields of energy U or less there."""
+    region, (slack, most) = regions[number], slack_and_most
+    if region.parts:
+        found = [_settled(regions, each, last, slack_and_most) for each in region.parts]
+        bound = min(bound for bound, _ in found)
+        boxes = [boxes for _, boxes in found if boxes is not None]
+    else:
+        bound = math.inf if region.boxes is None else last(region.boxes)
+        boxes = [] if region.boxes is None else [region.boxes[0]]
+    bound = max(region.bound - slack, bound)
+    if bound > most or not boxes:
+        return bound, None
+    least, greatest = np.min(boxes, axis=0), np.max(boxes, axis=0)
+    return bound, np.stack([least[:, 0], greatest[:, 1], least[:, 2], greatest[:, 3]], axis=1)
 
 
 def _last_steps(arrays: dict[str, Array], sketch: Sketch) -> tuple[Array, Array]:
@@ -1504,10 +1574,46 @@ def _last_steps(arrays: dict[str, Array], sketch: Sketch) -> tuple[Array, Array]
     return cuts, found
 
 
-def _descend(
-    arrays: dict[str, Array], sketch: Sketch, most: float, over: Over, way: Way
-) -> tuple[list[float], Array, Level]:
-    """The bounds of all levels, the boxes round the cells left after the last one, and the first level."""
+def _branches(arrays: dict[str, Array], sketch: Sketch, count: int) -> Array:
+    """For each level, the level whose cells it covers, and the part of these.
+
+    Columns: number of that level; pixel of a cut, or -1 for all cells; 0 for the cells below a step of alpha,
+    1 for those above, 2 and 3 the same for beta; the step.
+    """
+    if BRANCHES not in arrays:
+        rows = np.zeros((count, 4), dtype=np.int64)
+        rows[:, 0], rows[:, 1] = np.arange(count) - 1, -1
+        return rows
+    _need(sketch.norm == 2, BRANCHES, "is for the norm 2 only")
+    rows = _given(arrays, BRANCHES, "<i4", count, 4).astype(np.int64)
+    above, pixel, side = rows[:, 0], rows[:, 1], rows[:, 2]
+    _need(rows[0].tolist() == [-1, -1, 0, 0], BRANCHES, "does not begin with the whole first level")
+    _need((above[1:] >= 0) & (above[1:] <= np.arange(count - 1)), BRANCHES, "is no earlier level")
+    _need((pixel >= -1) & (pixel < len(sketch.offset)), BRANCHES, "is no pixel")
+    _need((side >= 0) & (side < 4), BRANCHES, "is no side")
+    for number in range(count):
+        parts = rows[1:][above[1:] == number, 1:]
+        single = len(parts) < 2
+        cut = len(parts) == 2 and parts[0, 0] >= 0 and (parts[0] ^ parts[1] == [0, 1, 0]).all()
+        _need(single or cut, BRANCHES, f"has parts of level {number} that do not belong together")
+    return rows
+
+
+def part_of(level: Level, cells: list[Array], branch: Array) -> list[Array]:
+    """The part of a level's cells that a row of `_branches` names."""
+    _, pixel, side, step = branch.tolist()
+    if pixel < 0:
+        return cells
+    found = list(cells)
+    found[pixel] = cells[pixel].copy()
+    along = found[pixel] if side < 2 else found[pixel].T
+    place = max(0, step - int(level.ranges[pixel, side // 2 * 2]))
+    along[slice(0, place) if side % 2 else slice(place, None)] = False
+    return found
+
+
+def _descend(arrays: dict[str, Array], sketch: Sketch, most: float, over: Over, way: Way) -> list[Region]:
+    """All levels, each with its bound and with boxes round the cells that it leaves."""
 
     def left_by(number: int) -> tuple[Level, float, list[Array]]:
         """A level without its messages, which take much memory, its bound, and the cells that it leaves."""
@@ -1516,28 +1622,34 @@ def _descend(
         bare = replace(level, messages=(), clusters=[], tables={})
         return bare, passed.bound, surviving(level, passed, most)
 
-    levels: list[Level] = []
-    bounds: list[float] = []
-    cells: list[Array] = []
+    count = _levels(head_of(arrays))
+    branches, margin = _branches(arrays, sketch, count), 2 * (count + 1) * SLIVER
+    parents = branches[:, 0].tolist()
+    regions: list[Region] = []
+    waiting: dict[int, list[Array]] = {}
     try:
-        for level, bound, kept in way.levels(left_by, range(_levels(head_of(arrays)))):
-            number = len(levels)
+        for level, bound, cells in way.levels(left_by, range(count)):
+            number = len(regions)
             if not number:
                 need_whole_strip(level, sketch)
             else:
-                centred = (level.alpha == levels[0].alpha) & (level.beta == levels[0].beta)
+                centred = (level.alpha == regions[0].level.alpha) & (level.beta == regions[0].level.beta)
                 _need(centred, f"level_{number}_alpha or beta", "is not that of the first level")
-                need_covered(levels[-1], cells, level, sketch, number)
-            levels.append(level)
-            bounds.append(bound)
-            cells = kept
+                coarse = regions[parents[number]].level
+                part = part_of(coarse, waiting[parents[number]], branches[number])
+                need_covered(coarse, part, level, sketch, number)
+            some = all(kept.any() for kept in cells)
+            regions.append(Region(level, bound, boxes_of(level, cells, sketch, margin) if some else None))
+            waiting[number] = cells
+            for done in [each for each in waiting if each not in parents[number + 1 :]]:
+                del waiting[done]
     except StoppedError:
-        if not bounds:
+        if not regions:
             raise
-    left = all(kept.any() for kept in cells)
-    _need(left, "the last level", "has a pixel without a cell, not even that of the field")
-    margin = 2 * (len(bounds) + 1) * SLIVER
-    return bounds, boxes_of(levels[-1], cells, sketch, margin), levels[0]
+    for number, region in enumerate(regions):
+        parts = [each for each in range(1, len(regions)) if parents[each] == number]
+        region.parts = parts if len(parts) == 2 or branches[parts, 1].tolist() == [-1] else []
+    return regions
 
 
 def _compare(head: dict[str, Any], verdict: Verdict, error: float) -> None:

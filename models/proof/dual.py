@@ -26,6 +26,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from copy import copy
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -98,6 +99,12 @@ class Dual:
         self._least_of_clusters = np.zeros(0)
         self._times, self._reached = 0, -math.inf
         self._left_by_combs = 1.0
+
+    def copy(self) -> Dual:
+        """The same dual, which stays as it is when this one moves to another lattice."""
+        found = copy(self)
+        found.places = [Here(copy(place.strip)) for place in self.places if isinstance(place, Here)]
+        return found
 
     def _all(self, name: str, *arguments: Any, **named: Any) -> list[Any]:
         """The results of all strips."""

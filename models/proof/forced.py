@@ -51,12 +51,13 @@ class Forced:
     """Choices that the boxes force.
 
     pairs (m,): whether the jump of the centre is a best one on the whole box. strokes (s,): whether a box
-    lies so close to its stroke that the lemma holds.
+    lies so close to its stroke that the lemma holds. target (s,): the direction of each stroke at one turn.
     """
 
     left: RemainingCells
     pairs: Bools
     strokes: Bools
+    target: Floats
 
     @property
     def everything(self) -> bool:
@@ -64,9 +65,24 @@ class Forced:
         return bool(self.pairs.all() and self.strokes.all())
 
     @property
+    def open_pixels(self) -> Bools:
+        """Pixels where something is not forced; if all is, those whose box exceeds a window; shape (n,)."""
+        instance = self.left.lattice.instance
+        grid, found = instance.grid, np.zeros(instance.grid.size, dtype=bool)
+        for pixels in (grid.first[~self.pairs], grid.second[~self.pairs]):
+            found[pixels] = True
+        found[instance.stroke_index[~self.strokes]] = True
+        if self.everything:
+            found[instance.stroke_index] = np.add(*self.whole.beyond) > 0
+        return found
+
+    @property
     def whole(self) -> Piece:
         """The boxes as one piece."""
-        return Piece(self.left, np.zeros(len(self.strokes), dtype=np.int32))
+        at = self.left.lattice.instance.stroke_index
+        above = self.left.alpha_low[at] - self.target >= QUARTER
+        below = self.target - self.left.alpha_high[at] >= QUARTER
+        return Piece(self.left, above.astype(np.int32) - below, self.target)
 
     def least(self, energy: float, over: Over = never) -> Least:
         """The minimum of the lowest piece, and a bound of all; pieces with a bound of `energy` stay whole.
@@ -103,11 +119,12 @@ class Piece:
     """A part of the boxes, cut at the edges of windows.
 
     lines (s,): 0 where u carries the stroke, or v beyond an edge that the piece crosses; -1 below the window
-    and 1 above it, where v carries the stroke.
+    and 1 above it, where v carries the stroke. target (s,): as of `Forced`.
     """
 
     left: RemainingCells
     lines: Ints
+    target: Floats
 
     def least(self, over: Over = never) -> Least:
         """The field that minimises the quadratic on the piece, and a lower bound of the energy there."""
@@ -122,7 +139,7 @@ class Piece:
 
     def crossed(self, field: CrossField) -> int:
         """The stroke with the largest deduction whose window the piece exceeds, or -1."""
-        above, below = self._beyond()
+        above, below = self.beyond
         if not (above + below).any():
             return -1
         return int(np.argmax(np.where(above + below > 0, 1e-12 + self._given(field), 0.0)))
@@ -130,7 +147,7 @@ class Piece:
     def cut(self, stroke: int) -> list[Self | None]:
         """The parts below, in and above the window of a stroke, None for an empty one."""
         instance, left = self.left.lattice.instance, self.left
-        target, at = instance.target[stroke], instance.stroke_index[stroke]
+        target, at = self.target[stroke], instance.stroke_index[stroke]
         ends = (-np.inf, target - QUARTER, target + QUARTER, np.inf)
         parts: list[Self | None] = []
         for line in (-1, 0, 1):
@@ -146,23 +163,24 @@ class Piece:
             parts.append(replace(self, left=replace(left, alpha_low=low, alpha_high=high), lines=lines))
         return parts
 
-    def _beyond(self) -> tuple[Floats, Floats]:
+    @property
+    def beyond(self) -> tuple[Floats, Floats]:
         """Distances by which the piece exceeds the windows where u carries the stroke, shapes (s,)."""
         instance = self.left.lattice.instance
         at, u = instance.stroke_index, self.lines == 0
-        above = np.maximum(self.left.alpha_high[at] - instance.target - QUARTER, 0.0)
-        below = np.maximum(instance.target - QUARTER - self.left.alpha_low[at], 0.0)
+        above = np.maximum(self.left.alpha_high[at] - self.target - QUARTER, 0.0)
+        below = np.maximum(self.target - QUARTER - self.left.alpha_low[at], 0.0)
         return above * u, below * u
 
     def _given(self, field: CrossField) -> Floats:
-        """Difference between Q and the quadratic at each stroke, shape (s,)."""
+        """Difference between the energy and the quadratic at each stroke, shape (s,)."""
         instance = field.instance
         at, weight = instance.stroke_index, instance.stroke_coefficient * instance.w
-        beta, u = field.beta[at], field.residual_r
-        v = field.alpha[at] - HALF * self.lines - beta - instance.target
-        above, below = self._beyond()
+        alpha, beta, counted = field.alpha[at], field.beta[at], field.residual_r
+        u, v = alpha + beta - self.target, alpha - HALF * self.lines - beta - self.target
+        above, below = self.beyond
         tilt = 4 * (above * (beta + QUARTER) + below * (QUARTER - beta))
-        given: Floats = weight * np.where(self.lines == 0, tilt, u * u - v * v)
+        given: Floats = weight * (counted * counted - np.where(self.lines == 0, u * u - tilt, v * v))
         return given
 
     def _quadratic(self) -> Quadratic:
@@ -171,22 +189,24 @@ class Piece:
         instance, n = lattice.instance, lattice.instance.grid.size
         energy, at = energy_at(instance, lattice.p), instance.stroke_index
         weight, v = instance.stroke_coefficient * instance.w, self.lines != 0
-        above, below = self._beyond()
-        vector = energy.vector.copy()
-        vector[at] += weight * v * HALF * self.lines
-        vector[n + at] += weight * np.where(v, -2 * instance.target - HALF * self.lines, 2 * (above - below))
+        above, below = self.beyond
+        vector, turned = energy.vector.copy(), self.target - instance.target
+        vector[at] += weight * (turned + HALF * self.lines)
+        of_v = -2 * instance.target - turned - HALF * self.lines
+        vector[n + at] += weight * np.where(v, of_v, turned + 2 * (above - below))
         places = (np.concatenate([at, at + n]), np.concatenate([at + n, at]))
-        turned = sparse.csr_array((np.tile(-2 * weight * v, 2), places), shape=energy.matrix.shape)
-        return Quadratic(energy.matrix + turned, vector)
+        swapped = sparse.csr_array((np.tile(-2 * weight * v, 2), places), shape=energy.matrix.shape)
+        return Quadratic(energy.matrix + swapped, vector)
 
 
-def forced(left: RemainingCells) -> Forced:
-    """Choices that are forced on the boxes that are left."""
-    at, target = left.lattice.instance.stroke_index, left.lattice.instance.target
+def forced(left: RemainingCells, target: Floats | None = None) -> Forced:
+    """Choices that are forced on the boxes that are left. target (s,): as of `Forced`; None: as the gauge."""
+    instance = left.lattice.instance
+    at, target = instance.stroke_index, instance.target if target is None else target
     away = np.maximum(np.abs(left.alpha_low[at] - target), np.abs(left.alpha_high[at] - target))
     most, products = at_pairs(left)
     pairs = (most <= HALF) & (np.pi * most - np.pi**2 / 4 <= 4 * products.min(axis=0))
-    return Forced(left, pairs, away <= 3 * QUARTER)
+    return Forced(left, pairs, away <= 3 * QUARTER, target)
 
 
 def at_pairs(left: RemainingCells) -> tuple[Floats, Floats]:

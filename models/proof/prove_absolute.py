@@ -31,7 +31,7 @@ class ForcedAbsolute(Forced):
     @property
     def whole(self) -> Piece:
         """The boxes as one piece."""
-        return AbsolutePiece(self.left, np.zeros(len(self.strokes), dtype=np.int32))
+        return AbsolutePiece(self.left, np.zeros(len(self.strokes), dtype=np.int32), self.target)
 
 
 class AbsolutePiece(Piece):
@@ -40,7 +40,7 @@ class AbsolutePiece(Piece):
     def least(self, over: Over = never) -> Least:  # noqa: ARG002
         """Minimum-energy field with the lines of the piece, and a lower bound on the energy there."""
         instance, p = self.left.lattice.instance, self.left.lattice.p
-        weight, (above, below) = instance.stroke_coefficient * instance.w, self._beyond()
+        weight, (above, below) = instance.stroke_coefficient * instance.w, self.beyond
         tilt, constant = np.zeros(2 * instance.grid.size), 2 * float(weight @ (above + below))
         if self._norm == "mixed":
             tilt[instance.grid.size + instance.stroke_index] = 4 * weight * (above - below)
@@ -56,12 +56,12 @@ class AbsolutePiece(Piece):
         """Deduction at each stroke whose window the piece exceeds, shape (s,)."""
         if self._norm == "mixed":
             return super()._given(field)
-        deduction: Floats = 2 * field.instance.w * np.add(*self._beyond())
+        deduction: Floats = 2 * field.instance.w * np.add(*self.beyond)
         return deduction
 
 
-def forced_absolute(left: RemainingCells) -> ForcedAbsolute:
-    """Choices that are forced on the boxes that are left."""
+def forced_absolute(left: RemainingCells, target: Floats | None = None) -> ForcedAbsolute:
+    """Choices that are forced on the boxes that are left, as `forced`."""
     reach = QUARTER if left.lattice.norm == 1 else HALF
     i, j = left.lattice.instance.grid.first, left.lattice.instance.grid.second
     most, even = at_pairs(left)[0], parity_sign(left.lattice.p) > 0
@@ -71,9 +71,10 @@ def forced_absolute(left: RemainingCells) -> ForcedAbsolute:
     least = np.maximum(np.maximum(left.beta_low, -left.beta_high), 0.0)
     given = np.where(unlike > 0, unlike, -np.minimum(least[i], least[j]))
     pairs = (most <= HALF) & (most + given <= QUARTER)
-    at, target = left.lattice.instance.stroke_index, left.lattice.instance.target
+    instance = left.lattice.instance
+    at, target = instance.stroke_index, instance.target if target is None else target
     away = np.maximum(left.alpha_high[at] - target, target - left.alpha_low[at])
-    return ForcedAbsolute(left, pairs, away - QUARTER <= reach)
+    return ForcedAbsolute(left, pairs, away - QUARTER <= reach, target)
 
 
 class WorkAbsolute(Work):

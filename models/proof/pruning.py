@@ -46,6 +46,11 @@ class RemainingCells:
     beta_high: Floats
 
     @property
+    def nothing(self) -> bool:
+        """Whether a pixel has no cell, so that no field is left."""
+        return bool((np.add.reduceat(self.cells, self.lattice.start[:-1], dtype=np.int64) == 0).any())
+
+    @property
     def bounds(self) -> tuple[Floats, Floats]:
         """Least and greatest (alpha, beta) of the boxes, shapes (2n,)."""
         low = np.concatenate([self.alpha_low, self.beta_low])
@@ -66,7 +71,7 @@ def boxed(lattice: Lattice, cells: Bools) -> RemainingCells:
 def cells_left(lattice: Lattice, survives: Bools) -> Bools:
     """The cells whose vertices are allowed and of which one survives; both flat like the labels."""
     cells = np.zeros(len(survives), dtype=bool)
-    _mark_cells(_rectangles(lattice), lattice.allowed, survives, cells)
+    _mark_cells(rectangles(lattice), lattice.allowed, survives, cells)
     return cells
 
 
@@ -93,7 +98,7 @@ def _covering(left: RemainingCells, new: Lattice, times: int, side: Ints) -> Lat
     """The new lattice with the labels of `_allow` alone, and all labels that no stroke reaches."""
     allowed = new.allowed
     allowed[:] = False
-    _allow((_rectangles(left.lattice), left.cells), (_rectangles(new), allowed), times, side)
+    _allow((rectangles(left.lattice), left.cells), (rectangles(new), allowed), times, side)
     allowed |= np.repeat(~reached(new.instance), new.count)
     return new
 
@@ -103,8 +108,8 @@ def prolonged_shares(old: Lattice, state: State, new: Lattice) -> list[Floats]:
     grid, shares = old.instance.grid, []
     for ends, values in ((grid.first, state.shares_first), (grid.second, state.shares_second)):
         found = np.zeros(int(new.share_starts(ends)[-1]))
-        was = _rectangles(old), old.share_starts(ends), values
-        now = _rectangles(new), new.share_starts(ends), found
+        was = rectangles(old), old.share_starts(ends), values
+        now = rectangles(new), new.share_starts(ends), found
         _interpolate(was, now, ends, new.h / old.h, (new.offset, new.allowed))
         shares.append(found)
     return shares
@@ -117,14 +122,14 @@ def rows_of(lattice: Lattice) -> tuple[Starts, Starts, Starts]:
     """
     start = starts(lattice.alpha_count)
     begin, end = np.zeros(start[-1], np.int64), np.zeros(start[-1], np.int64)
-    _find_rows(_rectangles(lattice), lattice.allowed, start, begin, end)
+    _find_rows(rectangles(lattice), lattice.allowed, start, begin, end)
     return start, begin, end
 
 
 def _ends(lattice: Lattice, cells: Bools) -> Ints:
     """Least and greatest k, then l, of the vertices of each pixel's cells, shape (n, 4)."""
     ends = np.zeros((len(lattice.count), 4), np.int32)
-    _bounds(_rectangles(lattice), cells, ends)
+    _bounds(rectangles(lattice), cells, ends)
     return ends + np.stack([lattice.alpha_first] * 2 + [lattice.beta_first] * 2, axis=1)
 
 
@@ -138,7 +143,8 @@ class Rectangles(NamedTuple):
     first_column: Ints
 
 
-def _rectangles(lattice: Lattice) -> Rectangles:
+def rectangles(lattice: Lattice) -> Rectangles:
+    """The rectangles of labels of all pixels."""
     return Rectangles(
         lattice.start, lattice.alpha_count, lattice.beta_count, lattice.alpha_first, lattice.beta_first
     )

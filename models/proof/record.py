@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Final, Literal, Self
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self
 
 from ..array_archive import Arrays
 from ..field.field import CrossField, Norm
@@ -16,6 +16,19 @@ if TYPE_CHECKING:
 Status = Literal["optimal", "gap"]
 
 EXACT: Final = 1e-9  # gap relative to 1 + energy that rounding leaves when the true gap is zero
+
+
+class Branch(NamedTuple):
+    """The cells that a level covers: those of a level before it, or a part of them.
+
+    above: number of that level, -1 for none. pixel: that of a cut, or -1 for all cells. side: 0 for cells
+    below a step of alpha, 1 for those above, 2 and 3 the same for beta. step: the first one above the cut.
+    """
+
+    above: int
+    pixel: int = -1
+    side: int = 0
+    step: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +63,11 @@ class LevelRecord(Lattice):
 
     @classmethod
     def of(cls, dual: Dual, energy: float, least_gap: float = 0.0) -> Self:
-        """The record of a dual, whose shares and tables are first rounded, as for that gap at least."""
-        quanta = dual.quantise(max(energy - dual.bound(), least_gap))
+        """The record of a dual, whose shares and tables are first rounded, as for that gap at least.
+
+        Where the bound exceeds the energy, rounding costs a small part of the excess.
+        """
+        quanta = dual.quantise(max(abs(energy - dual.bound()), least_gap))
         return cls.on(dual.lattice, dual.arrays(quanta), bound=dual.bound(), energy=energy)
 
     @classmethod
@@ -79,7 +95,8 @@ class Proof(Claim):
     forced
         Number of pairs with the same jump in every field that could be better.
     levels
-        The last chain of lattices, coarsest first. Each follows from the one before.
+        The last chain of lattices, coarsest first. Each follows from the one before, or, if there are
+        branches, from that which they name.
     seconds
         Duration of the whole work.
     ended
@@ -94,6 +111,8 @@ class Proof(Claim):
     cuts
         For each piece, before its parts, the stroke at whose window it is cut into three, or -1 if it stays
         whole.
+    branches
+        For each level, what it follows from.
 
     """
 
@@ -104,3 +123,4 @@ class Proof(Claim):
     norm: Norm = 2
     multipliers: Floats | None = None
     cuts: tuple[int, ...] = (-1,)
+    branches: tuple[Branch, ...] = ()

@@ -12,6 +12,10 @@ them can be dropped, and the work of a pass falls faster than the gap. A record 
 Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
 lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second
 level if the best field has a vortex, and on every level where the gap shrinks slowly.
+
+What is left may contain several fields of nearly the least energy. Once all jumps are forced near the best
+one, what is left is cut into parts (parts.py). Each part has levels of its own until its bound, or that of
+the convex problem on its boxes, reaches the energy.
 """
 
 from __future__ import annotations
@@ -36,13 +40,14 @@ from ..search.improvement import improved_field
 from ..search.search import search_patches
 from ..search.starts import best_start, polyvector_start
 from .certificate import certificate_effort
-from .check_certificate import MOST_COUNT
+from .check_certificate import MOST_COUNT, MOST_LEVELS
 from .clusters import table_sizes
 from .dual import Divide, Dual
 from .forced import Forced, forced
 from .lattice import Lattice, labels_at, reached
+from .parts import Cut, across_seam, best_cut, island_of
 from .pruning import RemainingCells, finer, narrowed
-from .record import EXACT, LevelRecord, Proof, Status
+from .record import EXACT, Branch, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
 
 COARSEST: Final = 16  # steps in pi/2 of the first level
@@ -78,6 +83,7 @@ _LATE: Final = 0.1  # share of the time for the search before a level that takes
 _LONGER: Final = 2  # duration of a search, relative to the one before, below which it is left out
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
+_OPEN: Final = 0.25  # share of pairs that may be open near the best field when what is left is cut
 
 
 @dataclass
@@ -132,20 +138,73 @@ def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossF
 
 
 @dataclass
+class _Rest:
+    """The cells that a level leaves, and what their boxes force."""
+
+    left: RemainingCells
+    what: Forced
+
+
+@dataclass
+class _Waiting:
+    """A part of what a level leaves, and the dual there, for levels that are still to come."""
+
+    dual: Dual
+    left: RemainingCells
+    branch: Branch
+
+
+@dataclass
 class _Chain:
-    """The levels round one centre, the effort of a certificate of each, and what they prove together."""
+    """The levels round one centre, the effort of a certificate of each, and what they prove together.
+
+    branches: what each level covers; next: what the next one covers. last: bounds of the convex problems of
+    levels that are followed by none. waiting: parts without a level.
+    """
 
     levels: list[LevelRecord] = field(default_factory=list)
     efforts: list[float] = field(default_factory=list)
-    bound: float = 0.0
+    branches: list[Branch] = field(default_factory=list)
+    next: Branch = field(default_factory=lambda: Branch(-1))
+    last: dict[int, float] = field(default_factory=dict)
+    waiting: list[_Waiting] = field(default_factory=list)
     forced: int = 0
     multipliers: Floats | None = None
     cuts: tuple[int, ...] = (-1,)
 
     @property
+    def bound(self) -> float:
+        """The bound that all levels prove together."""
+        return self.bound_of(0) if self.levels else 0.0
+
+    def bound_of(self, number: int) -> float:
+        """The bound of the fields in the domain of a level."""
+        parts = [part for part, branch in enumerate(self.branches) if branch.above == number]
+        best = max(self.levels[number].bound, self.last.get(number, -math.inf))
+        if parts and (len(parts) == 2 or self.branches[parts[0]].pixel < 0):
+            best = max(best, min(map(self.bound_of, parts)))
+        return best
+
+    def add(self, level: LevelRecord, effort: float) -> None:
+        """Add a level, which covers `next`; the one that follows covers all that it leaves."""
+        self.levels.append(level)
+        self.efforts.append(effort)
+        self.branches.append(self.next)
+        self.next = Branch(len(self.levels) - 1)
+
+    @property
+    def branched(self) -> bool:
+        """Whether cells were cut into parts."""
+        return self.next.pixel >= 0 or any(branch.pixel >= 0 for branch in self.branches)
+
+    @property
     def ends(self) -> list[LevelRecord]:
-        """The last level of each spacing."""
-        return list({level.h: level for level in self.levels}.values())
+        """The last level of each spacing among those that led to the last one."""
+        path, number = list[LevelRecord](), len(self.levels) - 1
+        while number >= 0:
+            path.append(self.levels[number])
+            number = self.branches[number].above
+        return list({level.h: level for level in reversed(path)}.values())
 
 
 @dataclass
@@ -191,7 +250,7 @@ class Work:
         status: Status = "optimal" if self._exact(bound) else "gap"
         return Proof(
             self.best, energy, bound, status, self.proven.forced, tuple(self.proven.levels), seconds, ended,
-            self.norm, self.proven.multipliers, self.proven.cuts,
+            self.norm, self.proven.multipliers, self.proven.cuts, tuple(self.proven.branches),
         )  # fmt: skip
 
     def run(self) -> str:
@@ -228,9 +287,12 @@ class Work:
         while True:
             self._add_clusters(dual)
             rising = self._ascend(dual, patient=patient)
-            left = self._record(dual)
-            if (ended := self._ended()) or left is None:
+            rest = self._record(dual)
+            if (ended := self._ended()) or rest is None:
                 return ended or "time"
+            if (cut := self._cut(rest)) is not None:
+                return self._go_through_parts(dual, rest, cut)
+            left = rest.left
             lattice = narrowed(left) if rising and not patient else finer(left)
             self._search_between(lattice)
             better = self.energy(self.best) < self.energy(before) * (1 - _BETTER)
@@ -245,6 +307,60 @@ class Work:
             patient = lattice.h == dual.lattice.h and (patient or not rising)
             self.limits.keep(self._effort_with(dual, lattice))
             dual.move(lattice)
+
+    def _cut(self, rest: _Rest) -> Cut | None:
+        """Where to cut what a level leaves, if only a few jumps are open near the best field."""
+        if self.norm != 2 or self.divide is not None:
+            return None
+        alpha, beta, jumps = labels_at(self.best, rest.left.lattice)
+        left = replace(rest.left, lattice=replace(rest.left.lattice, p=jumps))
+        island = island_of(left, alpha, beta)
+        what = None if island is None else self.forced(island)
+        if what is None or not what.strokes.all() or np.mean(~what.pairs) > _OPEN:
+            return None
+        return best_cut(rest.left, rest.what.open_pixels)
+
+    def _go_through_parts(self, dual: Dual, rest: _Rest, cut: Cut) -> str:
+        """Cut what is left into parts, and go through the levels of each; the reason of the end."""
+        self._wait(dual, rest, cut)
+        while self.chain.waiting:
+            part = self.chain.waiting.pop()
+            dual, self.chain.next = part.dual, part.branch
+            if ended := self._go_through_part(dual, narrowed(part.left)):
+                return ended
+        return "labels"
+
+    def _go_through_part(self, dual: Dual, lattice: Lattice) -> str:
+        """Go through the levels of a part, up to another cut; the reason of the end of the whole work."""
+        while True:
+            if _too_large(dual, lattice) or len(self.chain.levels) >= MOST_LEVELS:
+                return "labels"
+            if not self._in_time(dual, lattice):
+                return self.limits.met() or "time"
+            self.limits.keep(self._effort_with(dual, lattice))
+            dual.move(lattice)
+            rising = self._ascend(dual, patient=False, reached=self.chain.bound_of(self.chain.next.above))
+            rest = self._record(dual)
+            if ended := self._ended():
+                return ended
+            if self._exact(self.chain.bound_of(len(self.chain.levels) - 1)):
+                return ""
+            if rest is None:
+                return self.limits.met() or "time"
+            cut = best_cut(rest.left, rest.what.open_pixels)
+            if cut is not None:
+                self._wait(dual, rest, cut)
+                return ""
+            lattice = narrowed(rest.left) if rising else finer(rest.left)
+
+    def _wait(self, dual: Dual, rest: _Rest, cut: Cut) -> None:
+        """Let both parts of what is left wait; the one with fewer cells comes first."""
+        number = len(self.chain.levels) - 1
+        parts = [
+            _Waiting(dual.copy(), part, Branch(number, cut.pixel, 2 * cut.axis + side, cut.step))
+            for side, part in enumerate(cut.parts(rest.left))
+        ]
+        self.chain.waiting += sorted(parts, key=lambda part: -np.count_nonzero(part.left.cells))
 
     def _search_between(self, lattice: Lattice) -> None:
         """Search after the first level if the gap is wide, after some levels, and before one that takes long.
@@ -330,15 +446,14 @@ class Work:
     def _offer(self, found: CrossField) -> None:
         self.best = min(self.best, found, key=self.energy)
 
-    def _ascend(self, dual: Dual, *, patient: bool) -> bool:
+    def _ascend(self, dual: Dual, *, patient: bool, reached: float = -math.inf) -> bool:
         """Raise the dual of a level, and round fields from it, until the bound's rise is slow.
 
         Returns whether it is not, but the gap has become so small that passes over fewer labels are worth a
-        record. patient: whether there is no finer level.
+        record. patient: whether there is no finer level. reached: a bound from which the rise counts.
         """
         rounding, closing = Rounding(dual, self.improve), self._closing(dual)
-        rises = [np.inf, np.inf]
-        reached = -np.inf
+        rises = [math.inf if reached == -math.inf else 0.0] * 2
         for _ in range(_MOST_ROUNDS):
             bound = dual.ascend(_PASSES, self.limits.over, closing)
             self.best = rounding.lower(self.best, closing)
@@ -346,7 +461,7 @@ class Work:
             self._report(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
             rises = [rises[1], (bound - reached) / max(energy - bound, 1e-300)]
             slow = _SLOWEST if patient else self._slow(dual, bound)
-            if closing() or self._exact(bound) or max(rises) <= slow:
+            if closing() or self._exact(bound) or (max(rises) <= slow and bound >= reached):
                 break
             if self._may_narrow(dual, bound):
                 return True
@@ -370,34 +485,39 @@ class Work:
         self.limits.labels += labels
         self.progress(f"energy {self.energy(self.best):.5g}, bound {bound:.5g}, {labels} labels")
 
-    def _record(self, dual: Dual) -> RemainingCells | None:
-        """Record the level and, in time, prune it; the cells that are left."""
+    def _record(self, dual: Dual) -> _Rest | None:
+        """Record the level and, in time, prune it; what is left, if that does not end the level."""
         chain, energy = self.chain, self.energy(self.best)
         rough = _ROUGH * (1 + energy)
-        level, left = LevelRecord.of(dual, energy, rough if energy - chain.bound > rough else 0.0), None
+        level, rest = LevelRecord.of(dual, energy, rough if energy - chain.bound > rough else 0.0), None
         if level.bound > chain.bound or not self.limits.over():
-            chain.levels.append(level)
-            chain.efforts.append(certificate_effort(dual.lattice, dual.quads))
-            chain.bound = max(chain.bound, level.bound)
-        if not self.limits.over():
+            chain.add(level, certificate_effort(dual.lattice, dual.quads))
+        if not self.limits.over() and not (chain.branched and self._exact(level.bound)):
             left = dual.remaining_cells(level.bound, energy)
-            _, _, jumps = labels_at(self.best, left.lattice)
-            what = self.forced(replace(left, lattice=replace(left.lattice, p=jumps)))
-            chain.forced = int(what.pairs.sum())
-            self._fit(what)
+            if left.nothing:
+                chain.last[len(chain.levels) - 1] = energy
+            else:
+                rest = _Rest(left, self._fit(left))
         if chain.bound >= self.proven.bound:
             self.proven = chain
-        return left
+        return rest
 
-    def _fit(self, what: Forced) -> None:
-        """Solve the convex problem that is left, if all is forced."""
+    def _fit(self, left: RemainingCells) -> Forced:
+        """Find what is forced, and if all is, solve the convex problem that is left."""
+        chain, (_, _, jumps) = self.chain, labels_at(self.best, left.lattice)
+        what = self.forced(replace(left, lattice=replace(left.lattice, p=jumps)))
+        if what.everything or not chain.branched:
+            chain.forced = int(what.pairs.sum())
+        if not what.everything and self.norm == 2:
+            what = forced(*across_seam(left))
         if what.everything:
-            found, bound, self.chain.multipliers, self.chain.cuts = what.least(
-                self.energy(self.best), self.limits.over
-            )
-            jumps = relabelled(self.instance, found.alpha, found.beta, found.p)
-            self._offer(self.improved(jumps, self.limits.over))
-            self.chain.bound = max(self.chain.bound, min(bound, self.chain.levels[-1].energy))
+            energy = self.energy(self.best)
+            found, bound, chain.multipliers, chain.cuts = what.least(energy, self.limits.over)
+            chain.last[len(chain.levels) - 1] = min(bound, chain.levels[-1].energy)
+            if bound < energy:
+                better = relabelled(self.instance, found.alpha, found.beta, found.p)
+                self._offer(self.improved(better, self.limits.over))
+        return what
 
 
 def _seconds_of(passes: int, dual: Dual, lattice: Lattice) -> float:
