@@ -26,7 +26,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from copy import copy
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -48,6 +47,8 @@ _LOST: Final = 0.1  # share of the gap that rounding may cost at most; a fifth o
 _TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
 _ROUNDING: Final = 32 * 2.0**-53
 """Relative error of a term: eight numbers, with angles right to four units in the last place, squared."""
+
+_KEPT: Final = ("places", "_saved")  # attributes that stay the same when a dual returns to a former state
 
 Answer = Callable[[], Any]
 """Waits for the result of a call, and returns it."""
@@ -92,6 +93,7 @@ class Dual:
     def __init__(self, lattice: Lattice, crew: Crew, divide: Divide | None = None) -> None:
         """Start from zero shares and without clusters. divide: None for one strip with the crew's threads."""
         self.lattice = lattice
+        self._saved: dict[int, dict[str, Any]] = {}
         whole = slice(0, len(lattice.count))
         self.places = divide(lattice) if divide else [Here(Strip(part_of(lattice, whole), crew))]
         self.quads = np.zeros((0, 4), np.int64)  # those with clusters, as in `Grid.quads`
@@ -100,11 +102,15 @@ class Dual:
         self._times, self._reached = 0, -math.inf
         self._left_by_combs = 1.0
 
-    def copy(self) -> Dual:
-        """The same dual, which stays as it is when this one moves to another lattice."""
-        found = copy(self)
-        found.places = [Here(copy(place.strip)) for place in self.places if isinstance(place, Here)]
-        return found
+    def save(self, name: int) -> None:
+        """Keep what the dual is now under a name, until `restore` asks for it the last time."""
+        self._all("save", name)
+        self._saved[name] = {key: value for key, value in vars(self).items() if key not in _KEPT}
+
+    def restore(self, name: int, *, last: bool) -> None:
+        """Return to what was kept under a name."""
+        self._all("restore", name, last=last)
+        vars(self).update(self._saved.pop(name) if last else self._saved[name])
 
     def _all(self, name: str, *arguments: Any, **named: Any) -> list[Any]:
         """The results of all strips."""

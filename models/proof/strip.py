@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,7 @@ class Strip:
 
     def __init__(self, part: Part, crew: Crew) -> None:
         """Start on a part of a lattice, with the threads of a crew."""
+        self._saved: dict[int, dict[str, Any]] = {}
         self.lattice, self.own, self.crew = part.lattice, part.own, crew
         grid = self.lattice.instance.grid
         mine = np.zeros(grid.size, dtype=bool)
@@ -113,6 +114,14 @@ class Strip:
         self.lattice = lattice
         del self.state, state  # the new arrays need its memory
         self._begin(shares, clusters)
+
+    def save(self, name: int) -> None:
+        """Keep the present state under a name. Moves to other lattices leave its arrays as they are."""
+        self._saved[name] = {key: value for key, value in vars(self).items() if key != "_saved"}
+
+    def restore(self, name: int, *, last: bool) -> None:
+        """Return to the state under a name, which is forgotten if it is the last time."""
+        vars(self).update(self._saved.pop(name) if last else self._saved[name])
 
     def _find_edges(self) -> None:
         """Find the places of shares of the pairs above and below: at the own ends, and at the others."""

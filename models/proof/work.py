@@ -147,9 +147,8 @@ class _Rest:
 
 @dataclass
 class _Waiting:
-    """A part of what a level leaves, and the dual there, for levels that are still to come."""
+    """A part of what a level leaves, for levels that are still to come."""
 
-    dual: Dual
     left: RemainingCells
     branch: Branch
 
@@ -175,7 +174,7 @@ class _Chain:
     @property
     def bound(self) -> float:
         """The bound that all levels prove together."""
-        return self.bound_of(0) if self.levels else 0.0
+        return max(0.0, self.bound_of(0)) if self.levels else 0.0
 
     def bound_of(self, number: int) -> float:
         """The bound of the fields in the domain of a level."""
@@ -310,7 +309,7 @@ class Work:
 
     def _cut(self, rest: _Rest) -> Cut | None:
         """Where to cut what a level leaves, if only a few jumps are open near the best field."""
-        if self.norm != 2 or self.divide is not None:
+        if self.norm != 2:
             return None
         alpha, beta, jumps = labels_at(self.best, rest.left.lattice)
         left = replace(rest.left, lattice=replace(rest.left.lattice, p=jumps))
@@ -325,7 +324,9 @@ class Work:
         self._wait(dual, rest, cut)
         while self.chain.waiting:
             part = self.chain.waiting.pop()
-            dual, self.chain.next = part.dual, part.branch
+            self.chain.next = part.branch
+            above = [each.branch.above for each in self.chain.waiting]
+            dual.restore(part.branch.above, last=part.branch.above not in above)
             if ended := self._go_through_part(dual, narrowed(part.left)):
                 return ended
         return "labels"
@@ -356,8 +357,9 @@ class Work:
     def _wait(self, dual: Dual, rest: _Rest, cut: Cut) -> None:
         """Let both parts of what is left wait; the one with fewer cells comes first."""
         number = len(self.chain.levels) - 1
+        dual.save(number)
         parts = [
-            _Waiting(dual.copy(), part, Branch(number, cut.pixel, 2 * cut.axis + side, cut.step))
+            _Waiting(part, Branch(number, cut.pixel, 2 * cut.axis + side, cut.step))
             for side, part in enumerate(cut.parts(rest.left))
         ]
         self.chain.waiting += sorted(parts, key=lambda part: -np.count_nonzero(part.left.cells))
