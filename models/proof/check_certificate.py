@@ -84,15 +84,20 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
    trees for each pixel: its row, without gaps of the mask, with the columns that cross it; and its column,
    with the rows that cross it.
 
-4. Optimality. The last cells span a box for each pixel. There p is a best jump everywhere if max |A| <= pi/2
-   and pi max |A| - pi^2/4 <= 4 min (-1)^p beta_i beta_j: against p +- 1, A'^2 - A^2 >= pi^2/4 - pi |A| and
-   B^2 - B'^2 = -4 (-1)^p beta_i beta_j; against others |A| <= pi/2 is enough. Let a = alpha - theta, |a| <= 3
-   pi/4. Where |a| <= pi/4 the nearest line is u at this turn. At a = pi/4 + e it is v, with 4 e (pi/4 + beta)
-   less in its square, at a = -pi/4 - e with 4 e (pi/4 - beta) less: the squares differ by (u - v)(u + v),
-   with v = a - pi/2 - beta and v = a + pi/2 - beta. With the greatest e of the box these are linear in beta;
-   or the box is cut at the edge, and v carries the stroke beyond. So F is at least a convex quadratic G on
-   each piece, and G(y) >= G(x) + grad G(x) (y - x), whose least value over the y in a box is a sum of single
-   terms.
+   What a level leaves may be cut in two, between two steps of alpha or of beta at one pixel. Each cell of
+   that pixel is on one side. So a field of energy U or less has all its crosses in one of the two parts, and
+   each part may have levels of its own. F is then at least the lesser of their bounds, or U.
+
+4. Optimality. The last cells, of each part, span a box for each pixel. Cells above a gap in alpha may have
+   their other label there, (alpha - pi/2, -beta), if that makes the box narrower. There p is a best jump
+   everywhere if max |A| <= pi/2 and pi max |A| - pi^2/4 <= 4 min (-1)^p beta_i beta_j: against p +- 1, A'^2
+   - A^2 >= pi^2/4 - pi |A| and B^2 - B'^2 = -4 (-1)^p beta_i beta_j; against others |A| <= pi/2 is enough.
+   Let a = alpha - theta, |a| <= 3 pi/4. Where |a| <= pi/4 the nearest line is u at this turn. At a = pi/4 +
+   e it is v, with 4 e (pi/4 + beta) less in its square, at a = -pi/4 - e with 4 e (pi/4 - beta) less: the
+   squares differ by (u - v)(u + v), with v = a - pi/2 - beta and v = a + pi/2 - beta. With the greatest e of
+   the box these are linear in beta; or the box is cut at the edge, and v carries the stroke beyond. So F is
+   at least a convex quadratic G on each piece, and G(y) >= G(x) + grad G(x) (y - x), whose least value over
+   the y in a box is a sum of single terms.
 
 5. Absolute values. In the norm 1 the terms of F are 2 (|A| + |B|), W |R| and w_beta |beta|. In the norm
    "mixed" only those of pairs are; the others stay squares. The differences from 2 and 4 are these. There is
@@ -1461,7 +1466,7 @@ def lower_bound(
         return -math.inf
     if sketch.norm != 2:
         return pieces_bound(sketch, p, turned, boxes, steps)
-    above, below = beyond_windows(turned, boxes[:, [1, 0, 2, 3]]) >= 0  # the whole box is beyond
+    above, below = beyond_windows(turned, boxes[:, [1, 0, 2, 3]]) > 1e-12  # the whole box is beyond
     waiting = [Piece(boxes, above.astype(np.int64) - below, -math.inf)]
     found = []
     for _ in range(MOST_PIECES):

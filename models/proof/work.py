@@ -83,7 +83,7 @@ _LATE: Final = 0.1  # share of the time for the search before a level that takes
 _LONGER: Final = 2  # duration of a search, relative to the one before, below which it is left out
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
-_OPEN: Final = 0.25  # share of pairs that may be open near the best field when what is left is cut
+_OPEN: Final = 0.05  # share of pairs that may be open near the best field when what is left is cut
 
 
 @dataclass

@@ -9,7 +9,6 @@ import json
 import sys
 import zipfile
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +72,7 @@ class Level:
     quads: list  # pixels a, b, c, d and the tables of the pairs (a, b), (b, c), (d, c), (a, d)
     absolute: bool  # whether pairs count with absolute values
     bound: float = 0.0
-    left: list = field(default_factory=list)  # per pixel, remaining cells as rows (a0, a1, b0, b1)
+    left: list = field(default_factory=list)  # per pixel, remaining cells as rows (a0, a1, b0, b1, k, l)
 
     def places(self, i):
         """Alpha of every k and beta of every l of a pixel."""
@@ -391,7 +390,7 @@ def on_combs(rest, slacks, teeth):
 
 
 def remaining(level, i, tests):
-    """Cells of the domain with a good corner in each test, cut at |beta| = pi/4: rows (a0, a1, b0, b1)."""
+    """Cells of the domain with a good corner in each test, cut at |beta| = pi/4, as rows of `Level.left`."""
     cells = all_four(level.allowed[i])
     for test in tests:
         good = np.zeros_like(level.allowed[i])
@@ -400,14 +399,15 @@ def remaining(level, i, tests):
     k, low = np.nonzero(cells)
     alpha, beta = level.places(i)
     ends = alpha[k], alpha[k + 1], np.maximum(beta[low], -PI / 4), np.minimum(beta[low + 1], PI / 4)
-    return np.stack(ends, axis=1)[ends[3] - ends[2] > 2 * SLIVER]
+    steps = [np.floor(each[at]) for each, at in zip(level.steps[i], (k, low), strict=True)]
+    return np.stack([*ends, *steps], axis=1)[ends[3] - ends[2] > 2 * SLIVER]
 
 
 def covered(level, i, cells):
     """Whether the domain of a level contains each of the cells."""
     inside, (alpha, beta) = all_four(level.allowed[i]), level.places(i)
     result = np.zeros(len(cells), bool)
-    for c, (a0, a1, b0, b1) in enumerate(cells):
+    for c, (a0, a1, b0, b1, *_) in enumerate(cells):
         ks = (alpha[:-1] < a1 - SLIVER) & (alpha[1:] > a0 + SLIVER)
         ls = (beta[:-1] < b1 - SLIVER) & (beta[1:] > b0 + SLIVER)
         reach = alpha[0] - SLIVER <= a0 and a1 <= alpha[-1] + SLIVER
@@ -416,15 +416,41 @@ def covered(level, i, cells):
     return result
 
 
-def check_covers(problem, levels):
-    """The first level covers the strip, and each later one what remains of the level before."""
+def branches_of(arrays, problem, count):
+    """For each level, the level whose cells it covers, and the part of them: pixel, side and step."""
+    rows = [[k - 1, -1, 0, 0] for k in range(count)]
+    if problem.norm == 2 and "branches" in arrays:
+        rows = take(arrays, "branches", "<i4", count, 4).tolist()
+    need(rows[0] == [-1, -1, 0, 0], "branches: the first level follows another one")
+    for k, (above, pixel, side, _) in enumerate(rows[1:], 1):
+        known = 0 <= above < k and -1 <= pixel < len(problem.pixels) and 0 <= side < 4
+        need(known, f"branches: level {k} covers nothing known")
+    for k in range(count):
+        parts = [row[1:] for row in rows[1:] if row[0] == k]
+        if len(parts) > 1:
+            pixel, side, step = parts[0]
+            need(pixel >= 0 and parts[1:] == [[pixel, side ^ 1, step]], f"branches: the parts of level {k}")
+    return rows
+
+
+def part_of(cells, i, pixel, side, step):
+    """The remaining cells of pixel i that belong to a part."""
+    if i != pixel:
+        return cells
+    above = cells[:, 4 + side // 2] >= step
+    return cells[above if side % 2 else ~above]
+
+
+def check_covers(problem, levels, branches):
+    """The first level covers the strip, and each later one what remains of another, or a part of that."""
     for i, pixel in enumerate(problem.pixels):
         low = levels[0].places(i)[0][0]
         whole = covered(levels[0], i, [(low, low + PI / 2, -PI / 4, PI / 4)]).all()
         need(whole, f"level_0_allowed: does not cover the strip at pixel {pixel}")
-    for level, after in pairwise(levels):
+    for after, (above, *part) in zip(levels[1:], branches[1:], strict=True):
+        level = levels[above]
         for i, pixel in enumerate(problem.pixels):
-            whole = covered(after, i, level.left[i]).all()
+            whole = covered(after, i, part_of(level.left[i], i, *part)).all()
             what = f"what level {level.number} leaves at pixel {pixel}"
             need(whole, f"level_{after.number}_allowed: does not cover {what}")
 
@@ -432,14 +458,32 @@ def check_covers(problem, levels):
 # Section 6: the last step -----------------------------------------------------------------------------------
 
 
-def boxes_of(problem, levels):
-    """Box of every pixel around the remaining cells of the last level: rows (a0, a1, b0, b1)."""
-    cells, margin = levels[-1].left, 2 * (len(levels) + 1) * SLIVER
-    last = f"level_{len(levels) - 1}_allowed"
-    need(all(map(len, cells)), f"{last}: no cell remains at a pixel, not even that of the field")
+def boxes_of(cells, margin):
+    """Box of every pixel around its remaining cells: rows (a0, a1, b0, b1)."""
     ends = np.array([[*c.min(axis=0)[[0, 2]], *c.max(axis=0)[[1, 3]]] for c in cells])
     a0, b0, a1, b1 = (ends + np.array([-margin, -margin, margin, margin])).T
     return np.stack([a0, a1, np.maximum(b0, -PI / 4), np.minimum(b1, PI / 4)], axis=1)
+
+
+def across_seam(cells):
+    """The cells of a pixel, those above the widest gap with their other label if all are closer then."""
+    steps = np.unique(cells[:, 4])
+    if (np.diff(steps) <= 1).all():
+        return cells
+    other, above = cells.copy(), cells[:, 4] > steps[np.diff(steps).argmax()]
+    other[above, :2] -= PI / 2
+    other[above, 2], other[above, 3] = -cells[above, 3], -cells[above, 2]
+    width = [each[:, 1].max() - each[:, 0].min() for each in (cells, other)]
+    return other if width[1] < width[0] else cells
+
+
+def in_the_middle(problem, boxes):
+    """The crosses in the middle of boxes with their best jumps, in place of the field."""
+    alpha, beta = boxes.reshape(-1, 2, 2).mean(axis=2).T
+    i, j = problem.pairs.T
+    p = np.rint((alpha[j] - alpha[i]) / (PI / 2)) + np.array([[0], [-1], [1]])
+    costs = (alpha[i] - alpha[j] + PI / 2 * p) ** 2 + ((-1.0) ** p * beta[i] - beta[j]) ** 2
+    return replace(problem, alpha=alpha, beta=beta, p=p[costs.argmin(axis=0), np.arange(len(i))])
 
 
 def relabelled(problem, level):
@@ -466,7 +510,7 @@ def check_jumps(problem, boxes):
         need(forced, f"p: another jump may be better at the pixels {problem.pixels[[i, j]].tolist()}")
 
 
-def convex_bound(problem, boxes):
+def convex_bound(problem, boxes, enough):
     """Least bound of all pieces of the boxes, which are cut at |alpha - theta| = pi/4 where that helps."""
     theta = problem.theta + PI * np.rint((problem.alpha - problem.theta) / PI)
     boxes = boxes - np.stack(
@@ -474,8 +518,8 @@ def convex_bound(problem, boxes):
     )  # alpha is now relative to the stroke
     far = (problem.weight > 0) & (abs(boxes[:, :2]).max(axis=1) > 3 * PI / 4)
     need(not far.any(), f"lemma 5 does not apply at the stroke of pixel {problem.pixels[far.argmax()]}")
-    enough = problem.energy() - TOLERANCE / 2 * max(1, problem.energy())
-    bound, count, pieces = np.inf, 0, [(boxes, np.zeros(len(theta)))]
+    beyond = 1.0 * (boxes[:, 0] >= PI / 4) - (boxes[:, 1] <= -PI / 4)
+    bound, count, pieces = np.inf, 0, [(boxes, beyond)]
     while pieces:
         (boxes, side), count = pieces.pop(), count + 1
         least, lost = piece_bound(problem, theta, boxes, side)
@@ -490,7 +534,7 @@ def convex_bound(problem, boxes):
     return bound
 
 
-def multipliers_bound(problem, boxes):
+def multipliers_bound(problem, boxes, _):
     """Least bound of the pieces of the boxes that section 9 describes."""
     theta = problem.theta + PI * np.rint((problem.alpha - problem.theta) / PI)
     away = abs(boxes[:, :2] - theta[:, None]).max(axis=1)[problem.weight > 0]
@@ -606,29 +650,51 @@ def check(arrays):
     need(head.get("status") in {"optimal", "gap"}, "head: the status is neither optimal nor gap")
     norm = head.get("norm")
     need(type(norm) in {int, str} and norm in {1, 2, "mixed"}, "head: the norm")
-    problem, count = problem_of(arrays, norm), number(head, "levels", 1, 64)
+    problem, count = problem_of(arrays, norm), number(head, "levels", 1, 256)
     energy, claimed = problem.energy(), number(head, "energy", 0, 1e300)
     need(count == int(count), f"head: {count} levels")
     need(abs(energy - claimed) <= 1e-12 * max(1, energy), f"head: the energy is {energy}, not {claimed}")
 
-    levels = levels_of(arrays, problem, int(count))
-    bound = max(0.0, min(max(level.bound for level in levels), energy))
-    boxes, field = boxes_of(problem, levels), relabelled(problem, levels[0])
-    try:
-        check_jumps(field, boxes)
-        last = (convex_bound if norm == 2 else multipliers_bound)(field, boxes)
-        bound = max(bound, float(min(last, energy)))
-        why = f"with a bound of {bound}"
-    except Refused as refusal:  # the bound of a level may be enough
-        why = str(refusal)
+    branches = branches_of(arrays, problem, int(count))
+    levels = levels_of(arrays, problem, branches)
+    below, why = proven_from(0, problem, levels, branches)
+    need(below < np.inf, "the levels leave no cell, not even those of the field")
+    bound = max(0.0, float(min(below, energy)))
     optimal = bound >= energy - TOLERANCE * max(1, energy)
-    need(optimal or head["status"] == "gap", f"head: not optimal, {why}")
+    need(optimal or head["status"] == "gap", f"head: not optimal, with a bound of {bound}{why}")
     need(number(head, "bound", -1e300, 1e300) <= bound, f"head: the bound is {bound}, not {head['bound']}")
     return bound
 
 
-def levels_of(arrays, problem, count):
+def proven_from(k, problem, levels, branches):
+    """Lower bound of the fields of energy U or less in the domain of level k, and why it is not higher."""
+    level, parts = levels[k], [part for part, row in enumerate(branches) if part and row[0] == k]
+    if len(parts) == 2 or [branches[part][1] for part in parts] == [-1]:
+        bound, why = min(proven_from(part, problem, levels, branches) for part in parts)
+    elif not all(map(len, level.left)):
+        bound, why = np.inf, ""
+    else:
+        bound, why = last_step(problem, levels[0], level, 2 * (len(levels) + 1) * SLIVER)
+    return max(level.bound, bound), why
+
+
+def last_step(problem, first, level, margin):
+    """Section 6 after a level: a lower bound, -inf where the lemmas do not apply, and the reason."""
+    enough = problem.energy() - TOLERANCE / 2 * max(1, problem.energy())
+    boxes, turned = (boxes_of(cells, margin) for cells in (level.left, [*map(across_seam, level.left)]))
+    tries = [(relabelled(problem, first), boxes), (in_the_middle(problem, turned), turned)]
+    for crosses, these in tries[: 2 if problem.norm == 2 else 1]:
+        try:
+            check_jumps(crosses, these)
+            return (convex_bound if problem.norm == 2 else multipliers_bound)(crosses, these, enough), ""
+        except Refused as refusal:
+            why = f"; {refusal}"
+    return -np.inf, why
+
+
+def levels_of(arrays, problem, branches):
     """All levels, each with its bound and with the domain that it needs."""
+    count = len(branches)
     slack = 2 * (count + 1) * SLIVER * (64 + 8 * problem.weight + 4 * problem.w_beta).sum()
     levels = [level_of(arrays, k, problem) for k in range(count)]
     need(not arrays, f"{next(iter(arrays), '')} belongs to no certificate with {count} levels")
@@ -637,7 +703,7 @@ def levels_of(arrays, problem, count):
             (level.centre == levels[0].centre).all(), f"level_{level.number}_alpha or beta: not as at level 0"
         )
         examine(problem, level, slack)
-    check_covers(problem, levels)
+    check_covers(problem, levels, branches)
     return levels
 
 

@@ -24,7 +24,7 @@ from crossfield.models.search.absolute_fit import settled_absolute
 from exhaustive import optimum, random_instance
 
 REFUSED = (check_certificate.RefusedError, check_certificate.UnreadableError, second_checker.Refused)
-KINDS = ("optimal", "a window binds", "a worse field", "tables", "norm 1", "norm mixed")
+KINDS = ("optimal", "a window binds", "a worse field", "tables", "parts", "norm 1", "norm mixed")
 COARSE = 2.0**-12
 TRIES = 7
 """Places of every array that are changed, each once up and once down."""
@@ -34,10 +34,12 @@ def proof_of_kind(kind):
     """A proof of four pixels."""
     if kind.startswith("norm"):
         return prove(random_instance(2, (2, 2), 4), norm=1 if kind == "norm 1" else "mixed", jobs=1)
-    seed = {"optimal": 1, "a window binds": 6, "a worse field": 4, "tables": 3}[kind]
+    seed = {"optimal": 1, "a window binds": 6, "a worse field": 4, "tables": 3, "parts": 1}[kind]
     field = optimum(random_instance(seed, (2, 2), 4))
     if kind == "a worse field":
         field = CrossField(field.instance, field.alpha, field.beta + np.array([0, 0.01, 0, 0]), field.p)
+    if kind == "parts":
+        return plain_prover.proof_in_parts(field)
     proof = plain_prover.proof_of(field, levels=3, most=800)
     if kind == "tables":
         *before, last = proof.levels

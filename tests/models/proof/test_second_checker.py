@@ -3,6 +3,7 @@
 import ast
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.prove import prove
 from crossfield.models.sketch.samples import sample
 from exhaustive import optimum, random_instance
-from plain_prover import proof_of
+from plain_prover import proof_in_parts, proof_of
 from second_checker import Refused, arrays_of, check
 
 pytestmark = pytest.mark.numeric
@@ -55,6 +56,20 @@ def test_the_bound_of_a_certificate_with_a_gap_is_confirmed(gauge, seed, tmp_pat
     written = write_certificate(proof_of(optimum(instance), levels=3, most=800), path)
     assert written.status == "gap"
     assert 0 < written.bound <= check(arrays_of(path)) <= written.bound + 1e-9
+
+
+def test_a_level_in_two_parts_is_confirmed_and_none_may_be_left_out(tmp_path):
+    """A part without a level counts with the bound of the level that was cut."""
+    path, field = tmp_path / "it.npz", optimum(random_instance(1, (2, 2), 4))
+    proof = proof_in_parts(field)
+    whole = write_certificate(proof, path)
+    assert whole.bound <= check(arrays_of(path)) <= whole.bound + 1e-9
+    assert whole.bound > proof.bound + 0.1 * (field.energy().total - proof.bound)
+    for kept in (0, 1), (0, 2):
+        levels, branches = ([each[k] for k in kept] for each in (proof.levels, proof.branches))
+        half = write_certificate(replace(proof, levels=levels, branches=branches), path)
+        assert half.bound <= check(arrays_of(path)) <= half.bound + 1e-9
+        assert half.bound < proof.bound + 1e-3
 
 
 @pytest.mark.slow
