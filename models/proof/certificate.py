@@ -71,7 +71,7 @@ _COSTS: Final = 25_000.0  # of pairs in alpha or in beta, per unit of effort
 _TERMS: Final = 2_000_000.0  # an alpha of one pixel and an allowed label of its neighbour, per unit of effort
 _QUAD: Final = 2.7  # effort for each quad with tables, besides that for their numbers
 _NUMBERS: Final = 7_000.0  # of tables, per unit of effort
-_SPARE_TIME: Final = 1.5  # safety factor: files are compressed, and the machine may become busier
+_SPARE_TIME: Final = 1.1  # safety factor: the machine may become busier
 _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
 

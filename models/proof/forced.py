@@ -28,6 +28,7 @@ from .pruning import RemainingCells
 from .record import EXACT
 
 _MOST_PIECES: Final = 60
+_MOST_CROSSED: Final = 6  # strokes whose windows the boxes exceed; with more, all pieces are too many
 _MARGIN: Final = 1e-9  # radians
 _ROUNDING: Final = 1e-10  # deduction from a bound, relative to 1 + its value: float64 loses some 1e-12 in it
 
@@ -91,7 +92,8 @@ class Forced:
         """
         waiting: list[tuple[float, Piece | None]] = [(-np.inf, self.whole)]
         found, whole, cuts = list[Least](), list[Least | None](), list[int]()
-        while waiting and len(found) < _MOST_PIECES and not (found and over()):
+        few = np.count_nonzero(np.add(*self.whole.beyond)) <= _MOST_CROSSED
+        while waiting and len(found) < (_MOST_PIECES if few else 1) and not (found and over()):
             _, piece = waiting.pop()
             cuts.append(-1)
             if piece is None:

@@ -55,6 +55,7 @@ _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
 _PASSES: Final = 3  # forwards and backwards between two roundings
 _BEFORE: Final = 9  # forwards and backwards before the gap shows where the first clusters are needed
 _SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on, if labels do not grow
+_SLOW_PART: Final = 0.5  # the same in a part, which is easily cut again
 _SLOWEST: Final = 0.005  # the same on the last level
 _HALVES: Final = 4  # labels at half the spacing for each one that is left
 _NARROWED: Final = 0.5  # share of the labels that are left, at which passes go on over these only
@@ -78,12 +79,13 @@ _NEAR: Final = 0.75  # of the greatest distance from the centre that an alpha ca
 _ROUGH: Final = 1e-5  # gap relative to 1 + energy; a first smaller one is rounded like it: few digits may do
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
+_PACED: Final = 2.0  # seconds until the pace is measured again
 _SEARCH: Final = 0.03  # greatest share of the time for that search, no longer than the proof so far
 _LATE: Final = 0.1  # share of the time for the search before a level that takes long
 _LONGER: Final = 2  # duration of a search, relative to the one before, below which it is left out
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
-_OPEN: Final = 0.05  # share of pairs that may be open near the best field when what is left is cut
+_OPEN: Final = 0.5  # share of pairs that may be open near the best field when what is left is cut
 
 
 @dataclass
@@ -92,7 +94,7 @@ class WorkLimits:
 
     whole: the deadline of proof and certificate. certified: whether to keep time for a certificate. work:
     greatest number of labels; labels: those so far. measured: measures the seconds per unit of the
-    certificate's effort; pace: the last of them. kept: the seconds that the certificate is expected to take.
+    certificate's effort; pace: the last of them, and paced: the time of the monotonic clock then. kept: the seconds that the certificate is expected to take.
     """
 
     whole: Deadline
@@ -102,6 +104,7 @@ class WorkLimits:
     work: float
     labels: int = 0
     pace: float = 0.0
+    paced: float = -math.inf
     kept: float = 0.0
     measured: Callable[[], float] = field(kw_only=True)
 
@@ -114,7 +117,9 @@ class WorkLimits:
         """Keep time for a certificate of that effort, unless it is too little even for the first level."""
         if not self.certified or self.whole.at == np.inf:
             return
-        self.pace = median(self.measured() for _ in range(_MEASURED))
+        if time.monotonic() > self.paced + _PACED:
+            self.pace = median(self.measured() for _ in range(_MEASURED))
+            self.paced = time.monotonic()
         seconds = effort * self.pace
         self.certified = self.kept > 0 or self.whole.left() > seconds
         self.kept = seconds if self.certified else 0.0
@@ -289,7 +294,7 @@ class Work:
             rest = self._record(dual)
             if (ended := self._ended()) or rest is None:
                 return ended or "time"
-            if (cut := self._cut(rest)) is not None:
+            if not rising and (cut := self._cut(rest)) is not None:
                 return self._go_through_parts(dual, rest, cut)
             left = rest.left
             lattice = narrowed(left) if rising and not patient else finer(left)
@@ -336,7 +341,7 @@ class Work:
         while True:
             if _too_large(dual, lattice) or len(self.chain.levels) >= MOST_LEVELS:
                 return "labels"
-            if not self._in_time(dual, lattice):
+            if not self._in_time(dual, lattice, 2 * _PASSES):
                 return self.limits.met() or "time"
             self.limits.keep(self._effort_with(dual, lattice))
             dual.move(lattice)
@@ -381,11 +386,11 @@ class Work:
             self._search(seconds / left if 0 < left < np.inf else 1.0)
             self.searched = time.monotonic() - began
 
-    def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
+    def _in_time(self, dual: Dual, lattice: Lattice, passes: int = _WORTH) -> bool:
         """Whether there is time for some passes over the lattice that follows, and for its certificate."""
-        passes = _seconds_of(_WORTH, dual, lattice)
+        work = _seconds_of(passes, dual, lattice)
         certificate = self._effort_with(dual, lattice) * self.limits.pace if self.limits.certified else 0.0
-        return not self.limits.over(passes + max(0.0, certificate - self.limits.kept))
+        return not self.limits.over(work + max(0.0, certificate - self.limits.kept))
 
     def _effort_with(self, dual: Dual, lattice: Lattice) -> float:
         """The effort of a certificate with one more level, which has the clusters of the dual."""
@@ -455,14 +460,16 @@ class Work:
         record. patient: whether there is no finer level. reached: a bound from which the rise counts.
         """
         rounding, closing = Rounding(dual, self.improve), self._closing(dual)
-        rises = [math.inf if reached == -math.inf else 0.0] * 2
+        part = reached > -math.inf
+        rises = [0.0 if part else math.inf] * 2
         for _ in range(_MOST_ROUNDS):
             bound = dual.ascend(_PASSES, self.limits.over, closing)
-            self.best = rounding.lower(self.best, closing)
+            if not part:
+                self.best = rounding.lower(self.best, closing)
             energy = self.energy(self.best)
             self._report(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
             rises = [rises[1], (bound - reached) / max(energy - bound, 1e-300)]
-            slow = _SLOWEST if patient else self._slow(dual, bound)
+            slow = _SLOWEST if patient else _SLOW_PART if part else self._slow(dual, bound)
             if closing() or self._exact(bound) or (max(rises) <= slow and bound >= reached):
                 break
             if self._may_narrow(dual, bound):
