@@ -90,8 +90,8 @@ class Proof(Claim):
     bound
         No field has a lower energy.
     status
-        `optimal` if energy - bound <= 1e-9 (1 + energy), else `gap`. If it is optimal, all jumps are forced
-        and the field solves the convex problem that remains.
+        `optimal` if energy - bound <= 1e-9 (1 + energy), else `gap`. Usually all jumps are forced if it is
+        optimal, and the field solves the convex problem that remains.
     forced
         Number of pairs with the same jump in every field that could be better.
     levels

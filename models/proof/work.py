@@ -94,7 +94,8 @@ class WorkLimits:
 
     whole: the deadline of proof and certificate. certified: whether to keep time for a certificate. work:
     greatest number of labels; labels: those so far. measured: measures the seconds per unit of the
-    certificate's effort; pace: the last of them, and paced: the time of the monotonic clock then. kept: the seconds that the certificate is expected to take.
+    certificate's effort; pace: the last of them, and paced: the time of the monotonic clock then. kept:
+    the seconds that the certificate is expected to take.
     """
 
     whole: Deadline
