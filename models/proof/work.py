@@ -85,6 +85,7 @@ _LATE: Final = 0.1  # share of the time for the search before a level that takes
 _LONGER: Final = 2  # duration of a search, relative to the one before, below which it is left out
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
+_SMALL: Final = 0.003  # relative gap up to which what is left is cut; finer lattices close wider ones sooner
 _OPEN: Final = 0.5  # share of pairs that may be open near the best field when what is left is cut
 
 
@@ -314,8 +315,9 @@ class Work:
             dual.move(lattice)
 
     def _cut(self, rest: _Rest) -> Cut | None:
-        """Where to cut what a level leaves, if only a few jumps are open near the best field."""
-        if self.norm != 2:
+        """Where to cut what a level leaves, if the gap is small and many jumps are forced near the best field."""
+        energy = self.energy(self.best)
+        if self.norm != 2 or energy - self.chain.bound > _SMALL * energy:
             return None
         alpha, beta, jumps = labels_at(self.best, rest.left.lattice)
         left = replace(rest.left, lattice=replace(rest.left.lattice, p=jumps))
