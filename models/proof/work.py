@@ -315,7 +315,7 @@ class Work:
             dual.move(lattice)
 
     def _cut(self, rest: _Rest) -> Cut | None:
-        """Where to cut what a level leaves, if the gap is small and many jumps are forced near the best field."""
+        """Where to cut what is left, if the gap is small and many jumps are forced near the best field."""
         energy = self.energy(self.best)
         if self.norm != 2 or energy - self.chain.bound > _SMALL * energy:
             return None
