@@ -94,6 +94,13 @@ def test_a_field_with_a_vortex_is_confirmed(tmp_path):
     assert len(field.singularities.row) == 1
 
 
+@pytest.mark.slow
+def test_a_proof_in_parts_is_confirmed(tmp_path):
+    path = tmp_path / "it.npz"
+    confirmed(sample("ring", size=12), path)
+    assert (arrays_of(path)["branches"][:, 1] >= 0).any()
+
+
 def with_head(arrays, **changes):
     head = json.loads(arrays["head"].tobytes()) | changes
     return arrays | {"head": np.frombuffer(json.dumps(head).encode(), np.uint8)}
