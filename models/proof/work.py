@@ -13,9 +13,9 @@ Where a field has a vortex, the local polytope mixes fields with the vortex in o
 lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second
 level if the best field has a vortex, and on every level where the gap shrinks slowly.
 
-What is left may contain several fields of nearly the least energy. Once all jumps are forced near the best
-one, what is left is cut into parts (parts.py). Each part has levels of its own until its bound, or that of
-the convex problem on its boxes, reaches the energy.
+What is left may contain several fields of nearly the least energy. Once the gap is small and many jumps are
+forced near the best field, what is left is cut into parts (parts.py). Each part has levels of its own until
+its bound, or that of the convex problem on its boxes, reaches the energy.
 """
 
 from __future__ import annotations
