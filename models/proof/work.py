@@ -95,7 +95,7 @@ class WorkLimits:
 
     whole: the deadline of proof and certificate. certified: whether to keep time for a certificate. work:
     greatest number of labels; labels: those so far. measured: measures the seconds per unit of the
-    certificate's effort; pace: the last of them, and paced: the time of the monotonic clock then. kept:
+    certificate's effort; pace: the last of them; paced: the seconds that were left then. kept:
     the seconds that the certificate is expected to take.
     """
 
@@ -106,7 +106,7 @@ class WorkLimits:
     work: float
     labels: int = 0
     pace: float = 0.0
-    paced: float = -math.inf
+    paced: float = math.inf
     kept: float = 0.0
     measured: Callable[[], float] = field(kw_only=True)
 
@@ -119,9 +119,9 @@ class WorkLimits:
         """Keep time for a certificate of that effort, unless it is too little even for the first level."""
         if not self.certified or self.whole.at == np.inf:
             return
-        if time.monotonic() > self.paced + _PACED:
+        if self.paced - self.whole.left() > _PACED:
             self.pace = median(self.measured() for _ in range(_MEASURED))
-            self.paced = time.monotonic()
+            self.paced = self.whole.left()
         seconds = effort * self.pace
         self.certified = self.kept > 0 or self.whole.left() > seconds
         self.kept = seconds if self.certified else 0.0

@@ -114,17 +114,23 @@ def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
     assert [path.name for path in tmp_path.iterdir()] == ["mouse.prove.field.npz"]
 
 
-def limits(seconds, *paces):
-    """Limits of a certified proof whose clock stands still, on a machine that checks at these paces."""
-    whole = Deadline.after(seconds, lambda: 0.0)
+def limits(seconds, *paces, now=(0.0,)):
+    """Limits of a certified proof on a machine that checks at these paces; now: holds the time of its clock."""
+    whole = Deadline.after(seconds, lambda: now[0])
     measured = iter(paces).__next__
     return WorkLimits(whole, lambda: False, 0.0, certified=True, work=math.inf, measured=measured)
 
 
 def test_a_proof_keeps_time_for_its_certificate():
-    kept = limits(1e9, 0.5, 90.0, 0.25, 0.25, 0.125, 0.25)
+    """The pace is the middle one of three, measured again when more than two seconds have passed."""
+    now = [0.0]
+    kept = limits(1e9, 0.5, 90.0, 0.25, 0.25, 0.125, 0.25, now=now)
     kept.keep(1000.0)
     assert (kept.kept, kept.deadline.at) == (500.0, kept.whole.at - 500.0)
+    now[0] = 1.0
+    kept.keep(2000.0)
+    assert kept.kept == 1000.0
+    now[0] = 3.0
     kept.keep(2000.0)
     assert kept.kept == 500.0
     assert kept.certified
