@@ -115,7 +115,7 @@ def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
 
 
 def limits(seconds, *paces, now=(0.0,)):
-    """Limits of a certified proof on a machine that checks at these paces; now: holds the time of its clock."""
+    """Limits of a certified proof on a machine that checks at these paces. now: the time of its clock."""
     whole = Deadline.after(seconds, lambda: now[0])
     measured = iter(paces).__next__
     return WorkLimits(whole, lambda: False, 0.0, certified=True, work=math.inf, measured=measured)
