@@ -1,11 +1,11 @@
-"""Parts of what a level leaves, where the cells of a pixel fall apart.
+"""Parts of the remaining cells, cut between islands: groups of one pixel's cells with a gap between them.
 
-Several fields may have nearly the least energy. Then the cells of some pixels form islands, one for each of
-these fields, and the bound mixes the fields. So the cells of such a pixel are cut between two islands, and
-each part gets levels of its own. In most parts the bound soon exceeds the energy of the best field.
+If several fields have nearly the least energy, the cells of some pixels form one island for each of these
+fields, and the bound mixes the fields. A cut between two islands gives two parts, and each part has levels of
+its own. In most parts the bound soon exceeds the energy of the best field.
 
-An island that crosses the seam, where the strip of crosses is glued together, is one for the crosses but two
-for the labels. With the other label of one half, (alpha - pi/2, -beta), its box is small.
+At the seam, the two ends of the strip of crosses are glued together. The labels of an island that crosses the
+seam are at both ends. With the other label of one half, (alpha - pi/2, -beta), the box is narrow.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.jumps import free_jumps
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.grid import Bools, Floats
 from ..instance.instance import HALF, QUARTER
 from ..processes.compiled import compiled_if_needed
-from .lattice import Lattice, Starts, starts
-from .pruning import Rectangles, RemainingCells, boxed, rectangles
+from .lattice import Starts, starts
+from .pruning import Rectangles, RemainingCells, boxed, boxed_between, first_steps, rectangles
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Cut:
     share: float
 
     def parts(self, left: RemainingCells) -> tuple[RemainingCells, RemainingCells]:
-        """What is left below and above the cut."""
+        """The remaining cells below the cut, and those above it; other pixels keep all cells in both."""
         return self._part(left, above=False), self._part(left, above=True)
 
     def _part(self, left: RemainingCells, *, above: bool) -> RemainingCells:
@@ -50,9 +50,9 @@ class Cut:
 
 
 def best_cut(left: RemainingCells, wanted: Bools) -> Cut | None:
-    """The cut at a gap between a pixel's cells that leaves the largest share of them on both sides, if any.
+    """The cut whose smaller part has the largest share of the pixel's cells, or None without a gap.
 
-    wanted (n,): the pixels that may be cut.
+    wanted (n,): whether a pixel may be cut.
     """
     lattice, found = left.lattice, list[Cut]()
     for axis, first, counts in (
@@ -87,22 +87,14 @@ def island_of(left: RemainingCells, alpha: Floats, beta: Floats) -> RemainingCel
         rectangles(lattice), left.cells, (row.astype(np.int64), column.astype(np.int64)), ends
     ):
         return None
-    at = lattice.h * (ends + np.stack([lattice.alpha_first] * 2 + [lattice.beta_first] * 2, axis=1))
-    at += lattice.h * lattice.offset[:, None]
-    return replace(
-        left,
-        alpha_low=lattice.alpha + at[:, 0],
-        alpha_high=lattice.alpha + at[:, 1],
-        beta_low=np.maximum(lattice.beta + at[:, 2], -QUARTER),
-        beta_high=np.minimum(lattice.beta + at[:, 3], QUARTER),
-    )
+    return boxed_between(lattice, left.cells, ends + first_steps(lattice))
 
 
 def across_seam(left: RemainingCells) -> tuple[RemainingCells, Floats]:
-    """The boxes, narrower with the other label of some crosses, and the direction of each stroke there.
+    """Boxes that are narrower with the other label of some crosses, and a direction of each stroke, (s,).
 
-    The centres are the middles of the boxes, with the best jumps there. The direction of each stroke, (s,),
-    has the turn that is nearest to the middle of its box.
+    The lattice has the middles of the boxes as its centres, and the best jumps there. A direction has the
+    turn that is nearest to the middle of its box, in radians.
     """
     lattice = left.lattice
     groups = np.full((len(lattice.count), 6), -1, np.int64)
@@ -125,12 +117,7 @@ def across_seam(left: RemainingCells) -> tuple[RemainingCells, Floats]:
     instance = lattice.instance
     jumps, _ = free_jumps(instance.grid, alpha, beta)
     target = instance.target + np.pi * np.round((alpha[instance.stroke_index] - instance.target) / np.pi)
-    return replace(found, lattice=_centred(lattice, alpha, beta, jumps)), target
-
-
-def _centred(lattice: Lattice, alpha: Floats, beta: Floats, jumps: Ints) -> Lattice:
-    """The lattice with other centres and jumps: where the search in the boxes begins."""
-    return replace(lattice, alpha=alpha, beta=beta, p=jumps)
+    return replace(found, lattice=replace(lattice, alpha=alpha, beta=beta, p=jumps)), target
 
 
 @compiled_if_needed
