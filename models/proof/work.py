@@ -13,7 +13,7 @@ Where a field has a vortex, the local polytope mixes fields with the vortex in o
 lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second
 level if the best field has a vortex, and on every level where the gap shrinks slowly.
 
-What is left may contain several fields of nearly the least energy. Once the gap is small and many jumps are
+What is left may contain several fields of nearly the least energy. Once the gap is small and some jumps are
 forced near the best field, what is left is cut into parts (parts.py). Each part has levels of its own until
 its bound, or that of the convex problem on its boxes, reaches the energy.
 """
@@ -81,12 +81,13 @@ _LARGE: Final = 1_000_000  # labels of a level before which to search, for passe
 _MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
 _PACED: Final = 2.0  # seconds until the pace is measured again
 _SEARCH: Final = 0.03  # greatest share of the time for that search, no longer than the proof so far
-_LATE: Final = 0.1  # share of the time for the search before a level that takes long
+_LATE: Final = 0.05  # share of the time for the search before a level that takes long
 _LONGER: Final = 2  # duration of a search, relative to the one before, below which it is left out
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 _SMALL: Final = 0.003  # relative gap up to which what is left is cut; finer lattices close wider ones sooner
-_OPEN: Final = 0.5  # share of pairs that may be open near the best field when what is left is cut
+_SMALL_IF_FEW: Final = 0.006  # the same for a level of at most `_MANY_LABELS`
+_OPEN: Final = 0.9  # share of pairs that may be open near the best field when what is left is cut
 
 
 @dataclass
@@ -315,9 +316,10 @@ class Work:
             dual.move(lattice)
 
     def _cut(self, rest: _Rest) -> Cut | None:
-        """Where to cut what is left, if the gap is small and many jumps are forced near the best field."""
-        energy = self.energy(self.best)
-        if self.norm != 2 or energy - self.chain.bound > _SMALL * energy:
+        """Where to cut what is left, if the gap is small and some jumps are forced near the best field."""
+        energy, few = self.energy(self.best), rest.left.lattice.allowed.sum() <= _MANY_LABELS
+        small = _SMALL_IF_FEW if few else _SMALL
+        if self.norm != 2 or energy - self.chain.bound > small * energy:
             return None
         alpha, beta, jumps = labels_at(self.best, rest.left.lattice)
         left = replace(rest.left, lattice=replace(rest.left.lattice, p=jumps))
