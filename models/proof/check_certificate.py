@@ -173,6 +173,7 @@ MOST_JUMP = 64
 MOST_WEIGHT = 1e6
 MOST_WHOLE = 2.0**53  # of a message
 BLOCK = 1 << 16  # numbers of a product that NumPy handles at once
+KEPT = 1 << 23  # numbers of costs that a pass keeps for its combs
 ROWS = 32  # of a product, from which NumPy leaves out terms together
 ANY_ORDER = {"reassoc", "nnan", "nsz"}  # minima do not depend on the order of their terms
 LARGE = 3_000_000  # numbers in a certificate from which compiling, some 2 s, saves time
@@ -763,7 +764,7 @@ def positions(level: Level, sketch: Sketch, i: int) -> tuple[Array, Array]:
 
 
 def kept(level: Level, sketch: Sketch, i: int) -> tuple[Array, Array]:
-    """The alphas and the betas of pixel i that have an allowed label."""
+    """The alphas and the betas of pixel i that have an allowed label, both increasing."""
     alpha, beta = positions(level, sketch, i)
     return alpha[level.rows[i]], beta[level.columns[i]]
 
@@ -814,32 +815,37 @@ def _near_slope(u: Array, v: Array, slope: float, h: float, norm: Any) -> Array:
 
 
 def jumps(alpha_i: Array, alpha_j: Array) -> range:
-    """Every jump that is the best of its parity at some labels of two pixels, with a margin for rounding."""
-    low = -2 * float(alpha_i.max() - alpha_j.min()) / math.pi - 1
-    high = -2 * float(alpha_i.min() - alpha_j.max()) / math.pi + 1
+    """Every jump that is the best of its parity at some of two pixels' labels, with a margin for rounding.
+
+    alpha_i, alpha_j: increasing.
+    """
+    low = -2 * float(alpha_i[-1] - alpha_j[0]) / math.pi - 1
+    high = -2 * float(alpha_i[0] - alpha_j[-1]) / math.pi + 1
     return range(math.ceil(low - 1e-6), math.floor(high + 1e-6) + 1)
 
 
 class Pair:
     """The costs c of a pair: for each parity of the jump the sum of a matrix in alpha and one in beta.
 
-    c is the lesser of the two; rows are labels of the earlier pixel. Alphas and betas without an allowed
-    label are left out, because no minimum needs them.
+    c is the lesser of the two. Alphas and betas without an allowed label are left out, because no minimum
+    needs them. parts: for each parity, the matrix in alpha by the alphas of the later and of the earlier
+    pixel, and that in beta by the betas of the earlier and of the later one; back: with the pixels exchanged.
     """
 
-    def __init__(self, level: Level, sketch: Sketch, e: int) -> None:
+    def __init__(self, level: Level, sketch: Sketch, e: int, places: list[tuple[Array, Array]]) -> None:
+        """places: `kept` of every pixel."""
         i, j = int(sketch.first[e]), int(sketch.second[e])
         self.used, self.spans = zip(*((level.used[x], level.spans[x]) for x in sorted((i, j))))
-        (alpha_i, beta_i), (alpha_j, beta_j) = kept(level, sketch, i), kept(level, sketch, j)
+        (alpha_i, beta_i), (alpha_j, beta_j) = places[i], places[j]
         span, apart = jumps(alpha_i, alpha_j), alpha_i[:, None] - alpha_j[None, :]
-        reach = [float(np.abs(each).max()) for each in (alpha_i, alpha_j, beta_i, beta_j)]
+        reach = [max(-float(each[0]), float(each[-1])) for each in (alpha_i, alpha_j, beta_i, beta_j)]
         self.size = (1.0 + sum(reach) + HALF * max(abs(p) for p in span)) ** 2
         tables: Any = 0.0
         if e in level.tables:
             tables = level.tables[e][np.ix_(level.rows[i], level.rows[j])]
             self.size += float(np.abs(tables).max())
         squared = sketch.norm == 2
-        self.parts = []
+        parts: list[tuple[Array, Array]] = []
         for parity in (0, 1):
             a = [np.abs(apart + HALF * p) for p in span if p % 2 == parity]
             b = np.abs((1 - 2 * parity) * beta_i[:, None] - beta_j[None, :])
@@ -847,16 +853,12 @@ class Pair:
                 least = a[0] if len(a) == 1 else np.minimum.reduce(a)
                 along, b = (2 * (each * each if squared else each) for each in (least, b))
                 along = along - squared * level.h * level.h + tables
-                self.parts.append((along, b) if i < j else (along.T, b.T))
-        self._drop_idle()
-
-    def _drop_idle(self) -> None:
-        """Drop a parity that is nowhere less than the other."""
-        for worse, better in ((0, 1), (1, 0)):
-            if len(self.parts) == 2:
-                least = sum(float(part.min()) for part in self.parts[worse])
-                if least >= sum(float(part.max()) for part in self.parts[better]):
-                    self.parts.pop(worse)
+                parts.append((along, b) if i < j else (along.T, b.T))
+        _drop_idle(parts)
+        plain = np.ascontiguousarray
+        self.parts = [(plain(along.T), plain(b)) for along, b in parts]
+        self.back = [(plain(along), plain(b.T)) for along, b in parts]
+        self.numbers = 2 * sum(along.size + b.size for along, b in parts)
 
     def across(self, given: Array, product: Product, *, back: bool = False) -> Array:
         """The least given(x) + c(x, y) over x of the earlier pixel, for each label y of the later one.
@@ -868,12 +870,20 @@ class Pair:
         spread = np.full(used.shape, np.inf)
         spread[used] = given
         ends = []
-        for part in self.parts:
-            along, b = (part[0], part[1].T) if back else (part[0].T, part[1])
+        for along, b in self.back if back else self.parts:
             half = product(spread, b, (finite, whole(len(spread), b.shape[1])))
             ends.append(product(along, half, (whole(*along.shape), wanted))[other])
         least: Array = np.minimum.reduce(ends)
         return least
+
+
+def _drop_idle(parts: list[tuple[Array, Array]]) -> None:
+    """Drop a parity that is nowhere less than the other."""
+    for worse, better in ((0, 1), (1, 0)):
+        if len(parts) == 2:
+            least = sum(float(part.min()) for part in parts[worse])
+            if least >= sum(float(part.max()) for part in parts[better]):
+                parts.pop(worse)
 
 
 def whole(rows: int, columns: int) -> Array:
@@ -1021,12 +1031,20 @@ class Pass:
 
     def __init__(self, level: Level, sketch: Sketch, way: Way) -> None:
         self.level, self.sketch, self.way = level, sketch, way
+        self.places = [kept(level, sketch, i) for i in range(len(sketch.offset))]
         self.before: dict[int, Array] = {}  # S of the pairs whose later pixel is still to come
-        self.shares: dict[int, Array] = {}  # N of all pairs
+        self.ends: dict[int, tuple[Array, Array]] = {}  # a and b of all pairs after the pass
+        self.sizes: dict[int, float] = {}  # the sum of the greatest of both
+        self.pairs: dict[int, Pair] = {}  # those that are kept for the combs
+        self.room = KEPT
         self.errors: list[float] = []
 
-    def run(self, stop: Over) -> Passed:
-        """Do the pass. Raises StoppedError when it has to end before the last pixel."""
+    def run(self, stop: Over, most: float = math.inf) -> Passed:
+        """Do the pass. Raises StoppedError when it has to end before the last pixel.
+
+        most: greatest energy of interest. Where the bound exceeds it, the combs are left out: the last
+        visit alone excludes all cells of its pixel.
+        """
         numbers: list[Array] = []
         least: list[float] = []
         waiting: list[float] = []
@@ -1044,7 +1062,7 @@ class Pass:
         ]
         bound = math.fsum([*quads, *least])
         tests = [Test(rights, error)]
-        for excesses, wrong in self._combs(numbers, stop):
+        for excesses, wrong in self._combs(numbers, stop) if bound - error <= most + error else ():
             tests.append(Test([bound + excess for excess in excesses], error + wrong))
         return Passed(bound - error, tests)
 
@@ -1061,32 +1079,39 @@ class Pass:
         columns, rows = sketch.runs
         for teeth, spines in ((columns, rows), (rows, columns)):
             self.errors = []
-            hanging = self._along(teeth, single, over, stop)
-            yield self._along(spines, hanging, over, stop), 2 * math.fsum(self.errors)
+            hanging = self._along(teeth, single, stop)
+            yield self._along(spines, hanging, stop), 2 * math.fsum(self.errors)
 
-    def _along(self, runs: list[Run], given: list[Array], over: list[Array], stop: Over) -> list[Array]:
+    def _along(self, runs: list[Run], given: list[Array], stop: Over) -> list[Array]:
         """The excess of each label, plus the least of the rest of its run from both sides."""
         found = list(given)
         for pixels, pairs in runs:
             if stop():
                 raise StoppedError
-            costs = [Pair(self.level, self.sketch, e) for e in pairs]
+            costs = [self._pair(e) for e in pairs]
             for way in (1, -1):
                 carried = given[pixels[::way][0]]
                 for e, pair, j in zip(pairs[::way], costs[::way], pixels[::way][1:]):
-                    message = self._carried(e, pair, carried, over, back=way < 0)
+                    message = self._carried(e, pair, carried, back=way < 0)
                     found[j], carried = found[j] + message, given[j] + message
         return found
 
-    def _carried(self, e: int, pair: Pair, carried: Array, over: list[Array], *, back: bool) -> Array:
+    def _carried(self, e: int, pair: Pair, carried: Array, *, back: bool) -> Array:
         """The least of the excess carried to one end of pair e and the pair's, at labels of the other end."""
-        i = min(int(self.sketch.first[e]), int(self.sketch.second[e]))
-        handed = over[i] / max(1, len(self.sketch.earlier[i]), len(self.sketch.later[i]))
-        ends = (self.level.messages[e] - handed, self.shares[e])
-        mine, other = reversed(ends) if back else ends
+        mine, other = self.ends[e][:: -1 if back else 1]
         found = pair.across(carried - mine, self.way.product, back=back) - other
-        self._err(pair.size + sum(float(np.abs(each).max()) for each in (carried, *ends, found)))
+        self._err(pair.size + self.sizes[e] + greatest(carried) + greatest(found))
         return found
+
+    def _pair(self, e: int) -> Pair:
+        """The costs of pair e, which are kept as long as there is room."""
+        if e in self.pairs:
+            return self.pairs[e]
+        pair = Pair(self.level, self.sketch, e, self.places)
+        if pair.numbers <= self.room:
+            self.room -= pair.numbers
+            self.pairs[e] = pair
+        return pair
 
     def _visit(self, i: int) -> tuple[Array, float, float]:
         """t_i, mu_i and mu*_i; what the pairs to later pixels send is stored."""
@@ -1094,7 +1119,7 @@ class Pass:
         cost, size = unary(self.level, self.sketch, i)
         held = [self.level.messages[e] for e in later]
         _, waiting = self._theta(cost, size, held + [self.before.pop(e) for e in earlier])
-        over, least = self._theta(cost, size, held + [self.shares[e] for e in earlier])
+        over, least = self._theta(cost, size, held + [self.ends[e][1] for e in earlier])
         for e, message in zip(later, held):
             self._send(e, message, over / max(1, len(earlier), len(later)))
         return over, least, waiting
@@ -1117,19 +1142,24 @@ class Pass:
         cost, size: as of `unary`. shares: messages and shares of its pairs.
         """
         total: Array = np.sum([cost, *shares], axis=0)
-        self._err(size + sum(float(np.abs(share).max()) for share in shares))
+        self._err(size + sum(greatest(share) for share in shares))
         least = float(total.min())
         return total - least, least
 
     def _send(self, e: int, held: Array, handed: Array) -> None:
         """Send the message of pair e to its later pixel, without and with what its earlier pixel hands on."""
-        pair, given = Pair(self.level, self.sketch, e), handed - held
-        self.before[e], self.shares[e] = (pair.across(each, self.way.product) for each in (-held, given))
-        greatest = float(np.abs(given).max() + np.abs(held).max() + np.abs(self.shares[e]).max())
-        self._err(pair.size + greatest)
+        pair, given = self._pair(e), handed - held
+        self.before[e], share = (pair.across(each, self.way.product) for each in (-held, given))
+        self.ends[e], self.sizes[e] = (-given, share), greatest(given) + greatest(share)
+        self._err(pair.size + self.sizes[e] + greatest(held))
 
     def _err(self, size: float) -> None:
         self.errors.append(ROUNDING * PRECISION * size)
+
+
+def greatest(numbers: Array) -> float:
+    """The greatest absolute value."""
+    return max(float(numbers.max()), -float(numbers.min()))
 
 
 def surviving(level: Level, passed: Passed, most: float) -> list[Array]:
@@ -1623,7 +1653,7 @@ def _descend(arrays: dict[str, Array], sketch: Sketch, most: float, over: Over, 
     def left_by(number: int) -> tuple[Level, float, list[Array]]:
         """A level without its messages, which take much memory, its bound, and the cells that it leaves."""
         level = level_of(arrays, number, sketch)
-        passed = Pass(level, sketch, way).run(over)
+        passed = Pass(level, sketch, way).run(over, most)
         bare = replace(level, messages=(), clusters=[], tables={})
         return bare, passed.bound, surviving(level, passed, most)
 
