@@ -86,8 +86,10 @@ _LONGER: Final = 2  # duration of a search, relative to the one before, below wh
 _SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
 _ROUNDS: Final = 5  # of a search without a limit of time
 _SMALL: Final = 0.003  # relative gap up to which what is left is cut; finer lattices close wider ones sooner
-_SMALL_IF_FEW: Final = 0.006  # the same for a level of at most `_MANY_LABELS`
-_OPEN: Final = 0.9  # share of pairs that may be open near the best field when what is left is cut
+_OPEN: Final = 0.5  # share of pairs that may be open near the best field when what is left is cut
+_SMALL_IF_FEW: Final = 0.006  # both for a level with not many labels, if the next one would be large
+_OPEN_IF_FEW: Final = 0.9
+_CLOSED: Final = 0.5  # share of the gap that a lattice with not many labels leaves, if the next one follows
 
 
 @dataclass
@@ -318,14 +320,15 @@ class Work:
     def _cut(self, rest: _Rest) -> Cut | None:
         """Where to cut what is left, if the gap is small and some jumps are forced near the best field."""
         energy, few = self.energy(self.best), rest.left.lattice.allowed.sum() <= _MANY_LABELS
-        small = _SMALL_IF_FEW if few else _SMALL
-        if self.norm != 2 or energy - self.chain.bound > small * energy:
+        few = few and _next_labels(rest.left) > _LARGE
+        small, open_ = (_SMALL_IF_FEW, _OPEN_IF_FEW) if few else (_SMALL, _OPEN)
+        if self.norm != 2 or energy - self.chain.bound > small * energy or self._finer_pays(rest.left):
             return None
         alpha, beta, jumps = labels_at(self.best, rest.left.lattice)
         left = replace(rest.left, lattice=replace(rest.left.lattice, p=jumps))
         island = island_of(left, alpha, beta)
         what = None if island is None else self.forced(island)
-        if what is None or not what.strokes.all() or np.mean(~what.pairs) > _OPEN:
+        if what is None or not what.strokes.all() or np.mean(~what.pairs) > open_:
             return None
         return best_cut(rest.left, rest.what.open_pixels)
 
@@ -358,11 +361,20 @@ class Work:
                 return ""
             if rest is None:
                 return self.limits.met() or "time"
-            cut = best_cut(rest.left, rest.what.open_pixels)
+            pays = self._finer_pays(rest.left)
+            cut = None if pays else best_cut(rest.left, rest.what.open_pixels)
             if cut is not None:
                 self._wait(dual, rest, cut)
                 return ""
             lattice = narrowed(rest.left) if rising else finer(rest.left)
+
+    def _finer_pays(self, left: RemainingCells) -> bool:
+        """Whether the next lattice has not many labels and the last one, if no cells were cut, helped."""
+        branch, energy = self.chain.branches[-1], self.energy(self.best)
+        if _next_labels(left) > _MANY_LABELS:
+            return False
+        gap, before = (energy - self.chain.levels[number].bound for number in (-1, branch.above))
+        return branch.above < 0 or branch.pixel >= 0 or gap <= _CLOSED * before
 
     def _wait(self, dual: Dual, rest: _Rest, cut: Cut) -> None:
         """Let both parts of what is left wait; the one with fewer cells comes first."""
@@ -532,6 +544,11 @@ class Work:
                 better = relabelled(self.instance, found.alpha, found.beta, found.p)
                 self._offer(self.improved(better, self.limits.over))
         return what
+
+
+def _next_labels(left: RemainingCells) -> int:
+    """The number of labels at half the spacing, about."""
+    return _HALVES * int(np.count_nonzero(left.cells))
 
 
 def _seconds_of(passes: int, dual: Dual, lattice: Lattice) -> float:
