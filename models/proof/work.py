@@ -333,7 +333,11 @@ class Work:
         return best_cut(rest.left, rest.what.open_pixels)
 
     def _go_through_parts(self, dual: Dual, rest: _Rest, cut: Cut) -> str:
-        """Cut what is left into parts, and go through the levels of each; the reason of the end."""
+        """Cut what is left into parts, and go through the levels of each; the reason of the end.
+
+        A search comes first: with a field that is not the best, the part that holds a better one stays open.
+        """
+        self._search(_SEARCH if np.isfinite(self.limits.deadline.left()) else 1.0)
         self._wait(dual, rest, cut)
         while self.chain.waiting:
             part = self.chain.waiting.pop()
@@ -481,7 +485,7 @@ class Work:
         rises = [0.0 if part else math.inf] * 2
         for _ in range(_MOST_ROUNDS):
             bound = dual.ascend(_PASSES, self.limits.over, closing)
-            if not part:
+            if not part or self.chain.next.pixel < 0:
                 self.best = rounding.lower(self.best, closing)
             energy = self.energy(self.best)
             self._report(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
