@@ -49,7 +49,7 @@ LONG: Final = 3600.0
 LONG_ONES: Final = ("mouse 11", "curved 9 7011")
 TURNED: Final = tuple(names[place] for names in INSTANCES.values() for place in (0, 3))
 BEST: Final = 3
-"""Number of pairs that also get the turned instances."""
+"""Number of pairs that also get the turned instances and the long runs."""
 DATA: Final = FOLDER / "solvers.csv"
 
 
@@ -89,13 +89,13 @@ class Plan:
                     yield from (Run(name, each, solver, limit=self.limit) for solver in COMMERCIAL)
 
     def last(self, best: list[tuple[str, str]]) -> Iterator[Run]:
-        """The turned instances for the best pairs, then the long runs."""
+        """The turned instances, then the long runs, of the best pairs; also the long proofs."""
         for turns in (1, 2):
             for name in self.turned:
                 yield from (Run(name, *pair, turns=turns, limit=self.limit) for pair in best)
         for name in self.long_ones:
             yield from (Run(name, each, PROVE, limit=self.long) for each in PROBLEMS)
-            yield from (Run(name, *pair, limit=self.long) for pair in PAIRS)
+            yield from (Run(name, *pair, limit=self.long) for pair in best)
 
     @property
     def size(self) -> int:
