@@ -61,12 +61,12 @@ _HALVES: Final = 4  # labels at half the spacing for each one that is left
 _NARROWED: Final = 0.5  # share of the labels that are left, at which passes go on over these only
 _MANY_LABELS: Final = 600_000  # with fewer, passes take less time than one more level of the certificate
 _MOST_ROUNDS: Final = 40  # a level
-_CLUSTERS: Final = 24  # quads that become clusters first
-_MORE_CLUSTERS: Final = 12  # later
+_CLUSTERS: Final = (24, 0.08)  # quads that become clusters first: a number, or a share of all if that is more
+_MORE_CLUSTERS: Final = (12, 0.04)  # later
 _QUADS: Final = 0.15  # share of all quads that may become clusters at once
 _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above which there are more
 _MOST_WORK: Final = 2e11  # additions of a pass, some 20 s
-MOST_LABELS: Final = 24_000_000  # of a strip; each takes some 100 bytes
+MOST_LABELS: Final = 50_000_000  # of a strip; each takes some 100 bytes
 _TABLES: Final = 4  # numbers of tables that take as much as a label
 _RECORDING: Final = 9  # passes: the bound of a record and the pruning, with combs, take as long
 _PAIR: Final = 2  # passes that may follow when there is time to begin them
@@ -438,8 +438,9 @@ class Work:
         vortex = len(gaps) == 1 and len(self.best.singularities.index) > 0
         if not vortex and not (len(gaps) == 2 and gaps[1] > _STALLED * gaps[0]):
             return 0
-        most = _MORE_CLUSTERS if len(self.chain.levels[-1].tables["quads"]) else _CLUSTERS
-        return min(most, math.ceil(_QUADS * len(self.instance.grid.quads)))
+        quads = len(self.instance.grid.quads)
+        least, share = _MORE_CLUSTERS if len(self.chain.levels[-1].tables["quads"]) else _CLUSTERS
+        return min(max(least, math.ceil(share * quads)), math.ceil(_QUADS * quads))
 
     def _ended(self) -> str:
         """The reason why the work ends; empty if it goes on."""
