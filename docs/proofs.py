@@ -23,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -440,13 +441,19 @@ def in_short(kept: Kept) -> str:
 
 
 def where(rows: dict[str, Facts]) -> str:
-    """The machine of the measurements."""
-    machines = [row["machine"] for row in rows.values()]
-    first, loads = machines[0], [each["load"] for each in machines]
+    """The machine of most measurements, and the other ones with their rows."""
+    by_machine = defaultdict[str, list[str]](list)
+    for name, row in rows.items():
+        machine = row["machine"]
+        by_machine[
+            f"{machine['processor']}, {counted(machine['cores'])}, Python {machine['python']}, 2 threads"
+        ].append(name)
+    first, *others = sorted(by_machine, key=lambda machine: -len(by_machine[machine]))
+    named = "".join(f" {', '.join(by_machine[other])}: {other}." for other in others)
+    loads = [row["machine"]["load"] for row in rows.values()]
     return (
-        f"{first['processor']}, {counted(first['cores'])}, Python {first['python']}, 2 threads. The load "
-        f"average of the machine was {min(loads):.1f} to {max(loads):.1f}; above the number of its cores, "
-        "seconds are too long."
+        f"{first}.{named} The load average of the machine was {min(loads):.1f} to {max(loads):.1f}; above "
+        "the number of its cores, seconds are too long."
     )
 
 
