@@ -444,10 +444,9 @@ def where(rows: dict[str, Facts]) -> str:
     """The machine of most measurements, and the other ones with their rows."""
     by_machine = defaultdict[str, list[str]](list)
     for name, row in rows.items():
-        machine = row["machine"]
-        by_machine[
-            f"{machine['processor']}, {counted(machine['cores'])}, Python {machine['python']}, 2 threads"
-        ].append(name)
+        facts = row["machine"]
+        machine = f"{facts['processor']}, {counted(facts['cores'])}, Python {facts['python']}, 2 threads"
+        by_machine[machine].append(name)
     first, *others = sorted(by_machine, key=lambda machine: -len(by_machine[machine]))
     named = "".join(f" {', '.join(by_machine[other])}: {other}." for other in others)
     loads = [row["machine"]["load"] for row in rows.values()]

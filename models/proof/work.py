@@ -337,7 +337,7 @@ class Work:
 
         A search comes first: with a field that is not the best, the part that holds a better one stays open.
         """
-        self._search(_SEARCH if np.isfinite(self.limits.deadline.left()) else 1.0)
+        self._search(_SEARCH)
         self._wait(dual, rest, cut)
         while self.chain.waiting:
             part = self.chain.waiting.pop()
