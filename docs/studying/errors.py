@@ -17,16 +17,7 @@ from .rows import Row
 
 CLOSE: Final = 1e-3
 """Relative gap of a proof up to which its field counts as the optimum."""
-_NONE: Final = 5e-6  # smaller values are rounding
-_WHOLE: Final = 0.1
 Kind = Callable[[Row], bool]
-
-
-def percent(share: float) -> str:
-    """A share in percent: two digits, or whole percents of what is more than that."""
-    if abs(share) < _NONE:
-        return "0 %"
-    return f"{100 * share:,.0f} %" if abs(share) >= _WHOLE else f"{100 * share:.2g} %"
 
 
 def case_of(row: Row) -> tuple[Any, ...]:

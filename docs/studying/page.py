@@ -11,7 +11,6 @@ from crossfield.export.solvers_table import PROGRAMS
 from make import generated, markdown
 
 from . import errors, fields_page, practice_page, quality_page
-from .errors import percent
 from .instances import surfaces
 from .plan import Plan, stages
 from .rows import PARTS, Row, Table, key_of
@@ -20,6 +19,7 @@ from .solvers import page as solvers_page
 from .solvers.plan import DATA as SOLVER_ROWS
 from .solvers.plan import FULL
 from .solvers.plan import table as solvers_table
+from .wording import percent, series
 
 Kept = dict[str, list[Row]]
 SOLVERS: Final = SOLVER_ROWS.stem
@@ -81,7 +81,7 @@ def by_others() -> str:
     }
     parts = [f"{each} degrees at {size} pixels" for size, each in found.items() if each is not None]
     sure = [str(size) for size, each in found.items() if each is not None and each.sure]
-    beyond = f"only the difference at {' and '.join(sure)} pixels" if sure else "no difference"
+    beyond = f"only the difference at {series(sure)} pixels" if sure else "no difference"
     return (
         f"On {fields_page.counts()['others_drawings']} drawings by others, `bend` changes the mean error at "
         f"hidden curves, compared with `polyvector`, by {', '.join(parts)}; {beyond} exceeds two standard "

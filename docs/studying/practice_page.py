@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -12,8 +11,8 @@ import numpy as np
 from crossfield.models.evaluation.hidden import Summary
 
 from . import errors, plots
-from .errors import percent
 from .rows import FAILED, Row, Table
+from .wording import percent, series
 
 Kept = dict[str, list[Row]]
 QUICK: Final = 1.0
@@ -175,7 +174,7 @@ def _error(found: Fares, size: int, way: str) -> float:
 def _grouped(best: dict[int, str]) -> str:
     """Ways by the sizes for which they are best."""
     return ", ".join(
-        f"`{way}` at {_sizes(size for size in best if best[size] == way)} pixels"
+        f"`{way}` at {series(size for size in best if best[size] == way)} pixels"
         for way in dict.fromkeys(best.values())
     )
 
@@ -218,11 +217,6 @@ def below_all_others(rows: list[Row], way: str) -> tuple[int, int]:
 
 _SAME: Final = 1e-4
 """Relative difference of energies that count as equal."""
-
-
-def _sizes(sizes: Iterable[int]) -> str:
-    words = [str(size) for size in sizes]
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def draw(kept: Kept, pictures: Path) -> None:

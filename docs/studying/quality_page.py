@@ -9,8 +9,9 @@ import numpy as np
 from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 
 from . import errors, plots
-from .errors import Change, Kind, change, is_default, is_surface, percent, usable
+from .errors import Change, Kind, change, is_default, is_surface, usable
 from .rows import Row, Table
+from .wording import percent
 
 Kept = dict[str, list[Row]]
 

@@ -168,3 +168,20 @@ def test_means_are_given_only_for_complete_groups(study):
         assert text in [line[-1] for line in lines]
         assert len(study.page.details_table(rows[:count], plan)[1]) == count - 1
     assert "are missing" in study.page.completeness(rows, plan)
+
+
+def test_the_answer_counts_instances_that_any_solver_solves(study):
+    names = ("bottle 11", "singular 8")
+    plan = study.plan.Plan({25: names})
+    solvers = {("milp-mccormick", "highs"): names[:1], ("milp-mccormick", "cbc"): names}
+    rows = [
+        row(study, 3.0, "optimal" if name in solvers.get(kind[:2], ()) else "limit-with-point", bound=1.0)
+        | dict(zip(("formulation", "solver", "start"), kind, strict=True))
+        | {"instance": name, "turns": 0}
+        for kind in study.page.KINDS
+        if kind[2] == "cold"
+        for name in names
+    ]
+    first, *_ = study.page.answer(rows, plan)
+    assert "as `milp-mccormick`, 2 by HiGHS, SCIP or CBC and 0 by `prove`; as `miqp-exact`, 0 by" in first
+    assert "under way" in study.page.answer(rows[1:], plan)[0]

@@ -11,6 +11,7 @@ import numpy as np
 from crossfield.export.solvers_table import SOLVERS
 
 from ..rows import Row, Table
+from ..wording import series
 from . import statistics
 from .plan import COMMERCIAL, LONG, PAIRS, PROBLEMS, PROVE, STARTS, Plan, Run, made, run_of
 from .statistics import (
@@ -276,19 +277,51 @@ def _listed(rows: list[Row]) -> str:
 
 
 def answer(rows: list[Row], plan: Plan) -> list[str]:
-    """Answer on the reach of solvers: the limits, then each number of pairs with all cold runs done."""
+    """Answer on the reach of solvers, for the numbers of pairs with all cold runs done; then tightened."""
     found = groups(rows, plan)
-    cold = [kind for kind in KINDS if kind[2] == "cold"]
-    sentences = []
-    for count, names in plan.instances.items():
-        if all(len(found[count][kind]) == len(names) for kind in cold):
-            solved = [f"{title(kind[1])} on `{kind[0]}` {counted(found[count][kind])}" for kind in cold]
-            sentences.append(f"About {count} pairs of pixels: {', '.join(solved)}.")
-    if not sentences:
+    said = [_reach(found, plan, start) for start in STARTS]
+    if said[0] is None:
         unfinished = f"{len(rows)} of {plan.size} planned runs are done, and no number of pairs is complete."
         return [f"The measurement is under way: {unfinished}"]
-    limits = f"in {plan.limit:g} s on one thread, from a cold start"
-    return [f"The following numbers of instances are proven optimal {limits}.", *sentences]
+    counts, reach = said[0]
+    each = len(next(iter(plan.instances.values())))
+    cold = (
+        f"Of {each} instances each with about {series(counts)} pairs of pixels, the following are proven "
+        f"optimal in {plan.limit:g} s on one thread: {reach}."
+    )
+    sentences = [cold, "The [tables](#how-far-solvers-get) have each solver."]
+    if said[1] is not None and said[1][0] == counts:
+        sentences.insert(1, f"In the windows that a certificate of `prove` leaves: {said[1][1]}.")
+    return sentences
+
+
+def _reach(found: dict[int, dict[Kind, list[Row]]], plan: Plan, start: str) -> tuple[list[int], str] | None:
+    """The complete numbers of pairs, and how many instances the solvers and `prove` solve of each."""
+    kinds = [kind for kind in KINDS if kind[2] == start]
+    complete = [
+        count
+        for count, names in plan.instances.items()
+        if all(len(found[count][kind]) == len(names) for kind in kinds)
+    ]
+    if not complete:
+        return None
+    parts = []
+    for formulation in PROBLEMS:
+        mine = [kind for kind in kinds if kind[0] == formulation]
+        by = [[kind for kind in mine if kind[1] != PROVE], [kind for kind in mine if kind[1] == PROVE]]
+        solved = [
+            f"{series(len(_solved(found[count], some)) for count in complete)} by "
+            f"{series((title(kind[1]) for kind in some), 'or')}"
+            for some in by
+            if some
+        ]
+        parts.append(f"as `{formulation}`, {series(solved)}")
+    return complete, "; ".join(parts)
+
+
+def _solved(found: dict[Kind, list[Row]], kinds: list[Kind]) -> set[str]:
+    """The instances that at least one of the kinds solves."""
+    return {row["instance"] for kind in kinds for row in found[kind] if is_solved(row)}
 
 
 def tables(rows: list[Row], plan: Plan) -> dict[str, Table]:
