@@ -16,7 +16,7 @@ def percent(share: float) -> str:
     return f"{100 * share:,.0f} %" if abs(share) >= _WHOLE else f"{100 * share:.2g} %"
 
 
-def series(items: Iterable[object], word: str = "and") -> str:
-    """At least one item, with commas between them and a word before the last one."""
+def series(items: Iterable[object]) -> str:
+    """At least one item, with commas between them and "and" before the last one."""
     *most, last = map(str, items)
-    return f"{', '.join(most)} {word} {last}" if most else last
+    return f"{', '.join(most)} and {last}" if most else last

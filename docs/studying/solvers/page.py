@@ -287,16 +287,20 @@ def answer(rows: list[Row], plan: Plan) -> list[str]:
     each = len(next(iter(plan.instances.values())))
     cold = (
         f"Of {each} instances each with about {series(counts)} pairs of pixels, the following are proven "
-        f"optimal in {plan.limit:g} s on one thread: {reach}."
+        f"optimal in {plan.limit:g} s on one thread, from a cold start: {reach}."
     )
     sentences = [cold, "The [tables](#how-far-solvers-get) have each solver."]
     if said[1] is not None and said[1][0] == counts:
-        sentences.insert(1, f"In the windows that a certificate of `prove` leaves: {said[1][1]}.")
+        tightened = (
+            "In the windows that a certificate of `prove` leaves, these are proven optimal, the seconds of "
+            f"that proof not counted: {said[1][1]}."
+        )
+        sentences.insert(1, tightened)
     return sentences
 
 
 def _reach(found: dict[int, dict[Kind, list[Row]]], plan: Plan, start: str) -> tuple[list[int], str] | None:
-    """The complete numbers of pairs, and how many instances the solvers and `prove` solve of each."""
+    """The complete numbers of pairs, and how many instances any solver and `prove` solve of each."""
     kinds = [kind for kind in KINDS if kind[2] == start]
     complete = [
         count
@@ -311,11 +315,11 @@ def _reach(found: dict[int, dict[Kind, list[Row]]], plan: Plan, start: str) -> t
         by = [[kind for kind in mine if kind[1] != PROVE], [kind for kind in mine if kind[1] == PROVE]]
         solved = [
             f"{series(len(_solved(found[count], some)) for count in complete)} by "
-            f"{series((title(kind[1]) for kind in some), 'or')}"
+            f"{'at least one of ' if len(some) > 1 else ''}{series(title(kind[1]) for kind in some)}"
             for some in by
             if some
         ]
-        parts.append(f"as `{formulation}`, {series(solved)}")
+        parts.append(f"as `{formulation}`, {', and '.join(solved)}")
     return complete, "; ".join(parts)
 
 
