@@ -55,10 +55,12 @@ def prove_command(
     from ...models.processes.deadline import Deadline
     from ...models.processes.limits import Limits
     from ...models.proof.prove import prove
+    from ..solving.compiling import compile_proofs
 
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
         instance = sketch.instance(source, quiet=printing.quiet)
+        compile_proofs(output, show)
         deadline = Deadline.after(time_limit)
         proof = prove(
             instance,

@@ -23,7 +23,7 @@ from ...models.search.starts import best_start, first_field, polyvector_start
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
 from ..solutions.solution import Solution
-from .compiling import compile_proofs, is_compiled
+from .compiling import compile_proofs
 from .two_stage import find_jumps, fit_angles, jumps_until
 
 if TYPE_CHECKING:
@@ -262,12 +262,11 @@ def _progress_line(request: Request, deadline: Deadline, method: str, kept: str)
 
 
 def _prove(request: Request) -> Iterator[Candidate]:
-    begin, deadline = time.perf_counter(), request.deadline()
     from ...models.proof.prove import prove  # it loads compiled functions
 
-    if not is_compiled():
-        request.progress("prove: compiling the functions of proofs, once on this machine")
-        compile_proofs(request.folder, deadline)
+    # Before the time limit begins: a short one would end each run before anything is proven.
+    compile_proofs(request.folder, lambda line: request.progress(f"prove: {line}"), request.stop)
+    begin, deadline = time.perf_counter(), request.deadline()
     request.progress("prove: starting fields")
     proof = prove(
         request.instance,

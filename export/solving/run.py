@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from ...models.errors import CrossfieldError
+from ...models.errors import CrossfieldError, SolverError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
@@ -24,7 +24,7 @@ from ..formats.registry import generator
 from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.mask import has_mask, write_mask
 from ..surfaces.files import SHADED, surface_facts, write_shaded
-from .compiling import compiling
+from .compiling import compile_proofs, compiling
 from .methods import METHODS, Candidate, Request, instance_facts
 from .proven import Proven
 from .run_page import PAGE, write_page
@@ -43,6 +43,7 @@ LOWEST: Final = "lowest.npz"
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """Name of the field from which the methods of a run start: `first_field`, or the given one."""
+COMPILING: Final = "compiling"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,8 @@ class Report:
     failures
         Reasons by name of the method that failed.
     interrupted
-        The method, `certificate`, `drawing` or `surface` during which the run was interrupted; else empty.
+        The method, `compiling`, `certificate`, `drawing` or `surface` during which the run was interrupted;
+        else empty.
     proven
         Proven bound of the 2-norm energy of all fields, or None.
     stages
@@ -254,7 +256,10 @@ def run(
         request = Request(
             instance, folder / "solve", limits, options or {}, start, progress=progress, stop=over
         )
-        found = _all_methods(request, start, watch)
+        found = _Found([Candidate(START, start, watch.stages[START])], interrupted=_compiled(request))
+        watch.lap(COMPILING)
+    if not found.interrupted:
+        _find(found, request, watch)
     proven = _certified(found, folder / CERTIFICATE, limits, progress, over)
     watch.lap("certificate")
     report = Report(instance, found.ranked, tuple(manifests), found.failures, found.interrupted, proven)
@@ -299,9 +304,19 @@ class _Found:
         return tuple(sorted(self.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}")))
 
 
-def _all_methods(request: Request, start: CrossField, watch: Stopwatch) -> _Found:
-    """The start, and the fields that the methods of a run find in turn, until one is interrupted."""
-    found = _Found([Candidate(START, start, watch.stages[START])])
+def _compiled(request: Request) -> str:
+    """Compile what methods need, so that a first run finds what later ones find; the stage if interrupted."""
+    try:
+        compile_proofs(request.folder, request.progress, request.stop)
+    except KeyboardInterrupt:
+        return COMPILING
+    except SolverError as error:  # the method `prove` tries again, and its failure is in the report
+        request.progress(str(error))
+    return ""
+
+
+def _find(found: _Found, request: Request, watch: Stopwatch) -> None:
+    """Add the fields that the methods of a run find in turn, until one is interrupted."""
     for method in METHODS.values():
         try:
             for candidate in method.find(request):
@@ -316,7 +331,6 @@ def _all_methods(request: Request, start: CrossField, watch: Stopwatch) -> _Foun
         watch.lap(method.name)
         if found.interrupted:
             break
-    return found
 
 
 def _certified(found: _Found, path: Path, limits: Limits, progress: Progress, stop: Over) -> Proven | None:

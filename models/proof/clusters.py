@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.grid import Floats, Grid
-from ..processes.compiled import compiled_if_needed
+from ..processes.compiled import compiled
 from .lattice import Lattice, starts
 from .min_plus import least_of, min_plus, min_plus_between
 from .over_beta import Given, betas, least_cost, over_beta
@@ -108,7 +108,7 @@ def cluster_fronts(grid: Grid, clusters: Clusters) -> list[Indices]:
 # column.
 
 
-@compiled_if_needed
+@compiled
 def update_clusters(numbers: Indices, state: State) -> None:
     """Update some clusters, one after the other; their least values are then 0."""
     for number in numbers:
@@ -123,7 +123,7 @@ def update_clusters(numbers: Indices, state: State) -> None:
         _store(table + 3, rows, state, f3, min_plus(upper, _turned(f2)))
 
 
-@compiled_if_needed
+@compiled
 def least_of_clusters(begin: int, end: int, state: State, least: Floats) -> None:
     """Fill in the least of - sum lambda of some clusters over the allowed alphas."""
     for number in range(begin, end):
@@ -138,7 +138,7 @@ def least_of_clusters(begin: int, end: int, state: State, least: Floats) -> None
         least[number] = found
 
 
-@compiled_if_needed
+@compiled
 def _rows(number: int, state: State) -> IndexTable:
     """The number of alphas with an allowed label at the pixels a, b, c, d of a quad, then these alphas."""
     bottom, top = state.clusters.quads[number, 0], state.clusters.quads[number, 2]
@@ -161,7 +161,7 @@ def _rows(number: int, state: State) -> IndexTable:
     return found
 
 
-@compiled_if_needed
+@compiled
 def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
     """The least of a pair's cost - shares over betas and jumps, without this table; by allowed alphas."""
     column = table % 4
@@ -189,7 +189,7 @@ def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
     return best
 
 
-@compiled_if_needed
+@compiled
 def _least_of_rows(matrix: Floats) -> Floats:
     found = np.empty(matrix.shape[0])
     for x in range(found.size):
@@ -197,7 +197,7 @@ def _least_of_rows(matrix: Floats) -> Floats:
     return found
 
 
-@compiled_if_needed
+@compiled
 def _ends_of(i: int, rows: Indices, state: State) -> Ends:
     """The ends of some rows of a pixel, as of `ends_of`."""
     begin, end = ends_of(i, state)
@@ -207,7 +207,7 @@ def _ends_of(i: int, rows: Indices, state: State) -> Ends:
     return some
 
 
-@compiled_if_needed
+@compiled
 def _may_lower(
     best: Floats, least: tuple[Floats, Floats], in_alpha: Floats, rows: tuple[Indices, Indices], plus: float
 ) -> Ends:
@@ -227,7 +227,7 @@ def _may_lower(
     return begins, ends
 
 
-@compiled_if_needed
+@compiled
 def _lower_to(
     best: Floats, found: Floats, in_alpha: Floats, rows: tuple[Indices, Indices], ends: Ends
 ) -> None:
@@ -238,14 +238,14 @@ def _lower_to(
             best[x, y] = min(best[x, y], found[x, y] + in_alpha[mine[x + 1], others[y + 1]])
 
 
-@compiled_if_needed
+@compiled
 def _add(matrix: Floats, other: Floats, constant: float) -> None:
     for x in range(matrix.shape[0]):
         for y in range(matrix.shape[1]):
             matrix[x, y] += other[x, y] + constant
 
 
-@compiled_if_needed
+@compiled
 def _given(pair: int, i: int, rows: Indices, state: State) -> Floats:
     """Minus the shares of a pair at the allowed alphas of its end i; inf at labels that are not allowed."""
     columns = state.beta_count[i]
@@ -258,7 +258,7 @@ def _given(pair: int, i: int, rows: Indices, state: State) -> Floats:
     return given
 
 
-@compiled_if_needed
+@compiled
 def _negative(table: int, rows: IndexTable, state: State) -> Floats:
     """Minus a table of a cluster, at the allowed alphas."""
     column = table % 4
@@ -272,7 +272,7 @@ def _negative(table: int, rows: IndexTable, state: State) -> Floats:
     return found
 
 
-@compiled_if_needed
+@compiled
 def _store(table: int, rows: IndexTable, state: State, f: Floats, rest: Floats) -> None:
     """Set a table to a quarter of the least of all four f, f + rest, less its own f, at allowed alphas."""
     column = table % 4
@@ -285,7 +285,7 @@ def _store(table: int, rows: IndexTable, state: State, f: Floats, rest: Floats) 
             state.clusters.tables[begin + mine[x + 1] * wide + others[y + 1]] = value
 
 
-@compiled_if_needed
+@compiled
 def _turned(matrix: Floats) -> Floats:
     """The transposed matrix, as rows one after the other."""
     found = np.empty((matrix.shape[1], matrix.shape[0]))

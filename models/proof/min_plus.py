@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ..instance.grid import Floats
-from ..processes.compiled import compiled, compiled_if_needed, compiled_in_any_order
+from ..processes.compiled import compiled, compiled_in_any_order
 from .state import Ends
 
 _NEAR: Final = 1  # terms on both sides of the best one of a row that come before the others
@@ -77,7 +77,7 @@ def lower_rows(targets: Floats, left: Floats, terms: Terms, at: tuple[int, int])
     return _most_of_rows(targets, width)
 
 
-@compiled_if_needed
+@compiled
 def min_plus(left: Floats, right: Floats) -> Floats:
     """The (min,+) product of two matrices of which nearly all terms are needed.
 
@@ -87,7 +87,7 @@ def min_plus(left: Floats, right: Floats) -> Floats:
     return min_plus_between(left, right, ends)
 
 
-@compiled_if_needed
+@compiled
 def min_plus_between(left: Floats, right: Floats, ends: Ends) -> Floats:
     """The (min,+) product of two matrices between the ends of each row; elsewhere too great or inf."""
     out = np.empty((left.shape[0], right.shape[1]))
@@ -107,7 +107,7 @@ def min_plus_between(left: Floats, right: Floats, ends: Ends) -> Floats:
     return out
 
 
-@compiled_if_needed
+@compiled
 def _finite(left: Floats, row: int) -> tuple[int, int]:
     """The first column with a number below inf in four rows of a matrix, and the one after the last."""
     first, end = left.shape[1], 0

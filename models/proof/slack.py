@@ -14,7 +14,7 @@ import numpy as np
 
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF
-from ..processes.compiled import compiled_if_needed
+from ..processes.compiled import compiled
 from .lattice import Lattice
 from .products import all_taken
 from .state import Indices, State
@@ -70,7 +70,7 @@ def _corners(lattice: Lattice, alpha: Floats, beta: Floats) -> list[_Corner]:
     ]
 
 
-@compiled_if_needed
+@compiled
 def _fill_taken(first: int, end: int, state: State, theta: Floats) -> None:
     """Fill in the cost of each label of some pixels plus the shares of all pairs there."""
     begin = state.start[first]

@@ -15,7 +15,7 @@ from typing import Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.formats.registry import generator
-from crossfield.export.solving.compiling import compile_all, compile_clusters
+from crossfield.export.solving.compiling import compile_all
 from crossfield.export.solving.local import Solvers
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedBySolverError
 from crossfield.models.field.field import Norm
@@ -145,7 +145,6 @@ def _certificate(run: Run, folder: Path) -> Path:
 def _proven(run: Run, watch: Watch, certificates: Path) -> Row:
     """The row of a proof, its certificate included."""
     compile_all()
-    compile_clusters()
     cf.prove(made(*QUICK.turned), norm=_norm(run), limits=cf.Limits(gap=0), jobs=1)  # loads the functions
     watch.begin()
     limits = cf.Limits(run.limit, gap=0)

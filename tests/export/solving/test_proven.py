@@ -61,20 +61,35 @@ def test_a_field_stands_where_no_time_is_left_for_its_certificate(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_proofs_compile_is_compiled_once_within_the_limit(tmp_path):
-    def solve(seconds):
-        command = [sys.executable, "-m", "crossfield", "solve", "skew", "--size", "4", "-m", "prove"]
+def test_what_proofs_call_is_compiled_once_and_before_the_time_limit_begins(tmp_path):
+    def solve(sample, size, seconds):
+        command = [sys.executable, "-m", "crossfield", "solve", sample, "--size", size, "-m", "prove"]
         command += ["--time-limit", seconds, "-o", str(tmp_path / "out"), "--quiet"]
         settings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-        return subprocess.run(command, env=settings, capture_output=True, text=True, check=False)
+        assert subprocess.run(command, env=settings, check=False).returncode == 0
+        found = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
+        return {path: time for path, time in found.items() if not path.name.startswith("parts.")}
 
-    first = solve("1")
-    assert first.returncode == 1
-    assert "once per machine" in first.stderr
-    assert solve("250").returncode == 0
-    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
-    assert kept
-    (tmp_path / "out" / "compiling.log").unlink()
-    assert solve("100").returncode == 0
-    assert kept == {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
+    kept = solve("skew", "4", "0.1")
+    assert any(path.name.startswith("clusters.") for path in kept)
+    assert kept == solve("mouse", "8", "100")
+    assert (tmp_path / "out" / "mouse.prove.certificate.npz").exists()
     assert not (tmp_path / "out" / "compiling.log").exists()
+
+
+@pytest.mark.slow
+def test_a_run_that_is_stopped_while_it_compiles_leaves_its_start(tmp_path):
+    program = """
+import sys
+import crossfield as cf
+
+seen = []
+stop = lambda: "compiling" in seen[-1]
+report = cf.run(cf.sample("skew", 4), sys.argv[1], limits=cf.Limits(1.0), progress=seen.append, stop=stop)
+print(report.interrupted, [each.method for each in report.candidates])
+"""
+    settings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, "-c", program, str(tmp_path / "out")]
+    done = subprocess.run(command, env=settings, capture_output=True, text=True, check=True)
+    assert done.stdout.split(maxsplit=1) == ["compiling", "['start']\n"]
+    assert json.loads((tmp_path / "out" / "report.json").read_text())["interrupted"] == "compiling"
