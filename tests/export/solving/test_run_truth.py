@@ -58,6 +58,7 @@ def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
     assert list(document["stages"]) == [
         "start",
         "models",
+        "compiling",
         *METHODS,
         "certificate",
         "fields",
