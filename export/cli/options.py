@@ -220,7 +220,8 @@ SecondsInAll = Annotated[
     float,
     _time_limit(
         help="Seconds in total, including reading and writing files; methods that do not search end earlier."
-        " power, polyvector and bend always complete their first factorisation."
+        " power, polyvector and bend always complete their first factorisation. The first proof on a machine"
+        " compiles its functions before, in up to a minute."
     ),
 ]
 SecondsPerMethod = Annotated[
@@ -236,7 +237,7 @@ SecondsOfProof = Annotated[
     float,
     _time_limit(
         help="Seconds for the proof and for its certificate, which is written and checked. They count from"
-        " when the sketch has been read."
+        " when the sketch has been read and, once on a machine, the functions of proofs are compiled."
     ),
 ]
 Gap = Annotated[

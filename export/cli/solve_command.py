@@ -101,7 +101,7 @@ def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candida
     *_, candidate = METHODS[name].find(request)
     write_field(candidate.field, target)
     certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
-    return candidate, Proven.by(candidate.proof, certificate, deadline), target
+    return candidate, Proven.by(candidate.proof, certificate, deadline.later(candidate.compiling)), target
 
 
 def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solution, Path]:

@@ -6,6 +6,7 @@ Two such processes wait for each other, and the second finds everything compiled
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -16,7 +17,7 @@ from filelock import FileLock
 from ...models.errors import CrossfieldError, SolverError
 from ...models.processes.child import Child, KilledError
 from ...models.processes.control import WorkerError
-from ...models.processes.deadline import Over, Progress, never
+from ...models.processes.deadline import Clock, Over, Progress, never
 from ...models.storage import make_folder
 
 
@@ -36,25 +37,31 @@ def _compile_in(child: Child) -> None:
         child.call(compile_all)
 
 
-def compile_proofs(folder: Path, progress: Progress, stop: Over = never) -> None:
-    """Compile the functions of proofs unless they are; it takes up to a minute.
+def compile_proofs(
+    folder: Path, progress: Progress, stop: Over = never, clock: Clock = time.monotonic
+) -> float:
+    """Compile the functions of proofs unless they are; return the seconds that it took, 0 if they are.
 
-    folder: where the output is kept if the work fails. progress: receives a line if there is something to
-    compile. stop: returns whether to stop; what is compiled by then stays. Raises KeyboardInterrupt when it
-    or Ctrl-C stops the work, and SolverError when the work fails.
+    It takes up to a minute, and no time limit includes it. folder: where the output is kept if the work
+    fails. progress: receives a line if there is something to compile. stop: returns whether to stop; what is
+    compiled by then stays. clock: measures the seconds. Raises KeyboardInterrupt when `stop` or Ctrl-C stops
+    the work, and SolverError when the work fails.
     """
     if is_compiled():
-        return
+        return 0.0
+    begin = clock()
     progress("compiling the functions of proofs, once on this machine, before the time limit begins")
     log = make_folder(folder) / "compiling.log"
     try:
         with Child() as child:
             child.call(compile_all, log=log, stop=stop)
-    except KilledError as error:
+    except (KilledError, KeyboardInterrupt) as error:
+        log.unlink(missing_ok=True)
         raise KeyboardInterrupt from error
     except WorkerError as error:
         raise SolverError(f"the functions of proofs were not compiled: {error}", file=log) from error
     log.unlink(missing_ok=True)
+    return clock() - begin
 
 
 def is_compiled() -> bool:

@@ -36,7 +36,8 @@ _STARTING: Final = 0.5  # share of the seconds for the field from which solvers 
 class Candidate:
     """A field and how it was found: method, seconds, counts, and the solution if a solver returned it.
 
-    proof: the method's proof about the field, if it proves anything.
+    proof: the method's proof about the field, if it proves anything. compiling: seconds of compiling, which
+    neither `seconds` nor the time limit includes.
     """
 
     method: str
@@ -46,6 +47,7 @@ class Candidate:
     interrupted: bool = False
     counts: tuple[tuple[str, int], ...] = ()
     proof: Proof | None = None
+    compiling: float = 0.0
 
     def facts(self) -> dict[str, Any]:
         """Facts for a report: the facts of the field, seconds, and claims with recomputed values."""
@@ -262,11 +264,13 @@ def _progress_line(request: Request, deadline: Deadline, method: str, kept: str)
 
 
 def _prove(request: Request) -> Iterator[Candidate]:
+    begin, deadline = time.perf_counter(), request.deadline()
     from ...models.proof.prove import prove  # it loads compiled functions
 
-    # Before the time limit begins: a short one would end each run before anything is proven.
-    compile_proofs(request.folder, lambda line: request.progress(f"prove: {line}"), request.stop)
-    begin, deadline = time.perf_counter(), request.deadline()
+    compiling = compile_proofs(
+        request.folder, lambda line: request.progress(f"prove: {line}"), request.stop, request.clock
+    )
+    begin, deadline = begin + compiling, deadline.later(compiling)
     request.progress("prove: starting fields")
     proof = prove(
         request.instance,
@@ -283,7 +287,7 @@ def _prove(request: Request) -> Iterator[Candidate]:
     if request.instance.gauge == "box":
         near = relabelled(request.instance, field.alpha, field.beta, field.p)
         field = best_start(request.instance, near, request.stop)
-    yield Candidate("prove", field, seconds, interrupted=interrupted, counts=counts, proof=proof)
+    yield Candidate("prove", field, seconds, None, interrupted, counts, proof, compiling)
 
 
 def _two_stage(request: Request) -> Iterator[Candidate]:

@@ -41,7 +41,7 @@ def compiled_in_any_order(work: _Work) -> _Work:
 
 
 def compiled_if_needed(work: _Work, *, in_any_order: bool = False) -> _Work:
-    """As `compiled`, for a function that most work does without, and that nobody waits for in advance."""
+    """As `compiled`, for a function that is not compiled in advance."""
     return _made(work, fastmath=_ANY_ORDER if in_any_order else False)
 
 

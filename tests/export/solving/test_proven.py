@@ -65,12 +65,32 @@ def test_what_proofs_call_is_compiled_once_and_before_the_time_limit_begins(tmp_
     def solve(sample, size, seconds):
         command = [sys.executable, "-m", "crossfield", "solve", sample, "--size", size, "-m", "prove"]
         command += ["--time-limit", seconds, "-o", str(tmp_path / "out"), "--quiet"]
+        return called(command)
+
+    def called(command):
         settings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
         assert subprocess.run(command, env=settings, check=False).returncode == 0
         found = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
         return {path: time for path, time in found.items() if not path.name.startswith("parts.")}
 
-    kept = solve("skew", "4", "0.1")
+    # The clock passes the time limit while the functions are compiled, and stands still otherwise.
+    program = """
+import sys
+from pathlib import Path
+import crossfield as cf
+from crossfield.export.cli.solve_command import _by_method
+from crossfield.export.solving.methods import Request
+
+lines = []
+request = Request(
+    cf.sample("skew", 4), Path(sys.argv[1]), cf.Limits(500.0), progress=lines.append,
+    clock=lambda: 1000.0 * any("compiling" in line for line in lines),
+)
+candidate, proven, _ = _by_method("prove", request, request.deadline())
+assert (candidate.proof.ended, candidate.compiling) == ("optimal", 1000.0)
+assert proven is not None
+"""
+    kept = called([sys.executable, "-c", program, str(tmp_path / "out")])
     assert any(path.name.startswith("clusters.") for path in kept)
     assert kept == solve("mouse", "8", "100")
     assert (tmp_path / "out" / "mouse.prove.certificate.npz").exists()
