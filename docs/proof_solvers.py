@@ -100,7 +100,7 @@ def both(name: str, size: int, seconds: float, proof_seconds: float) -> Iterator
     """Proofs of each installed solver for a sample: from the files as they are, and tightened."""
     proofs: dict[str, Certificate] = {}
     for solver, formulation in USES:
-        if not PROGRAMS[solver].present:
+        if PROGRAMS[solver].missing:
             continue
         instance = largest(name, size, formulation, solver)
         if instance.sha256 not in proofs:

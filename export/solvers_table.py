@@ -24,6 +24,7 @@ from ..models.formulations.declaration import Formulation
 from ..models.formulations.problem import Problem
 from ..models.instance.instance import Instance
 from .formats.registry import FORMATS, carried
+from .licence import gams_is_licensed
 
 Stage = Literal["read", "solve", "local"]
 Proof = Literal["global", "convex", "local"]
@@ -59,7 +60,7 @@ class Program:
     algebra, behaviour: the formats for which it reports coefficients, or values at points. needs: its
     package, or its executable. tolerance: relative difference of the numbers that it reports, 0 for equal to
     the bit. free: limits of its free edition. adds: pattern of the columns that it adds when it reads or
-    writes a model.
+    writes a model. licensed: whether its licence is valid; None if it has no term.
     """
 
     name: str
@@ -71,6 +72,7 @@ class Program:
     tolerance: float = 0.0
     free: str = ""
     adds: str = ""
+    licensed: Callable[[], bool] | None = None
 
     @property
     def formats(self) -> tuple[str, ...]:
@@ -78,11 +80,15 @@ class Program:
         return self.algebra + self.behaviour
 
     @property
-    def present(self) -> bool:
-        """Whether it is installed."""
-        if self.install.startswith("apt "):
-            return shutil.which(self.needs) is not None
-        return find_spec(self.needs) is not None
+    def missing(self) -> str:
+        """The reason why it cannot be used, and the remedy; empty if it can."""
+        executable = self.install.startswith("apt ")
+        if (shutil.which(self.needs) if executable else find_spec(self.needs)) is None:
+            return f"{self.title} is not installed: {self.install}"
+        if self.licensed is not None and not self.licensed():
+            newer = self.install.replace("install", "install --upgrade")
+            return f"the licence of {self.title} has expired: {newer}, or install a licence of your own"
+        return ""
 
     @property
     def solvers(self) -> tuple[str, ...]:
@@ -119,6 +125,7 @@ PROGRAMS: Final = {
         Program(
             "gams", "GAMS", (), ("gms",), "gamspy_base", "pip install gamspy_base gamspy_baron",
             free="2000 linear or 1000 nonlinear columns and rows, 50 for BARON", adds=r"objvar",
+            licensed=gams_is_licensed,
         ),
     )
 }  # fmt: skip
@@ -180,10 +187,11 @@ class Solver:
 
     @property
     def missing(self) -> str:
-        """Instructions to install it; empty if it is installed."""
-        if not PROGRAMS[self.program].present:
-            return PROGRAMS[self.program].install
-        return f"pip install {self.package}" if self.package and find_spec(self.package) is None else ""
+        """The reason why it cannot be used, and the remedy; empty if it can."""
+        if missing := PROGRAMS[self.program].missing:
+            return missing
+        absent = self.package and find_spec(self.package) is None
+        return f"{self.title} is not installed: pip install {self.package}" if absent else ""
 
 
 _LINEAR_ONLY: Final = {"anything beyond linear": Refusal("read", "it takes linear models only")}

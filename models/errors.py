@@ -93,7 +93,7 @@ class SolverError(CrossfieldError):
 
 
 class MissingSolverError(SolverError):
-    """A solver that is not installed."""
+    """A solver that is not installed, or whose licence has expired."""
 
 
 class UnsupportedBySolverError(SolverError):

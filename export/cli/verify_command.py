@@ -49,6 +49,6 @@ def _show(found: Verification) -> None:
         mine = [f.verdict for f in found.checks if (f.program, f.step) == (program, step)]
         rows.append([program, step, *(str(mine.count(verdict) or "-") for verdict in verdicts)])
     show_table(f"files in {found.folder}", columns, rows, numbers=columns[2:])
-    for name, how in found.absent.items():
-        print_line(f"absent: {name}; {how}")
+    for why in found.absent.values():
+        print_line(f"not used: {why}")
     print_line(f"reasons and numbers: {found.folder / 'verify.json'}")

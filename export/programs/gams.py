@@ -11,10 +11,10 @@ import os
 import re
 import shutil
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
+from ..licence import package_folder
 from ..solutions.readers.text import Status
 from . import casadi as casadi_program
 from .protocol import Job, Outcome, RefusedError, TooLargeError, run_command
@@ -31,11 +31,6 @@ _OPTIONS: Final = {
 _TABLE: Final = "gmscmpNT.txt" if os.name == "nt" else "gmscmpun.txt"
 
 
-def _package(name: str) -> Path | None:
-    found = find_spec(name)
-    return None if found is None or found.origin is None else Path(found.origin).parent
-
-
 def version() -> str:
     """Its version, and the version of CasADi, which evaluates CONVERT's file."""
     from importlib.metadata import version as installed
@@ -45,7 +40,7 @@ def version() -> str:
 
 def _system(solver: str) -> Path:
     """The folder of GAMS; for BARON a copy, by links where possible, with BARON's files and its entry."""
-    base, baron = _package("gamspy_base"), _package("gamspy_baron")
+    base, baron = package_folder("gamspy_base"), package_folder("gamspy_baron")
     assert base is not None
     if solver != "baron" or baron is None:
         return base

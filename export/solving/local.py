@@ -127,7 +127,7 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
         )
     present = [solver for solver in willing if not solver.missing]
     if not present:
-        raise MissingSolverError(f"{willing[0].title} is not installed; {willing[0].missing}")
+        raise MissingSolverError(willing[0].missing)
     formats = {solver.name: FORMATS[taking[solver.name].format] for solver in present}
     return min(present, key=lambda each: carried(problem, formats[each.name]).formulation.weakened)
 

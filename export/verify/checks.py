@@ -53,7 +53,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks, the versions of the programs that took part, and how to install absent ones."""
+    """All checks, the versions of the programs that took part, and why others are absent."""
 
     folder: Path
     checks: list[Check] = field(default_factory=list)

@@ -96,11 +96,11 @@ def verify(
     manifests = [read_manifest(path) for path in sorted(folder.glob("*.manifest.json"))]
     if not manifests:
         raise InputError("holds no manifest; give the folder that `crossfield export` wrote", file=folder)
-    found = Verification(folder, absent={each.name: each.install for each in wanted if not each.present})
+    found = Verification(folder, absent={each.name: each.missing for each in wanted if each.missing})
     with tempfile.TemporaryDirectory(prefix="crossfield-verify-") as temporary:
         subjects, broken = _subjects(manifests, Path(temporary))
         found.checks.extend(broken)
-        for program in (each for each in wanted if each.present):
+        for program in (each for each in wanted if not each.missing):
             chosen = [subject for subject in subjects if subject.format in program.formats]
             with Solvers() as solvers:
                 bench = _Bench(program, solvers, seconds)
@@ -233,7 +233,7 @@ class _Bench:
         if local := _refusal(solver, subject, "local"):
             return ended(Verdict.NOT_TRIED, local)
         if missing := SOLVERS[solver].missing:
-            return ended(Verdict.NOT_TRIED, f"{SOLVERS[solver].title} is not installed: {missing}")
+            return ended(Verdict.NOT_TRIED, missing)
         files = Files.for_model(subject.path, solver)
         limits = Limits(seconds, GAP, threads=1)
         try:

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.bundle.starts import LAYOUTS, STARTS
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS
+from crossfield.export.licence import gams_is_licensed
 from crossfield.export.solvers_table import BUNDLED, PROGRAMS, SOLVERS, Refusal, Solver, StartFile
 from crossfield.models.formulations.catalogue import FORMULATIONS
 
@@ -72,8 +74,26 @@ def test_a_solver_is_one_entry_and_the_module_of_its_program(monkeypatch: pytest
 def test_a_program_that_is_not_here_says_how_to_get_it():
     absent = Solver("absent", "Absent", ("lp",), "highs", package="no_such_package")
     assert find_spec("no_such_package") is None
-    assert absent.missing == "pip install no_such_package"
+    assert absent.missing == "Absent is not installed: pip install no_such_package"
     assert BUNDLED["highs"].missing == ""
+
+
+def test_a_program_whose_licence_has_expired_is_absent():
+    expired = replace(PROGRAMS["highs"], licensed=lambda: False)
+    assert PROGRAMS["highs"].missing == ""
+    assert expired.missing.startswith("the licence of HiGHS has expired: pip install --upgrade highspy")
+
+
+@pytest.mark.parametrize("code, licensed", [(0, True), (2, True), (7, False)])
+def test_gams_that_ends_with_an_error_of_its_licence_has_none(tmp_path, monkeypatch, code, licensed):
+    """The codes are those of GAMS: 2 is an error of the model, 7 one of the licence."""
+    package = tmp_path / "gamspy_base"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "gams").write_text(f"#!/bin/sh\nexit {code}\n")
+    (package / "gams").chmod(0o755)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert gams_is_licensed.__wrapped__() is licensed
 
 
 def test_a_program_that_is_hidden_is_absent_and_its_neighbours_are_not(tmp_path, monkeypatch, hidden):
@@ -83,5 +103,5 @@ def test_a_program_that_is_hidden_is_absent_and_its_neighbours_are_not(tmp_path,
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     assert SOLVERS["glpk"].missing == ""
     hidden("glpsol")
-    assert SOLVERS["glpk"].missing == "apt install glpk-utils"
+    assert SOLVERS["glpk"].missing == "GLPK is not installed: apt install glpk-utils"
     assert subprocess.run([shutil.which("neighbour")], check=False).returncode == 0

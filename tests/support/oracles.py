@@ -83,11 +83,9 @@ and what to do where they are not.
 
 def absence(program: str) -> str:
     """Why tests that need one of these programs cannot run, in a line; nothing where it is here."""
-    if program in OTHERS:
-        present, title, remedy = OTHERS[program]
-    else:
-        entry = PROGRAMS[program]
-        present, title, remedy = entry.present, entry.title, entry.install
+    if program in PROGRAMS:
+        return PROGRAMS[program].missing
+    present, title, remedy = OTHERS[program]
     return "" if present else f"{title} is not installed: {remedy}"
 
 

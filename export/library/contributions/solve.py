@@ -58,14 +58,14 @@ def solve_library(
 ) -> list[dict[str, Any]]:
     """Run solvers, add the records to the ledger, bring the library up to date and return the records.
 
-    solvers: by default all that are installed; time_limit: seconds of a run; up_to: last rung. An entry that
+    solvers: by default all that can be used; time_limit: seconds of a run; up_to: last rung. An entry that
     is too large for the free edition of a program is skipped. Raises InputError for an unknown name,
-    MissingSolverError for a named solver that is not installed.
+    MissingSolverError for a named solver that cannot be used.
     """
     rungs = RUNGS[: RUNGS.index(_known(up_to or RUNGS[-1], RUNGS, "rung")) + 1]
     for name in solvers or ():
         if missing := SOLVERS[_known(name, SOLVERS, "solver")].missing:
-            raise MissingSolverError(f"{name} is not installed; {missing}")
+            raise MissingSolverError(missing)
     chosen = dict.fromkeys(solvers or [name for name, each in SOLVERS.items() if not each.missing])
     check_text("by", by)
     check_text("machine", machine)
