@@ -1,4 +1,4 @@
-"""Whether GAMS accepts its licence: that of the free package ends half a year after its release."""
+"""Whether GAMS accepts its licence: that of the free package ends on a date."""
 
 from __future__ import annotations
 

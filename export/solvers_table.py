@@ -82,12 +82,16 @@ class Program:
     @property
     def missing(self) -> str:
         """The reason why it cannot be used, and the remedy; empty if it can."""
+        return self.missing_for(self.title)
+
+    def missing_for(self, title: str) -> str:
+        """The same for a solver of that title, which it contains."""
         executable = self.install.startswith("apt ")
         if (shutil.which(self.needs) if executable else find_spec(self.needs)) is None:
-            return f"{self.title} is not installed: {self.install}"
+            return f"{title} is not installed; {self.install}"
         if self.licensed is not None and not self.licensed():
             newer = self.install.replace("install", "install --upgrade")
-            return f"the licence of {self.title} has expired: {newer}, or install a licence of your own"
+            return f"the licence of {self.title} has expired; {newer}, or install a licence of your own"
         return ""
 
     @property
@@ -188,10 +192,10 @@ class Solver:
     @property
     def missing(self) -> str:
         """The reason why it cannot be used, and the remedy; empty if it can."""
-        if missing := PROGRAMS[self.program].missing:
+        if missing := PROGRAMS[self.program].missing_for(self.title):
             return missing
         absent = self.package and find_spec(self.package) is None
-        return f"{self.title} is not installed: pip install {self.package}" if absent else ""
+        return f"{self.title} is not installed; pip install {self.package}" if absent else ""
 
 
 _LINEAR_ONLY: Final = {"anything beyond linear": Refusal("read", "it takes linear models only")}

@@ -74,14 +74,14 @@ def test_a_solver_is_one_entry_and_the_module_of_its_program(monkeypatch: pytest
 def test_a_program_that_is_not_here_says_how_to_get_it():
     absent = Solver("absent", "Absent", ("lp",), "highs", package="no_such_package")
     assert find_spec("no_such_package") is None
-    assert absent.missing == "Absent is not installed: pip install no_such_package"
+    assert absent.missing == "Absent is not installed; pip install no_such_package"
     assert BUNDLED["highs"].missing == ""
 
 
 def test_a_program_whose_licence_has_expired_is_absent():
     expired = replace(PROGRAMS["highs"], licensed=lambda: False)
     assert PROGRAMS["highs"].missing == ""
-    assert expired.missing.startswith("the licence of HiGHS has expired: pip install --upgrade highspy")
+    assert expired.missing.startswith("the licence of HiGHS has expired; pip install --upgrade highspy")
 
 
 @pytest.mark.parametrize("code, licensed", [(0, True), (2, True), (7, False)])
@@ -103,5 +103,5 @@ def test_a_program_that_is_hidden_is_absent_and_its_neighbours_are_not(tmp_path,
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     assert SOLVERS["glpk"].missing == ""
     hidden("glpsol")
-    assert SOLVERS["glpk"].missing == "GLPK is not installed: apt install glpk-utils"
+    assert SOLVERS["glpk"].missing == "GLPK is not installed; apt install glpk-utils"
     assert subprocess.run([shutil.which("neighbour")], check=False).returncode == 0

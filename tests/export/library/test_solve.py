@@ -194,10 +194,10 @@ def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others
 
 def test_a_solver_that_is_not_installed_is_one_line(copy, monkeypatch, hidden):
     hidden("glpsol")
-    with pytest.raises(CrossfieldError, match=r"^glpk is not installed; apt install glpk-utils$"):
+    with pytest.raises(CrossfieldError, match=r"^GLPK is not installed; apt install glpk-utils$"):
         solve_library(copy, solvers=["glpk"])
     monkeypatch.setitem(SOLVERS, "highs", replace(SOLVERS["highs"], package="no_such_package"))
-    with pytest.raises(CrossfieldError, match=r"^highs is not installed; pip install no_such_package$"):
+    with pytest.raises(CrossfieldError, match=r"^HiGHS is not installed; pip install no_such_package$"):
         solve_library(copy, solvers=["highs"])
     assert read_ledger(copy).records == ()
 

@@ -273,7 +273,7 @@ def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     write_all(on_grid(1, 2), tmp_path, formulations=["qp-fixed"], formats=["lp"])
     monkeypatch.setitem(PROGRAMS, "xpress", replace(PROGRAMS["xpress"], needs="no_such_package"))
     found = verify(tmp_path, programs=["highs", "xpress"])
-    assert found.absent == {"xpress": "pip install xpress"}
+    assert found.absent == {"xpress": "Xpress is not installed; pip install xpress"}
     assert {f.program for f in found.checks} == {"highs"}
     assert found.ok
 
