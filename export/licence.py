@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
-_LICENSING_ERROR: Final = 7  # GAMS's code of return
+_LICENSING_ERROR: Final = 7  # a return code of GAMS
 _SECONDS: Final = 60.0
 
 
