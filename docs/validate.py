@@ -164,7 +164,7 @@ def readings(runs: list[Run]) -> str:
         found = [f.verdict for f in checks]
         counts = [found.count(verdict) for verdict in (Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED)]
         counts.append(found.count(Verdict.DIFFERS) + found.count(Verdict.FAILED))
-        version = runs[0].result.versions.get(name, f"absent: {entry.missing}")
+        version = runs[0].result.versions.get(name, entry.missing)
         by = ["coefficients"] * bool(entry.algebra) + ["values"] * bool(entry.behaviour)
         rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(by), *map(str, counts)])
     return markdown(

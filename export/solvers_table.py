@@ -81,11 +81,11 @@ class Program:
 
     @property
     def missing(self) -> str:
-        """The reason why it cannot be used, and the remedy; empty if it can."""
+        """Why it cannot be used, and the remedy; empty if it can be used."""
         return self.missing_for(self.title)
 
     def missing_for(self, title: str) -> str:
-        """The same for a solver of that title, which it contains."""
+        """Why its solver of that title cannot be used, and the remedy; empty if it can be used."""
         executable = self.install.startswith("apt ")
         if (shutil.which(self.needs) if executable else find_spec(self.needs)) is None:
             return f"{title} is not installed; {self.install}"
@@ -191,7 +191,7 @@ class Solver:
 
     @property
     def missing(self) -> str:
-        """The reason why it cannot be used, and the remedy; empty if it can."""
+        """Why it cannot be used, and the remedy; empty if it can be used."""
         if missing := PROGRAMS[self.program].missing_for(self.title):
             return missing
         absent = self.package and find_spec(self.package) is None

@@ -14,6 +14,7 @@ from pathlib import Path
 import crossfield
 import places
 import pytest
+from crossfield.export.licence import package_folder
 from crossfield.export.solvers_table import PROGRAMS
 
 DOCS = places.ROOT / "docs"
@@ -26,9 +27,8 @@ ELSEWHERE = ("pip install", "sphinx-build", "python3 -m venv", ". .venv")
 
 def programs() -> str:
     """The search path, with the folder of GAMS where it is installed for Python."""
-    found = find_spec("gamspy_base")
-    more = [] if found is None or found.origin is None else [str(Path(found.origin).parent)]
-    return os.pathsep.join([*more, os.environ["PATH"]])
+    gams = package_folder("gamspy_base")
+    return os.pathsep.join([*([] if gams is None else [str(gams)]), os.environ["PATH"]])
 
 
 def is_there(program: str) -> bool:
