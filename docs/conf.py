@@ -7,8 +7,9 @@ from importlib.metadata import version as installed
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from crossfield.export.library.site.formulas import lines_of, mathml
+from crossfield.templates import ENVIRONMENT
 from docutils.nodes import SkipNode
-from latex2mathml.converter import convert
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -19,7 +20,7 @@ project = "crossfield"
 author = "The crossfield authors"
 version = release = installed("crossfield")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "command_pages"]
-exclude_patterns = ["studying"]
+exclude_patterns = ["static", "studying"]
 source_suffix = {".md": "markdown"}
 
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
@@ -30,6 +31,8 @@ html_theme = "furo"
 html_title = f"crossfield {version}"
 html_math_renderer = "mathml"
 html_copy_source = False
+html_show_copyright = False
+html_static_path = ["static"]
 html_theme_options = {"navigation_with_keys": True}
 
 autodoc_typehints = "none"
@@ -41,16 +44,22 @@ napoleon_use_rtype = False
 
 def _inline(writer: Any, node: Any) -> None:
     """Write a formula within a line."""
-    writer.body.append(convert(node.astext()))
+    writer.body.append(mathml(node.astext()).replace(' displaystyle="true"', ""))
     raise SkipNode
 
 
 def _block(writer: Any, node: Any) -> None:
-    """Write a formula on lines of its own."""
-    writer.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
+    """Write a formula on lines of its own, and a model as a table."""
+    source = node.astext()
+    if source.startswith(r"\begin{aligned}"):
+        template = ENVIRONMENT.get_template("site/model.html.j2")
+        writer.body.append(template.render(name=node.parent[0].astext(), lines=lines_of(source)))
+    else:
+        writer.body.append(f'<div class="math">{mathml(source)}</div>')
     raise SkipNode
 
 
 def setup(app: Sphinx) -> None:
     """Show formulas as MathML, for which browsers need no script."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
+    app.add_css_file("formulas.css")

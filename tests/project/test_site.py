@@ -9,6 +9,7 @@ import sys
 import places
 import pytest
 from browsing import find, served, show, sideways
+from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 
 pytestmark = pytest.mark.slow
 
@@ -48,13 +49,48 @@ def address(site):
         yield found
 
 
-def test_formulas_are_shown(browser, address):
-    browser.get(f"{address}/mathematics.html")
-    sizes = browser.execute_script(
-        "return [...document.querySelectorAll('math')].map(each => each.getBoundingClientRect().height)"
+FORMULAS = """
+const inside = math => {
+  const box = math.getBoundingClientRect();
+  for (let frame = math.parentElement; frame; frame = frame.parentElement) {
+    const { left, right } = frame.getBoundingClientRect();
+    if (frame.matches('.table-wrapper')) return true;  // a wide table scrolls
+    if (getComputedStyle(frame).overflowX !== 'visible' && (box.left < left - 1 || box.right > right + 1))
+      return false;
+  }
+  return box.left >= 0 && box.right <= innerWidth + 1;
+};
+return [...document.querySelectorAll('math')].map(math =>
+  [math.textContent, math.getBoundingClientRect().height > 4 && math.checkVisibility(), inside(math)]);
+"""
+"""Text of every formula, whether it is visible, and whether no edge of the page or of a frame cuts it."""
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_formulas_are_whole_and_inside_the_page(browser, address, site, width):
+    show(browser, width=width)
+    count = 0
+    for page in sorted(site.rglob("*.html")):
+        if "<math" not in page.read_text(encoding="utf-8"):
+            continue
+        browser.get(f"{address}/{page.relative_to(site)}")
+        formulas = browser.execute_script(FORMULAS)
+        count += len(formulas)
+        assert [text for text, *_ in formulas if re.search(r"[&\\\\]", text)] == [], page
+        assert [text for text, visible, _ in formulas if not visible] == [], page
+        assert [text for text, _, inside in formulas if not inside] == [], page
+    assert count > 500
+
+
+def test_a_model_has_every_line_of_its_declaration(browser, address):
+    browser.get(f"{address}/formulations.html")
+    models = (
+        "[...document.querySelectorAll('.model')].map(model => model.querySelectorAll('tbody tr').length)"
     )
-    assert len(sizes) > 100
-    assert min(sizes) > 4
+    declared = [declare(name) for name in FORMULATIONS]
+    assert browser.execute_script(f"return {models}") == [
+        len(each.objective) + len(each.rows) + len(each.variables) for each in declared
+    ]
 
 
 def test_a_search_finds_a_page(browser, address):

@@ -5,10 +5,8 @@ The structure is the sparsity of the matrix and of the Hessian of the Lagrangian
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 from itertools import combinations, combinations_with_replacement
 from pathlib import Path
 from typing import Any, Final
@@ -25,8 +23,8 @@ from ....models.storage import write_bytes
 from ...pictures.sparsity import Parts, Pattern, Places, sparsity_picture
 from ..documents.documents import Library, problem_of
 from ..documents.statistics import row_classes
+from .formulas import lines_of
 
-_LABEL: Final = re.compile(r" \\quad \\text\{(.*)\}$")
 _HIGHEST: Final = 4  # the greatest degree of a polynomial in any formulation
 
 
@@ -65,33 +63,6 @@ def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
         blocks(patterns["hessian"]) if "hessian" in patterns else None,
         row_classes(problem),
     )
-
-
-@cache
-def lines_of(source: str) -> tuple[dict[str, str], ...]:
-    """Return the lines of a model as role, formula, set and equation of the paper.
-
-    role: `minimise`, `subject to`, `where`, or empty as on the line before. Formula and set are MathML made
-    from our declarations alone.
-    """
-    last, found = "", []
-    for row in source.split("\n")[1:-1]:  # lead & formula && set, label; domains have no label
-        lead, formula, *rest = (part.strip() for part in row.removesuffix(r" \\").split("&", maxsplit=2))
-        over = rest[0].removeprefix("&").strip() if rest else ""
-        label = _LABEL.search(over)
-        role = "minimise" if lead or not rest else "subject to" if label else "where"
-        line = {"role": "" if role == last else role, "formula": _converted(formula)}
-        found.append(line | {"over": _converted(_LABEL.sub("", over)), "label": label[1] if label else ""})
-        last = role
-    return tuple(found)
-
-
-def _converted(formula: str) -> str:
-    """LaTeX of our own declarations, never of a file, as inline MathML in display style."""
-    from latex2mathml.converter import convert
-
-    found = convert(formula, display="block") if formula else ""
-    return found.replace(' display="block"', ' displaystyle="true"')
 
 
 def matrix(problem: Problem) -> Pattern:
