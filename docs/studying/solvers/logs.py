@@ -20,9 +20,8 @@ _ROOT: Final = {
     "highs": r"^ .? +0 +\d+ +\d+ +\S+% +(\S+) +\S+ +\S+ .*s$",
     "scip": r"^.? *\S+s\| +1 \|(?:[^|]*\|){12} *(\S+) \|",
     "cbc": r"^Continuous objective value is (\S+) -|^Cbc0013I At root node, .* to (\S+) in \d+ pass",
-    "bonmin": r"^NLP0014I +1 +OPT (\S+)",
 }
-"""Patterns of the lower bound at the root, whose last match counts."""
+"""Patterns of the lower bound at the root, whose last match counts. Bonmin's log has none."""
 
 
 def progress(solver: str, text: str) -> Iterator[Step]:
@@ -47,7 +46,7 @@ def _within(word: str) -> float | None:
 
 
 def root_bound(solver: str, text: str) -> float | None:
-    """The last lower bound before the first branching; of Bonmin, the value of the relaxation."""
+    """The last lower bound before the first branching, as the log rounds it; None where it has none."""
     found = re.findall(_ROOT[solver], text, re.MULTILINE) if solver in _ROOT else []
     if not found:
         return None

@@ -45,9 +45,10 @@ def contradicted(row: Row, energy: float, bound: float) -> bool:
     """Whether an answer contradicts the energy of a known field, or a proven bound of all fields."""
     slack = WITHIN * max(1.0, abs(energy))
     low = row["objective"] is not None and row["objective"] < bound - slack
+    bounds = [row[name] for name in ("bound", "root_bound") if row[name] is not None]
     return (
         low
-        or (row["bound"] is not None and row["bound"] > energy + slack)
+        or max(bounds, default=-np.inf) > energy + slack
         or (is_solved(row) and row["objective"] > energy + slack)
     )
 
