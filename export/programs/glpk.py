@@ -127,11 +127,11 @@ def _our_name(name: str, digits: int) -> str:
 def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any, Any]:
     """Bounds of rows or columns: a letter (free, lower, upper, double, s: fixed) at place `at`, and numbers.
 
-    Rows without a line are free; columns are at least 0, and at most 1 in a model with integers.
+    A row without a line is an equation with 0 on its right; a column without a line is at least 0, and in a
+    model with integers it is binary.
     """
-    lower, upper = np.zeros(count), np.full(count, 1.0 if at == 3 else np.inf)
-    if kind == "i":
-        lower[:] = -np.inf
+    default = 0.0 if kind == "i" else 1.0 if at == 3 else np.inf
+    lower, upper = np.zeros(count), np.full(count, default)
     for line in (line for line in lines if line[0] == kind and len(line) > at):
         place, letter, numbers = int(line[1]) - 1, line[at], [float(text) for text in line[at + 1 :]]
         lower[place] = numbers[0] if letter in "lds" else -np.inf
