@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from . import highs as highs_program
-from .protocol import Job, NotReportedError, Outcome, RefusedError, run_program
+from .protocol import Job, NotReportedError, Outcome, RefusedError, complete, run_program
 from .reading import Meaning
 
 
@@ -48,7 +48,8 @@ def solve(job: Job) -> Outcome:
     """Solve the file; the solution is the file of CBC's command `solution`, which has eight digits."""
     gaps = ("ratio", f"{job.gap:g}", "allow", "1e-9", "primalT", "1e-9", "integerT", "1e-9")
     limits = (*gaps, "sec", f"{job.seconds:g}", "timem", "elapsed")
-    output = _run(str(job.model), *limits, "solve", "solution", str(job.solution))
+    with complete(job.solution) as part:
+        output = _run(str(job.model), *limits, "solve", "solution", str(part))
     if not job.solution.exists():
         raise RefusedError(f"CBC wrote no solution: {' '.join(output.split())[-200:]}")
     bound = re.search(r"^Lower bound: +(\S+)$", output, re.MULTILINE)

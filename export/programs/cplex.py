@@ -16,7 +16,7 @@ from cplex.exceptions import CplexError, CplexSolverError
 from ...models.processes.control import on_stop
 from ..solutions.readers.text import Status
 from ..writing.terms import Terms, listed
-from .protocol import Job, Outcome, RefusedError, TooLargeError
+from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
 from .reading import Meaning, finite, infinite
 
 _SIZE_LIMIT = 1016
@@ -119,5 +119,6 @@ def solve(job: Job) -> Outcome:
     if not answer.is_primal_feasible():
         status = Status.INFEASIBLE if "infeasible" in words else Status.LIMIT_WITHOUT_POINT
         return Outcome(status, words, bound, nodes)
-    answer.write(str(job.solution))
+    with complete(job.solution) as part:
+        answer.write(str(part))
     return Outcome(bound=bound, nodes=nodes)

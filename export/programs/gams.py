@@ -17,7 +17,7 @@ from typing import Final
 from ..licence import package_folder
 from ..solutions.readers.text import Status
 from . import casadi as casadi_program
-from .protocol import Job, Outcome, RefusedError, TooLargeError, run_command
+from .protocol import Job, Outcome, RefusedError, TooLargeError, complete, run_command
 from .reading import Evaluation, Points
 
 _LINEAR_AND_QUADRATIC: Final = ("lp", "mip", "qcp", "miqcp")
@@ -124,7 +124,8 @@ def solve(job: Job) -> Outcome:
     """
     solver = job.solver.removeprefix("gams-")
     threads = (f"threads={job.threads}",) if job.threads else ()
-    log = _run(job.model, solver, f"reslim={job.seconds:g}", *threads, f"--RESULTS={job.solution}")
+    with complete(job.solution) as part:
+        log = _run(job.model, solver, f"reslim={job.seconds:g}", *threads, f"--RESULTS={part}")
     model, state = (
         int(found[1]) if (found := re.search(rf"\*\*\*\* {kind} STATUS +(\d+)", log)) else 0
         for kind in ("MODEL", "SOLVER")

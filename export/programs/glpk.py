@@ -16,7 +16,7 @@ import numpy as np
 from ...models.processes.control import stopped
 from ..solutions.readers.text import Status
 from ..writing.terms import listed
-from .protocol import Job, Outcome, RefusedError, run_command, run_program
+from .protocol import Job, Outcome, RefusedError, complete, run_command, run_program
 from .reading import Evaluation, Meaning, Points
 
 _KINDS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
@@ -143,7 +143,8 @@ def solve(job: Job) -> Outcome:
     """Solve the file; the solution is the file of `-w`, whose columns have no names."""
     limits = ("--tmlim", str(max(1, int(job.seconds))), "--mipgap", f"{job.gap:g}")
     try:
-        _run(job.model, *limits, "-w", str(job.solution))
+        with complete(job.solution) as part:
+            _run(job.model, *limits, "-w", str(part))
     except RefusedError:
         if not stopped():  # an interrupt ends GLPK at once
             raise

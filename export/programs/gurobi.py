@@ -12,7 +12,7 @@ import numpy as np
 
 from ...models.processes.control import on_stop
 from ..writing.terms import Terms, listed
-from .protocol import Job, Outcome, RefusedError, TooLargeError
+from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
 from .reading import Meaning, finite
 
 _SIZE_LIMIT = 10010
@@ -94,7 +94,8 @@ def solve(job: Job) -> Outcome:
                 raise TooLargeError(str(error)) from error
             raise RefusedError(f"Gurobi error {error.errno}: {error}") from error
         model.setParam("JSONSolDetail", 1)  # columns at 0 too
-        model.write(str(job.solution))
+        with complete(job.solution) as part:
+            model.write(str(part))
         if not (model.IsMIP or model.IsQCP):
             return Outcome()
         return Outcome(bound=finite(model.ObjBound), nodes=int(model.NodeCount))

@@ -11,7 +11,7 @@ import numpy as np
 from ...models.errors import OutputError
 from ...models.processes.control import stopped
 from ..writing.terms import of_triangle, terms
-from .protocol import Job, Outcome, RefusedError
+from .protocol import Job, Outcome, RefusedError, complete
 from .reading import Meaning, finite
 
 _RAW: Final = 0
@@ -59,11 +59,11 @@ def solved(highs: Any, path: Path) -> Any:
 
 def write_solution(highs: Any, solution: Path) -> None:
     """Write the solution file. Raises OutputError."""
-    beside = solution.with_suffix(".part")
-    if highs.writeSolution(str(beside), _RAW) == highspy.HighsStatus.kError:
-        beside.unlink(missing_ok=True)
-        raise OutputError("HiGHS cannot write it; free some space or choose another folder", file=solution)
-    beside.replace(solution)
+    with complete(solution) as part:
+        if highs.writeSolution(str(part), _RAW) == highspy.HighsStatus.kError:
+            raise OutputError(
+                "HiGHS cannot write it; free some space or choose another folder", file=solution
+            )
 
 
 def read(path: Path) -> Meaning:

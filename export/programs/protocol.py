@@ -17,6 +17,8 @@ import os
 import shutil
 import signal
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -96,6 +98,27 @@ def call(program: str, step: str, *arguments: Any) -> Any:
         raise
     except Exception as error:
         raise FailedError(f"{type(error).__name__}: {error}") from error
+
+
+def part_of(solution: Path) -> Path:
+    """Return the path of a solution while it is written; programs choose the layout by its suffix."""
+    return solution.with_name(f".part-{solution.name}")
+
+
+@contextmanager
+def complete(solution: Path) -> Iterator[Path]:
+    """Yield the path for a program to write a solution to; the file gets its name once it is complete.
+
+    So a file that exists after the program was killed is a whole answer.
+    """
+    part = part_of(solution)
+    part.unlink(missing_ok=True)
+    try:
+        yield part
+        if part.exists():
+            part.replace(solution)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def run_program(name: str, *arguments: str, folder: Path | None = None) -> str:

@@ -17,7 +17,7 @@ import pyscipopt
 from ...models.processes.control import on_stop
 from ..solutions.readers.text import Status
 from ..writing.terms import Terms, listed
-from .protocol import Job, Outcome, RefusedError, file_names
+from .protocol import Job, Outcome, RefusedError, complete, file_names
 from .reading import Evaluation, Meaning, Points, finite
 
 _INFINITY: Final = 1e19  # SCIP's is 1e20
@@ -191,7 +191,8 @@ def solve(job: Job) -> Outcome:
     status = _STATUS.get(words, Status.ERROR)
     bound, nodes = finite(scip.getDualbound()), scip.getNTotalNodes()
     if scip.getNSols():
-        scip.writeBestSol(str(job.solution))
+        with complete(job.solution) as part:
+            scip.writeBestSol(str(part))
     elif status == Status.LIMIT_WITH_POINT:
         status = Status.LIMIT_WITHOUT_POINT
     return Outcome(status, words, bound, nodes)

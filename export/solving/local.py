@@ -36,7 +36,7 @@ from ...models.storage import make_folder
 from ..bundle.manifest import is_recordable, write_manifest
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, carried, write
-from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError, call
+from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError, call, part_of
 from ..solutions.readers.text import Status
 from ..solutions.solution import Solution, read_solution
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in
@@ -47,6 +47,7 @@ FEASIBLE: Final = 1e-6
 VERSION_SECONDS: Final = 60.0
 """Seconds in which a program has to report its version."""
 _LATE: Final = "returned no answer within its time; give it more, or a start"
+_KILLED: Final = "did not end within its time; the answer is what it had written by then"
 _NO_BETTER: Final = "nothing better than the start"
 
 
@@ -291,16 +292,17 @@ class Solvers:
         except (RefusedError, FailedError) as error:
             raise SolverError(f"{entry.title}: {error}", file=files.model) from error
         except KilledError as error:
-            outcome, interrupted = Outcome(Status.LIMIT_WITHOUT_POINT, _LATE), error.interrupted
+            outcome, interrupted = _outcome_of_killed(files, held), error.interrupted
         except WorkerError as error:
             raise SolverError(
                 f"{entry.title}: {error}; its log is {files.log.name}", file=files.model
             ) from error
         finally:
             files.start.unlink(missing_ok=True)
-        if outcome.status == Status.LIMIT_WITHOUT_POINT and not files.solution.exists():
-            outcome = _start_as_answer(held, point, files, outcome, entry)
         found = _answer(held, files, outcome, entry)
+        unsolved = found.status == Status.LIMIT_WITHOUT_POINT
+        if unsolved and point is not None and held.violation(point).worst <= FEASIBLE:
+            found = _start_as_answer(held, point, files, outcome, entry)
         return replace(
             found,
             interrupted=interrupted,
@@ -333,17 +335,22 @@ def _start_file(held: Problem, solver: str, start: CrossField | None, path: Path
     return path
 
 
-def _start_as_answer(
-    held: Problem, point: Floats | None, files: Files, outcome: Outcome, entry: Solver
-) -> Outcome:
-    """Write the start as the solution of a solver that ended without a point, if the start is feasible."""
-    if point is None or held.violation(point).worst > FEASIBLE:
-        return outcome
+def _outcome_of_killed(files: Files, held: Problem) -> Outcome:
+    """What is known of a solver that was killed: its solution file counts if the solver completed it."""
+    part_of(files.solution).unlink(missing_ok=True)
+    try:
+        status = read_solution(files.solution, held).claimed
+    except (InputError, SolutionError):  # there is none, or one that cannot be read
+        files.solution.unlink(missing_ok=True)
+        return Outcome(Status.LIMIT_WITHOUT_POINT, _LATE)
+    return Outcome(Status.LIMIT_WITH_POINT if status is Status.FEASIBLE else None, _KILLED)
+
+
+def _start_as_answer(held: Problem, point: Floats, files: Files, outcome: Outcome, entry: Solver) -> Solution:
+    """Write the feasible start as the solution of a solver that ended without a point, and read it."""
     save(files.solution, LAYOUTS["highs"](Start(held, point)))
-    return outcome._replace(
-        status=Status.LIMIT_WITH_POINT,
-        message=f"{entry.name}: stopped at its limit or by Ctrl-C, {_NO_BETTER}",
-    )
+    message = f"{entry.name}: stopped at its limit or by Ctrl-C, {_NO_BETTER}"
+    return _answer(held, files, outcome._replace(status=Status.LIMIT_WITH_POINT, message=message), entry)
 
 
 def _answer(held: Problem, files: Files, outcome: Outcome, entry: Solver) -> Solution:

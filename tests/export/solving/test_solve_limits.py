@@ -6,7 +6,10 @@ import threading
 
 import crossfield as cf
 import pytest
+from crossfield.export.programs.protocol import part_of
 from crossfield.export.solutions.readers.text import Status
+from crossfield.export.solving.local import Files, Solvers
+from crossfield.models.processes.child import Child, KilledError
 from crossfield.models.processes.deadline import Deadline
 
 
@@ -24,6 +27,63 @@ def test_without_time_the_start_is_the_answer(tmp_path, name):
     assert found.bound is None
     assert not list(tmp_path.glob("*.log"))
     assert cf.solve(problem, limits=cf.Limits(1e-6)).status == Status.LIMIT_WITHOUT_POINT
+
+
+class KilledAfterItsCall(Child):
+    """A child whose work is done, its files written, when the parent kills it; `spoil` changes the files."""
+
+    spoil = staticmethod(lambda _job: None)
+
+    def call(self, work, program, step, job, **options):
+        super().call(work, program, step, job, **options)
+        self.spoil(job)
+        raise KilledError("did not end in time")
+
+
+class KilledSolvers(Solvers):
+    def child(self, program):
+        if program not in self._children:
+            self._children[program] = self._stack.enter_context(KilledAfterItsCall(self._folder))
+        return self._children[program]
+
+
+@pytest.fixture
+def skew():
+    """A problem and a start."""
+    start = cf.greedy_field(cf.sample("skew", 4))
+    return cf.formulate(start.instance, "milp-mccormick"), start
+
+
+@pytest.mark.parametrize(
+    ("solver", "status"),
+    [
+        ("highs", Status.OPTIMAL_GLOBAL),
+        pytest.param("scip", Status.LIMIT_WITH_POINT, marks=pytest.mark.needs("scip")),
+    ],
+)
+def test_a_complete_answer_of_a_killed_solver_counts(solver, status, tmp_path, skew):
+    """SCIP's file states no status; HiGHS' states the proof, which is then the solver's own claim."""
+    problem, _ = skew
+    with KilledSolvers() as solvers:
+        found = solvers.solve(problem, solver, folder=tmp_path, limits=cf.Limits(60.0))
+    assert (found.claimed, found.doubt) == (status, "")
+    assert found.objective == pytest.approx(cf.solve(problem, solver).objective, abs=1e-6)
+
+
+def test_a_cut_answer_of_a_killed_solver_is_not_read(tmp_path, skew):
+    problem, start = skew
+
+    def cut(job):
+        job.solution.replace(part_of(job.solution))
+
+    with KilledSolvers() as solvers:
+        solvers.child("highs").spoil = cut
+        found = solvers.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(60.0))
+        assert (found.status, found.point) == (Status.LIMIT_WITHOUT_POINT, None)
+        assert not list(tmp_path.glob("*.sol")) + list(tmp_path.glob(".part*"))
+        found = solvers.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(60.0), start=start)
+    assert (found.status, found.start_returned) == (Status.LIMIT_WITH_POINT, True)
+    assert not list(tmp_path.glob(".part*"))
 
 
 def test_a_time_limit_does_not_keep_highs_from_reading_a_file(tmp_path):
