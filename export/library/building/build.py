@@ -13,16 +13,17 @@ from typing import Any
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.processes.deadline import Progress, silent
-from ....models.storage import make_folder, write_bytes
+from ....models.storage import make_folder, read_bytes, sha256_of, write_bytes
 from ..documents.documents import Library, about_file, are_whole, read_about, read_library, read_sidecar
 from ..documents.lock import locked
 from ..ledger.given import NO_POINTS, Points, points_of, read_points
+from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record, merged, read_ledger, write_ledger
 from ..plan.recipe import InstancePlan, plan, without
 from ..plan.spec import Spec
 from .entry_task import Inputs, make_entry
 from .executor import Tasks, ahead, executor
-from .index import write_index
+from .index import SUMS, write_index
 from .instance_task import Files, prepared
 
 
@@ -97,6 +98,13 @@ def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Libr
     """Bring a library up to date as `rebuild` does, under the lock of the caller."""
     spec = read_library(folder).spec
     return _built(spec, plan(spec), folder, points_of(folder), jobs=jobs, scheduler=None, progress=progress)
+
+
+def has_unbuilt_records(library: Library) -> bool:
+    """Whether the ledger differs from SHA256SUMS: a change was interrupted before its rebuild."""
+    digest = sha256_of(library.folder / LEDGER)
+    sums = read_bytes(library.folder / SUMS).decode("utf-8", "replace").splitlines()
+    return f"{digest}  {LEDGER}" not in sums
 
 
 def unmatched(library: Library) -> list[Record]:

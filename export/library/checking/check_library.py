@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
@@ -39,6 +39,7 @@ from .check_entry import BUILD, Finding, instance_findings, of_error, run_findin
 
 FETCH: Final = "fetch it again, or build the library again"
 REMOVE: Final = "remove it"
+_INTERRUPTED: Final = f"after an interrupted solve or submission {BUILD}; otherwise fetch it again"
 PLAIN: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")  # names of files in a library
 
 Checked = tuple[dict[str, Any] | None, list[Finding]]
@@ -122,15 +123,20 @@ class _Verification:
             else:
                 listed.add(parts[2])
                 yield from self._checksum(parts[2], parts[1])
+        of_ledger: Collection[str] = ()
+        with suppress(CrossfieldError):  # a damaged ledger is reported with the entries
+            of_ledger = read_ledger(self.folder).files
         for name in sorted(self.present - listed - {SUMS}):
-            yield Finding(name, "is not in SHA256SUMS", f"{REMOVE}, or {BUILD}")
+            remedy = BUILD if name in of_ledger else f"{REMOVE}, or {BUILD}"
+            yield Finding(name, "is not in SHA256SUMS", remedy)
 
     def _checksum(self, name: str, expected: str) -> Iterator[Finding]:
         if name not in self.present:
             yield Finding(name, "is missing", FETCH)
         elif sha256_of(self.folder / name) != expected:
             self.damaged.add(name)
-            yield Finding(name, "has another SHA-256 than SHA256SUMS states", FETCH)
+            remedy = _INTERRUPTED if name == LEDGER else FETCH
+            yield Finding(name, "has another SHA-256 than SHA256SUMS states", remedy)
 
     def _index(self, library: Library) -> Iterator[Finding]:
         """Findings about the index, and missing texts and checkers."""

@@ -22,12 +22,13 @@ from ....models.errors import (
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
 from ....models.processes.deadline import Progress, silent
+from ....models.processes.groups import interruptible
 from ....models.processes.limits import Limits
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, format_for
-from ..building.build import rebuild
+from ..building.build import has_unbuilt_records, rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
 from ..ledger.ledger import (
@@ -44,6 +45,7 @@ from ..ledger.standing import contradicts, is_better
 from ..plan.spec import RUNGS
 
 GAP: Final = 1e-7  # relative gap of a search, smaller than the gap of a proof: points may be infeasible
+_PURPOSE: Final = "a solve of the library"
 
 
 def solve_library(
@@ -59,7 +61,8 @@ def solve_library(
     """Run solvers, add the records to the ledger, bring the library up to date and return the records.
 
     solvers: by default all that can be used; time_limit: seconds of a run; up_to: last rung. An entry that
-    is too large for the free edition of a program is skipped. Raises InputError for an unknown name,
+    is too large for the free edition of a program is skipped. After Ctrl-C the library is brought up to date
+    with the runs before it, and KeyboardInterrupt is raised. Raises InputError for an unknown name,
     MissingSolverError for a named solver that cannot be used.
     """
     rungs = RUNGS[: RUNGS.index(_known(up_to or RUNGS[-1], RUNGS, "rung")) + 1]
@@ -69,24 +72,36 @@ def solve_library(
     chosen = dict.fromkeys(solvers or [name for name, each in SOLVERS.items() if not each.missing])
     check_text("by", by)
     check_text("machine", machine)
-    library, found = read_library(folder), []
-    with Solvers() as at_work:
-        work = _Solving(library, at_work, time_limit)
-        runs = list(work.runs(list(chosen), rungs))
-        for number, (document, solver) in enumerate(runs, 1):
-            progress(f"{number} of {len(runs)} runs: {solver} on {document['name']}")
-            try:
-                record, field = work.run(document, solver)
-            except UnsupportedBySolverError as error:
-                progress(f"{document['name']}: {error}")
-                continue
-            record = replace(record, by=by, machine=machine)
-            with locked(library.folder, "a solve of the library", progress):
-                found.append(asdict(add_record(library.folder, record, field)))
-    with locked(library.folder, "a solve of the library", progress):
+    library, records = read_library(folder), []
+    if has_unbuilt_records(library):
+        library = _bring_up_to_date(library, progress)
+    try:
+        with Solvers() as at_work:
+            work = _Solving(library, at_work, time_limit)
+            runs = list(work.runs(list(chosen), rungs))
+            for number, (document, solver) in enumerate(runs, 1):
+                progress(f"{number} of {len(runs)} runs: {solver} on {document['name']}")
+                try:
+                    record, field = work.run(document, solver)
+                except UnsupportedBySolverError as error:
+                    progress(f"{document['name']}: {error}")
+                    continue
+                record = replace(record, by=by, machine=machine)
+                with locked(library.folder, _PURPOSE, progress), interruptible() as pressed:
+                    records.append(asdict(add_record(library.folder, record, field)))
+                if pressed():
+                    raise KeyboardInterrupt
+    finally:  # records count although Ctrl-C or an error ended the runs
+        if has_unbuilt_records(library):
+            _bring_up_to_date(library, progress)
+    return records
+
+
+def _bring_up_to_date(library: Library, progress: Progress) -> Library:
+    """Rebuild what follows from the ledger, without the measured bounds that its points refute."""
+    with locked(library.folder, _PURPOSE, progress):
         drop_refuted(library)
-    rebuild(library.folder, progress=progress)
-    return found
+    return rebuild(library.folder, progress=progress)
 
 
 def _known(name: str, table: Any, kind: str) -> str:

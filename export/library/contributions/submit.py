@@ -31,8 +31,7 @@ from ....models.storage import read_bytes
 from ...formats.registry import generator
 from ...solutions.readers.registry import read_raw
 from ...solutions.solution import read_solution
-from ..building.build import rebuilt
-from ..building.index import SUMS
+from ..building.build import has_unbuilt_records, rebuilt
 from ..documents.documents import Library, about_file, folder_of, problem_of, read_about, read_library
 from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
@@ -125,7 +124,8 @@ def submit(
         made = library.document["generator"]
         raise InputError(f"was built by {made}; submit with that version, or build it again", file=folder)
     with locked(library.folder, "a submission", progress):
-        library = _settled(library, progress)
+        if has_unbuilt_records(library):
+            library = rebuilt(library.folder, progress=progress)
         if entry is not None:
             library.entry(entry)
         session = _Session(library, entry, facts)
@@ -140,13 +140,6 @@ def submit(
             replace(each, status=library.entry(each.entries[0])["status"]) if each.entries else each
             for each in found
         ]
-
-
-def _settled(library: Library, progress: Progress) -> Library:
-    """The library, rebuilt if an earlier submission was interrupted before its rebuild."""
-    digest = hashlib.sha256(read_bytes(library.folder / LEDGER)).hexdigest()
-    sums = read_bytes(library.folder / SUMS).decode("utf-8", "replace").splitlines()
-    return library if f"{digest}  {LEDGER}" in sums else rebuilt(library.folder, progress=progress)
 
 
 @dataclass

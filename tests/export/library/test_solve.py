@@ -192,6 +192,40 @@ def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others
     assert {(each.status, each.seconds) for each in records} == {("no point", None)}
 
 
+def interrupting(lines):
+    """A progress that presses Ctrl-C at the first line that contains one of these texts, and forgets it."""
+    left = list(lines)
+
+    def progress(line):
+        if left and left[0] in line:
+            left.pop(0)
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_ctrl_c_keeps_the_runs_before_it_and_the_library_is_whole(copy):
+    with pytest.raises(KeyboardInterrupt):
+        solve_library(copy, solvers=["highs"], time_limit=250.0, progress=interrupting(["2 of 2 runs"]))
+    (record,) = read_ledger(copy).records
+    milp = read_sidecar(copy / "cf_a_n003_milp.json")
+    assert (milp["status"], milp["best"]["objective"]) == ("claimed", pytest.approx(record.primal))
+    assert verify_library(copy) == []
+
+
+def test_an_interrupted_rebuild_is_completed_by_the_next_solve(copy):
+    lines = interrupting(["2 of 2 runs", "index"])
+    with pytest.raises(KeyboardInterrupt):
+        solve_library(copy, solvers=["highs"], time_limit=250.0, progress=lines)
+    findings = verify_library(copy)
+    assert {"ledger.json"} <= {each.file for each in findings}
+    assert not [each for each in findings if each.remedy.startswith("remove")]
+    assert [each["entry"] for each in solve_library(copy, solvers=["highs"], time_limit=250.0)] == [
+        "cf_a_n003_qp"
+    ]
+    assert verify_library(copy) == []
+
+
 def test_a_solver_that_is_not_installed_is_one_line(copy, monkeypatch, hidden):
     hidden("glpsol")
     with pytest.raises(CrossfieldError, match=r"^GLPK is not installed; apt install glpk-utils$"):

@@ -8,7 +8,7 @@ import crossfield as cf
 import pytest
 from crossfield.export.programs.protocol import part_of
 from crossfield.export.solutions.readers.text import Status
-from crossfield.export.solving.local import Files, Solvers
+from crossfield.export.solving.local import Solvers
 from crossfield.models.processes.child import Child, KilledError
 from crossfield.models.processes.deadline import Deadline
 
@@ -55,7 +55,7 @@ def skew():
 
 
 @pytest.mark.parametrize(
-    ("solver", "status"),
+    "solver, status",
     [
         ("highs", Status.OPTIMAL_GLOBAL),
         pytest.param("scip", Status.LIMIT_WITH_POINT, marks=pytest.mark.needs("scip")),
