@@ -15,7 +15,7 @@ from typing import Any, Final
 from ....models.errors import InputError
 from ....models.field.field import Norm
 from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, declare, norm_of
-from .spec import Rung, Sketch, Spec
+from .spec import Rung, Sketch, Spec, facets_of
 
 LONGEST: Final = 32  # characters of a name before its suffix
 NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
@@ -162,10 +162,7 @@ def _instance_name(short: str, size: int, seed: int | None, gauge: str) -> str:
 
 def _entries(recipe: InstanceRecipe, rung: Rung, formulations: tuple[str, ...]) -> tuple[EntryRecipe, ...]:
     chosen = [
-        (name, facet, False)
-        for facet in rung.facets
-        for name in formulations
-        if facet == "hull" or "facet" in FORMULATIONS[name].settable
+        (name, facet, False) for facet in rung.facets for name in formulations if facet in facets_of(name)
     ]
     if recipe.gauge == "strokes":  # certificates are of this gauge
         chosen += [(name, "hull", True) for name in rung.tightened]

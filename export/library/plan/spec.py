@@ -15,8 +15,8 @@ from datetime import date
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
-from ....models.errors import InputError, naming, shortened
-from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, declaration_of, short_names
+from ....models.errors import InputError, UnsupportedByFormatError, naming, shortened
+from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, declaration_of, declare, short_names
 from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
@@ -26,7 +26,8 @@ from ....models.sketch.random_strokes import RAGGED_SHARE
 from ....models.sketch.read import suffix_of_picture
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
-from ...formats.registry import FORMATS
+from ...formats.registry import FORMATS, carried
+from ...solvers_table import smallest
 from .splits import check_splits, seeds_document, seeds_of, split_document, splits_of
 
 FORMAT: Final = "crossfield-library-spec"
@@ -313,6 +314,7 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         raise InputError(
             f"sketches[{name[0]}].name: {name[1]!r} is the name of two sketches; give each its own"
         )
+    _check_entries(formulations, [rung for rung in rungs if any(rung.name in s.rungs for s in sketches)])
     check_splits(each for sketch in sketches for each in sketch.sources())
     proven = [sketch.name for sketch in sketches if sketch.points == "proven"]
     if proven and all(FORMULATIONS[each].minimises == AT_JUMPS for each in formulations):
@@ -328,6 +330,40 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         raise InputError(f"points: there is no {points.name}; omit the key, or give the points of a library")
     release = Release.of(document["release"]) if "release" in document else None
     return Spec(document["title"], formulations, rungs, sketches, ledger, points, release)
+
+
+def facets_of(formulation: str) -> tuple[str, ...]:
+    """Return the facets of which a formulation has entries: hull alone, unless it has the option."""
+    return FACETS if "facet" in FORMULATIONS[formulation].settable else ("hull",)
+
+
+def _check_entries(formulations: tuple[str, ...], rungs: Sequence[Rung]) -> None:
+    """Check that every formulation and every rung has entries, and every entry a model file."""
+    for name in formulations:
+        if all(set(rung.facets).isdisjoint(facets_of(name)) for rung in rungs):
+            raise InputError(
+                f"formulations: {name} has no facet 'printed'; add hull to facets, or omit {name}"
+            )
+    for rung in rungs:
+        present = [name for name in formulations if not set(rung.facets).isdisjoint(facets_of(name))]
+        if not present:
+            raise InputError(
+                f"rungs.{rung.name}.facets: none of the formulations has the facet 'printed'; add hull"
+            )
+        for name in present:
+            if not any(_holds(each, name) for each in rung.formats):
+                raise InputError(
+                    f"rungs.{rung.name}.formats: none of {', '.join(rung.formats)} holds {name}; "
+                    "add nl or gms, or omit the formulation"
+                )
+
+
+def _holds(file_format: str, formulation: str) -> bool:
+    try:
+        carried(smallest(declare(formulation)), FORMATS[file_format])
+    except UnsupportedByFormatError:
+        return False
+    return True
 
 
 def _twice(names: Sequence[str]) -> tuple[int, str] | None:

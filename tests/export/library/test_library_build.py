@@ -153,6 +153,22 @@ BAD = {
     "size as text": (HEAD + '[rungs.tiny]\nsizes = ["4"]\n' + SKETCH, "must be a list of whole numbers"),
     "size as truth": (HEAD + "[rungs.tiny]\nsizes = [true]\n" + SKETCH, "must be a list of whole numbers"),
     "size twice": (HEAD + RUNG + "[rungs.small]\nsizes = [4]\n" + SKETCH, "a has size 4 on two rungs"),
+    "no facet of a formulation": (
+        HEAD + 'formulations = ["parity", "milp"]\nfacets = ["printed"]\n' + RUNG + SKETCH,
+        "formulations: minlp-parity has no facet 'printed'; add hull to facets, or omit minlp-parity",
+    ),
+    "a rung without entries": (
+        HEAD
+        + 'formulations = ["cubic"]\n'
+        + RUNG
+        + '[rungs.small]\nsizes = [5]\nfacets = ["printed"]\n'
+        + SKETCH,
+        "rungs.small.facets: none of the formulations has the facet 'printed'; add hull",
+    ),
+    "entries without a model file": (
+        HEAD + 'formulations = ["milp", "parity"]\n' + RUNG + 'formats = ["lp", "mps"]\n' + SKETCH,
+        "rungs.tiny.formats: none of lp, mps holds minlp-parity; add nl or gms, or omit the formulation",
+    ),
     "unknown format": (HEAD + RUNG + 'formats = ["docx"]\n' + SKETCH, "there is no 'docx'; choose from nl"),
     "unknown formulation": (
         HEAD + 'formulations = ["lp"]\n' + RUNG + SKETCH,
