@@ -288,7 +288,7 @@ def _write_sets(
 
         def begin(problem: Problem) -> dict[str, Future[Written]]:
             problem.complete()  # threads share the problem
-            stem = folder / f"{problem.instance.name}.{problem.name}"
+            stem = folder / _stem(problem)
             paths = {name: f"{stem}{FORMATS[name].suffix}{'.gz' if compress else ''}" for name in formats}
             return {
                 name: pool.submit(write, problem, path, dialect=dialects.get(name), start=start)
@@ -320,8 +320,8 @@ def _finished(
         except UnsupportedByFormatError as error:
             refused[name] = str(error)
     if start is not None:
-        write_starts(problem, start, folder, f"{problem.instance.name}.{problem.name}")
-    return _kept(_document(problem, folder, written, refused), folder)
+        write_starts(problem, start, folder, _stem(problem))
+    return record_set(problem, written, refused, folder, _stem(problem))
 
 
 def is_recordable(problem: Problem) -> bool:
@@ -335,23 +335,36 @@ def write_manifest(problem: Problem, written: Written, folder: Path) -> Manifest
 
     Files of the same problem that an existing manifest lists stay listed. Raises OutputError.
     """
-    document = _document(problem, folder, [written], {})
+    document, path = _document(problem, folder, [written], {}), _path(folder, _stem(problem))
     try:
-        earlier = read_manifest(_path(document, folder)).document
+        earlier = read_manifest(path).document
     except CrossfieldError:
         earlier = {"sha256": ""}
     if earlier["sha256"] == problem.sha256:
         others = [file for file in earlier["files"] if file["name"] not in written.files]
         document |= {"files": others + document["files"], "refused": earlier["refused"]}
-    return _kept(document, folder)
+    return _write_document(document, path)
 
 
-def _path(document: dict[str, Any], folder: Path) -> Path:
-    return folder / f"{document['instance']['name']}.{document['formulation']}.manifest.json"
+def record_set(
+    problem: Problem, written: list[Written], refused: dict[str, str], folder: Path, stem: str
+) -> Manifest:
+    """Write manifest and instance for the files of a problem; return the manifest. Raises OutputError.
+
+    refused: reasons by format. stem: of the manifest's name.
+    """
+    return _write_document(_document(problem, folder, written, refused), _path(folder, stem))
 
 
-def _kept(document: dict[str, Any], folder: Path) -> Manifest:
-    path = _path(document, folder)
+def _stem(problem: Problem) -> str:
+    return f"{problem.instance.name}.{problem.name}"
+
+
+def _path(folder: Path, stem: str) -> Path:
+    return folder / f"{stem}.manifest.json"
+
+
+def _write_document(document: dict[str, Any], path: Path) -> Manifest:
     write_bytes(path, (json.dumps(document, indent=1) + "\n").encode())
     return Manifest(document, path)
 

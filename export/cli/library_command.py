@@ -107,6 +107,7 @@ def get_command(
 ) -> None:
     """Write model files of the library that ships, without a build: the same bytes as a build.
 
+    Each entry comes with its instance and a manifest, with which `crossfield read` reads an answer back.
     Names, --rung and --where select entries together; at least one of them is needed.
     """
     from ...models.errors import InputError

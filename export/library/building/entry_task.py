@@ -23,7 +23,7 @@ from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes
 from ...bundle.starts import Start, start_of
 from ...formats.nl import Layout
-from ...formats.registry import generator, write
+from ...formats.registry import Written, generator, write
 from ...solutions.readers.ampl import write_ampl_sol
 from ...writing.curvature import probtype
 from ...writing.records import number
@@ -96,7 +96,8 @@ def make_entry(task: Entry) -> Files:
         if task.recipe.tightened and task.certificate is not None:
             certificate = read_certificate(made / task.certificate["file"], on=instance)
             problem, certified = tightened_by(certificate, problem), certificate.field
-        listed, refused = model_files(problem, task.recipe, made)
+        written, refused = write_models(problem, task.recipe, made)
+        listed = _models(problem, written)
         best = best_point(problem, list(known.values()), certified)
         records = _records(task, best, instance)
         bounds = _bounds(task, best, records)
@@ -130,23 +131,31 @@ def formulated(instance: Instance, formulation: str, facet: str, jumps: Ints | N
     return formulate(instance, formulation, p=jumps if recipe.fixed else None, **options)
 
 
-def model_files(
-    problem: Problem, recipe: EntryRecipe, folder: Path
-) -> tuple[list[dict[str, Any]], dict[str, str]]:
-    """Write the model files of an entry; return their facts, and why the other formats are refused."""
-    listed: list[dict[str, Any]] = []
-    refused = {}
+def write_models(problem: Problem, recipe: EntryRecipe, folder: Path) -> tuple[list[Written], dict[str, str]]:
+    """Write the model files of an entry; return what was written, and why the other formats are refused."""
+    written, refused = [], {}
     for name in recipe.formats:
         path = folder / f"{recipe.name}.{name}{'.gz' if recipe.compress else ''}"
         try:
-            written = write(problem, path)
+            written.append(write(problem, path))
         except UnsupportedByFormatError as error:
             refused[name] = str(error)
-            continue
-        notes = notes_of(problem, name)
-        kind = {"format": name, "dialect": written.dialect}
-        listed += [{"name": file, **kind, **facts, "notes": notes} for file, facts in written.files.items()]
-    return listed, refused
+    return written, refused
+
+
+def _models(problem: Problem, written: list[Written]) -> list[dict[str, Any]]:
+    """Facts of model files for a sidecar."""
+    return [
+        {
+            "name": name,
+            "format": each.format,
+            "dialect": each.dialect,
+            **facts,
+            "notes": notes_of(problem, each.format),
+        }
+        for each in written
+        for name, facts in each.files.items()
+    ]
 
 
 def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.storage import make_folder
+from ...bundle.manifest import record_set
 from ...formats.registry import Written, write
 from ..documents.documents import about_file, tightened_by
 from ..ledger.given import ROLES, Given, read_point
@@ -25,7 +26,7 @@ from ..ledger.points import Known, best_point, ours
 from ..plan.recipe import EntryRecipe, InstancePlan, plan
 from ..plan.sources import instance_from
 from ..plan.spec import DEFAULT, RUNGS, Spec, default_spec
-from .entry_task import formulated, model_files
+from .entry_task import formulated, write_models
 from .table import COLUMNS, TABLE, read_table
 from .where import condition
 
@@ -130,10 +131,16 @@ class LibraryEntry:
         """
         return write(self.problem, path)
 
-    def model_files(self, folder: Path) -> list[str]:
-        """Write the model files that a build writes; return their names. Raises OutputError."""
-        listed, _ = model_files(self.problem, self._recipe, folder)
-        return [each["name"] for each in listed]
+    def write_set(self, folder: Path) -> list[str]:
+        """Write the model files that a build writes, with manifest and instance; return the names of all.
+
+        The manifest has the name of the entry, because several entries have one formulation. Raises
+        OutputError.
+        """
+        written, refused = write_models(self.problem, self._recipe, folder)
+        manifest = record_set(self.problem, written, refused, folder, self.name)
+        models = [name for each in written for name in each.files]
+        return [*models, manifest.path.name, manifest.document["instance"]["file"]]
 
     @property
     def _recipe(self) -> EntryRecipe:
@@ -217,11 +224,14 @@ def entry(name: str) -> LibraryEntry:
 def write_entries(
     folder: str | Path, chosen: Sequence[LibraryEntry], *, progress: Progress = silent
 ) -> dict[str, list[str]]:
-    """Write the model files of entries as a build does; return their names by entry. Raises OutputError."""
+    """Write the files of entries as a build does, with manifests and instances that read answers back.
+
+    Returns the names of the files by entry. Raises OutputError.
+    """
     target, found = make_folder(folder), {}
     for number, each in enumerate(chosen, 1):
         progress(f"{number} of {len(chosen)} entries: {each.name}")
-        found[each.name] = each.model_files(target)
+        found[each.name] = each.write_set(target)
     return found
 
 

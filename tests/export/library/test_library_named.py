@@ -35,6 +35,11 @@ def models_of(sidecar):
     return [file["name"] for file in sidecar["files"] if file["format"] != "sol"]
 
 
+def set_of(sidecar):
+    """The files that belong to an entry without a library: models, manifest and instance."""
+    return [*models_of(sidecar), f"{sidecar['name']}.manifest.json", sidecar["instance"]["file"]]
+
+
 # The table
 
 
@@ -90,12 +95,12 @@ def test_verify_knows_the_table(built, tmp_path):
 def test_model_files_have_the_bytes_of_a_build(built, tmp_path):
     chosen = [cf.entry(name) for name in built.document["entries"]]
     written = write_entries(tmp_path, chosen)
-    assert written == {each["name"]: models_of(each) for each in built.entries}
+    assert written == {each["name"]: set_of(each) for each in built.entries}
     assert {path.name for path in tmp_path.iterdir()} == {
         name for names in written.values() for name in names
     }
-    for path in tmp_path.iterdir():
-        assert path.read_bytes() == (built.folder / path.name).read_bytes()
+    for name in {name for each in built.entries for name in models_of(each)}:
+        assert (tmp_path / name).read_bytes() == (built.folder / name).read_bytes()
 
 
 def test_an_entry_has_the_problem_and_the_point_of_its_sidecar(built):
@@ -177,8 +182,31 @@ def test_the_command_writes_the_files_of_the_selected_entries(built, tmp_path, c
     names = ["cf_cyl_n005_exact", "cf_cyl_n005_milp"]
     where = "formulation == 'milp-mccormick'"
     assert invoke(["library", "get", *names, "--where", where, "-o", str(tmp_path), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {names[1]: models_of(built.entry(names[1]))}
-    assert {path.name for path in tmp_path.iterdir()} == set(models_of(built.entry(names[1])))
+    assert json.loads(capsys.readouterr().out) == {names[1]: set_of(built.entry(names[1]))}
+    assert {path.name for path in tmp_path.iterdir()} == set(set_of(built.entry(names[1])))
+
+
+@pytest.mark.needs("highs")
+@pytest.mark.parametrize(
+    "name", ["cf_cyl_n005_milp", "cf_cyl_n005_printed_milp", "cf_saddle_n009_milp_tight"]
+)
+def test_the_answer_to_a_file_of_the_command_is_read_back(name, tmp_path, monkeypatch, capsys):
+    """Two facets, and the narrower windows of a certificate, of one formulation in one folder."""
+    import highspy
+
+    monkeypatch.chdir(tmp_path)
+    others = ["cf_cyl_n005_milp", "cf_cyl_n005_printed_milp"]
+    assert invoke(["library", "get", name, *others, "-o", ".", "--quiet"]) == 0
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.readModel(next(str(path) for path in tmp_path.glob(f"{name}.mps*")))
+    highs.run()
+    highs.writeSolution(f"{name}.sol", 0)
+    command = ["read", f"{name}.sol", "--manifest", f"{name}.manifest.json", "-o", "field.npz", "--json"]
+    assert invoke(command) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["objective_recomputed"] == pytest.approx(cf.entry(name).objective, rel=1e-6)
+    assert cf.read_field("field.npz").instance.sha256 == cf.entry(name).instance.sha256
 
 
 BAD = {
