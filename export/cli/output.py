@@ -287,8 +287,10 @@ def show_manifests(manifests: list[Manifest], folder: Path) -> None:
 
 def _sizes(document: dict[str, Any]) -> dict[str, int]:
     """Size in bytes of the model file in each format."""
-    lists = (".row", ".col", ".row.gz", ".col.gz")
-    return {file["format"]: file["bytes"] for file in document["files"] if not file["name"].endswith(lists)}
+    from ..formats.registry import FORMATS
+
+    models = (file for file in document["files"] if FORMATS[file["format"]].is_model(file["name"]))
+    return {file["format"]: file["bytes"] for file in models}
 
 
 _ONLY_IF_ANY: Final = (

@@ -30,7 +30,8 @@ class Format:
 
     degree: greatest degree of a polynomial it holds (99: any function); module: of its writer in this folder;
     dialects: named variants, the default first; starts: whether it has a place for a starting point; default:
-    whether it is written when no format is requested.
+    whether it is written when no format is requested; command: a line that solves {model} and writes
+    {answer}; answers: suffix of that answer, so that those of several formats differ.
     """
 
     name: str
@@ -40,11 +41,17 @@ class Format:
     dialects: tuple[str, ...] = ("",)
     starts: bool = False
     default: bool = True
+    command: str = ""
+    answers: str = ".sol"
 
     @property
     def suffix(self) -> str:
         """Suffix of its files, with the dot."""
         return f".{self.name}"
+
+    def is_model(self, name: str) -> bool:
+        """Whether the file of that name is the model itself, not a list of names or data beside it."""
+        return _unpacked(Path(name)).endswith(self.suffix)
 
     def generate(
         self, form: Canonical, header: list[str], start: Floats | None = None, dialect: str = ""
@@ -63,16 +70,21 @@ FORMATS: Final = {
     for entry in (
         Format(
             "nl", "AMPL .nl with .row and .col, for Ipopt, Bonmin, Couenne, SCIP, Baron, Knitro",
-            ANY_DEGREE, "nl", ("text", "binary"), starts=True,
+            ANY_DEGREE, "nl", ("text", "binary"), starts=True, command="bonmin {model} -AMPL",
         ),
         Format(
             "gms", "GAMS model, self-contained, one equation per row",
             ANY_DEGREE, "gams", ("scalar",), starts=True,
+            command="gams {model} --RESULTS={answer}", answers=".csv",
         ),
-        Format("lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, "lp"),
+        Format(
+            "lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, "lp",
+            command='scip -c "read {model}" -c optimize -c "write solution {answer}" -c quit',
+            answers=".lp.sol",
+        ),
         Format(
             "mps", "free MPS with QUADOBJ and QCMATRIX, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK",
-            2, "mps",
+            2, "mps", command="gurobi_cl ResultFile={answer} {model}", answers=".mps.sol",
         ),
         Format(
             "mod", "AMPL model in the paper's notation with its data in a .dat; the linear ones for GLPK too",

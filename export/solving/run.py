@@ -20,7 +20,7 @@ from ...models.storage import make_folder, write_bytes
 from ...models.surface.lift import surface
 from ...models.surface.surface import Surface
 from ..bundle.manifest import Manifest, write_all
-from ..formats.registry import generator
+from ..formats.registry import FORMATS, generator
 from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.mask import has_mask, write_mask
 from ..surfaces.files import SHADED, surface_facts, write_shaded
@@ -108,9 +108,9 @@ class Report:
 
     @property
     def files(self) -> int:
-        """Number of solver files, lists of names not counted."""
-        names = [entry["name"] for manifest in self.manifests for entry in manifest.document["files"]]
-        return sum(not name.removesuffix(".gz").endswith((".row", ".col")) for name in names)
+        """Number of model files, lists of names and data beside them not counted."""
+        files = [entry for manifest in self.manifests for entry in manifest.document["files"]]
+        return sum(FORMATS[entry["format"]].is_model(entry["name"]) for entry in files)
 
     @property
     def seconds(self) -> float:

@@ -9,6 +9,7 @@ from typing import Any, Final
 from ...models.storage import read_bytes, write_bytes
 from ...templates import ENVIRONMENT
 from ..bundle.manifest import Manifest
+from ..formats.registry import FORMATS
 from .methods import shown
 
 PAGE: Final = "index.html"
@@ -22,13 +23,6 @@ _LAYERS: Final = (
 )
 """Layers of overlay.svg, and whether they are shown at first."""
 _COLUMNS: Final = ("1-norm", "off strokes", "lines < 45°", "singularities", "seconds")
-_SOLVED: Final = {
-    "nl": ("bonmin models/{file} -AMPL", "models/{stem}.sol"),
-    "gms": ("gams models/{file} --RESULTS={answer}", "{stem}.csv"),
-    "lp": ('scip -c "read models/{file}" -c optimize -c "write solution {answer}" -c quit', "{stem}.lp.sol"),
-    "mps": ("gurobi_cl ResultFile={answer} models/{file}", "{stem}.mps.sol"),
-}
-"""The line that solves a file of each format, and the file of its answer."""
 _FILES: Final = {
     "field.npz": "the field that is kept; also .json, and .rawfield with .obj and .sings",
     "lowest.npz": "the field of lowest 2-norm energy",
@@ -86,18 +80,25 @@ def _set(document: dict[str, Any]) -> dict[str, Any]:
         "kind": document["class"],
         "columns": counts["columns"],
         "rows": counts["rows"],
-        "files": [_file(each) for each in document["files"] if each["name"].endswith(f".{each['format']}")],
+        "files": [
+            _file(each) for each in document["files"] if FORMATS[each["format"]].is_model(each["name"])
+        ],
         "refused": list(document["refused"].values()),
     }
 
 
 def _file(file: dict[str, Any]) -> dict[str, Any]:
-    stem = file["name"].removesuffix(f".{file['format']}")
-    solve, answer = _SOLVED[file["format"]]
-    answer = answer.format(stem=stem)
+    """A model file, with the line that solves it, if its format has one, and the line that reads the answer.
+
+    A program that is given no name for its answer, such as an AMPL solver, writes it next to the model.
+    """
+    entry = FORMATS[file["format"]]
+    stem = file["name"].removesuffix(entry.suffix)
+    beside = bool(entry.command) and "{answer}" not in entry.command
+    answer = f"{'models/' if beside else ''}{stem}{entry.answers}"
     return {
         "name": file["name"],
         "kilobytes": max(1, round(file["bytes"] / 1000)),
-        "solve": solve.format(file=file["name"], answer=answer),
+        "solve": entry.command.format(model=f"models/{file['name']}", answer=answer),
         "read": f"crossfield read {answer} --manifest models/{stem}.manifest.json -o {stem}.npz",
     }

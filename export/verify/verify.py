@@ -129,7 +129,7 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
                 broken.append(Check(*about, Verdict.FAILED, words))
                 continue
             path = _unpacked(source, place)
-            if path.suffix != FORMATS[entry["format"]].suffix:
+            if not FORMATS[entry["format"]].is_model(path.name):
                 continue
             held = carried(problem, FORMATS[entry["format"]])
             stated, holds = entry["lifted"], held.formulation.lifted

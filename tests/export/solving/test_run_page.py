@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 import shlex
+from functools import partial
 
 import crossfield as cf
 import pytest
 from browsing import CONTRAST, find, served, show, sideways
+from crossfield.export.bundle.manifest import write_all
 from crossfield.export.cli.app import invoke
+from crossfield.export.formats.registry import DEFAULTS, FORMATS, Format
+from crossfield.export.solving import run
 
 pytestmark = pytest.mark.slow
 
@@ -71,6 +75,16 @@ def test_the_line_that_reads_an_answer_back_reads_it(folder, monkeypatch):
     monkeypatch.chdir(folder)
     assert invoke(shlex.split(line.removesuffix("</pre>"))[1:]) == 0
     assert (folder / f"{stem}.npz").exists()
+
+
+def test_a_new_default_format_needs_no_other_edit(tmp_path, monkeypatch):
+    """Its entry in the table is enough; without a command in it, the page has the line that reads."""
+    monkeypatch.setitem(FORMATS, "ninth", Format("ninth", "LP by another name", 2, "lp"))
+    monkeypatch.setattr(run, "write_all", partial(write_all, formats=(*DEFAULTS, "ninth")))
+    cf.run(cf.sample("mouse", 4), tmp_path, limits=cf.Limits(0.1))
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "mouse.milp-mccormick.ninth" in page
+    assert re.search(r"<pre[^>]*>crossfield read mouse.milp-mccormick.sol --manifest models/", page)
 
 
 def test_a_doubted_surface_and_warnings_are_explained(tmp_path):
