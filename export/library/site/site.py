@@ -6,7 +6,6 @@ templates, templates/site/*.html.j2, escape every text from a file.
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 from collections import Counter
@@ -138,7 +137,10 @@ def _sums(path: Path) -> dict[str, str]:
 
 
 def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
-    """Link or copy every file of the library into a folder. Raises InputError for links and other files."""
+    """Copy every file of the library into a folder. Raises InputError for symbolic links and other files.
+
+    A hard link would save space, but whoever edits a file of the site would edit the library.
+    """
     for name in (*sums, SUMS):
         if (folder / name).is_symlink():
             raise InputError(
@@ -151,10 +153,7 @@ def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
                 "is missing or differs from SHA256SUMS; build the library again", file=folder / name
             )
     for name in (*sums, SUMS):
-        try:
-            os.link(folder / name, target / name)
-        except OSError:
-            write_bytes(target / name, read_bytes(folder / name))
+        shutil.copyfile(folder / name, target / name)
 
 
 def _draw(folder: Path, shown: Shown, target: Path) -> None:

@@ -207,6 +207,15 @@ def test_the_whole_library_is_in_the_folder_of_files(library, site):
     assert content_of(site / "files") == content_of(library.folder)
 
 
+def test_an_edit_in_the_site_leaves_the_library_as_it_is(library, tmp_path):
+    write_site(library.folder, tmp_path / "site")
+    before = {path.name: path.read_bytes() for path in library.folder.iterdir()}
+    for path in (tmp_path / "site" / "files").iterdir():
+        with path.open("ab") as stream:
+            stream.write(b"of another hand")
+    assert {path.name: path.read_bytes() for path in library.folder.iterdir()} == before
+
+
 def test_the_command_prints_the_number_of_pages_and_replaces_an_earlier_site(library, site, tmp_path, capsys):
     earlier = shutil.copytree(site, tmp_path / "web")
     (earlier / "index.html").write_text("old")
