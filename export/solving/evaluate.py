@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -161,13 +161,17 @@ def _in_turn(
     done: list[CurveDeviation] = []
     try:
         with interruptible() as pressed, TemporaryDirectory(prefix="crossfield-") as folder:
+
+            def over() -> bool:
+                return pressed() or stop()
+
             for number, curve in enumerate(hidden, start=1):
 
                 def report(line: str, at: int = number) -> None:
                     progress(f"curve {at} of {len(hidden)}: {line}")
 
-                request = Request(curve.rest, Path(folder), limits, progress=report, stop=stop)
-                done.append(_measured(curve, methods, request, lambda: pressed() or stop()))
+                request = Request(curve.rest, Path(folder), limits, progress=report, stop=over)
+                done.append(_measured(curve, methods, request))
     except KeyboardInterrupt:
         if not done and not stop():
             raise
@@ -175,9 +179,7 @@ def _in_turn(
     return done, False
 
 
-def _measured(
-    curve: HiddenCurve, methods: tuple[str, ...], request: Request, interrupted: Callable[[], bool]
-) -> CurveDeviation:
+def _measured(curve: HiddenCurve, methods: tuple[str, ...], request: Request) -> CurveDeviation:
     """The methods' angles to a curve. Raises KeyboardInterrupt after Ctrl-C: half a curve has no use."""
     found = CurveDeviation(curve.number, len(curve.stroke), {}, {})
     for method in methods:
@@ -187,7 +189,7 @@ def _measured(
             stopped = answer.interrupted
         except CrossfieldError as error:
             found.failures[method], stopped = str(error), False
-        if stopped or interrupted():
+        if stopped or request.stop():
             raise KeyboardInterrupt
     return found
 

@@ -303,9 +303,9 @@ def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
     check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
     try:
         scalars = {name: head[key] for key, name in _SCALARS.items()}
-        origin = (float(arrays["origin"][0]), float(arrays["origin"][1]))
+        x, y = arrays["origin"].astype(np.float64).tolist()
         entries: dict[str, Any] = scalars | {key: arrays[key] for key in _ARRAYS}
-        return Instance(origin=origin, **entries)
+        return Instance(origin=(x, y), **entries)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error
 

@@ -45,25 +45,38 @@ def ending(code: int) -> str:
         return f"was killed by signal {-code}"
 
 
+class _Presses:
+    """The handler of Ctrl-C of all nested blocks of `interruptible`."""
+
+    def __init__(self) -> None:
+        self._pressed = False
+
+    def __call__(self, _number: int, _frame: Any) -> None:
+        if self._pressed:
+            raise KeyboardInterrupt
+        self._pressed = True
+
+    def is_pressed(self) -> bool:
+        return self._pressed
+
+
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
     """A function that returns whether Ctrl-C was pressed; a second Ctrl-C interrupts at once.
 
-    Outside the main thread, and where signals are ignored already, it always returns False.
+    A block inside another one has the same function, so Ctrl-C ends the work of both: a proof, and the search
+    in it. Outside the main thread, and where signals are ignored already, it always returns False.
     """
-    pressed: list[int] = []
-
-    def note(number: int, _frame: Any) -> None:
-        if pressed:
-            raise KeyboardInterrupt
-        pressed.append(number)
-
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or before is signal.SIG_IGN:
         yield lambda: False
         return
-    signal.signal(signal.SIGINT, note)
+    if isinstance(before, _Presses):
+        yield before.is_pressed
+        return
+    presses = _Presses()
+    signal.signal(signal.SIGINT, presses)
     try:
-        yield lambda: bool(pressed)
+        yield presses.is_pressed
     finally:
         signal.signal(signal.SIGINT, before)

@@ -467,6 +467,7 @@ class Work:
                 seed=seed + self.searches,
                 jobs=jobs,
                 start=self.best,
+                progress=lambda line: self.progress(f"search: {line}"),
                 stop=self.limits.stop,
             ).field
         )

@@ -74,6 +74,24 @@ def test_ctrl_c_in_the_search_ends_the_run_with_its_best_field(tmp_path):
     }
 
 
+def test_ctrl_c_in_a_search_ends_the_proof_around_it():
+    program = """
+import signal, crossfield as cf
+
+pressed = []
+
+def press_once(line):
+    if line.startswith("search:") and not pressed:
+        pressed.append(line)
+        signal.raise_signal(signal.SIGINT)
+
+proof = cf.prove(cf.sample("mouse", 16), limits=cf.Limits(250), progress=press_once)
+print(len(pressed), proof.ended)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1", "interrupted"]
+
+
 @pytest.mark.slow
 def test_ctrl_c_while_it_draws_keeps_the_report(tmp_path):
     with started([sys.executable, "-c", RUN, tmp_path, "1"], "drawing field") as process:
