@@ -92,7 +92,7 @@ def _absent(item):
 def pytest_collection_finish(session):
     """Compiles the functions of proofs, or waits for the process that does: tests have limits of time."""
     if session.items and not session.config.option.collectonly:
-        from crossfield.export.solving.compiling import compile_all
+        from crossfield.models.proof.compiling import compile_all
 
         compile_all()
 

@@ -55,24 +55,21 @@ def prove_command(
     from ...models.processes.deadline import Deadline
     from ...models.processes.limits import Limits
     from ...models.proof.prove import prove
-    from ..solving.compiling import compile_proofs
 
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
         instance = sketch.instance(source, quiet=printing.quiet)
-        compile_proofs(output, show)
-        deadline = Deadline.after(time_limit)
         proof = prove(
             instance,
             norm=NORMS[norm],
             start=read_start(start, instance),
-            limits=Limits(time_limit, gap).until(deadline),
+            limits=Limits(time_limit, gap),
             certified=True,
             scheduler=scheduler,
             progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
         )
         show("writing and checking the certificate")
-        document = _write(proof, output, deadline)
+        document = _write(proof, output, Deadline.after(time_limit - proof.seconds))
     printing.show(document, lambda: _show(proof, document, output))
     if instance.gauge == "box":
         print_notice("the proof is of the gauge strokes; its bound also holds in the gauge box")

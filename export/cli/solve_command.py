@@ -59,7 +59,7 @@ def solve_command(
         )
         if method is not None:
             _check_method(method, solver, relax=formulating.relax)
-            candidate, proven, target = _by_method(method, request, deadline)
+            candidate, proven, target = _by_method(method, request)
         else:
             solution, target = _by_solver(str(formulation), solver, request)
     if method is not None:
@@ -90,7 +90,7 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
         raise typer.BadParameter(f"--solver {solver}: the method {name} has its own solvers")
 
 
-def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candidate, Proven | None, Path]:
+def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, Path]:
     """Final field of a method, its proof if any, and the file to which the field was written."""
     from ...models.field.file import write_field
     from ...models.storage import make_folder
@@ -101,7 +101,8 @@ def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candida
     *_, candidate = METHODS[name].find(request)
     write_field(candidate.field, target)
     certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
-    return candidate, Proven.by(candidate.proof, certificate, deadline.later(candidate.compiling)), target
+    deadline = Deadline.after(request.limits.time_limit - candidate.seconds)
+    return candidate, Proven.by(candidate.proof, certificate, deadline), target
 
 
 def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solution, Path]:

@@ -23,7 +23,6 @@ from ...models.search.starts import best_start, first_field, polyvector_start
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
 from ..solutions.solution import Solution
-from .compiling import compile_proofs
 from .two_stage import find_jumps, fit_angles, jumps_until
 
 if TYPE_CHECKING:
@@ -36,8 +35,7 @@ _STARTING: Final = 0.5  # share of the seconds for the field from which solvers 
 class Candidate:
     """A field and how it was found: method, seconds, counts, and the solution if a solver returned it.
 
-    proof: the method's proof about the field, if it proves anything. compiling: seconds of compiling, which
-    neither `seconds` nor the time limit includes.
+    proof: the method's proof about the field, if it proves anything.
     """
 
     method: str
@@ -47,7 +45,6 @@ class Candidate:
     interrupted: bool = False
     counts: tuple[tuple[str, int], ...] = ()
     proof: Proof | None = None
-    compiling: float = 0.0
 
     def facts(self) -> dict[str, Any]:
         """Facts for a report: the facts of the field, seconds, and claims with recomputed values."""
@@ -238,7 +235,7 @@ def _search(request: Request) -> Iterator[Candidate]:
         limits=request.limits.until(deadline),
         jobs=_processes(request),
         start=request.start,
-        progress=_progress_line(request, deadline, "search", "the best field so far"),
+        progress=_progress_line(request, deadline),
         stop=request.stop,
     )
     yield _searched("search", found, begin, rounds=found.rounds)
@@ -254,11 +251,12 @@ def _processes(request: Request) -> int:
     return request.limits.threads or cores()
 
 
-def _progress_line(request: Request, deadline: Deadline, method: str, kept: str) -> Progress:
-    """A callback that passes on the lines of a method, with the time left and what Ctrl-C keeps."""
+def _progress_line(request: Request, deadline: Deadline) -> Progress:
+    """A callback that passes on the lines of a search, with the time left and what Ctrl-C keeps."""
 
     def report(line: str) -> None:
-        request.progress(f"{method}: {line}, at most {deadline.left():.0f} s more; Ctrl-C keeps {kept}")
+        left = f"at most {deadline.left():.0f} s more"
+        request.progress(f"search: {line}, {left}; Ctrl-C keeps the best field so far")
 
     return report
 
@@ -267,27 +265,25 @@ def _prove(request: Request) -> Iterator[Candidate]:
     begin, deadline = time.perf_counter(), request.deadline()
     from ...models.proof.prove import prove  # it loads compiled functions
 
-    compiling = compile_proofs(
-        request.folder, lambda line: request.progress(f"prove: {line}"), request.stop, request.clock
-    )
-    begin, deadline = begin + compiling, deadline.later(compiling)
     request.progress("prove: starting fields")
+    loading = time.perf_counter() - begin
     proof = prove(
         request.instance,
         start=request.start,
         limits=request.limits.until(deadline),
         certified=True,
         jobs=_processes(request),
-        progress=_progress_line(request, deadline, "prove", "them"),
+        progress=lambda line: request.progress(f"prove: {line}; Ctrl-C keeps them"),
         stop=request.stop,
     )
-    counts = (("levels", len(proof.levels)), ("forced_jumps", proof.forced))
-    seconds, interrupted = time.perf_counter() - begin, proof.ended == "interrupted"
+    begin = time.perf_counter()
     field = proof.field
     if request.instance.gauge == "box":
         near = relabelled(request.instance, field.alpha, field.beta, field.p)
         field = best_start(request.instance, near, request.stop)
-    yield Candidate("prove", field, seconds, None, interrupted, counts, proof, compiling)
+    counts = (("levels", len(proof.levels)), ("forced_jumps", proof.forced))
+    seconds = loading + proof.seconds + time.perf_counter() - begin
+    yield Candidate("prove", field, seconds, None, proof.ended == "interrupted", counts, proof)
 
 
 def _two_stage(request: Request) -> Iterator[Candidate]:

@@ -24,7 +24,6 @@ from ..formats.registry import FORMATS, generator
 from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.mask import has_mask, write_mask
 from ..surfaces.files import SHADED, surface_facts, write_shaded
-from .compiling import compile_proofs, compiling
 from .methods import METHODS, Candidate, Request, instance_facts
 from .proven import Proven
 from .run_page import PAGE, write_page
@@ -242,6 +241,8 @@ def run(
     progress("greedy field")
     start = first_field(instance)
     watch.lap(START)
+    from ...models.proof.compiling import compiling  # it loads Numba
+
     with compiling():
         manifests = write_all(
             instance,
@@ -306,8 +307,10 @@ class _Found:
 
 def _compiled(request: Request) -> str:
     """Compile what methods need, so that a first run finds what later ones find; the stage if interrupted."""
+    from ...models.proof.compiling import compile_proofs
+
     try:
-        compile_proofs(request.folder, request.progress, request.stop)
+        return "" if compile_proofs(request.progress, request.stop) else COMPILING
     except KeyboardInterrupt:
         return COMPILING
     except SolverError as error:  # the method `prove` tries again, and its failure is in the report

@@ -22,6 +22,7 @@ from .side_by_side import checked
 _Part = TypeVar("_Part")
 _Work = TypeVar("_Work", bound=Callable[..., Any])
 _MADE: Final[list[Any]] = []
+_KEPT: Final[set[Any]] = set()  # those that were cached on disk when somebody asked
 _ANY_ORDER: Final = {"reassoc", "nnan", "nsz"}
 _PARTS: Final = 2  # of shared work for each thread: one that takes longer than expected then costs less
 
@@ -54,7 +55,8 @@ def _made(work: _Work, *, fastmath: bool | set[str]) -> _Work:
 
 def all_compiled() -> bool:
     """Whether each function of `compiled` is cached on disk where possible: it then only has to be loaded."""
-    return all(map(_is_kept, _MADE))
+    _KEPT.update(made for made in _MADE if made not in _KEPT and _is_kept(made))
+    return len(_KEPT) == len(_MADE)
 
 
 def place() -> Path:

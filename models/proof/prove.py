@@ -11,12 +11,13 @@ from ..errors import InputError
 from ..field.field import CrossField, Norm, relabelled
 from ..instance.instance import Instance
 from ..processes.compiled import crew
-from ..processes.deadline import Progress, Stop, silent, stop_function
+from ..processes.deadline import Deadline, Progress, Stop, silent, stop_function
 from ..processes.groups import interruptible
 from ..processes.limits import Limits
 from ..processes.side_by_side import checked
 from ..smooth.systems import one_thread
 from .certificate import checking_pace
+from .compiling import compile_proofs
 from .prove_absolute import WorkIn1Norm, WorkInMixedNorm
 from .record import Proof
 from .work import Work, WorkLimits
@@ -46,7 +47,8 @@ def prove(
     The proof of an instance in the gauge `box`, with its field, is that of the same sketch in the gauge
     `strokes`. The bound holds for both gauges, because every field in `box` has a field in `strokes` of at
     most its energy. Without a time limit the same arguments give the same proof, for any number of threads.
-    Ctrl-C ends the proof with its best field and bound.
+    Ctrl-C ends the proof with its best field and bound. The first proof on a machine compiles its functions
+    before the time limit begins, in up to a minute.
 
     Parameters
     ----------
@@ -89,6 +91,8 @@ def prove(
         For another norm, for too few or too many jobs or threads, and without dask or a scheduler there.
     InstanceError
         For a start on another instance.
+    SolverError
+        When the functions of proofs cannot be compiled.
 
     """
     if norm not in KINDS:
@@ -98,14 +102,20 @@ def prove(
         start = relabelled(instance.with_gauge("strokes"), start.alpha, start.beta, start.p)
     instance = instance.with_gauge("strokes")
     checked(jobs)
-    given = limits or Limits(math.inf, gap=0.0)
-    began = time.monotonic()
+    given, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
     divided = nullcontext() if scheduler is None else strips_on(scheduler)
     with interruptible() as interrupted, crew(given.threads or jobs) as hands, divided as divide:
-        asked = stop_function(stop)
+
+        def over() -> bool:
+            return interrupted() or asked()
+
+        end = given.deadline()
+        seconds = end.left()
+        compile_proofs(progress, over)
+        began = time.monotonic()
         own = WorkLimits(
-            given.deadline(),
-            lambda: interrupted() or asked(),
+            Deadline.after(seconds, end.clock),
+            over,
             given.gap,
             certified,
             work or math.inf,

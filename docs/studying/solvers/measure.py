@@ -15,7 +15,6 @@ from typing import Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.formats.registry import generator
-from crossfield.export.solving.compiling import compile_all
 from crossfield.export.solving.local import Solvers
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedBySolverError
 from crossfield.models.field.field import Norm
@@ -23,6 +22,7 @@ from crossfield.models.formulations.problem import Problem, tightened
 from crossfield.models.formulations.windows import Windows
 from crossfield.models.instance.instance import Instance
 from crossfield.models.proof.certificate import read_certificate
+from crossfield.models.proof.compiling import compile_all
 from crossfield.models.proof.tightening import windows_left
 from crossfield.models.storage import replacing
 

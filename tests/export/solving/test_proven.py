@@ -8,10 +8,8 @@ import sys
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.cli.solve_command import _by_method
-from crossfield.export.solving.methods import METHODS, Request
+from crossfield.export.solving.methods import METHODS
 from crossfield.export.solving.proven import Proven
-from crossfield.models.processes.deadline import Deadline
 from crossfield.models.proof.certificate import read_certificate
 
 
@@ -52,49 +50,31 @@ def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
     assert METHODS["prove"].timed
 
 
-def test_a_field_stands_where_no_time_is_left_for_its_certificate(tmp_path):
-    request = Request(cf.sample("skew", 4), tmp_path)
-    candidate, proven, path = _by_method("prove", request, Deadline(at=0.0))
-    assert proven is None
-    assert cf.read_field(path).energy().total == candidate.field.energy().total
-    assert list(tmp_path.iterdir()) == [path]
-
-
 @pytest.mark.slow
 def test_what_proofs_call_is_compiled_once_and_before_the_time_limit_begins(tmp_path):
-    def solve(sample, size, seconds):
-        command = [sys.executable, "-m", "crossfield", "solve", sample, "--size", size, "-m", "prove"]
-        command += ["--time-limit", seconds, "-o", str(tmp_path / "out"), "--quiet"]
-        return called(command)
-
-    def called(command):
-        settings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-        assert subprocess.run(command, env=settings, check=False).returncode == 0
-        found = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
-        return {path: time for path, time in found.items() if not path.name.startswith("parts.")}
-
     # The clock passes the time limit while the functions are compiled, and stands still otherwise.
     program = """
-import sys
-from pathlib import Path
 import crossfield as cf
-from crossfield.export.cli.solve_command import _by_method
-from crossfield.export.solving.methods import Request
 
 lines = []
-request = Request(
-    cf.sample("skew", 4), Path(sys.argv[1]), cf.Limits(500.0), progress=lines.append,
-    clock=lambda: 1000.0 * any("compiling" in line for line in lines),
-)
-candidate, proven, _ = _by_method("prove", request, request.deadline())
-assert (candidate.proof.ended, candidate.compiling) == ("optimal", 1000.0)
-assert proven is not None
+deadline = Deadline(500.0, lambda: 1000.0 * any("compiling" in line for line in lines))
+proof = cf.prove(cf.sample("skew", 4), limits=cf.Limits(500.0).until(deadline), progress=lines.append)
+assert (proof.ended, proof.status, len(proof.levels) > 0) == ("optimal", "optimal", True)
+assert proof.seconds < 500
 """
-    kept = called([sys.executable, "-c", program, str(tmp_path / "out")])
+
+    def call(*command):
+        settings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        assert subprocess.run([sys.executable, *command], env=settings, check=False).returncode == 0
+        times = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
+        return {path: time for path, time in times.items() if not path.name.startswith("parts.")}
+
+    kept = call("-c", program)
     assert any(path.name.startswith("clusters.") for path in kept)
-    assert kept == solve("mouse", "8", "100")
-    assert (tmp_path / "out" / "mouse.prove.certificate.npz").exists()
-    assert not (tmp_path / "out" / "compiling.log").exists()
+    out = tmp_path / "out"
+    options = ["-m", "prove", "--time-limit", "100", "-o", str(out), "--quiet"]
+    assert kept == call("-m", "crossfield", "solve", "mouse", "--size", "8", *options)
+    assert (out / "mouse.prove.certificate.npz").exists()
 
 
 @pytest.mark.slow

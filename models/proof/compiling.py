@@ -1,0 +1,83 @@
+"""Compilation of the functions of proofs, once per machine, in a child process that can be stopped.
+
+Two such processes wait for each other, and the second finds everything compiled.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from filelock import FileLock
+
+from ..errors import CrossfieldError, SolverError
+from ..processes.child import Child, KilledError
+from ..processes.compiled import all_compiled, crew, place
+from ..processes.control import WorkerError
+from ..processes.deadline import Deadline, Over, Progress, never, silent
+from ..sketch.samples import sample
+from .certificate import write_certificate
+from .dual import Dual
+from .lattice import Lattice
+from .work import Work, WorkLimits
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Compile the functions of proofs in the background, unless they are; stop at the end of the context."""
+    if all_compiled():
+        yield
+        return
+    with Child() as child:
+        threading.Thread(target=_compile_in, args=(child,), daemon=True).start()
+        yield
+
+
+def _compile_in(child: Child) -> None:
+    with suppress(CrossfieldError):  # the child was ended, or fails again when a proof needs the functions
+        child.call(compile_all)
+
+
+def compile_proofs(progress: Progress, stop: Over = never) -> bool:
+    """Compile the functions of proofs unless they are; return False where `stop` or Ctrl-C ended that.
+
+    It takes up to a minute, and no time limit includes it. What is compiled by the end stays. progress:
+    receives a line if there is something to compile. Raises SolverError when the work fails.
+    """
+    if all_compiled():
+        return True
+    progress("compiling the functions of proofs, once on this machine, before the time limit begins")
+    with TemporaryDirectory() as folder, Child() as child:
+        log = Path(folder) / "log"
+        try:
+            return not child.call(compile_all, log=log, stop=stop).interrupted
+        except KilledError:
+            return False
+        except WorkerError as error:
+            lines = log.read_text("utf-8", "replace").split("\n") if log.exists() else []
+            words = "; ".join([str(error), *filter(None, lines[-2:])])
+            raise SolverError(f"the functions of proofs were not compiled: {words}") from error
+
+
+def compile_all() -> None:
+    """Compile the functions of proofs, by the certificate of a few pixels and by a pass with a cluster."""
+    if all_compiled():
+        return
+    with FileLock(place() / "compiling.lock"):
+        if all_compiled():
+            return
+        instance = sample("mouse", 4).with_gauge("strokes")
+        limits = WorkLimits(Deadline(), never, gap=0.0, certified=False, work=math.inf, measured=lambda: 0.0)
+        with crew(1) as hands:
+            work = Work(instance, Work.first(instance, None, never), limits, hands, (0, 1), silent)
+            ended = work.run()
+            proof = work.proof(0.0, ended)
+            dual = Dual(Lattice.whole(proof.field, 2), hands)
+            dual.add_clusters(1, proof.field)
+            dual.ascend(1)
+        with TemporaryDirectory() as folder:
+            write_certificate(proof, Path(folder) / "certificate.npz")
