@@ -14,7 +14,7 @@ import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
 from ...models.processes.control import on_stop
-from ..solutions.readers.text import Status
+from ..solutions.statuses import Status
 from ..writing.terms import Terms, listed
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
 from .reading import Meaning, finite, infinite

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from ..licence import package_folder
-from ..solutions.readers.text import Status
+from ..solutions.statuses import Status
 from . import casadi as casadi_program
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete, run_command
 from .reading import Evaluation, Points

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.processes.control import stopped
-from ..solutions.readers.text import Status
+from ..solutions.statuses import Status
 from ..writing.terms import listed
 from .protocol import Job, Outcome, RefusedError, complete, run_command, run_program
 from .reading import Evaluation, Meaning, Points

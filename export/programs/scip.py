@@ -15,7 +15,7 @@ import numpy as np
 import pyscipopt
 
 from ...models.processes.control import on_stop
-from ..solutions.readers.text import Status
+from ..solutions.statuses import Status
 from ..writing.terms import Terms, listed
 from .protocol import Job, Outcome, RefusedError, complete, file_names
 from .reading import Evaluation, Meaning, Points, finite

@@ -22,7 +22,8 @@ from ...models.previews import table_of
 from ..formats.registry import FORMATS, carried
 from ..writing.canonical import Canonical
 from .readers.registry import read_raw
-from .readers.text import RawSolution, Status, values_for, values_in_order
+from .readers.text import RawSolution, values_for, values_in_order
+from .statuses import Status
 
 ROUND: Final = 1e-5
 """Largest distance from an integer at which an integer column is rounded; other values are kept."""

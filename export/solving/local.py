@@ -37,8 +37,8 @@ from ..bundle.manifest import is_recordable, write_manifest
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, carried, write
 from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError, call, part_of
-from ..solutions.readers.text import Status
 from ..solutions.solution import Solution, read_solution
+from ..solutions.statuses import Status
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in
 from ..writing.sink import save
 

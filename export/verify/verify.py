@@ -32,8 +32,8 @@ from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, carried
 from ..programs.protocol import NotReportedError, RefusedError, TooLargeError
 from ..programs.reading import Points
-from ..solutions.readers.text import Status
 from ..solutions.solution import Solution
+from ..solutions.statuses import Status
 from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
 from ..solving.local import Files, Solvers
 from .checks import Check, Verdict, Verification

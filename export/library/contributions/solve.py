@@ -24,8 +24,8 @@ from ....models.formulations.problem import Problem
 from ....models.processes.deadline import Progress, silent
 from ....models.processes.groups import interruptible
 from ....models.processes.limits import Limits
-from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
+from ...solutions.statuses import Status
 from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, format_for
 from ..building.build import has_unbuilt_records, rebuild

@@ -42,7 +42,8 @@ import numpy as np
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ....models.storage import replacing
-from .text import HEAD, Cursor, RawSolution, Reader, Status, begins, is_number, numbers, one_line, shown
+from ..statuses import of_ampl
+from .text import HEAD, Cursor, RawSolution, Reader, begins, is_number, numbers, one_line, shown
 
 _OPTIONS = re.compile(rb"^Options[ \t]*\n", re.MULTILINE)
 _OBJNO = re.compile(rb"^objno\b.*", re.MULTILINE)
@@ -52,25 +53,6 @@ _OUR_OPTIONS: Final = (1, 1, 0)  # as in the first line of our .nl files
 _LONGEST_MESSAGE: Final = 10_000
 _OPTIONS_WORD: Final = b"Options"
 _MAGIC: Final = b"\x06\0\0\0binary\x06\0\0\0"
-
-_GLOBAL = re.compile(
-    r"(optimal solution found$|(baron|cbc|copt|cplex|gurobi|highs|scip|xpress)\b(?!.*\blocal).*\boptimal)",
-    re.IGNORECASE,
-)
-# SCIP writes those three words instead of its name; Ipopt writes them after its own
-
-
-_CODES: Final = (
-    (-1, Status.ERROR),
-    (99, Status.OPTIMAL_LOCAL),
-    (199, Status.FEASIBLE),
-    (299, Status.INFEASIBLE),
-    (399, Status.UNBOUNDED),
-    # from 450 to 469: infeasible or unbounded, which points rule out; older SCIP uses 450 for interrupted
-    (469, Status.LIMIT_WITH_POINT),
-    (499, Status.LIMIT_WITHOUT_POINT),
-)
-"""Greatest code of each status; greater codes are failures."""
 
 
 def _recognises_text(head: bytes) -> bool:
@@ -153,19 +135,8 @@ def _solution(message: bytes, code: int | None, values: Floats, rows: int) -> Ra
     words = one_line(message)
     if code is not None and 0 <= code <= 99 and not values.size:
         raise SolutionError("the file states solved but holds no values; let the solver write the file again")
-    status = _status(code, words, with_point=values.size > 0)
+    status = of_ampl(code, words, with_point=values.size > 0)
     return RawSolution(status, words, None, None, values, rows=rows)
-
-
-def _status(code: int | None, message: str, *, with_point: bool) -> Status:
-    if code is None:
-        return Status.FEASIBLE if with_point else Status.NO_POINT
-    if 0 <= code <= 99 and _GLOBAL.match(message):
-        return Status.OPTIMAL_GLOBAL
-    if 450 <= code <= 469 and not with_point and "infeasible" in message.lower():
-        return Status.INFEASIBLE
-    status = next((status for last, status in _CODES if code <= last), Status.ERROR)
-    return status if with_point else status.without_point
 
 
 def parse_binary(data: bytes) -> RawSolution:

@@ -22,12 +22,12 @@ from typing import Final
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
+from ..statuses import Status, of_baron
 from .text import (
     Bytes,
     Cursor,
     RawSolution,
     Reader,
-    Status,
     begins,
     labelled_numbers,
     one_line,
@@ -43,8 +43,6 @@ _FIRST = re.compile(rb"^ +first(?:feas|loc) += +1$", re.MULTILINE)
 _POINT: Final = b">>> Objective value is:"
 _INFINITE: Final = 1e50
 _RAY: Final = b"unbounded ray:"
-_NORMAL: Final = b"Normal completion"
-_STOPPED = re.compile(rb"max\. allowable|memory|interrupt", re.IGNORECASE)
 
 
 def parse_results(data: bytes) -> RawSolution:
@@ -56,7 +54,7 @@ def parse_results(data: bytes) -> RawSolution:
         raise SolutionError("the file is cut off: the end of the search is missing; let BARON write it again")
     words = one_line(banners[-1])
     at = data.rfind(_TABLE)
-    status = _status(banners[-1], has_table=at >= 0, unbounded=_RAY in data[max(at, 0) :])
+    status = of_baron(words, has_table=at >= 0, unbounded=_RAY in data[max(at, 0) :])
     if status is Status.OPTIMAL_GLOBAL and _FIRST.search(data):
         status = Status.FEASIBLE
     if at < 0 or status is Status.UNBOUNDED:
@@ -69,15 +67,6 @@ def parse_results(data: bytes) -> RawSolution:
     if abs(objective) >= _INFINITE:
         return without_point(Status.UNBOUNDED, words)
     return RawSolution(status, words, objective, names, values)
-
-
-def _status(banner: bytes, *, has_table: bool, unbounded: bool) -> Status:
-    if banner == _NORMAL:
-        proven = Status.OPTIMAL_GLOBAL if has_table else Status.INFEASIBLE
-        return Status.UNBOUNDED if unbounded else proven
-    if has_table:
-        return Status.LIMIT_WITH_POINT
-    return Status.LIMIT_WITHOUT_POINT if _STOPPED.search(banner) else Status.ERROR
 
 
 def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:

@@ -18,11 +18,11 @@ from typing import Final
 
 import numpy as np
 
+from ..statuses import of_cbc
 from .text import (
     Cursor,
     RawSolution,
     Reader,
-    Status,
     begins,
     fault,
     labelled_numbers,
@@ -34,17 +34,6 @@ from .text import (
 
 _HEAD = re.compile(rb"([A-Z][^\n]{2,100}?) - objective value +(\S+)")
 _MARK: Final = b"\n**"
-_CONTINUOUS: Final = b"continuous used"
-_WORDS: Final = (
-    (b"optimal", Status.OPTIMAL_GLOBAL),
-    (b"infeasible", Status.INFEASIBLE),
-    (b"integer infeasible", Status.INFEASIBLE),
-    (b"linear relaxation infeasible", Status.INFEASIBLE),
-    (b"unbounded", Status.UNBOUNDED),
-    (b"linear relaxation unbounded", Status.UNBOUNDED),
-    (b"stopped on difficulties", Status.ERROR),
-    (b"stopped", Status.LIMIT_WITH_POINT),
-)
 
 
 def parse(data: bytes) -> RawSolution:
@@ -54,7 +43,7 @@ def parse(data: bytes) -> RawSolution:
     head = _HEAD.fullmatch(line)
     if head is None:
         raise cursor.fault(f"{shown(line)} is not a status and the objective")
-    status = _status(head[1])
+    status = of_cbc(head[1].decode(errors="replace"))
     if not status.promises_point:
         return without_point(status, head[1])
     objective = cursor.number(head[2])
@@ -76,14 +65,6 @@ def parse(data: bytes) -> RawSolution:
         omits_zeros=not (values == 0).any(),
         of_rows=names[:first],
     )
-
-
-def _status(words: bytes) -> Status:
-    known = (status for start, status in _WORDS if words.lower().startswith(start))
-    status = next(known, Status.ERROR)
-    if _CONTINUOUS in words and status.promises_point:
-        return Status.LIMIT_WITHOUT_POINT
-    return status
 
 
 READERS: Final = (Reader("cbc", "CBC, the file of its command solution", begins(_HEAD.pattern), parse),)

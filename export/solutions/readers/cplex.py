@@ -24,25 +24,12 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
 from ....models.errors import SolutionError
-from .text import RawSolution, Reader, Status, begins, named_pairs, number_of, one_line, without_point
+from ..statuses import CPLEX, CPLEX_STOPPED, Status
+from .text import RawSolution, Reader, begins, named_pairs, number_of, one_line, without_point
 
 _OMITS_ZEROS: Final = "3"
 _INTEGERS_ONLY: Final = {"2", "4"}
 _CHUNK: Final = 1 << 20
-
-_CODES: Final = {
-    Status.OPTIMAL_GLOBAL: (1, 101, 102, 129, 130),
-    Status.OPTIMAL_LOCAL: (24,),
-    # 5 and 115: optimal, but infeasible before scaling; 127: a further solution of a pool
-    Status.FEASIBLE: (5, 23, 115, 127),
-    Status.INFEASIBLE: (3, 4, 103, 119),  # 4 and 119: or unbounded, which our objectives are not
-    Status.UNBOUNDED: (2, 20, 118, 133),
-    Status.LIMIT_WITH_POINT: (6, 104, 105, 107, 109, 111, 113, 116, 128, 131),
-    Status.LIMIT_WITHOUT_POINT: (106, 108, 110, 112, 114, 117, 132),
-}
-_STATUS: Final = {code: status for status, codes in _CODES.items() for code in codes}
-_STOPPED: Final = {10, 11, 12, 13, 21, 22, 25}
-"""A continuous problem was stopped; the header states whether the point is feasible."""
 
 
 def parse(data: bytes) -> RawSolution:
@@ -83,10 +70,10 @@ def _with_point(first: _FirstSolution, status: Status, words: str) -> RawSolutio
 def _status(header: dict[str, str]) -> Status:
     text = header.get("solutionStatusValue", "")
     code = int(text) if re.fullmatch(r"[0-9]{1,6}", text) else -1
-    if code in _STOPPED:
+    if code in CPLEX_STOPPED:
         feasible = header.get("primalFeasible") == "1"
         return Status.LIMIT_WITH_POINT if feasible else Status.LIMIT_WITHOUT_POINT
-    return _STATUS.get(code, Status.ERROR)
+    return CPLEX.get(code, Status.ERROR)
 
 
 class _FirstSolution:

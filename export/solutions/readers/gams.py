@@ -20,58 +20,17 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from .text import Cursor, RawSolution, Reader, Status, begins, named_numbers, shown, without_point
+from ..statuses import of_gams
+from .text import Cursor, RawSolution, Reader, begins, named_numbers, shown, without_point
 
 _EPS = re.compile(rb",[ ]*EPS[ ]*$", re.MULTILINE)
 _NO_VALUE: Final = {b"NA", b"UNDF"}
-
-_MODEL: Final = {
-    1: (Status.OPTIMAL_GLOBAL, "optimal"),
-    2: (Status.OPTIMAL_LOCAL, "locally optimal"),
-    3: (Status.UNBOUNDED, "unbounded"),
-    4: (Status.INFEASIBLE, "infeasible"),
-    5: (Status.LIMIT_WITHOUT_POINT, "locally infeasible"),  # proves nothing
-    6: (Status.LIMIT_WITHOUT_POINT, "intermediate infeasible"),
-    7: (Status.FEASIBLE, "feasible solution"),
-    8: (Status.FEASIBLE, "integer solution"),
-    9: (Status.LIMIT_WITHOUT_POINT, "intermediate non-integer"),
-    10: (Status.INFEASIBLE, "integer infeasible"),
-    14: (Status.LIMIT_WITHOUT_POINT, "no solution returned"),
-    18: (Status.UNBOUNDED, "unbounded, no solution"),
-    19: (Status.INFEASIBLE, "infeasible, no solution"),
-}
-_SOLVER: Final = {
-    1: "normal completion",
-    2: "iteration limit",
-    3: "time limit",
-    4: "terminated by the solver",
-    5: "evaluation errors",
-    6: "capability problems",
-    7: "licensing problems",
-    8: "user interrupt",
-    9: "setup failure",
-    10: "solver failure",
-    11: "internal solver error",
-    12: "skipped",
-    13: "system failure",
-}
-_LIMITS: Final = {2, 3, 4, 8}
-
-
-def _claim(model: int, solver: int) -> tuple[Status, str]:
-    """The claim of GAMS's model status and solver status, and both in words."""
-    status, words = _MODEL.get(model, (Status.ERROR, f"model status {model}"))
-    if status is Status.FEASIBLE and solver in _LIMITS:
-        status = Status.LIMIT_WITH_POINT
-    if status is Status.LIMIT_WITHOUT_POINT and solver not in _LIMITS | {1}:
-        status = Status.ERROR
-    return status, f"{words}; {_SOLVER.get(solver, f'solver status {solver}')}"
 
 
 def parse_csv(data: bytes) -> RawSolution:
     """Read a CSV. Raises SolutionError for NA, UNDF, other words that are not numbers, and a cut."""
     cursor = Cursor(data)
-    status, words = _claim(_state(cursor, "model_status"), _state(cursor, "solver_status"))
+    status, words = of_gams(_state(cursor, "model_status"), _state(cursor, "solver_status"))
     if data.startswith(b"problem,", cursor.position):
         cursor.line("problem")  # the caller for every kind of file checks it
     text = cursor.after(b"objective,", "objective")

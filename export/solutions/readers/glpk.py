@@ -25,11 +25,11 @@ import numpy as np
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ...writing.canonical import Order
+from ..statuses import GLPK, Status
 from .text import (
     Cursor,
     RawSolution,
     Reader,
-    Status,
     begins,
     fault,
     labelled_numbers,
@@ -42,21 +42,6 @@ _SUMMARY = re.compile(rb"s (mip|bas|ipt) (\d{1,12}) (\d{1,12}) (.+) (\S+)")
 _END: Final = b"e o f"
 _GOAL_OF_MOD: Final = b"energy ="
 _WORDS: Final = {b"mip": 3, b"ipt": 4, b"bas": 5}
-_STATUS: Final = {
-    b"o": Status.OPTIMAL_GLOBAL,
-    b"f": Status.LIMIT_WITH_POINT,
-    b"n": Status.INFEASIBLE,
-    b"i": Status.LIMIT_WITHOUT_POINT,
-    b"u": Status.LIMIT_WITHOUT_POINT,
-    b"f f": Status.OPTIMAL_GLOBAL,
-    b"f i": Status.LIMIT_WITH_POINT,
-    b"f u": Status.LIMIT_WITH_POINT,
-    b"f n": Status.UNBOUNDED,
-    b"n f": Status.INFEASIBLE,
-    b"n i": Status.INFEASIBLE,
-    b"n n": Status.INFEASIBLE,
-    b"n u": Status.INFEASIBLE,
-}
 
 
 class _Summary(NamedTuple):
@@ -106,7 +91,7 @@ def _summary(cursor: Cursor) -> _Summary:
     found = _SUMMARY.fullmatch(line)
     if found is None:
         raise cursor.fault(f"{shown(line)} is not kind, rows, columns, status and objective")
-    status = _STATUS.get(found[4], Status.LIMIT_WITHOUT_POINT)
+    status = GLPK.get(found[4].decode(errors="replace"), Status.LIMIT_WITHOUT_POINT)
     return _Summary(_WORDS[found[1]], int(found[2]), int(found[3]), status, cursor.number(found[5]))
 
 

@@ -26,12 +26,12 @@ from typing import Any, Final
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
+from ..statuses import GUROBI, Status
 from .text import (
     Bytes,
     Cursor,
     RawSolution,
     Reader,
-    Status,
     begins,
     is_number,
     named_numbers,
@@ -46,24 +46,6 @@ _START = re.compile(rb"# ?MIP start\b", re.IGNORECASE)
 _LINES_TO_TELL: Final = 5
 _INFINITE: Final = 1e100
 
-_STATUS: Final = {
-    2: (Status.OPTIMAL_GLOBAL, "optimal"),
-    3: (Status.INFEASIBLE, "infeasible"),
-    4: (Status.INFEASIBLE, "infeasible or unbounded"),  # our objectives are bounded below
-    5: (Status.UNBOUNDED, "unbounded"),
-    6: (Status.LIMIT_WITH_POINT, "cutoff"),
-    7: (Status.LIMIT_WITH_POINT, "iteration limit"),
-    8: (Status.LIMIT_WITH_POINT, "node limit"),
-    9: (Status.LIMIT_WITH_POINT, "time limit"),
-    10: (Status.LIMIT_WITH_POINT, "solution limit"),
-    11: (Status.LIMIT_WITH_POINT, "interrupted"),
-    13: (Status.FEASIBLE, "suboptimal"),
-    15: (Status.LIMIT_WITH_POINT, "objective limit"),
-    16: (Status.LIMIT_WITH_POINT, "work limit"),
-    17: (Status.LIMIT_WITH_POINT, "memory limit"),
-    18: (Status.OPTIMAL_LOCAL, "locally optimal"),
-    19: (Status.LIMIT_WITH_POINT, "locally infeasible"),  # proves nothing, and has no point
-}
 _POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED}
 
 
@@ -117,7 +99,7 @@ def parse_json(data: bytes) -> RawSolution:
     information, variables = content.get("SolutionInfo"), content.get("Vars")
     if not isinstance(information, dict) or not isinstance(information.get("Status"), int):
         raise SolutionError("the SolutionInfo has no Status; let Gurobi write the file again")
-    status, words = _STATUS.get(
+    status, words = GUROBI.get(
         information["Status"], (Status.ERROR, f"Gurobi's status {information['Status']}")
     )
     if variables is None or status in _POINTLESS:

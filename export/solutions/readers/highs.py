@@ -29,26 +29,12 @@ import numpy as np
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
-from .text import Bytes, Cursor, RawSolution, Reader, Status, named_numbers, one_line, shown
+from ..statuses import HIGHS, Status
+from .text import Bytes, Cursor, RawSolution, Reader, named_numbers, one_line, shown
 
 _OTHER_STYLES: Final = {
     re.compile(rb"Columns\n +Index +Status"): "style 1 (pretty), which has six digits only",
     re.compile(rb"Problem:"): "style 3 (GLPK pretty), which has six digits only",
-}
-_STATUS: Final = {
-    b"Optimal": Status.OPTIMAL_GLOBAL,
-    b"Infeasible": Status.INFEASIBLE,
-    b"Primal infeasible or unbounded": Status.INFEASIBLE,  # our objectives are bounded below
-    b"Unbounded": Status.UNBOUNDED,
-    b"Bound on objective reached": Status.LIMIT_WITH_POINT,
-    b"Target for objective reached": Status.LIMIT_WITH_POINT,
-    b"Time limit reached": Status.LIMIT_WITH_POINT,
-    b"Iteration limit reached": Status.LIMIT_WITH_POINT,
-    b"Solution limit reached": Status.LIMIT_WITH_POINT,
-    b"Memory limit reached": Status.LIMIT_WITH_POINT,
-    b"Interrupted by user": Status.LIMIT_WITH_POINT,
-    b"Interrupted by HiGHS": Status.LIMIT_WITH_POINT,
-    b"Unknown": Status.LIMIT_WITH_POINT,
 }
 _COLUMNS = re.compile(rb"# Columns (-?)(\d{1,12})( sparse)?")
 
@@ -107,7 +93,7 @@ def _expect(cursor: Cursor, expected: bytes) -> None:
 
 
 def _status(words: bytes, *, feasible: bool) -> Status:
-    status = _STATUS.get(words, Status.ERROR)
+    status = HIGHS.get(words.decode(errors="replace"), Status.ERROR)
     return status if feasible else status.without_point
 
 

@@ -15,11 +15,11 @@ from __future__ import annotations
 
 from typing import Final
 
+from ..statuses import Status, of_scip
 from .text import (
     Cursor,
     RawSolution,
     Reader,
-    Status,
     begins,
     labelled_numbers,
     one_line,
@@ -33,16 +33,6 @@ _OBJECTIVE_LABEL: Final = b"objective value:"
 _UNKNOWN: Final = b"unknown"
 _NONE: Final = b"no solution available"
 
-_STATUS: Final = {
-    b"optimal solution found": Status.OPTIMAL_GLOBAL,
-    b"infeasible": Status.INFEASIBLE,
-    b"infeasible or unbounded": Status.INFEASIBLE,  # our objectives are bounded below
-    b"unbounded": Status.UNBOUNDED,
-    b"user interrupt": Status.LIMIT_WITH_POINT,
-    b"termination signal received": Status.LIMIT_WITH_POINT,
-    b"unknown": Status.FEASIBLE,
-}
-
 
 def parse(data: bytes) -> RawSolution:
     """Read a file. Raises SolutionError for `unknown`, other words that are not numbers, and a cut."""
@@ -51,7 +41,7 @@ def parse(data: bytes) -> RawSolution:
     line = cursor.line("the status or the objective")
     if line.startswith(_STATUS_LABEL):
         words = line.removeprefix(_STATUS_LABEL).strip()
-        status = _status(words)
+        status = of_scip(words.decode(errors="replace"))
         line = cursor.line("the objective")
     if line == _NONE:
         silent = status is Status.FEASIBLE
@@ -65,12 +55,6 @@ def parse(data: bytes) -> RawSolution:
     per_line = 3 if len(words_of_line(data, cursor.position)) == 3 else 2  # the cost is the third word
     names, values = labelled_numbers(data, cursor.position, len(data), per_line, label=0, numeric=(1,))
     return RawSolution(status, one_line(words), objective, names, values[:, 0], omits_zeros=True)
-
-
-def _status(words: bytes) -> Status:
-    if words.endswith(b"limit reached"):
-        return Status.LIMIT_WITH_POINT
-    return _STATUS.get(words, Status.ERROR)
 
 
 READERS: Final = (

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cache
 from itertools import repeat
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
+from ..statuses import Status
 
 if TYPE_CHECKING:  # the driver of a solver needs neither the writers nor the formulations
     from ...writing.canonical import Order
@@ -54,41 +54,6 @@ def added_columns() -> dict[str, str]:
 
     ours = {"crossfield": r"ONE", "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"}
     return ours | {program.title: program.adds for program in PROGRAMS.values() if program.adds}
-
-
-class Status(StrEnum):
-    """A solver's claim about its answer, and the remaining status once the point is checked.
-
-    no-point: there is none, without a reason. unknown: the point contradicts the claim.
-    """
-
-    OPTIMAL_GLOBAL = "optimal-global"
-    OPTIMAL_LOCAL = "optimal-local"
-    FEASIBLE = "feasible"
-    INFEASIBLE = "infeasible"
-    UNBOUNDED = "unbounded"
-    LIMIT_WITH_POINT = "limit-with-point"
-    LIMIT_WITHOUT_POINT = "limit-without-point"
-    NO_POINT = "no-point"
-    ERROR = "error"
-    UNKNOWN = "unknown"
-
-    @property
-    def promises_point(self) -> bool:
-        """Whether the status implies a feasible point."""
-        return self in {
-            Status.OPTIMAL_GLOBAL,
-            Status.OPTIMAL_LOCAL,
-            Status.FEASIBLE,
-            Status.LIMIT_WITH_POINT,
-        }
-
-    @property
-    def without_point(self) -> Status:
-        """The status of a file that states this one, but holds no point."""
-        if self is Status.LIMIT_WITH_POINT:
-            return Status.LIMIT_WITHOUT_POINT
-        return Status.ERROR if self.promises_point else self
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,11 +15,11 @@ import re
 from typing import Final
 
 from ....models.errors import SolutionError
+from ..statuses import Status
 from .text import (
     Cursor,
     RawSolution,
     Reader,
-    Status,
     begins,
     fault,
     labelled_numbers,

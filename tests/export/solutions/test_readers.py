@@ -10,12 +10,12 @@ from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.text import (
     RawSolution,
-    Status,
     named_numbers,
     numbers,
     values_for,
     values_in_order,
 )
+from crossfield.export.solutions.statuses import Status
 from crossfield.models.errors import OutputError, SolutionError
 from hypothesis import given, settings
 from hypothesis import strategies as st

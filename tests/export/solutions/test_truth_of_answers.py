@@ -20,8 +20,9 @@ from crossfield.export.formats.registry import write
 from crossfield.export.library.documents import check_point
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
-from crossfield.export.solutions.readers.text import Status, added_columns
+from crossfield.export.solutions.readers.text import added_columns
 from crossfield.export.solutions.solution import LARGEST, TOLERANCE, Solution, read_solution
+from crossfield.export.solutions.statuses import Status
 from crossfield.models.errors import InstanceError, SolutionError
 from crossfield.models.formulations.problem import formulate
 

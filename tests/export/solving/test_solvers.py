@@ -16,7 +16,7 @@ import pytest
 from children import command_lines, complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
-from crossfield.export.solutions.readers.text import Status
+from crossfield.export.solutions.statuses import Status
 from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.local import solver_for
 from crossfield.export.solving.methods import Request

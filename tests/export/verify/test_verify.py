@@ -15,8 +15,8 @@ from cases import MASKS, make_field, make_instance
 from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solutions.solution import Solution
+from crossfield.export.solutions.statuses import Status
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
 from crossfield.export.solving.local import Files, Solvers
 from crossfield.export.verify.checks import Verdict, Verification
