@@ -3,7 +3,7 @@
 .mod, .dat: GLPK reads the linear ones. Of the others it evaluates every expression once variables are
 parameters: its MathProg is a second implementation of the language, and AMPL itself cannot be had for free.
 .osil: SCIP. .qplib: pyqplib, where it is installed, and a reader after
-qplib.zib.de/doc.html. .bar: BARON itself in its free size.
+qplib.zib.de/doc.html. .bar: BARON itself in its free size; test_algebraic_text.py reads its text.
 """
 
 from __future__ import annotations
@@ -460,71 +460,6 @@ def test_a_start_has_its_place(name: str, tmp_path: Path):
 
 
 # BARON
-
-
-def bar_model(text: str) -> dict[str, Any]:
-    """The sections of a .bar file: kinds of variables, bounds, rows and objective in Python."""
-    text = re.sub(r"//.*", "", text)
-    found: dict[str, Any] = {"kind": {}, "rows": {}, "lower": {}, "upper": {}}
-    for keyword, listed in re.findall(r"^(\w*VARIABLES)\s([^;]*);", text, re.MULTILINE):
-        found["kind"] |= dict.fromkeys(re.split(r",\s*", listed.strip()), keyword)
-    for end in ("lower", "upper"):
-        body = re.search(rf"{end.upper()}_BOUNDS\s*{{(.*?)}}", text, re.DOTALL)
-        pairs = re.findall(r"(\w+): *(\S+?);", body[1]) if body else []
-        found[end] = {name: float(value) for name, value in pairs}
-    objective = re.search(r"OBJ: minimize(.*?);", text, re.DOTALL)
-    found["objective"] = python(objective[1])
-    equations = re.search(r"^EQUATIONS\s([^;]*);", text, re.MULTILINE)
-    body = text[text.index("EQUATIONS") : objective.start()] if equations else ""
-    for name, left, sense, right in re.findall(r"(\w+):\s([^;:]*?)(<=|>=|==)([^;]*);", body):
-        found["rows"][name] = (python(left), sense, float(right))
-    declared = re.split(r",\s*", equations[1].strip()) if equations else []
-    assert list(found["rows"]) == declared
-    return found
-
-
-def python(expression: str) -> Any:
-    return compile(" ".join(expression.replace("^", "**").split()), "bar", "eval")
-
-
-def evaluated(model: dict[str, Any], names: list[str], point: Any) -> tuple[float, dict[str, float]]:
-    """Objective, and rows with their right side moved to the left and turned to `>= 0` or `== 0`."""
-    given = dict(zip(names, point.tolist(), strict=True))
-    signs = {"<=": -1.0}
-    rows = {
-        name: signs.get(sense, 1.0) * (eval(left, {}, given) - right)
-        for name, (left, sense, right) in model["rows"].items()
-    }
-    return eval(model["objective"], {}, given), rows
-
-
-@for_each("label", POLYNOMIAL)
-def test_bar_says_what_the_problem_is(label: str, tmp_path: Path):
-    problem = problem_of(label)
-    model = bar_model(written(problem, tmp_path / "model.bar"))
-    columns, rows = names(problem)
-    binary = np.concatenate(
-        [
-            np.full(b.count, b.integer and bool(((b.lower == 0) & (b.upper == 1)).all()))
-            for b in problem.blocks.values()
-        ]
-    )
-    kinds = np.where(binary, "BINARY_VARIABLES", np.where(problem.integer, "INTEGER_VARIABLES", "VARIABLES"))
-    assert model["kind"] == dict(zip(columns, kinds.tolist(), strict=True))
-    for end, bounds in (("lower", problem.lower), ("upper", problem.upper)):
-        stated = np.isfinite(bounds) & ~binary
-        assert model[end] == {columns[at]: bounds[at] for at in np.nonzero(stated)[0].tolist()}
-    assert list(model["rows"]) == rows
-    low, high = limits(problem)
-    senses = np.where(low == high, "==", np.where(np.isfinite(low), ">=", "<="))
-    assert [sense for _, sense, _ in model["rows"].values()] == senses.tolist()
-    for point in points_of(problem, 3):
-        objective, activities = evaluated(model, columns, point)
-        (expected,), (values,) = values_at(problem, point[None])
-        assert_values([objective], [expected])
-        sign = np.where(np.isfinite(low), 1, -1)
-        assert_values(list(activities.values()), sign * (values - np.where(np.isfinite(low), low, high)))
-    assert max(map(len, columns + rows)) <= 15
 
 
 BARON = importlib.util.find_spec("gamspy_baron")
