@@ -16,7 +16,6 @@ from .sketch_options import SketchOptions
 
 if TYPE_CHECKING:
     from ...models.field.field import Norm as NormOfField
-    from ...models.processes.deadline import Deadline
     from ...models.proof.certificate import Certificate
     from ...models.proof.record import Proof
 
@@ -52,7 +51,6 @@ def prove_command(
         return
     if source is None or output is None:
         raise typer.BadParameter("give a sketch, a sample or an instance, and -o DIR; or --check FILE")
-    from ...models.processes.deadline import Deadline
     from ...models.processes.limits import Limits
     from ...models.proof.prove import prove
 
@@ -64,12 +62,10 @@ def prove_command(
             norm=NORMS[norm],
             start=read_start(start, instance),
             limits=Limits(time_limit, gap),
-            certified=True,
             scheduler=scheduler,
             progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
         )
-        show("writing and checking the certificate")
-        document = _write(proof, output, Deadline.after(time_limit - proof.seconds))
+        document = _write(proof, output)
     printing.show(document, lambda: _show(proof, document, output))
     if instance.gauge == "box":
         print_notice("the proof is of the gauge strokes; its bound also holds in the gauge box")
@@ -89,17 +85,15 @@ def prove_command(
         raise SolverError(f"{NOTHING}; field and report were written. Increase --time-limit", file=output)
 
 
-def _write(proof: Proof, folder: Path, deadline: Deadline) -> dict[str, Any]:
+def _write(proof: Proof, folder: Path) -> dict[str, Any]:
     """Write field, certificate and report of a proof; return the report."""
     from ...models.field.file import write_field
-    from ...models.processes.groups import interruptible
     from ...models.storage import make_folder, write_bytes
     from ..solving.proven import certified
 
     stem = f"{proof.field.instance.name}.proof"
     path = make_folder(folder) / f"{stem}.certificate.npz"
-    with interruptible() as interrupted:
-        certificate = certified(proof, path, deadline, interrupted)
+    certificate = certified(proof, path)
     proven, bounds = _proven(proof, certificate)
     write_field(proof.field, folder / f"{stem}.field.npz")
     document = proven | {

@@ -101,8 +101,7 @@ def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, P
     *_, candidate = METHODS[name].find(request)
     write_field(candidate.field, target)
     certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
-    deadline = Deadline.after(request.limits.time_limit - candidate.seconds)
-    return candidate, Proven.by(candidate.proof, certificate, deadline), target
+    return candidate, Proven.by(candidate.proof, certificate), target
 
 
 def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solution, Path]:

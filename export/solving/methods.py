@@ -271,7 +271,6 @@ def _prove(request: Request) -> Iterator[Candidate]:
         request.instance,
         start=request.start,
         limits=request.limits.until(deadline),
-        certified=True,
         jobs=_processes(request),
         progress=lambda line: request.progress(f"prove: {line}; Ctrl-C keeps them"),
         stop=request.stop,

@@ -261,7 +261,7 @@ def run(
         watch.lap(COMPILING)
     if not found.interrupted:
         _find(found, request, watch)
-    proven = _certified(found, folder / CERTIFICATE, limits, progress, over)
+    proven = _certified(found, folder / CERTIFICATE)
     watch.lap("certificate")
     report = Report(instance, found.ranked, tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
@@ -336,19 +336,13 @@ def _find(found: _Found, request: Request, watch: Stopwatch) -> None:
             break
 
 
-def _certified(found: _Found, path: Path, limits: Limits, progress: Progress, stop: Over) -> Proven | None:
-    """The proven bound, with its certificate at the path; a refusal or Ctrl-C is recorded.
-
-    It has the time that its method has left of its own. A request to stop that ended the proof does not end
-    the certificate.
-    """
+def _certified(found: _Found, path: Path) -> Proven | None:
+    """The proven bound, with its certificate at the path; a refusal or Ctrl-C is recorded."""
     by = next((each for each in found.candidates if each.proof is not None), None)
     if by is None:
         return None
-    progress("writing and checking the certificate")
     try:
-        late = never if stop() else stop
-        return Proven.by(by.proof, path, Deadline.after(limits.time_limit - by.seconds), late)
+        return Proven.by(by.proof, path)
     except CrossfieldError as error:
         found.failures["certificate"] = str(error)
     except KeyboardInterrupt:

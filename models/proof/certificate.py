@@ -41,7 +41,6 @@ from __future__ import annotations
 
 import json
 import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -61,8 +60,11 @@ from .check_certificate import Verdict, Way
 from .clusters import clusters_on, table_sizes
 from .encoding import messages_of, tables_of
 from .lattice import Lattice
-from .record import Claim, LevelRecord, Proof, Status
+from .record import Claim, LevelRecord, Proof
 from .state import Indices
+
+REFUSALS: Final = (check_certificate.RefusedError, check_certificate.UnreadableError)
+"""Errors of the checker for a proof that does not hold."""
 
 _PREFIX: Final = "instance_"
 _PIXEL: Final = 1.0  # effort for each pixel, besides that for its labels
@@ -72,7 +74,6 @@ _TERMS: Final = 2_000_000.0  # an alpha of one pixel and an allowed label of its
 _QUAD: Final = 2.7  # effort for each quad with tables, besides that for their numbers
 _NUMBERS: Final = 7_000.0  # of tables, per unit of effort
 _SPARE_TIME: Final = 1.1  # safety factor: the machine may become busier
-_SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +88,6 @@ class Certificate(Claim):
         Its energy in the norm.
     bound
         Proven lower bound of the energy of all fields.
-    status
-        `optimal` or `gap`.
     verdict
         Findings of the checker.
 
@@ -120,8 +119,8 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
     path
         The file to write.
     stop
-        A function that returns whether to stop, or an event. The certificate then has only the levels
-        that were checked before.
+        A function that returns whether to stop, or an event, for a proof that is not checked yet. The
+        certificate then has only the levels that were checked before.
 
     Returns
     -------
@@ -141,21 +140,31 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
     path = Path(path)
     if not proof.levels:
         raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
-    packing, arrays = Packing(), _arrays(proof)
-    with ThreadPoolExecutor(1) as beside:
-        packed = beside.submit(packing.add, arrays)
-        verdict = _confirmed(arrays | _head(proof, "gap", 0.0), path, stop_function(stop))
-        packed.result()
-    status = cast("Status", verdict.status)
-    bound = max(0.0, verdict.bound - _SPARE * (1 + verdict.bound))
-    checked = len(verdict.levels)
-    confirmed = replace(proof, levels=proof.levels[:checked], branches=proof.branches[:checked])
-    if checked < len(proof.levels):
-        packing = Packing()
-        packing.add(_arrays(confirmed))
-    packing.add(_head(confirmed, status, bound))
+    try:
+        checked = proof if proof.verdict is not None else checked_proof(proof, stop_function(stop))
+    except check_certificate.StoppedError as error:
+        reason = "is not written: the time was over before the coarsest level of the proof was checked"
+        raise SolverError(reason, file=path) from error
+    except REFUSALS as error:
+        raise InputError(f"would hold a proof that is not valid: {error}", file=path) from error
+    verdict, packing = cast("Verdict", checked.verdict), Packing()
+    count = len(verdict.levels)
+    written = replace(checked, levels=checked.levels[:count], branches=checked.branches[:count])
+    packing.add(_arrays(written) | _head(written))
     write_bytes(path, packing.finish())
-    return Certificate(proof.field, verdict.energy, bound, status, verdict)
+    return Certificate(written.field, written.energy, written.bound, verdict)
+
+
+def checked_proof(proof: Proof, over: Over) -> Proof:
+    """The proof with the checker's findings, and with the bound and the forced jumps that it confirms.
+
+    over: returns whether to end the check. The proof then has the bound of the levels checked before. Raises
+    StoppedError if there are none, and one of `REFUSALS` for a proof that does not hold.
+    """
+    verdict = check_certificate.check(_arrays(proof) | _head(replace(proof, bound=0.0)), over, _quick_way())
+    found = replace(proof, bound=verdict.bound, forced=verdict.forced)
+    object.__setattr__(found, "verdict", verdict)
+    return found
 
 
 def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certificate:
@@ -199,7 +208,9 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
         raise InputError(f"is refused as a certificate: {error}", file=path) from error
     except check_certificate.UnreadableError as error:
         raise InputError(f"is not a certificate: {error}", file=path) from error
-    return Certificate(field, verdict.energy, head["bound"], head["status"], verdict)
+    except MemoryError as error:
+        raise InputError("needs more memory than there is to be checked", file=path) from error
+    return Certificate(field, field.energy(verdict.norm).total, head["bound"], verdict)
 
 
 def _checked(arrays: Arrays) -> Verdict:
@@ -220,17 +231,6 @@ def _field(arrays: Arrays) -> CrossField:
     return field
 
 
-def _confirmed(arrays: Arrays, path: Path, over: Over) -> Verdict:
-    """Verdict of the checker on arrays that are to be written. Raises InputError, SolverError."""
-    try:
-        return check_certificate.check(arrays, over, _quick_way())
-    except check_certificate.StoppedError as error:
-        reason = "is not written: the time was over before the coarsest level of the proof was checked"
-        raise SolverError(reason, file=path) from error
-    except check_certificate.RefusedError as error:
-        raise InputError(f"would hold a proof that is not valid: {error}", file=path) from error
-
-
 @cache
 def _quick_way() -> Way:
     """The checker's way with compiled products, whose least sums are the same numbers.
@@ -242,14 +242,14 @@ def _quick_way() -> Way:
     return Way(check_certificate.in_loops(partial(compiled_if_needed, in_any_order=True)))
 
 
-def _head(proof: Proof, status: Status, bound: float) -> Arrays:
-    """The head of a certificate that claims this status and bound."""
+def _head(proof: Proof) -> Arrays:
+    """The head of a certificate, with the claim of a proof."""
     head = {
         "format": check_certificate.FORMAT,
         "version": check_certificate.VERSION,
-        "status": status,
+        "status": proof.status,
         "energy": proof.energy,
-        "bound": bound,
+        "bound": proof.bound,
         "levels": len(proof.levels),
         "norm": proof.norm,
     }
@@ -327,8 +327,8 @@ def checking_pace() -> float:
     none = clusters_on(at, np.zeros(0, np.int64))
     numbers = messages_of(at, shares, 1.0, slice(0, len(pairs))), tables_of(at, none, 1.0)
     level = LevelRecord.on(at, numbers, bound=0.0, energy=0.0)
-    proof = Proof(field, 0.0, 0.0, "gap", 0, (level,), 0.0, "time")
-    arrays = _arrays(proof) | _head(proof, "gap", 0.0)
+    proof = Proof(field, 0.0, 0.0, 0, (level,), 0.0, "time")
+    arrays = _arrays(proof) | _head(proof)
     began = time.perf_counter()
     check_certificate.check(arrays, way=_quick_way())
     seconds = time.perf_counter() - began

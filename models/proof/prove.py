@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 import time
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Final
 
 from ..errors import InputError
 from ..field.field import CrossField, Norm, relabelled
 from ..instance.instance import Instance
 from ..processes.compiled import crew
-from ..processes.deadline import Deadline, Progress, Stop, silent, stop_function
+from ..processes.deadline import Deadline, Over, Progress, Stop, silent, stop_function
 from ..processes.groups import interruptible
 from ..processes.limits import Limits
 from ..processes.side_by_side import checked
 from ..smooth.systems import one_thread
-from .certificate import checking_pace
+from .certificate import REFUSALS, checked_proof, checking_pace
+from .check_certificate import StoppedError
 from .compiling import compile_proofs
 from .prove_absolute import WorkIn1Norm, WorkInMixedNorm
 from .record import Proof
@@ -25,6 +27,9 @@ from .workers import strips_on
 
 KINDS: Final[dict[Norm, type[Work]]] = {1: WorkIn1Norm, 2: Work, "mixed": WorkInMixedNorm}
 """The work of a proof, by norm."""
+
+_LATE: Final = 0.5  # seconds by which a check may exceed the time limit, rather than drop levels
+_LATE_SHARE: Final = 0.05  # of the proof's time, by which it may exceed it as well
 
 
 @one_thread()
@@ -35,7 +40,6 @@ def prove(
     start: CrossField | None = None,
     limits: Limits | None = None,
     work: int | None = None,
-    certified: bool = False,
     seed: int = 0,
     jobs: int = 2,
     scheduler: str | None = None,
@@ -47,8 +51,11 @@ def prove(
     The proof of an instance in the gauge `box`, with its field, is that of the same sketch in the gauge
     `strokes`. The bound holds for both gauges, because every field in `box` has a field in `strokes` of at
     most its energy. Without a time limit the same arguments give the same proof, for any number of threads.
-    Ctrl-C ends the proof with its best field and bound. The first proof on a machine compiles its functions
-    before the time limit begins, in up to a minute.
+    Ctrl-C ends the proof with its best field and bound, and a second one ends the check. The first proof on a
+    machine compiles its functions before the time limit begins, in up to a minute.
+
+    The checker of certificates checks the levels at the end. Bound, status and forced jumps are those that it
+    confirms, and `write_certificate` writes them.
 
     Parameters
     ----------
@@ -61,13 +68,10 @@ def prove(
         A field to begin with where, improved, it is lower than the first field.
     limits
         Time limit, relative gap at which to end (0 asks for optimality), and threads (0: as many as `jobs`).
-        Levels that could not be recorded in time are not begun. If no level was recorded, the bound is 0 and
-        `levels` is empty. None: no time limit, and a gap of 0.
+        Levels that could not be recorded and checked in time are not begun. If no level was checked, the
+        bound is 0 and `levels` is empty. None: no time limit, and a gap of 0.
     work
         Number of labels, counted at each rounding, after which to end: a limit that no clock decides.
-    certified
-        Whether to keep the estimated time that `write_certificate` takes for the levels. A level whose
-        certificate would be late is not begun.
     seed
         Seed of the search that follows where the lattices leave a gap.
     jobs
@@ -117,7 +121,7 @@ def prove(
             Deadline.after(seconds, end.clock),
             over,
             given.gap,
-            certified,
+            True,  # noqa: FBT003 - whether to keep time for the certificate
             work or math.inf,
             measured=checking_pace,
         )
@@ -125,5 +129,26 @@ def prove(
         proving = kind(
             instance, kind.first(instance, start, own.over), own, hands, (seed, jobs), progress, divide
         )
-        ended = proving.run()
-        return proving.proof(time.monotonic() - began, ended)
+        proof = proving.proof(0.0, proving.run())
+    proof = replace(proof, seconds=time.monotonic() - began)
+    if not proof.levels:
+        return proof
+    progress("checking the levels")
+    return _checked(proof, own.whole, asked)
+
+
+def _checked(proof: Proof, deadline: Deadline, asked: Over) -> Proof:
+    """The proof as the checker confirms it; without levels if none was checked in time.
+
+    The check may end after the deadline, by half a second and 5 % of the time of the proof. A request to stop
+    that ended the proof does not end the check. A proof that the checker refuses has no bound, and
+    `write_certificate` names the reason.
+    """
+    last, before = deadline.later(_LATE + _LATE_SHARE * proof.seconds), asked()
+    with interruptible() as interrupted:
+        try:
+            return checked_proof(proof, lambda: last.passed() or interrupted() or (not before and asked()))
+        except StoppedError:
+            return replace(proof, bound=0.0, forced=0, levels=(), branches=())
+        except REFUSALS:
+            return replace(proof, bound=0.0, forced=0)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, cast
 
 from ..array_archive import Arrays
 from ..field.field import CrossField, Norm
 from ..instance.grid import Floats
+from .check_certificate import Verdict, gap_of, status_of
 from .lattice import Lattice
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 Status = Literal["optimal", "gap"]
 
-EXACT: Final = 1e-9  # gap relative to 1 + energy that rounding leaves when the true gap is zero
+EXACT: Final = 1e-9  # gap relative to 1 + energy at which the prover ends; the checker's rounding adds to it
 
 
 class Branch(NamedTuple):
@@ -38,12 +39,16 @@ class Claim:
     field: CrossField
     energy: float
     bound: float
-    status: Status
+
+    @property
+    def status(self) -> Status:
+        """`optimal` or `gap`, as the checker of certificates calls this energy and bound."""
+        return cast("Status", status_of(self.energy, self.bound))
 
     @property
     def gap(self) -> float:
         """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
-        return 0.0 if self.status == "optimal" else (self.energy - self.bound) / max(self.energy, 1e-300)
+        return gap_of(self.energy, self.bound)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -88,15 +93,12 @@ class Proof(Claim):
     energy
         Its energy in the norm of the proof.
     bound
-        No field has a lower energy.
-    status
-        `optimal` if energy - bound <= 1e-9 (1 + energy), else `gap`. Usually all jumps are forced if it is
-        optimal, and the field solves the convex problem that remains.
+        No field has a lower energy, as the checker confirms: the bound that the certificate claims.
     forced
         Number of pairs with the same jump in every field that could be better.
     levels
         The last chain of lattices, coarsest first. Each follows from the one before, or, if there are
-        branches, from that which they name.
+        branches, from that which they name. The check may have ended before the last ones; see `verdict`.
     seconds
         Duration of the whole work.
     ended
@@ -113,6 +115,8 @@ class Proof(Claim):
         whole.
     branches
         For each level, what it follows from.
+    verdict
+        Findings of the checker; None before the check.
 
     """
 
@@ -124,3 +128,4 @@ class Proof(Claim):
     multipliers: Floats | None = None
     cuts: tuple[int, ...] = (-1,)
     branches: tuple[Branch, ...] = ()
+    verdict: Verdict | None = field(default=None, init=False, repr=False)  # `replace` leaves it out

@@ -47,7 +47,7 @@ from .forced import Forced, forced
 from .lattice import Lattice, labels_at, reached
 from .parts import Cut, across_seam, best_cut, island_of
 from .pruning import RemainingCells, finer, narrowed
-from .record import EXACT, Branch, LevelRecord, Proof, Status
+from .record import EXACT, Branch, LevelRecord, Proof
 from .rounding import Rounding, improve
 
 COARSEST: Final = 16  # steps in pi/2 of the first level
@@ -96,10 +96,10 @@ _CLOSED: Final = 0.5  # share of the gap that a lattice with not many labels lea
 class WorkLimits:
     """When to end: a deadline, a request to stop, a sufficient gap, enough work.
 
-    whole: the deadline of proof and certificate. certified: whether to keep time for a certificate. work:
-    greatest number of labels; labels: those so far. measured: measures the seconds per unit of the
-    certificate's effort; pace: the last of them; paced: the seconds that were left then. kept:
-    the seconds that the certificate is expected to take.
+    whole: the deadline of proof and certificate. work: greatest number of labels; labels: those so far.
+    measured: measures the seconds per unit of the certificate's effort; pace: the last of them; paced: the
+    seconds that were left then. certified: whether to keep time for a certificate; kept: the seconds that it
+    is expected to take.
     """
 
     whole: Deadline
@@ -254,11 +254,10 @@ class Work:
         return Lattice.whole(centre, COARSEST)
 
     def proof(self, seconds: float, ended: str) -> Proof:
-        """The proof so far, with the levels that prove it."""
+        """The proof so far, with the levels that prove it; not checked."""
         bound, energy = min(self.proven.bound, self.energy(self.best)), self.energy(self.best)
-        status: Status = "optimal" if self._exact(bound) else "gap"
         return Proof(
-            self.best, energy, bound, status, self.proven.forced, tuple(self.proven.levels), seconds, ended,
+            self.best, energy, bound, self.proven.forced, tuple(self.proven.levels), seconds, ended,
             self.norm, self.proven.multipliers, self.proven.cuts, tuple(self.proven.branches),
         )  # fmt: skip
 

@@ -184,7 +184,7 @@ def proof_of(field, *, steps=8, levels=3, passes=8, most=300):
         labels = table.finer(record.bound, energy)
         if max(allowed.size for *_, allowed in labels) > most:
             break
-    return Proof(field, energy, max(record.bound for record in records), "gap", 0, tuple(records), 0.0, "gap")
+    return Proof(field, energy, max(record.bound for record in records), 0, tuple(records), 0.0, "gap")
 
 
 def proof_in_parts(field, *, steps=8, passes=8):
@@ -198,7 +198,7 @@ def proof_in_parts(field, *, steps=8, passes=8):
         records.append(risen(field, HALF / steps / 2, labels, passes)[1])
         branches.append(Branch(0, 0, side, step))
     parts = tuple(records), 0.0, "gap"
-    return Proof(field, energy, first.bound, "gap", 0, *parts, branches=tuple(branches))
+    return Proof(field, energy, first.bound, 0, *parts, branches=tuple(branches))
 
 
 def risen(field, h, labels, passes):

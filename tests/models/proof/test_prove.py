@@ -162,6 +162,7 @@ def test_limits_end_a_proof_with_what_it_has():
     some = cf.prove(instance, limits=cf.Limits(math.inf, 0.5), progress=lines.append)
     assert some.ended == "gap"
     assert 0 < some.gap <= 0.5
+    assert lines.pop() == "checking the levels"
     for line in lines:
         energy, bound, labels = re.fullmatch(r"energy (\S+), bound (\S+), (\d+) labels", line).groups()
         assert float(bound) <= float(energy)

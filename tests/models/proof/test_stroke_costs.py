@@ -25,8 +25,8 @@ def test_every_label_costs_what_the_checker_computes():
     field = CrossField.from_lines(instance, *lines)
     with crew(1) as hands:
         level = LevelRecord.of(Dual(Lattice.whole(field, 16), hands), field.energy().total)
-    proof = Proof(field, field.energy().total, 0.0, "gap", 0, (level,), 0.0, "labels")
-    arrays = _arrays(proof) | _head(proof, "gap", 0.0)
+    proof = Proof(field, field.energy().total, 0.0, 0, (level,), 0.0, "labels")
+    arrays = _arrays(proof) | _head(proof)
     sketch = check_certificate.sketch_of(arrays)
     same = check_certificate.level_of(arrays, 0, sketch)
     mine = np.split(level.unary_costs(), level.start[1:-1])
