@@ -1,15 +1,28 @@
-"""Whether GAMS accepts its licence: that of the free package ends on a date."""
+"""Whether programs accept their licences: those of free editions end on dates."""
 
 from __future__ import annotations
 
+import re
 import subprocess
+import sys
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
-_LICENSING_ERROR: Final = 7  # a return code of GAMS
+_TRIALS: Final = {
+    "gurobi": "import gurobipy; gurobipy.Env()",
+    "xpress": "import xpress; xpress.problem()",
+}
+"""The shortest Python code that needs the licence, by program; GAMS runs an empty model."""
+
+_REFUSAL: Final = re.compile(r"^(?:\*\*\*|gurobipy\S*:|xpress\S*:) (.+?)\.?$", re.MULTILINE)
+"""The words of a program that refuses its licence: GAMS's log, or the last line of Python."""
+
+_CODES: Final = {"gams": 7, "gurobi": 1, "xpress": 1}
+"""Return codes of a refusal."""
+
 _SECONDS: Final = 60.0
 
 
@@ -20,15 +33,28 @@ def package_folder(name: str) -> Path | None:
 
 
 @cache
-def gams_is_licensed() -> bool:
-    """Whether the installed GAMS runs an empty model; errors of other kinds count as yes."""
+def licence_error(program: str) -> str:
+    """The words with which an installed program refuses its licence.
+
+    Empty if it accepts the licence, has none that ends, or fails for another reason.
+    """
+    if program not in _CODES:
+        return ""
+    with TemporaryDirectory(prefix="crossfield-licence-") as folder:
+        (Path(folder) / "empty.gms").write_bytes(b"")
+        try:
+            done = subprocess.run(
+                _command(program), cwd=folder, capture_output=True, check=False, timeout=_SECONDS
+            )
+        except (OSError, subprocess.TimeoutExpired):
+            return ""
+    words = _REFUSAL.search((done.stdout + done.stderr).decode(errors="replace"))
+    return words[1].rstrip() if words and done.returncode == _CODES[program] else ""
+
+
+def _command(program: str) -> list[str]:
+    if program in _TRIALS:
+        return [sys.executable, "-W", "ignore", "-c", _TRIALS[program]]
     gams = package_folder("gamspy_base")
     assert gams is not None
-    with TemporaryDirectory(prefix="crossfield-gams-") as folder:
-        (Path(folder) / "empty.gms").write_bytes(b"")
-        command = [str(gams / "gams"), "empty.gms", "lo=0"]
-        try:
-            done = subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=_SECONDS)
-        except (OSError, subprocess.TimeoutExpired):
-            return True
-    return done.returncode != _LICENSING_ERROR
+    return [str(gams / "gams"), "empty.gms", "lo=3"]

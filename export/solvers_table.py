@@ -24,7 +24,7 @@ from ..models.formulations.declaration import Formulation
 from ..models.formulations.problem import Problem
 from ..models.instance.instance import Instance
 from .formats.registry import FORMATS, carried
-from .licence import gams_is_licensed
+from .licence import licence_error
 
 Stage = Literal["read", "solve", "local"]
 Proof = Literal["global", "convex", "local"]
@@ -60,7 +60,7 @@ class Program:
     algebra, behaviour: the formats for which it reports coefficients, or values at points. needs: its
     package, or its executable. tolerance: relative difference of the numbers that it reports, 0 for equal to
     the bit. free: limits of its free edition. adds: pattern of the columns that it adds when it reads or
-    writes a model. licensed: whether its licence is valid; None if it has no term.
+    writes a model.
     """
 
     name: str
@@ -72,7 +72,6 @@ class Program:
     tolerance: float = 0.0
     free: str = ""
     adds: str = ""
-    licensed: Callable[[], bool] | None = None
 
     @property
     def formats(self) -> tuple[str, ...]:
@@ -89,9 +88,12 @@ class Program:
         executable = self.install.startswith("apt ")
         if (shutil.which(self.needs) if executable else find_spec(self.needs)) is None:
             return f"{title} is not installed; {self.install}"
-        if self.licensed is not None and not self.licensed():
+        if words := licence_error(self.name):
             newer = self.install.replace("install", "install --upgrade")
-            return f"the licence of {self.title} has expired; {newer}, or install a licence of your own"
+            return (
+                f"{self.title} does not accept its licence ({words}); {newer}, "
+                "or install a licence of your own"
+            )
         return ""
 
     @property
@@ -129,7 +131,6 @@ PROGRAMS: Final = {
         Program(
             "gams", "GAMS", (), ("gms",), "gamspy_base", "pip install gamspy_base gamspy_baron",
             free="2000 linear or 1000 nonlinear columns and rows, 50 for BARON", adds=r"objvar",
-            licensed=gams_is_licensed,
         ),
     )
 }  # fmt: skip

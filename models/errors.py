@@ -93,7 +93,7 @@ class SolverError(CrossfieldError):
 
 
 class MissingSolverError(SolverError):
-    """A solver that is not installed, or whose licence has expired."""
+    """A solver that is not installed, or does not accept its licence."""
 
 
 class UnsupportedBySolverError(SolverError):

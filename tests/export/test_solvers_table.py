@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import subprocess
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -17,8 +16,9 @@ from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.bundle.starts import LAYOUTS, STARTS
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.licence import gams_is_licensed
+from crossfield.export.licence import licence_error
 from crossfield.export.solvers_table import BUNDLED, PROGRAMS, SOLVERS, Refusal, Solver, StartFile
+from crossfield.models.errors import MissingSolverError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 
 ROOT = Path(cf.__file__).parent
@@ -78,22 +78,53 @@ def test_a_program_that_is_not_here_says_how_to_get_it():
     assert BUNDLED["highs"].missing == ""
 
 
-def test_a_program_whose_licence_has_expired_is_absent():
-    expired = replace(PROGRAMS["highs"], licensed=lambda: False)
-    assert PROGRAMS["highs"].missing == ""
-    assert expired.missing.startswith("the licence of HiGHS has expired; pip install --upgrade highspy")
+@pytest.fixture
+def fresh_licences():
+    """Licences are tried again in this test, and after it."""
+    licence_error.cache_clear()
+    yield
+    licence_error.cache_clear()
 
 
-@pytest.mark.parametrize("code, licensed", [(0, True), (2, True), (7, False)])
-def test_gams_that_ends_with_an_error_of_its_licence_has_none(tmp_path, monkeypatch, code, licensed):
+@pytest.mark.parametrize(
+    "name, variable, words",
+    [
+        pytest.param("gurobi", "GRB_LICENSE_FILE", "No HostID", marks=pytest.mark.needs("gurobi")),
+        pytest.param("xpress", "XPAUTH_PATH", "Xpress licensing error 1", marks=pytest.mark.needs("xpress")),
+    ],
+)
+@pytest.mark.usefixtures("fresh_licences")
+def test_a_program_that_refuses_its_licence_is_absent(name, variable, words, tmp_path, monkeypatch):
+    """A file without a licence is refused by the same error as a licence that has ended."""
+    (tmp_path / "empty.lic").write_text("nothing\n")
+    monkeypatch.setenv(variable, str(tmp_path / "empty.lic"))
+    title, package = PROGRAMS[name].title, PROGRAMS[name].needs
+    assert PROGRAMS[name].missing.startswith(f"{title} does not accept its licence ({words}")
+    assert PROGRAMS[name].missing.endswith(
+        f"; pip install --upgrade {package}, or install a licence of your own"
+    )
+    with pytest.raises(MissingSolverError, match="does not accept its licence"):
+        cf.solve(cf.formulate(make_instance(), "milp-mccormick"), name)
+
+
+@pytest.mark.parametrize(
+    "code, line, words",
+    [
+        (7, "*** Time-limited license expired 1 days ago", "Time-limited license expired 1 days ago"),
+        (2, "*** Status: Compilation error(s)", ""),
+        (0, "*** Status: Normal completion", ""),
+    ],
+)
+@pytest.mark.usefixtures("fresh_licences")
+def test_gams_that_ends_with_an_error_of_its_licence_has_none(tmp_path, monkeypatch, code, line, words):
     """The codes are those of GAMS: 2 is an error of the model, 7 one of the licence."""
     package = tmp_path / "gamspy_base"
     package.mkdir()
     (package / "__init__.py").write_text("")
-    (package / "gams").write_text(f"#!/bin/sh\nexit {code}\n")
+    (package / "gams").write_text(f"#!/bin/sh\necho '{line}'\nexit {code}\n")
     (package / "gams").chmod(0o755)
     monkeypatch.syspath_prepend(tmp_path)
-    assert gams_is_licensed.__wrapped__() is licensed
+    assert licence_error("gams") == words
 
 
 def test_a_program_that_is_hidden_is_absent_and_its_neighbours_are_not(tmp_path, monkeypatch, hidden):
