@@ -8,9 +8,9 @@
     slx     .slx   `NAME`, lines ` C name value`, `ENDATA`             Xpress: readslxsol
 
 Names are those of our files. (.nl and GAMS files hold a starting point themselves.) A start for LP and MPS
-has the columns of these files, including lifted products and ONE. SCIP reads a nonlinear objective as an
-additional variable, under three names: quadobjvar (LP), qmatrixvar (MPS), nlobjvar (.nl). All three are in
-its file with the value of the nonlinear part of the objective, and SCIP ignores unknown names.
+has the columns of these files, including lifted products and the column fixed to 1. SCIP reads a nonlinear
+objective as an additional variable, under three names: quadobjvar (LP), qmatrixvar (MPS), nlobjvar (.nl). All
+three are in its file with the value of the nonlinear part of the objective, and SCIP ignores unknown names.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ from ...models.instance.grid import Floats
 from ..formats.registry import FORMATS, carried
 from ..solvers_table import SOLVERS, takes
 from ..writing.canonical import Canonical
-from ..writing.names import ONE
 from ..writing.records import Decimals, Pieces, number, render, words
 from ..writing.sink import save
 
@@ -60,8 +59,7 @@ class Start:
             at = np.nonzero(values)[0]
             names, values = names.at(at), values[at]
         yield from render([before, names, b" ", words(values), b"\n"], len(values))
-        if self.form.has_one:
-            yield before + ONE + b" 1\n"
+        yield before + self.form.one + b" 1\n"
 
     def activities(self) -> Iterator[bytes]:
         """A line `name value` for every row, constants on its right side."""
@@ -91,8 +89,7 @@ def _cplex(start: Start) -> Iterator[bytes]:
     names, index, values = start.form.names.all, Decimals(np.arange(count)), words(start.point)
     parts: Pieces = [b'<variable name="', names, b'" index="', index, b'" value="', values, b'"/>\n']
     yield from render(parts, count)
-    if start.form.has_one:
-        yield b'<variable name="%b" index="%d" value="1"/>\n' % (ONE, count)
+    yield b'<variable name="%b" index="%d" value="1"/>\n' % (start.form.one, count)
     yield b"</variables>\n</CPLEXSolution>\n</CPLEXSolutions>\n"
 
 

@@ -227,17 +227,17 @@ def read_command(
         problem, held = described_problem(manifest)
         found = read_solution(solution, problem, held=held, tolerance=tolerance)
         if found.point is None:
+            words = found.caveat and f"; claims {found.caveat}"
             raise InputError(
-                f"holds no point: {found.status}; {found.message or 'the solver gives no reason'}",
+                f"holds no point: {found.status}; {found.message or 'the solver gives no reason'}{words}",
                 file=solution,
             )
         if not found.doubt:
             write_field(found.field, output)
     print_solution(found, output, printing)
     if found.doubt:
-        raise SolutionError(
-            f"{found.doubt}; no field was written (--tolerance X allows for more)", file=solution
-        )
+        remedy = found.remedy and f"; {found.remedy}"
+        raise SolutionError(f"{found.doubt}; no field was written{remedy}", file=solution)
 
 
 @command("draw")

@@ -298,6 +298,7 @@ _ONLY_IF_ANY: Final = (
     "furthest_rounding",
     "unknown_names",
     "contradictions",
+    "claims",
     "interrupted",
     "dual_bound",
     "gap",

@@ -2,7 +2,7 @@ r"""CPLEX-style LP, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC a
 
     \ comment
     Minimize
-     obj_sha256_1a2b3c4d5e6f: + 7 ONE  repeated in the solutions of Gurobi and GLPK
+     obj_sha256_1a2b3c4d5e6: + 7 ONE_1a2b3c4d5e6   the constant; solutions repeat both names
      + 2 s_00_00_u                     every column, also with cost 0: fixes their order (L16, L31)
      + [
      + 4 d_00_00_u ^2                  twice the coefficient, for the / 2 (L9, L12); no blank after ^ (L34)
@@ -15,9 +15,9 @@ r"""CPLEX-style LP, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC a
     Generals / Binaries                never Integers (L5)
     End
 
-The column ONE, fixed to 1, carries a constant (L1, L2). Each line has one term, so that no line is long
-(L30). A model without rows gets the row `c_ONE: + 1 ONE = 1` (L27). Numbers are shortest round trip.
-L-numbers: docs/format-rules.md.
+The column ONE_... is fixed to 1; it carries the constant (L1, L2) and the stamp of the problem. Each line has
+one term, so that no line is long (L30). A model without rows gets the row `c_ONE: + 1 ONE_1a2b3c4d5e6 = 1`
+(L27). Numbers are shortest round trip. L-numbers: docs/format-rules.md.
 """
 
 from __future__ import annotations
@@ -39,17 +39,16 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     for line in header:
         yield f"\\ {line}\n".encode()
     yield f"Minimize\n obj_{problem.stamp}:".encode()
-    yield from render([b" ", words(form.constant, signed), b" ONE\n"] if form.has_one else [b"\n"], 1)
+    yield from render([b" ", words(form.constant, signed), b" ", form.one, b"\n"], 1)
     products = form.products()
     yield from _objective(form, products, counts)
     yield b"Subject To\n"
     if not problem.rows:
-        yield b" c_ONE: + 1 ONE = 1\n"
+        yield b" c_ONE: + 1 %b = 1\n" % form.one
     for family in problem.rows:
         yield from _rows(family, names, counts)
     yield b"Bounds\n"
-    if form.has_one:
-        yield b" 1 <= ONE <= 1\n"
+    yield b" 1 <= %b <= 1\n" % form.one
     for block in problem.blocks.values():
         yield from _bounds(block, names, counts)
     if form.blocks("integer"):

@@ -1,6 +1,6 @@
 """Free MPS, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC and GLPK read alike.
 
-    NAME ring_sha256_1a2b3c4d5e6f FREE   repeated in solutions; FREE is for CBC (M20)
+    NAME ring_sha256_1a2b3c4d5e6 FREE    repeated in solutions; FREE is for CBC (M20)
     ROWS                               one N row, always minimised, no OBJSENSE (M5, M6)
     COLUMNS                            ` column row value`, one pair per line; `obj 0` without a cost (M19);
         MARKER 'MARKER' 'INTORG'       one block of markers round each run of integer columns
@@ -11,7 +11,8 @@
     QCMATRIX row                       both triangles, without one-half (M16), after BOUNDS (M17)
     ENDATA
 
-The objective's constant is the cost of a column ONE fixed to 1. M-numbers: docs/format-rules.md.
+The last column is fixed to 1. Its name carries the stamp, `ONE_1a2b3c4d5e6`, and its cost is the constant.
+M-numbers: docs/format-rules.md.
 """
 
 from __future__ import annotations
@@ -62,8 +63,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     yield b"BOUNDS\n"
     for block in problem.blocks.values():
         yield from _bounds(block, names, counts)
-    if form.has_one:
-        yield b" FX BND1 ONE 1\n"
+    yield b" FX BND1 %b 1\n" % form.one
     products = form.products()
     yield from _objective_matrix(names, products, counts)
     for family in problem.rows:
@@ -93,10 +93,9 @@ def _columns(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
         if integer:
             yield f" MARKER{markers + 1} 'MARKER' 'INTEND'\n".encode()
             markers += 2
-    if form.has_one:
-        yield f" ONE obj {number(form.constant)}\n".encode()
-        if not problem.rows:
-            yield b" ONE c_ONE 1\n"
+    yield b" %b obj %b\n" % (form.one, number(form.constant).encode())
+    if not problem.rows:
+        yield b" %b c_ONE 1\n" % form.one
 
 
 def _entries(

@@ -2,7 +2,7 @@
 
 The order of columns and rows is that of `writing.nl_layout`. Header, line by line (docs/format-rules.md):
 
-    g3 1 1 0                           b3 1 1 0 for binary; the options come back in the .sol
+    g4 1 1 0 123456789                 b4 for binary; the .sol repeats the options, the last of them the stamp
     variables rows objectives ranges equations
     nonlinear rows, objectives
     0 0                                no network
@@ -49,6 +49,7 @@ from ..writing.records import (
     scalar_when_constant,
     words,
 )
+from ..writing.stamps import stamp_option
 
 __all__ = ["Layout", "generate"]
 
@@ -63,7 +64,7 @@ Numbers = NDArray[Any] | int | float
 class Text:
     """The text form: each token on its own line, its numbers apart by blanks."""
 
-    head = (b"g3 1 1 0", 0)
+    letter, arithmetic = b"g", 0
     padded = True
 
     def __init__(self) -> None:
@@ -103,7 +104,7 @@ class Text:
 class Binary(Text):
     """The binary form: one letter, then little-endian int32 and float64."""
 
-    head = (b"b3 1 1 0", 1)
+    letter, arithmetic = b"b", 1
     padded = False
 
     def number(self, value: Numbers) -> bytes | Part:
@@ -158,19 +159,18 @@ def generate(
 
 def _counts(layout: Layout, code: Text) -> bytes:
     problem, count = layout.problem, np.bincount(layout.group, minlength=9)
-    options, arithmetic = code.head
     nlvb, nlvc, only = int(count[:2].sum()), int(count[:4].sum()), int(count[4:6].sum())
     equations = sum(family.count for family in layout.rows if family.family.sense == "==")
     entries = sum(family.count * len(_entries(family)) for family in layout.rows)
     rows = (name_length(problem.instance, row.family.tag, row.family.over) for row in layout.rows)
     columns = (name_length(problem.instance, block.name, block.over) for block in problem.blocks.values())
     lines = [
-        options,
+        b"%b4 1 1 0 %d" % (code.letter, stamp_option(problem.stamp)),
         b" %d %d 1 0 %d" % (problem.n_columns, problem.n_rows, equations),
         b" %d %d" % (sum(family.count for family in layout.nonlinear_rows), bool(layout.nonlinear_objective)),
         b" 0 0",
         b" %d %d %d" % (nlvc, nlvc + only if only else nlvb, nlvb),
-        b" 0 0 %d 1" % arithmetic,
+        b" 0 0 %d 1" % code.arithmetic,
         b" %d %d %d %d %d" % tuple(int(count[group]) for group in (7, 8, 1, 3, 5)),
         b" %d %d" % (entries, len(_gradient(layout)[0])),
         b" %d %d" % (max([len(OBJECTIVE), *rows]), max(columns)),

@@ -207,12 +207,12 @@ def evaluate(path: Path, points: Points) -> Evaluation:
 
 
 def solve(job: Job) -> Outcome:
-    """Solve the file with Ipopt or Bonmin; the solution is an AMPL .sol, which repeats the stamp."""
+    """Solve the file with Ipopt or Bonmin; the solution is an AMPL .sol, which states the stamp."""
     model = read_nl(job.model)
     answer = solve_model(job.solver, model, job.seconds, job.gap)
-    message = f"{job.solver} through CasADi {version()}: {answer.words}\n{job.stamp}"
+    message = f"{job.solver} through CasADi {version()}: {answer.words}"
     columns, rows = len(model.start), len(model.row_lower)
-    write_ampl_sol(job.solution, message, answer.point, rows, answer.code, columns=columns)
+    write_ampl_sol(job.solution, message, answer.point, rows, answer.code, columns=columns, stamp=job.stamp)
     return Outcome()
 
 

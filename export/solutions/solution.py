@@ -1,16 +1,16 @@
 """A solution: the content of a solver's file, mapped by name to a problem and checked against the instance.
 
-Integers are rounded, objective and violations are computed again from the declaration, and a claim that they
-contradict is not passed on.
+Integers are rounded, and objective and violations are computed again from the declaration. A claim of the
+file (status, objective, bound) is passed on only if the file states its problem, and the point bears it out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ...models.instance.grid import Floats
 from ...models.previews import table_of
 from ..formats.registry import FORMATS, carried
 from ..writing.canonical import Canonical
+from ..writing.stamps import is_identified
 from .readers.registry import read_raw
 from .readers.text import RawSolution, values_for, values_in_order
 from .statuses import Status
@@ -28,12 +29,21 @@ from .statuses import Status
 ROUND: Final = 1e-5
 """Largest distance from an integer at which an integer column is rounded; other values are kept."""
 
-TOLERANCE: Final = 1e-5
-"""Largest error of a point that does not contradict its claims, in units of a column (radians, jumps).
+TRUSTED: Final = 1e-5
+"""Largest violation of a point whose claims are kept, in units of a column (radians, jumps).
 
 By default, solvers leave these errors: HiGHS, GLPK, CBC and Ipopt at most 1e-7; SCIP 1e-6 in rows and 3e-6
 in the objective; CPLEX, Gurobi and Xpress 2e-6 in integers (1e-5 is allowed); BARON 1e-5 in rows.
 """
+
+TOLERANCE: Final = TRUSTED
+"""Largest violation of a feasible point, unless the caller allows more; then no claim is kept."""
+
+AGREEMENT: Final = 1e-5
+"""Largest difference of two objectives that agree, relative to their size, or 1."""
+
+ROUNDED: Final = 1e-3
+"""Largest violation that a file of few digits explains: listings have four decimals."""
 
 _DIGITS: Final = 1e-13
 """Rounding of an objective that is summed in doubles, relative to the sum of its coefficients."""
@@ -58,8 +68,13 @@ class Solution:
         The solver's own words.
     reader
         Name of the reader that recognised the file.
-    reported, bound
-        Objective and dual bound in the file, if any.
+    identified
+        Whether the file states the problem, or the caller knows that it answers it. No claim of another file
+        is kept.
+    reported, claimed_bound
+        Objective and dual bound in the file, if any. `bound` is what remains of the latter.
+    order
+        The file whose column order was assumed, `nl`, `lp`, `mps` or `mod`; empty if values have names.
     rounded
         Largest change of an integer column by rounding.
     unknown
@@ -71,7 +86,7 @@ class Solution:
     start_returned
         Whether the point is the start that the solver was given; None if unknown.
     tolerance
-        Largest error of a point, in units of a column, that does not contradict the claims.
+        Largest violation of a feasible point, in units of a column.
     nodes
         Number of nodes of the search tree, if reported.
 
@@ -82,8 +97,10 @@ class Solution:
     claimed: Status
     message: str
     reader: str
+    identified: bool
     reported: float | None = None
-    bound: float | None = None
+    claimed_bound: float | None = None
+    order: str = ""
     rounded: float = 0.0
     unknown: int = 0
     seconds: float | None = None
@@ -107,6 +124,7 @@ class Solution:
             "gap": self.gap,
             "worst violation": self.violation and self.violation.worst,
             "doubt": self.doubt or None,
+            "claims": self.caveat or None,
             "message": self.message or None,
             "seconds": self.seconds,
         }
@@ -124,40 +142,71 @@ class Solution:
 
         A violation beyond the tolerance contradicts a status that promises a point, and a point without one
         contradicts `infeasible`. Another objective contradicts an objective, and an objective below it a dual
-        bound. The tolerance is relative to the largest coefficient of the rows, or 1; for the objective, to
-        its size, or 1.
+        bound. The tolerance is relative to the largest coefficient of the rows, or 1; it is not used for
+        objectives, which agree within AGREEMENT.
         """
         if self.objective is None or self.violation is None:
             return ()
-        broken = tuple(self._broken(self.violation))
         if self.claimed.promises_point:
-            return (*broken, *self._wrong_values(self.objective))
-        return ("its point is feasible",) if self.claimed is Status.INFEASIBLE and not broken else ()
+            return (*self._infeasibilities, *self._wrong_values(self.objective))
+        if self.claimed is Status.INFEASIBLE and not self._infeasibilities:
+            return ("its point is feasible",)
+        return ()
 
-    def _broken(self, found: Violation) -> Iterator[str]:
+    @cached_property
+    def _infeasibilities(self) -> tuple[str, ...]:
         """The kinds of violation that are beyond the tolerance."""
+        return tuple(
+            f"its point breaks {kind} by {value:.3g}, where {allowed:.3g} is allowed"
+            for kind, value, allowed in self._violations(self.tolerance)
+            if not value <= allowed
+        )
+
+    def _violations(self, tolerance: float) -> Iterator[tuple[str, float, float]]:
+        """Kind, size and largest allowed size of the point's violations."""
+        if self.violation is None:
+            return
         scale = max([1.0, *(float(family.scale.max(initial=0.0)) for family in self.problem.rows)])
-        for what, value, allowed in (
-            (f"rows (family {found.worst_family})", found.rows, self.tolerance * scale),
-            ("bounds", found.bounds, self.tolerance),
-            ("integrality", max(found.integrality, self.rounded), self.tolerance),
-        ):
-            if not value <= allowed:
-                yield f"its point breaks {what} by {value:.3g}, where {allowed:.3g} is allowed"
+        yield f"rows (family {self.violation.worst_family})", self.violation.rows, tolerance * scale
+        yield "bounds", self.violation.bounds, tolerance
+        yield "integrality", max(self.violation.integrality, self.rounded), tolerance
 
     def _wrong_values(self, objective: float) -> Iterator[str]:
         """Contradictions of the claimed objective and dual bound."""
         sizes = sum(float(np.sum(family.scale)) for family in self.problem.objective)
-        allowed = self.tolerance * max(1.0, abs(objective)) + _DIGITS * sizes
+        allowed = AGREEMENT * max(1.0, abs(objective)) + _DIGITS * sizes
         if self.reported is not None and not abs(self.reported - objective) <= allowed:
             yield f"it states the objective {self.reported:.9g}, but its point has {objective:.9g}"
-        if self.bound is not None and self.bound > objective + allowed:
-            yield f"the dual bound {self.bound:.9g} lies above the objective {objective:.9g} of the point"
+        if self.identified and self.claimed_bound is not None and self.claimed_bound > objective + allowed:
+            bound = f"{self.claimed_bound:.9g}"
+            yield f"the dual bound {bound} lies above the objective {objective:.9g} of the point"
+
+    @property
+    def keeps_claims(self) -> bool:
+        """Whether status and bound of the file hold for the problem.
+
+        The file must state the problem, and nothing may contradict it. A point must satisfy the problem
+        within TRUSTED, whatever tolerance the caller allows.
+        """
+        if not self.identified or self.contradictions:
+            return False
+        return not self.claimed.promises_point or all(
+            value <= allowed for _, value, allowed in self._violations(TRUSTED)
+        )
 
     @property
     def status(self) -> Status:
-        """The claim, or UNKNOWN when the point contradicts it."""
-        return Status.UNKNOWN if self.contradictions else self.claimed
+        """The claim if it is kept; otherwise FEASIBLE for a feasible point, NO_POINT or ERROR, or UNKNOWN."""
+        if self.keeps_claims or self.claimed in {Status.NO_POINT, Status.ERROR}:
+            return self.claimed
+        if self.claimed is Status.LIMIT_WITHOUT_POINT:
+            return Status.NO_POINT
+        return Status.FEASIBLE if self.claimed.promises_point and not self.contradictions else Status.UNKNOWN
+
+    @property
+    def bound(self) -> float | None:
+        """The dual bound of the file if it is kept, else None."""
+        return self.claimed_bound if self.keeps_claims else None
 
     @property
     def doubt(self) -> str:
@@ -167,6 +216,30 @@ class Solution:
         if self.point is not None and not self.claimed.promises_point:
             return f"claims {self.claimed} ({self.message or 'no message'}): its values are not a solution"
         return ""
+
+    @property
+    def remedy(self) -> str:
+        """What may explain a doubt about the point, and what to do; empty without an explanation."""
+        if self.order and not self.identified:
+            return (
+                f"its values have no names and were taken in the order of the .{self.order} file that "
+                "crossfield writes; give the answer to that file"
+            )
+        only_infeasible = self.contradictions and self.contradictions == self._infeasibilities
+        if only_infeasible and self.violation is not None and self.violation.worst <= ROUNDED:
+            return (
+                f"if the file has few digits, --tolerance {ROUNDED:g} accepts its point, without its claims"
+            )
+        return ""
+
+    @property
+    def caveat(self) -> str:
+        """Why claims of the file are not kept although its point can be used; empty if all are kept."""
+        if self.keeps_claims or self.contradictions:
+            return ""
+        if not self.identified:
+            return f"not kept ({self.claimed}): the file is of an unidentified problem"
+        return f"not kept ({self.claimed}): the point is feasible only within {self.tolerance:g}"
 
     @cached_property
     def objective(self) -> float | None:
@@ -202,23 +275,28 @@ def read_solution(
     *,
     held: Mapping[str, Problem] | None = None,
     tolerance: float = TOLERANCE,
+    identified: bool = False,
 ) -> Solution:
     """Read a solver's answer to a problem; the kind of file is detected from its content.
 
-    Named values are mapped by name, and positional ones by the column order of the .nl, LP or MPS file. If
-    the solver repeated the problem's stamp, it decides whether the file belongs to the problem.
+    Named values are mapped by name, and positional ones by the column order of the .nl, LP or MPS file. The
+    claims of the file are kept only if it states the stamp of the problem, as solvers do that repeat a name
+    or an option of the files of crossfield.
 
     Parameters
     ----------
     path
-        The file, plain or .gz.
+        The file, plain or packed.
     problem
         The problem that was solved.
     held
         The problem by format, with products lifted as in the solved file: `Manifest.held`. By default
         positional values follow the files as they are written today.
     tolerance
-        Largest error of a point, in units of a column, that does not contradict the claims of the file.
+        Largest violation of a feasible point, in units of a column. It has no influence on the comparison of
+        objectives. Claims of a point that violates more than 1e-5 are not kept.
+    identified
+        Whether the caller knows that the file answers this problem, even if it does not state it.
 
     Returns
     -------
@@ -230,20 +308,15 @@ def read_solution(
     InputError
         If the file cannot be read.
     SolutionError
-        If it is damaged, or belongs to another problem.
+        If it is damaged, or states or fits another problem.
 
     """
     raw = read_raw(path)
-    if raw.stamp and raw.stamp != problem.stamp:
-        raise SolutionError(
-            f"is a solution of another problem: it states {raw.stamp}, and this one is {problem.stamp}; "
-            "instance, options or fixed jumps differ, give the manifest next to the solver's model",
-            file=path,
-        )
-    if not raw.has_point:
-        return _solution(raw, problem, None, tolerance)
     with naming(path):
-        return _mapped(raw, _form(raw, problem, held or {}), tolerance)
+        known = is_identified(raw.stamps, problem.stamp) or identified
+        if not raw.has_point:
+            return _solution(raw, problem, None, identified=known, tolerance=tolerance)
+        return _mapped(raw, _form(raw, problem, held or {}), identified=known, tolerance=tolerance)
 
 
 def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Canonical:
@@ -265,17 +338,26 @@ def _carried(problem: Problem, name: str) -> Problem:
         raise SolutionError(f"is of an .{name} file, and {error}; it is of another problem") from error
 
 
-def _solution(raw: RawSolution, problem: Problem, point: Floats | None, tolerance: float) -> Solution:
-    claims = (raw.status, raw.message, raw.reader, raw.objective, raw.bound)
-    return Solution(problem, point, *claims, tolerance=tolerance)
+def _solution(raw: RawSolution, problem: Problem, point: Floats | None, **facts: Any) -> Solution:
+    return Solution(
+        problem,
+        point,
+        raw.status,
+        raw.message,
+        raw.reader,
+        reported=raw.objective,
+        claimed_bound=raw.bound,
+        order="" if raw.names is not None else raw.order,
+        **facts,
+    )
 
 
-def _mapped(raw: RawSolution, form: Canonical, tolerance: float) -> Solution:
+def _mapped(raw: RawSolution, form: Canonical, **facts: Any) -> Solution:
     problem = form.problem
     point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
     _check_range(point, problem)
     point, moved = _rounded(point, problem)
-    return replace(_solution(raw, problem, point, tolerance), rounded=moved, unknown=unknown)
+    return _solution(raw, problem, point, rounded=moved, unknown=unknown, **facts)
 
 
 def _check_range(point: Floats, problem: Problem) -> None:
@@ -293,7 +375,7 @@ def _check_range(point: Floats, problem: Problem) -> None:
 def _by_position(raw: RawSolution, form: Canonical) -> Floats:
     """The point of a file without names; columns in no term, missing in the solver's model, are arbitrary."""
     problem, order = form.problem, form.order(raw.order)
-    point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and ONE
+    point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and the column fixed to 1
     point[order] = values_in_order(len(order), form.row_count(raw.order), raw)
     return point[: problem.n_columns]
 

@@ -358,16 +358,26 @@ def _answer(held: Problem, files: Files, outcome: Outcome, entry: Solver) -> Sol
     if not files.solution.exists():
         status = outcome.status or Status.NO_POINT
         return Solution(
-            held, None, status, outcome.message, entry.title, bound=outcome.bound, nodes=outcome.nodes
+            held,
+            None,
+            status,
+            outcome.message,
+            entry.title,
+            identified=True,
+            claimed_bound=outcome.bound,
+            nodes=outcome.nodes,
         )
     try:
-        found = read_solution(files.solution, held)
+        found = read_solution(files.solution, held, identified=True)
     except SolutionError:
         files.solution.unlink(missing_ok=True)  # cut off, for example by a full disk: it must not be used
         raise
     reported: dict[str, Any] = {
-        "claimed": outcome.status, "message": outcome.message, "bound": outcome.bound, "nodes": outcome.nodes
-    }  # fmt: skip
+        "claimed": outcome.status,
+        "message": outcome.message,
+        "claimed_bound": outcome.bound,
+        "nodes": outcome.nodes,
+    }
     return replace(found, **{key: value for key, value in reported.items() if value not in (None, "")})
 
 

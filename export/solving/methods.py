@@ -120,6 +120,7 @@ def solution_facts(solution: Solution) -> dict[str, Any]:
         "status": str(solution.status),
         "claimed": str(solution.claimed),
         "contradictions": list(solution.contradictions),
+        "claims": solution.caveat,
         "message": solution.message,
         "objective_reported": solution.reported,
         "objective_recomputed": solution.objective,

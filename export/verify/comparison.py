@@ -13,7 +13,6 @@ from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats
 from ..programs.reading import Evaluation, Meaning, Points, places
 from ..writing.canonical import Canonical
-from ..writing.names import ONE
 from ..writing.terms import terms
 
 VALUES: Final = 1e-9
@@ -31,14 +30,13 @@ def names_of_rows(problem: Problem) -> list[str]:
 
 
 def of_problem(problem: Problem) -> Meaning:
-    """The intended content of an LP or MPS file of the problem, from its arrays: ONE is the last column."""
+    """The intended content of an LP or MPS file, from the problem's arrays; the last column is fixed to 1."""
     form = Canonical(problem)
-    one = [ONE.decode()] * form.has_one
-    n, ones = problem.n_columns, np.ones(len(one))
+    n, ones = problem.n_columns, np.ones(1)
     at, value = row_terms(problem.rows, 1)
     products, product = row_terms(problem.rows, 2)
     return Meaning.of(
-        names_of(column_names(problem)) + one,
+        [*names_of(column_names(problem)), form.one.decode()],
         names_of_rows(problem) or ["c_ONE"],
         lower=np.concatenate([problem.lower, ones]),
         upper=np.concatenate([problem.upper, ones]),

@@ -255,7 +255,7 @@ def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
 
 def _judged(subject: _Subject, solver: str, found: Solution) -> Check:
     """Judge a solver's answer: check its point, and compute objective and energy again."""
-    held, numbers = subject.held, {"seconds": round(found.seconds or 0.0, 2), "bound": found.bound}
+    held, numbers = subject.held, {"seconds": round(found.seconds or 0.0, 2), "bound": found.claimed_bound}
     point, objective, worst = found.point, found.objective, found.violation
     if point is None or objective is None or worst is None:
         limit = found.claimed == Status.LIMIT_WITHOUT_POINT

@@ -1,8 +1,8 @@
 """The canonical form of a problem for writers of its files and readers of their answers.
 
-It determines the columns of the files (ONE among them), their kinds and costs, the limits of the rows, and
-the order of columns in each kind of file, once for all. It follows MathOptInterface's bridges and linopy's
-`matrices`.
+It determines the columns of the files (the column fixed to 1 among them), their kinds and costs, the limits
+of the rows, and the order of columns in each kind of file, once for all. It follows MathOptInterface's
+bridges and linopy's `matrices`.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from ...models.instance.grid import Bools, Floats, Ints
 from .names import Names
 from .nl_layout import Layout
 from .records import Texts, check_coefficients, of_bytes
+from .stamps import one_column
 
 Kind = Literal["continuous", "binary", "integer"]
 
 Order = Literal["nl", "lp", "mps", "mod"]
-"""Kinds of files by the order of their columns: .nl has one of its own, LP and MPS put ONE first and last,
-and of a .mod GLPK numbers the columns as it meets them."""
+"""Kinds of files by the order of their columns: .nl has one of its own, LP and MPS put the column fixed to 1
+first and last, and of a .mod GLPK numbers the columns as it meets them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +51,18 @@ class Canonical:
         return float(self.problem.merged_objective(0)[1][0])
 
     @property
-    def has_one(self) -> bool:
-        """Whether LP and MPS have the column ONE, fixed to 1.
+    def one(self) -> bytes:
+        """Name of the column of LP and MPS that is fixed to 1; its cost is the constant of the objective.
 
-        They have it for a constant, which is its cost, and for a model without rows, whose only row is
-        `c_ONE: ONE = 1`.
+        Solvers repeat it, and it carries the stamp, so that an answer identifies its problem. A model without
+        rows gets the row `c_ONE`, which fixes this column too.
         """
-        return not self.problem.rows or self.constant != 0
+        return one_column(self.problem.stamp)
 
     @property
     def column_count(self) -> int:
         """Number of columns of LP and MPS."""
-        return self.problem.n_columns + self.has_one
+        return self.problem.n_columns + 1
 
     @cached_property
     def costs(self) -> Floats:
@@ -116,12 +117,12 @@ class Canonical:
         return Layout(self.problem)
 
     def order(self, file: Order) -> Ints:
-        """The problem's column at each place of a file; ONE is the number after its last column."""
+        """The problem's column at each place of a file; the column fixed to 1 comes after its last one."""
         if file == "nl":
             return self.layout.order
         if file == "mod":
             return _glpk_order(self.problem)
-        own, one = np.arange(self.problem.n_columns, dtype=np.int32), [self.problem.n_columns] * self.has_one
+        own, one = np.arange(self.problem.n_columns, dtype=np.int32), [self.problem.n_columns]
         return np.concatenate([one, own] if file == "lp" else [own, one]).astype(np.int32)
 
     def row_count(self, file: Order) -> int:

@@ -13,9 +13,6 @@ from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SLOTS, IndexSet
 from .records import Tagged, Words
 
-ONE: Final = b"ONE"
-"""The column fixed to 1 that carries the objective's constant in LP and MPS."""
-
 OBJECTIVE: Final = b"obj"
 """Name of the objective row."""
 

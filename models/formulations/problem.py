@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import sympy as sp
@@ -27,6 +27,9 @@ from .declaration import Family, Formulation
 from .families import ANY_DEGREE, Block, Monomial, PlacedFamily, block_costs, merged, ordered
 from .symbols import NARROWED, SLOTS, VARIABLES, Variable, elements, numeric, way
 from .windows import Windows
+
+STAMP_DIGITS: Final = 11
+"""Digits of a hash in names: `ONE_` and these have 15 characters, the most that every program takes."""
 
 
 @dataclass(frozen=True)
@@ -384,11 +387,11 @@ class Problem:
 
     @cached_property
     def stamp(self) -> str:
-        """`sha256_` and the first 12 digits of the hash before products were lifted.
+        """`sha256_` and the first 11 digits of the hash before products were lifted.
 
         Manifests hold this hash; the stamp is short enough for names.
         """
-        return f"sha256_{self._digest('')[:12]}"
+        return f"sha256_{self._digest('')[:STAMP_DIGITS]}"
 
     def _digest(self, lifting: str) -> str:
         text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {lifting}"

@@ -168,7 +168,8 @@ def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict
         path = folder / f"{task.name}.nl.sol"
         message = f"{best.known.provenance.solver}: objective {number(best.objective)}"
         code = _SOLVED if proven else _NOT_PROVEN
-        write_ampl_sol(path, message, best.point[layout.order], best.problem.n_rows, code)
+        point, rows = best.point[layout.order], best.problem.n_rows
+        write_ampl_sol(path, message, point, rows, code, stamp=best.problem.stamp)
         listed.append(_listed(path, "ampl", ["columns in the order of the .nl and its .col"]))
     return listed
 

@@ -14,6 +14,7 @@ from ...formats.registry import FORMATS, carried
 from ...solutions.logs.registry import parse_log
 from ...solutions.logs.run_log import RunLog
 from ...solvers_table import SOLVERS
+from ...writing.stamps import is_identified
 from ..ledger.standing import MAKERS
 
 _ADDED: Final = 2  # columns that a program adds: for a constant, for an objective that is not linear
@@ -35,12 +36,16 @@ class SubmittedLog:
             return cls(path, content, parse_log(content))
 
     def check(self, entry: str, problem: Problem, named: set[str]) -> None:
-        """Raise SolutionError if the log is about another problem. named: the entries that it names."""
+        """Raise SolutionError unless the log states its problem. named: the entries that it names."""
         others = sorted(named - {entry}) if entry not in named else []
-        if self.run.stamps - {problem.stamp}:
-            others = others or [f"a problem {min(self.run.stamps - {problem.stamp})}"]
         if others:
             raise SolutionError(f"is a log of {others[0]}, not of {entry}", file=self.path)
+        with naming(self.path):
+            if not is_identified(self.run.stamps, problem.stamp) and not named:
+                raise SolutionError(
+                    f"does not state its problem: neither {entry} nor {problem.stamp} is in it; "
+                    "let the solver read the model under its name in the library"
+                )
         if "GAMS" not in self.run.text and not has_size(self.run, problem):
             raise SolutionError(
                 f"is a log of a model of {self.run.columns} columns and {self.run.rows} rows, "

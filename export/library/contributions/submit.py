@@ -31,6 +31,7 @@ from ....models.storage import read_bytes
 from ...formats.registry import generator
 from ...solutions.readers.registry import read_raw
 from ...solutions.solution import read_solution
+from ...writing.stamps import is_stated
 from ..building.build import has_unbuilt_records, rebuilt
 from ..documents.documents import Library, about_file, folder_of, problem_of, read_about, read_library
 from ..documents.lock import locked
@@ -192,9 +193,11 @@ class _Session:
             raw = read_raw(source.path)
             if not raw.has_point:
                 raise SolutionError(f"holds no point ({raw.status})", file=source.path)
-            stamps = {raw.stamp} if raw.stamp else stamps
+            stamps = set(raw.stamps) or stamps
         stamped = {
-            each["name"] for each in self.library.entries if stamps and self._problem(each).stamp in stamps
+            each["name"]
+            for each in self.library.entries
+            if stamps and is_stated(self._problem(each).stamp, stamps)
         }
         for found in (stamped, self._named_in(log), {self._by_file_name(path)}):
             if len(found) == 1 and any(found):

@@ -62,7 +62,7 @@ NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 CLAIM = Decimal("1e-5")  # how far the objective may be from a claimed one, as a part of its size, or of 1
 MARK = "\ufeff"  # a byte order mark, which some editors put before a text
 ADDED = re.compile(
-    r"ONE|Constant|(?:MPS_)?Rg.*|nlobjvar|quadobjvar|qmatrixvar|objconstvar|~r_\d+|objvar|"
+    r"ONE(?:_[0-9a-f]{11})?|Constant|(?:MPS_)?Rg.*|nlobjvar|quadobjvar|qmatrixvar|objconstvar|~r_\d+|objvar|"
     r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"
 )
 """Columns that solvers and their readers add to a model; in a point they are passed over."""

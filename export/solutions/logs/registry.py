@@ -11,7 +11,8 @@ from typing import Final, Literal
 from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_LOG
 from ....models.storage import read_bytes
-from .run_log import RunLog, Step, at_least, last, number, seconds, stamps, thinned, whole
+from ...writing.stamps import digits_in_text
+from .run_log import RunLog, Step, at_least, last, number, seconds, thinned, whole
 
 _LONGEST: Final = 300  # most characters of a line of a table
 
@@ -293,7 +294,9 @@ def parse_log(data: bytes) -> RunLog:
                     "that began its search"
                 )
             version = last(reader.version, text)
-            return replace(found, version=version, trace=_trace(found), stamps=stamps(text), text=text)
+            return replace(
+                found, version=version, trace=_trace(found), stamps=digits_in_text(text.encode()), text=text
+            )
     known = ", ".join(sorted(reader.title for reader in LOG_READERS))
     raise SolutionError(f"this is not a log of a known solver; give one of {known}, or the bound itself")
 

@@ -14,7 +14,6 @@ MOST_STEPS: Final = 40
 
 _HUGE: Final = 1e19  # solvers write infinity as 1e20 and more
 _TIMES: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
-_STAMP: Final = re.compile(r"sha256_[0-9a-f]{12}(?![0-9a-f])")
 
 
 class Step(NamedTuple):
@@ -32,7 +31,7 @@ class RunLog:
     solver: its name in the table of solvers. ended: `optimal` if the log states a proven optimum, else
     `limit`. bound: the dual bound at the end; if the log rounds it, the least number that rounds to it.
     limit: seconds it was allowed. columns, rows: of the model that it read. trace: in the order of time.
-    stamps: of the problems that it names (`Problem.stamp`); text: the whole.
+    stamps: digits of the stamps of the problems that it names; text: the whole.
     """
 
     solver: str
@@ -88,11 +87,6 @@ def at_least(word: str | None) -> float | None:
         return None
     exponent = int(shown.as_tuple().exponent)
     return float(shown - Decimal(5).scaleb(exponent - 1))
-
-
-def stamps(text: str) -> frozenset[str]:
-    """The stamps of the problems named in a text."""
-    return frozenset(_STAMP.findall(text))
 
 
 def thinned(steps: Iterable[Step], bound: float | None) -> tuple[Step, ...]:

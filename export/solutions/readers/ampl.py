@@ -19,7 +19,8 @@ Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl an
     suffix ...                      suffixes and other text, not needed here
 
 The options are those of the .nl file: ours have no tolerance (vbtol), and their .sol have the Options block,
-without which duals and values could not be distinguished. The binary form has the same parts as records
+without which duals and values could not be distinguished. The fourth option of ours is the stamp of the
+problem (export/writing/stamps.py). The binary form has the same parts as records
 between their lengths, as in Fortran: integers of 4 bytes, numbers of 8, low byte first.
 
 The solve code states only `solved`. It counts as a global proof only if the message names a solver that
@@ -32,7 +33,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -42,6 +43,7 @@ import numpy as np
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ....models.storage import replacing
+from ...writing.stamps import digits_of_option, stamp_option
 from ..statuses import of_ampl
 from .text import HEAD, Cursor, RawSolution, Reader, begins, is_number, numbers, one_line, shown
 
@@ -49,7 +51,7 @@ _OPTIONS = re.compile(rb"^Options[ \t]*\n", re.MULTILINE)
 _OBJNO = re.compile(rb"^objno\b.*", re.MULTILINE)
 _CODE = re.compile(rb"objno[ \t]+\d{1,9}(?:[ \t]+(-?\d{1,9}))?[ \t]*")
 _MOST_OPTIONS: Final = 16
-_OUR_OPTIONS: Final = (1, 1, 0)  # as in the first line of our .nl files
+_OUR_OPTIONS: Final = (1, 1, 0)  # and the stamp, as in the first line of our .nl files
 _LONGEST_MESSAGE: Final = 10_000
 _OPTIONS_WORD: Final = b"Options"
 _MAGIC: Final = b"\x06\0\0\0binary\x06\0\0\0"
@@ -67,16 +69,17 @@ def parse_text(data: bytes) -> RawSolution:
     counts = _read_counts(cursor)
     values = _read_values(cursor, counts)
     code = _read_code(cursor)
-    return _solution(data[: found.start()], code, values, counts.rows)
+    return _solution(data[: found.start()], code, values, counts)
 
 
 class _Counts(NamedTuple):
-    """The four counts of the Options block."""
+    """The four counts of the Options block, and the digits of the stamp among the options."""
 
     rows: int
     duals: int
     columns: int
     values: int
+    stamps: frozenset[str] = frozenset()
 
     @property
     def complaint(self) -> str | None:
@@ -93,12 +96,18 @@ def _read_counts(cursor: Cursor) -> _Counts:
     count = cursor.count("the number of options")
     if count > _MOST_OPTIONS:
         raise cursor.fault(f"{count} options are announced")
-    for _ in range(count):
-        cursor.integer("an option")
-    counts = _Counts(*(cursor.count("a count of constraints, variables or values") for _ in range(4)))
+    options = [cursor.integer("an option") for _ in range(count)]
+    numbers = (cursor.count("a count of constraints, variables or values") for _ in range(4))
+    counts = _Counts(*numbers, stamps=_stamps(options))
     if counts.complaint:
         raise cursor.fault(counts.complaint)
     return counts
+
+
+def _stamps(options: Sequence[int]) -> frozenset[str]:
+    """Digits of the stamp in the options, which only our .nl files have."""
+    ours = len(options) == len(_OUR_OPTIONS) + 1 and tuple(options[:-1]) == _OUR_OPTIONS
+    return digits_of_option(options[-1]) if ours else frozenset()
 
 
 def _read_values(cursor: Cursor, counts: _Counts) -> Floats:
@@ -131,12 +140,12 @@ def _read_code(cursor: Cursor) -> int | None:
     return None if code[1] is None else int(code[1])
 
 
-def _solution(message: bytes, code: int | None, values: Floats, rows: int) -> RawSolution:
+def _solution(message: bytes, code: int | None, values: Floats, counts: _Counts) -> RawSolution:
     words = one_line(message)
     if code is not None and 0 <= code <= 99 and not values.size:
         raise SolutionError("the file states solved but holds no values; let the solver write the file again")
     status = of_ampl(code, words, with_point=values.size > 0)
-    return RawSolution(status, words, None, None, values, rows=rows)
+    return RawSolution(status, words, None, None, values, rows=counts.rows, stamps=counts.stamps)
 
 
 def parse_binary(data: bytes) -> RawSolution:
@@ -152,7 +161,7 @@ def parse_binary(data: bytes) -> RawSolution:
         )
     if np.isnan(values).any():
         raise records.fault("one of the values is not a number")
-    return _solution(message, records.take_code(), values, counts.rows)
+    return _solution(message, records.take_code(), values, counts)
 
 
 @dataclass
@@ -189,10 +198,10 @@ class _Records:
         count, *numbers = struct.unpack(f"<{size // 4}i", record[len(_OPTIONS_WORD) :]) or (0,)
         if not 0 <= count <= _MOST_OPTIONS or len(numbers) != count + 4:
             raise self.fault(f"the Options record of {len(record)} bytes announces {count} options")
-        return self._checked(_Counts(*numbers[-4:]))
+        return self._checked(_Counts(*numbers[-4:], stamps=_stamps(numbers[:-4])))
 
     def _checked(self, counts: _Counts) -> _Counts:
-        if min(counts) < 0 or counts.complaint:
+        if min(counts[:4]) < 0 or counts.complaint:
             raise self.fault(counts.complaint or "a count is negative")
         return counts
 
@@ -220,30 +229,33 @@ def write_ampl_sol(
     code: int,
     *,
     columns: int | None = None,
+    stamp: str = "",
 ) -> Path:
     """Write an AMPL solution file in text form and return its path.
 
     primal: values (n,) in the order of the .nl file, or empty when there is no point; then `columns` gives n.
-    rows: number of constraints. code: solve code as in the head of this module. Reading gives the same
-    numbers, bit by bit.
+    rows: number of constraints. code: solve code as in the head of this module. stamp: of the problem, if it
+    is to identify it. Reading gives the same numbers, bit by bit.
 
     Raises SolutionError when a value is not finite, OutputError when the file cannot be written.
     """
     primal = np.asarray(primal, dtype=np.float64)
     if not np.isfinite(primal).all():
         raise SolutionError("the solver returned a value that is not finite; nothing was written", file=path)
-    counts = (rows, 0, len(primal) if columns is None else columns, len(primal))
+    options = (*_OUR_OPTIONS, *([stamp_option(stamp)] if stamp else []))
+    numbers = (len(options), *options, rows, 0, len(primal) if columns is None else columns, len(primal))
     with replacing(path) as stream:
-        stream.writelines(_text_parts(message, primal, counts, code))
+        stream.writelines(_text_parts(message, primal, numbers, code))
     return Path(path)
 
 
-def _text_parts(message: str, primal: Floats, counts: tuple[int, ...], code: int) -> Iterator[bytes]:
+def _text_parts(message: str, primal: Floats, numbers: tuple[int, ...], code: int) -> Iterator[bytes]:
+    """The text of a file; numbers: the count of options, the options, and the four counts."""
     lines = message[:_LONGEST_MESSAGE].strip().splitlines()
     words = (one_line(line.encode(errors="replace")) for line in lines)
     # An empty line or this word would end the message.
     kept = ({"": " ", "Options": "Options."}.get(line, line) for line in words)
-    head = ["\n".join(kept), "", "Options", len(_OUR_OPTIONS), *_OUR_OPTIONS, *counts]
+    head = ["\n".join(kept), "", "Options", *numbers]
     yield "\n".join(map(str, head)).encode() + b"\n"
     for start in range(0, len(primal), HEAD):
         text = "\n".join(map(repr, primal[start : start + HEAD].tolist())) + "\n"

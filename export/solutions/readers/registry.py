@@ -5,19 +5,20 @@ from __future__ import annotations
 import codecs
 import gzip
 import io
-import re
 import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
+from ...writing.stamps import digits_in_columns, digits_in_text
 from . import ampl, baron, cbc, cplex, gams, glpk, gurobi, highs, scip, xpress
 from .text import HEAD, RawSolution, Reader, with_unix_ends
 
-_STAMP = re.compile(rb"sha256_[0-9a-f]{12}(?![0-9a-f])")
 _GZIP: Final = b"\x1f\x8b"
 _SMALLER: Final = "let the solver write it without columns at 0"
 
@@ -46,7 +47,7 @@ def parse_raw(data: bytes) -> RawSolution:
     for reader in READERS:
         if reader.recognises(head):
             raw = reader.parse(with_unix_ends(data) if reader.text else data)
-            return replace(raw, reader=reader.name, stamp=_stamp(head))
+            return replace(raw, reader=reader.name, stamps=raw.stamps | _stamps(head, raw))
     known = "; ".join(reader.description for reader in READERS)
     raise SolutionError(f"this is not a solution file of a known kind; give one of these: {known}")
 
@@ -61,10 +62,11 @@ def _without_mark(data: bytes) -> bytes:
         raise SolutionError("the text in UTF-16 is damaged or cut off; save it again") from error
 
 
-def _stamp(head: bytes) -> str:
-    """The stamp (`Problem.stamp`) that a solver repeats in a name or message; empty without one."""
-    found = _STAMP.search(head)
-    return found[0].decode() if found else ""
+def _stamps(head: bytes, raw: RawSolution) -> frozenset[str]:
+    """Digits of the stamps (`Problem.stamp`) that a solver repeats in a message, a name or a column."""
+    names = np.empty(0, "S1") if raw.names is None else raw.names
+    columns = names[np.strings.find(np.strings.upper(names), b"ONE_") >= 0]
+    return digits_in_text(head) | digits_in_columns(columns.tolist())
 
 
 def _unpacked(data: bytes) -> bytes:

@@ -52,7 +52,7 @@ def added_columns() -> dict[str, str]:
     # Not at the top: a solver's child process, which writes such files, would load formulations too.
     from ...solvers_table import PROGRAMS
 
-    ours = {"crossfield": r"ONE", "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"}
+    ours = {"crossfield": r"ONE(?:_[0-9a-f]{11})?", "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"}
     return ours | {program.title: program.adds for program in PROGRAMS.values() if program.adds}
 
 
@@ -66,7 +66,8 @@ class RawSolution:
     number of constraints in the file, or None if it does not state them. order: the order of the values
     without names. bound: the solver's dual bound, or None. of_rows: names (k,) that the file lists as names
     of rows, whose values are left out.
-    stamp: of the problem, if the solver repeated it, or empty. reader: name of the reader of the file.
+    stamps: digits of the problem's stamp, or the first of them, wherever the solver repeated it. reader: name
+    of the reader of the file.
     """
 
     status: Status
@@ -79,7 +80,7 @@ class RawSolution:
     order: Order = "nl"
     bound: float | None = None
     of_rows: Bytes | None = None
-    stamp: str = ""
+    stamps: frozenset[str] = frozenset()
     reader: str = ""
 
     @property

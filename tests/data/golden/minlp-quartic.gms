@@ -45,7 +45,7 @@ $ifThen set RESULTS
 File results / "%RESULTS%" /;
 put results;
 put 'model_status,' m.modelStat:0:0 / 'solver_status,' m.solveStat:0:0 /;
-put 'problem,sha256_6dd96a9a6a79' /;
+put 'problem,sha256_6dd96a9a6a7' /;
 results.nr = 2; results.nd = 15; results.nw = 24;
 put 'objective,' objvar.l:0 /;
 put 'alpha_00_00,' alpha_00_00.l:0 /;

@@ -111,7 +111,7 @@ def test_header_agrees_with_the_writer_of_pyomo(label: str):
     ours = b"".join(nl.generate(Canonical(problem))).decode().splitlines()
     theirs = [line.partition("#")[0].split() for line in pyomo_text(problem)[:10]]
     mine = [line.split() for line in ours[:10]]
-    assert mine[0] == ["g3", "1", "1", "0"]
+    assert mine[0] == ["g4", "1", "1", "0", str(int(problem.sha256[:7], 16))]
     assert mine[1] == [str(int(theirs[1][0]) + alone), *theirs[1][1:5]]
     assert mine[2] == theirs[2][:2]
     for line in (3, 4, 6, 7, 9):  # networks; nonlinear columns; integers; nonzeros; common expressions
@@ -160,7 +160,7 @@ def test_binary_holds_the_numbers_themselves():
     point = points_of(problem)[0]
     data = b"".join(nl.generate(Canonical(problem), binary=True, start=point))
     head = data.split(b"\n", 10)
-    assert head[0] == b"b3 1 1 0"
+    assert head[0] == b"b4 1 1 0 %d" % int(problem.sha256[:7], 16)
     assert head[5].split() == [b"0", b"0", b"1", b"1"]
     assert head[10].startswith(b"C" + struct.pack("<i", 0))
     place = data.index(b"x" + struct.pack("<i", problem.n_columns)) + 5

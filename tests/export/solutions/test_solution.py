@@ -160,7 +160,8 @@ def test_infinite_values_are_an_error(tmp_path, field, value):
 def test_a_file_without_a_point_has_no_field(tmp_path, field):
     problem = problem_of(field, "milp-mccormick")
     path = tmp_path / "x.sol"
-    write_ampl_sol(path, "no room", np.zeros(0), problem.n_rows, 220, columns=problem.n_columns)
+    facts = {"columns": problem.n_columns, "stamp": problem.stamp}
+    write_ampl_sol(path, "no room", np.zeros(0), problem.n_rows, 220, **facts)
     solution = read_solution(path, problem)
     assert (solution.point, solution.objective, solution.violation) == (None, None, None)
     assert solution.status == Status.INFEASIBLE

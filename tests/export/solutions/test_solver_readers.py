@@ -92,7 +92,7 @@ def test_no_file_is_claimed_by_two_readers(path):
 @for_each("path", [path for path in GOOD if FILES[path.name][1] in WITH_POINT and problem_of(path)])
 def test_the_point_is_the_one_that_the_solver_had(path):
     status, name = FILES[path.name][1], problem_of(path)
-    solution = read_solution(path, problem(name))
+    solution = read_solution(path, problem(name), identified=True)
     assert (solution.unknown, solution.claimed) == (0, status)
     if solution.reported is not None:
         assert solution.objective == pytest.approx(solution.reported, abs=1e-6)
@@ -267,17 +267,17 @@ def test_words_of_cbc(words, status):
 def test_glpk_has_no_names_and_tells_lp_from_mps():
     raws = {order: read_raw(TINY / f"{K}_milp_optimal_{order}.sol") for order in ("lp", "mps")}
     for order, raw in raws.items():
-        assert (raw.order, raw.rows, len(raw.values)) == (order, 48, 35)
+        assert (raw.order, raw.rows, len(raw.values)) == (order, 48, 36)
         with pytest.raises(SolutionError, match=f"without names.*in the order of the .{order} file"):
             values_for(names_of("milp"), raw)
-        for rows, columns in ((48, 34), (49, 35), (46, 35)):
-            with pytest.raises(SolutionError, match="of 35 columns and 48 rows, the problem has"):
+        for rows, columns in ((48, 35), (49, 36), (46, 36)):
+            with pytest.raises(SolutionError, match="of 36 columns and 48 rows, the problem has"):
                 values_in_order(columns, rows, raw)
 
 
 @pytest.mark.parametrize("order", ["lp", "mps"])
 def test_one_comes_first_in_lp_and_last_in_mps(tmp_path, order):
-    """The QP has a constant and no rows: GLPK would list nine columns, one of them ONE, and the row c_ONE."""
+    """The QP has no rows: GLPK lists nine columns, one of them fixed to 1, and the row c_ONE."""
     values = dict(zip(names_of("qp").tolist(), 0.01 * np.arange(1, 9), strict=True))
     listed = [1, *values.values()] if order == "lp" else [*values.values(), 1]
     head = f"c Problem:    {'' if order == 'lp' else 'tiny'}\ns ipt 1 9 o 0\ni 1 1 0\n"

@@ -21,7 +21,7 @@ from crossfield.export.library.documents import check_point
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.text import added_columns
-from crossfield.export.solutions.solution import LARGEST, TOLERANCE, Solution, read_solution
+from crossfield.export.solutions.solution import AGREEMENT, LARGEST, TOLERANCE, Solution, read_solution
 from crossfield.export.solutions.statuses import Status
 from crossfield.models.errors import InstanceError, SolutionError
 from crossfield.models.formulations.problem import formulate
@@ -98,10 +98,11 @@ def test_the_answer_of_a_relaxation_is_not_passed_on(skew, reading, tmp_path):
     assert re.search(
         r"relaxed\.sol: claims optimal-global, but its point breaks integrality by 0\.3", complaint
     )
-    assert "--tolerance" in complaint
+    assert "--tolerance" not in complaint
     code, facts, complaint, written = reading(path, "--tolerance", "0.5")
     assert (code, written, complaint) == (0, True, "")
-    assert (facts["status"], facts["contradictions"]) == ("optimal-global", [])
+    assert (facts["status"], facts["contradictions"]) == ("feasible", [])
+    assert facts["claims"] == "not kept (optimal-global): the point is feasible only within 0.5"
 
 
 @pytest.mark.needs("glpk")
@@ -116,7 +117,8 @@ def test_glpk_answers_relaxations_and_models_in_its_own_order(skew, reading, tmp
     assert (code, facts["status"], written) == (1, "unknown", False)
     code, facts, complaint, written = reading(whole)
     assert (code, complaint, written) == (0, "", True)
-    assert facts["status"] == "optimal-global"
+    assert (facts["status"], facts["claimed"]) == ("feasible", "optimal-global")
+    assert facts["claims"].endswith("the file is of an unidentified problem")
     assert facts["worst_violation"] < 1e-9
     assert facts["objective_recomputed"] == pytest.approx(facts["objective_reported"], abs=1e-9)
 
@@ -129,7 +131,7 @@ def test_the_columns_of_a_model_have_glpks_order_also_with_pixels_apart(tmp_path
         write(problem, tmp_path / f"{number}.mod")
         command = ["glpsol", "-m", f"{number}.mod", "-d", f"{number}.dat", "-w", "answer"]
         subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
-        solution = read_solution(tmp_path / "answer", problem)
+        solution = read_solution(tmp_path / "answer", problem, identified=True)
         assert (solution.status, solution.contradictions) == ("optimal-global", ())
 
 
@@ -138,21 +140,35 @@ def test_claims_fall_to_objective_bound_and_violation(milp):
     objective = problem.objective_value(point)
 
     def of(claimed=Status.OPTIMAL_GLOBAL, at=point, **claims):
-        return Solution(problem, at, claimed, "", "by hand", **claims)
+        facts = {"identified": True, **claims}
+        return Solution(problem, at, claimed, "", "by hand", **facts)
 
-    assert of(reported=objective, bound=objective).status == "optimal-global"
-    assert of(reported=objective * (1 + 0.5 * TOLERANCE), bound=objective - 1).status == "optimal-global"
+    assert of(reported=objective, claimed_bound=objective).status == "optimal-global"
+    near = of(reported=objective * (1 + 0.5 * AGREEMENT), claimed_bound=objective - 1)
+    assert (near.status, near.bound, near.caveat) == ("optimal-global", objective - 1, "")
     (why,) = of(reported=objective + 0.01).contradictions
     assert why.startswith("it states the objective")
-    (why,) = of(bound=objective + 0.01).contradictions
+    contradicted = of(claimed_bound=objective + 0.01)
+    (why,) = contradicted.contradictions
     assert why.startswith("the dual bound")
+    assert (contradicted.bound, contradicted.gap) == (None, None)
     assert of(reported=np.inf).status == of(reported=np.nan).status == "unknown"
     off = point.copy()
     off[problem.blocks["beta"].offset] += 3e-4
     assert of(at=off).status == "unknown"
-    assert of(at=off, tolerance=1e-3).status == "optimal-global"
+    loose = of(at=off, claimed_bound=0.0, tolerance=1e-3)
+    assert (loose.status, loose.bound, loose.gap, loose.doubt) == ("feasible", None, None, "")
+    assert loose.caveat.endswith("feasible only within 0.001")
+    assert of(at=off, reported=objective + 0.01, tolerance=10.0).status == "unknown"
+    assert of(at=off, tolerance=10.0, claimed_bound=problem.objective_value(off) + 1).status == "unknown"
+    stranger = of(claimed_bound=0.0, identified=False)
+    assert (stranger.status, stranger.bound, stranger.gap, stranger.doubt) == ("feasible", None, None, "")
+    assert stranger.caveat.endswith("the file is of an unidentified problem")
     assert of(Status.INFEASIBLE).contradictions == ("its point is feasible",)
     assert of(Status.INFEASIBLE, at=off).status == "infeasible"
+    assert of(Status.INFEASIBLE, at=None).status == of(Status.INFEASIBLE, at=off).status == "infeasible"
+    assert of(Status.INFEASIBLE, at=None, identified=False).status == "unknown"
+    assert of(Status.LIMIT_WITHOUT_POINT, at=None, identified=False).status == "no-point"
     assert of(Status.ERROR).status == "error"
 
 
@@ -160,11 +176,12 @@ def test_a_bound_of_gurobi_above_the_objective_contradicts_it(tmp_path):
     document = json.loads((TINY / "gurobi-13.0.3_milp_optimal.json").read_text())
     path = tmp_path / "x.json"
     path.write_text(json.dumps(document))
-    assert read_solution(path, problem("milp")).status == "optimal-global"
+    assert read_solution(path, problem("milp"), identified=True).status == "optimal-global"
     document["SolutionInfo"]["ObjBound"] = 0.9
     path.write_text(json.dumps(document))
-    found = read_solution(path, problem("milp"))
-    assert (found.status, found.claimed, found.bound) == ("unknown", "optimal-global", 0.9)
+    found = read_solution(path, problem("milp"), identified=True)
+    assert (found.status, found.claimed, found.claimed_bound) == ("unknown", "optimal-global", 0.9)
+    assert found.bound is None
 
 
 @pytest.mark.parametrize(
@@ -178,7 +195,7 @@ def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, 
     bad[: len(instance.theta)] += 1
     for values in (point, bad):
         path = tmp_path / "x.sol"
-        write_ampl_sol(path, "some words", values[Layout(held).order], held.n_rows, code)
+        write_ampl_sol(path, "some words", values[Layout(held).order], held.n_rows, code, stamp=held.stamp)
         exit_code, facts, complaint, written = reading(path)
         assert (exit_code, written) == (1, False)
         assert facts["claimed"] == status
@@ -358,7 +375,17 @@ def test_columns_that_programs_add_stand_in_one_table():
     """The standalone checker has the same patterns, once each."""
     ours = {part for patterns in added_columns().values() for part in patterns.split("|")}
     assert set(check_point.ADDED.pattern.split("|")) - ours == set()
-    names = ("ONE", "objconstvar", "nlobjvar", "~r_0", "Rgc1", "MPS_Rgc1", "Constant", "objvar")
+    names = (
+        "ONE",
+        "ONE_1a2b3c4d5e6",
+        "objconstvar",
+        "nlobjvar",
+        "~r_0",
+        "Rgc1",
+        "MPS_Rgc1",
+        "Constant",
+        "objvar",
+    )
     assert all(check_point.ADDED.fullmatch(name) for name in names)
     assert not any(check_point.ADDED.fullmatch(name) for name in ("alpha_00_00", "x", "Constant1"))
 

@@ -134,7 +134,8 @@ def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path: Path)
     for less, verdict in ((0.0, Verdict.AGREES), (4e-6, Verdict.AGREES), (1e-4, Verdict.DIFFERS)):
         point = problem.point(random_field(problem, 1))
         point[index[cost > 0, 0]] -= less
-        check = _judged(subjects[0], "highs", Solution(problem, point, Status.OPTIMAL_GLOBAL, "", "test"))
+        answer = Solution(problem, point, Status.OPTIMAL_GLOBAL, "", "test", identified=True)
+        check = _judged(subjects[0], "highs", answer)
         assert check.verdict == verdict, (less, check.reason)
         assert check.objective <= check.energy <= check.objective + check.leeway + 1e-9
     assert _energy_difference(problem, 1.0, 1.2, 0.1, proven=False)

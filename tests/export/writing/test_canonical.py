@@ -18,7 +18,7 @@ def lines_of(form: Canonical, name: str) -> list[str]:
 
 def named(form: Canonical, file: str) -> list[str]:
     """Names of columns in the form's order for a file."""
-    names = [name.decode() for name in form.column_names] + ["ONE"]
+    names = [name.decode() for name in form.column_names] + [form.one.decode()]
     return [names[column] for column in form.order(file)]
 
 
@@ -29,7 +29,7 @@ def test_columns_stand_in_lp_and_mps_in_the_order_of_the_form(label: str):
     limits = lp[lp.index("Bounds") + 1 :]
     assert [m[1] for line in limits if (m := re.search(r"<= (\w+) <=", line))] == named(form, "lp")
     assert [m[1] for line in mps if (m := re.fullmatch(r" (\w+) obj \S+", line))] == named(form, "mps")
-    assert form.column_count == len(form.order("lp")) == form.problem.n_columns + form.has_one
+    assert form.column_count == len(form.order("lp")) == form.problem.n_columns + 1
 
 
 def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():

@@ -1,11 +1,11 @@
 c Problem:    
 c Rows:       49
-c Columns:    35
+c Columns:    36
 c Non-zeros:  151
 c Status:     INTEGER EMPTY
-c Objective:  obj = 0 (MINimum)
+c Objective:  obj_sha256_a1a5428ed32 = 0 (MINimum)
 c
-s mip 49 35 n 0
+s mip 49 36 n 0
 i 1 0
 i 2 0
 i 3 0
@@ -90,4 +90,5 @@ j 32 0
 j 33 0
 j 34 0
 j 35 0
+j 36 0
 e o f

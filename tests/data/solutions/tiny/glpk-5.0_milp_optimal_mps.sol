@@ -1,11 +1,11 @@
-c Problem:    tiny
+c Problem:    tiny_sha256_a1a5428ed32
 c Rows:       48
-c Columns:    35
+c Columns:    36
 c Non-zeros:  150
 c Status:     INTEGER OPTIMAL
 c Objective:  obj = 0.5565360828 (MINimum)
 c
-s mip 48 35 o 0.556536082845935
+s mip 48 36 o 0.556536082845935
 i 1 0
 i 2 0
 i 3 0
@@ -89,4 +89,5 @@ j 32 0.0853981633974482
 j 33 0.0853981633974482
 j 34 0.0853981633974482
 j 35 0.0853981633974482
+j 36 1
 e o f

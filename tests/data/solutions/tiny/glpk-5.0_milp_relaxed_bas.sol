@@ -1,11 +1,11 @@
 c Problem:    
 c Rows:       48
-c Columns:    35
+c Columns:    36
 c Non-zeros:  150
 c Status:     OPTIMAL
-c Objective:  obj = 0 (MINimum)
+c Objective:  obj_sha256_a1a5428ed32 = 0 (MINimum)
 c
-s bas 48 35 f f 0
+s bas 48 36 f f 0
 i 1 l 0 0
 i 2 b 0 0
 i 3 l 0 0
@@ -54,23 +54,23 @@ i 45 b 0 0
 i 46 b 0 0
 i 47 b 0 0
 i 48 b 0 0
-j 1 b 0.2 0
-j 2 b 1.6 0
-j 3 l 0 0
-j 4 b 2.6 0
-j 5 b 0 0
+j 1 s 1 0
+j 2 b 0.2 0
+j 3 b 1.6 0
+j 4 l 0 0
+j 5 b 2.6 0
 j 6 b 0 0
 j 7 b 0 0
 j 8 b 0 0
-j 9 l 0 0
-j 10 b 0.127323954473516 0
-j 11 l 0 0
+j 9 b 0 0
+j 10 l 0 0
+j 11 b 0.127323954473516 0
 j 12 l 0 0
-j 13 b 0.445633840657307 0
-j 14 u 0 0
-j 15 b 0.827605704077856 0
-j 16 b -0.318309886183791 0
-j 17 l 0 2
+j 13 l 0 0
+j 14 b 0.445633840657307 0
+j 15 u 0 0
+j 16 b 0.827605704077856 0
+j 17 b -0.318309886183791 0
 j 18 l 0 2
 j 19 l 0 2
 j 20 l 0 2
@@ -78,15 +78,16 @@ j 21 l 0 2
 j 22 l 0 2
 j 23 l 0 2
 j 24 l 0 2
-j 25 b 0 0
+j 25 l 0 2
 j 26 b 0 0
 j 27 b 0 0
 j 28 b 0 0
 j 29 b 0 0
 j 30 b 0 0
 j 31 b 0 0
-j 32 l 0 0.001
+j 32 b 0 0
 j 33 l 0 0.001
 j 34 l 0 0.001
 j 35 l 0 0.001
+j 36 l 0 0.001
 e o f

@@ -1,11 +1,11 @@
-c Problem:    milp-mccormick
+c Problem:    tiny
 c Rows:       49
-c Columns:    35
+c Columns:    36
 c Non-zeros:  165
 c Status:     INTEGER OPTIMAL
 c Objective:  obj = 0.5565360828 (MINimum)
 c
-s mip 49 35 o 0.5565360828459
+s mip 49 36 o 0.5565360828459
 i 1 0.556536082846
 i 2 0
 i 3 0
@@ -90,4 +90,5 @@ j 32 0.0853981633974
 j 33 0.0853981633974
 j 34 0.0853981633974
 j 35 0.0853981633974
+j 36 1
 e o f

@@ -1,0 +1,259 @@
+"""Answers of one problem read as answers of another: no claim is passed on.
+
+The problems have the same columns and rows, and differ in one bound, a weight, the gauge, the facet or a norm.
+"""
+
+import re
+import subprocess
+from dataclasses import replace
+
+import crossfield as cf
+import highspy
+import numpy as np
+import pytest
+from answers import FILES, GOOD, problem_of
+from answers import problem as tiny
+from crossfield.export.cli.app import invoke
+from crossfield.export.solutions.readers.ampl import write_ampl_sol
+from crossfield.export.solutions.readers.registry import read_raw
+from crossfield.export.solutions.solution import read_solution
+from crossfield.export.writing.nl_layout import Layout
+from crossfield.models.errors import SolutionError
+from crossfield.models.formulations.problem import formulate, tightened
+from crossfield.models.formulations.windows import Windows
+
+MILP = "milp-mccormick"
+KEPT = {"optimal-global", "optimal-local", "infeasible", "unbounded"}
+
+
+def instance_of(**facts):
+    values = {"theta": [0.2, 1.6, 2.6], "w": [1.0, 0.75, 0.5], "gauge": "strokes", **facts}
+    strokes = np.array([[0, 0], [0, 1], [1, 1]])
+    return cf.Instance(
+        "two", np.ones((2, 2), bool), strokes, np.array(values["theta"]), np.array(values["w"]),
+        stroke_coefficient=1.5, skew_coefficient=1e-3, gauge=values["gauge"],
+    )  # fmt: skip
+
+
+def with_another_bound(problem):
+    """The problem with the upper bound of one alpha a little lower."""
+    instance = problem.instance
+    quarter = np.full(instance.grid.size, np.pi / 4)
+    upper = instance.alpha_upper - np.array([0, 0, 1e-3, 0])
+    ends = (instance.alpha_lower, upper, -quarter, quarter, instance.p_min, instance.p_max)
+    return tightened(problem, Windows(*ends, energy=9.0, proof="by hand", norm=1))
+
+
+@pytest.fixture(scope="module")
+def solved():
+    return formulate(instance_of(), MILP)
+
+
+OTHERS = {
+    "bound": lambda: with_another_bound(formulate(instance_of(), MILP)),
+    "weight": lambda: formulate(instance_of(w=[1.0, 0.75, 0.5000001]), MILP),
+    "gauge": lambda: formulate(instance_of(gauge="box"), MILP),
+    "facet": lambda: formulate(instance_of(), MILP, facet="printed"),
+    "norm": lambda: formulate(instance_of(), MILP, stroke_norm=2),
+    "relaxation": lambda: formulate(instance_of(), MILP, relax=True),
+}
+
+
+def highs_loaded(model):
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.readModel(str(model))
+    return highs
+
+
+def by_highs(model, answer, style):
+    highs = highs_loaded(model)
+    highs.run()
+    highs.writeSolution(str(answer), style)
+
+
+def by_scip(model, answer):
+    pyscipopt = pytest.importorskip("pyscipopt")
+    scip = pyscipopt.Model()
+    scip.hideOutput()
+    scip.readProblem(str(model))
+    scip.optimize()
+    scip.writeBestSol(str(answer))
+    # The shell of SCIP writes the status before the solution, its library does not.
+    answer.write_text("solution status: optimal solution found\n" + answer.read_text())
+
+
+def by_cbc(model, answer):
+    command = ["cbc", str(model), "solve", "solution", str(answer)]
+    subprocess.run(command, check=True, capture_output=True)
+
+
+def by_glpk(model, answer):
+    kind = "--lp" if model.suffix == ".lp" else "--freemps"
+    subprocess.run(["glpsol", kind, str(model), "-w", str(answer)], check=True, capture_output=True)
+
+
+def by_gurobi(model, answer):
+    import gurobipy
+
+    with (
+        gurobipy.Env(params={"OutputFlag": 0}) as environment,
+        gurobipy.read(str(model), environment) as read,
+    ):
+        read.optimize()
+        read.write(str(answer))
+
+
+def by_cplex(model, answer):
+    import cplex
+
+    with cplex.Cplex(str(model)) as problem:
+        for stream in (problem.set_log_stream, problem.set_results_stream, problem.set_warning_stream):
+            stream(None)
+        problem.solve()
+        problem.solution.write(str(answer))
+
+
+def by_xpress(model, answer):
+    import xpress
+
+    problem = xpress.problem()
+    problem.controls.outputlog = 0
+    problem.readProb(str(model))
+    problem.optimize()
+    problem.writeSlxSol(str(answer))
+
+
+def by_ampl_library(model, answer):
+    """The AMPL Solver Library repeats the options of a real .nl; the values are those of HiGHS."""
+    subprocess.run(["gjh_asl_json", "-s", str(model.with_suffix(""))], check=True, capture_output=True)
+    options = re.search(r"Options\n(4\n1\n1\n0\n\d+\n)", model.with_suffix(".sol").read_text())[1]
+    problem = formulate(instance_of(), MILP)
+    mps = model.with_suffix(".mps")
+    cf.write(problem, mps)
+    by_highs(mps, answer, 0)
+    point = read_solution(answer, problem).point
+    write_ampl_sol(answer, "optimal solution found", point[Layout(problem).order], problem.n_rows, 0)
+    answer.write_text(re.sub(r"(?<=Options\n)3\n1\n1\n0\n", options, answer.read_text()))
+
+
+def needing(program, *values):
+    return pytest.param(*values, marks=pytest.mark.needs(program), id=f"{program} {' '.join(values[1:])}")
+
+
+WRITERS = [
+    pytest.param(lambda model, answer: by_highs(model, answer, 0), "mps", "sol", id="highs mps, style 0"),
+    pytest.param(lambda model, answer: by_highs(model, answer, 4), "lp", "sol", id="highs lp, style 4"),
+    pytest.param(by_scip, "lp", "sol", id="scip lp"),
+    pytest.param(by_scip, "mps", "sol", id="scip mps"),
+    needing("cbc", by_cbc, "lp", "sol"),
+    needing("cbc", by_cbc, "mps", "sol"),
+    needing("glpk", by_glpk, "lp", "sol"),
+    needing("glpk", by_glpk, "mps", "sol"),
+    needing("gurobi", by_gurobi, "lp", "json"),
+    needing("gurobi", by_gurobi, "mps", "sol"),
+    needing("cplex", by_cplex, "lp", "sol"),
+    needing("cplex", by_cplex, "mps", "sol"),
+    needing("xpress", by_xpress, "mps", "slx"),
+    needing("asl", by_ampl_library, "nl", "sol"),
+]
+
+
+@pytest.mark.parametrize("write_answer, model, suffix", WRITERS)
+@pytest.mark.filterwarnings("ignore")
+def test_an_answer_proves_nothing_about_another_problem(write_answer, model, suffix, solved, tmp_path):
+    files = tmp_path / f"model.{model}", tmp_path / f"answer.{suffix}"
+    cf.write(solved, files[0])
+    write_answer(*files)
+    own = read_solution(files[1], solved)
+    assert own.identified
+    assert own.status in {own.claimed, "feasible"}
+    assert own.caveat == ""
+    for name, other in OTHERS.items():
+        with pytest.raises(SolutionError, match=r"answer\.\w+: is of another problem: it states"):
+            pytest.fail(f"{name}: {read_solution(files[1], other())}")
+
+
+@pytest.mark.parametrize("write_answer, model, suffix", WRITERS)
+@pytest.mark.filterwarnings("ignore")
+def test_without_a_stamp_no_claim_is_kept(write_answer, model, suffix, solved, tmp_path):
+    """The files of a writer that states no stamp: `ONE` and a name without digits, three options in a .nl."""
+    whole, plain = tmp_path / f"model.{model}", tmp_path / f"plain.{model}"
+    cf.write(solved, whole)
+    text = re.sub(r"sha256_[0-9a-f]{11}|(?<=ONE)_[0-9a-f]{11}", "", whole.read_text())
+    plain.write_text(text)
+    if model == "nl":
+        cf.write(solved, tmp_path / "plain.nl")
+        write_answer(plain, tmp_path / f"answer.{suffix}")
+        answer = re.sub(
+            r"(?<=Options\n)4\n1\n1\n0\n\d+\n", "3\n1\n1\n0\n", (tmp_path / "answer.sol").read_text()
+        )
+        (tmp_path / "answer.sol").write_text(answer)
+    else:
+        write_answer(plain, tmp_path / f"answer.{suffix}")
+    claimed = read_raw(tmp_path / f"answer.{suffix}").status
+    for problem in (solved, *(other() for other in OTHERS.values())):
+        try:
+            solution = read_solution(tmp_path / f"answer.{suffix}", problem)
+        except SolutionError:
+            continue
+        assert solution.claimed == claimed
+        assert solution.status in {"feasible", "unknown"}
+        assert (solution.identified, solution.bound, solution.gap) == (False, None, None)
+        assert solution.status == "unknown" or "of an unidentified problem" in solution.caveat
+
+
+def test_files_of_solvers_without_a_stamp_keep_no_claim():
+    """Every file of a real solver in the collection that states no problem, of the right one and another."""
+    unidentified = 0
+    for path in GOOD:
+        name = problem_of(path) or "milp"
+        if read_raw(path).stamps:
+            continue
+        unidentified += 1
+        other = tiny(name).instance
+        changed = replace(other, stroke_coefficient=other.stroke_coefficient + 1e-7)
+        for problem in (tiny(name), formulate(changed, tiny(name).name, p=tiny(name).jumps)):
+            try:
+                solution = read_solution(path, problem)
+            except SolutionError:
+                assert problem_of(path) is None
+                continue
+            assert solution.claimed == FILES[path.name][1]
+            assert solution.status not in KEPT
+            assert (solution.bound, solution.gap) == (None, None)
+    assert unidentified > len(GOOD) // 2
+
+
+def test_read_passes_on_no_proof_of_another_gauge(tmp_path, capsys):
+    """The optimum with the gauge `box` is 2.93, and 0.699 with the other: nothing else differs."""
+    for gauge in ("box", "strokes"):
+        arguments = [
+            "--size",
+            "4",
+            "--gauge",
+            gauge,
+            "-f",
+            MILP,
+            "-F",
+            "mps",
+            "-o",
+            str(tmp_path / gauge),
+            "-q",
+        ]
+        assert invoke(["export", "skew", *arguments]) == 0
+    (model,) = (tmp_path / "box").glob("*.mps")
+    by_highs(model, tmp_path / "answer.sol", 0)
+
+    def read(gauge):
+        (manifest,) = (tmp_path / gauge).glob("*.manifest.json")
+        field = tmp_path / f"{gauge}.npz"
+        arguments = [str(tmp_path / "answer.sol"), "--manifest", str(manifest), "-o", str(field), "--json"]
+        return invoke(["read", *arguments]), field.exists(), capsys.readouterr()
+
+    code, written, printed = read("strokes")
+    assert (code, written, printed.out) == (1, False, "")
+    assert "answer.sol: is of another problem" in printed.err
+    code, written, printed = read("box")
+    assert (code, written) == (0, True)
+    assert '"status": "optimal-global"' in printed.out
