@@ -40,18 +40,18 @@ class SubmittedLog:
         others = sorted(named - {entry}) if entry not in named else []
         if others:
             raise SolutionError(f"is a log of {others[0]}, not of {entry}", file=self.path)
-        with naming(self.path):
-            if not is_identified(self.run.stamps, problem.stamp) and not named:
-                raise SolutionError(
-                    f"does not state its problem: neither {entry} nor {problem.stamp} is in it; "
-                    "let the solver read the model under its name in the library"
-                )
         if "GAMS" not in self.run.text and not has_size(self.run, problem):
             raise SolutionError(
                 f"is a log of a model of {self.run.columns} columns and {self.run.rows} rows, "
                 f"and {entry} has other numbers",
                 file=self.path,
             )
+        with naming(self.path):
+            if not is_identified(self.run.stamps, problem.stamp) and not named:
+                raise SolutionError(
+                    f"does not state its problem: neither {entry} nor {problem.stamp} is in it; "
+                    "let the solver read the model under its name in the library"
+                )
 
 
 def has_size(log: RunLog, problem: Problem) -> bool:

@@ -175,14 +175,15 @@ def test_a_refused_format_is_reported_and_recorded(files, capsys):
 
 
 @pytest.mark.parametrize(
-    "words, status", [("Infeasible", "infeasible"), ("Time limit reached", "limit-without-point")]
+    "words, status, claim",
+    [("Infeasible", "unknown", "infeasible"), ("Time limit reached", "no-point", "limit-without-point")],
 )
-def test_solutions_without_a_point_are_refused(files, refused, instance, words, status):
-    """The others: tests/export/solutions."""
+def test_solutions_without_a_point_are_refused(files, refused, instance, words, status, claim):
+    """The others: tests/export/solutions. HiGHS lists no names then, so nothing states the problem."""
     exported = cf.write_problem(cf.formulate(instance, "milp-mccormick"), "set", formats=["nl"])
     Path("none.sol").write_text(WITHOUT_POINT.format(words))
     line = refused("read", "none.sol", "--manifest", exported.path, "-o", "field.npz")
-    assert line.startswith(f"none.sol: holds no point: {status}")
+    assert line.startswith(f"none.sol: holds no point: {status}; {words}; claims not kept ({claim})")
 
 
 WITHOUT_POINT = "Model status\n{}\n\n# Primal solution values\nNone\n\n# Dual solution values\nNone\n"

@@ -351,7 +351,7 @@ def test_an_invalid_submission_is_refused_in_one_line_and_changes_nothing(lib, s
         "larger.log": log.replace(MILP, "model").replace(" cols;", "9 cols;", 1),
         "none.log": "no log",
         "unnamed.log": log.replace(MILP, "model"),
-        "unnamed.sol": re.sub(r"sha256_\w+", "", sol),
+        "unnamed.sol": re.sub(r"sha256_\w+|(?<=ONE)_\w+", "", sol),
         "foreign.sol": sol.replace("alpha_00_00", "alpha_09_09"),
         "nan.sol": re.sub("alpha_00_00 .*", "alpha_00_00 nan", sol),
     }
@@ -364,6 +364,7 @@ def test_an_invalid_submission_is_refused_in_one_line_and_changes_nothing(lib, s
         (tmp_path / "larger.log", {"entry": MILP}, "is a log of a model of .* columns"),
         (tmp_path / "none.log", {"entry": MILP}, "is no solution, field, certificate or log"),
         (tmp_path / "unnamed.log", {}, "does not show its entry; name the entry"),
+        (tmp_path / "unnamed.log", {"entry": MILP}, "does not state its problem"),
         (tmp_path / "unnamed.sol", {}, "does not show its entry; name the entry"),
         (tmp_path / "foreign.sol", {"entry": MILP}, "another instance, formulation or option"),
         (tmp_path / "nan.sol", {"entry": MILP}, "line"),
@@ -402,7 +403,7 @@ def test_an_invalid_submission_is_refused_in_one_line_and_changes_nothing(lib, s
     ],
 )
 def test_a_log_that_no_ledger_can_hold_is_refused_before_anything_is_written(lib, tmp_path, text, words):
-    (tmp_path / "a.log").write_text(text)
+    (tmp_path / "a.log").write_text(f"{text}\n{MILP}")
     before = content(lib)
     with pytest.raises(InputError, match=rf"a\.log: {words}") as refused:
         submit_one(lib, tmp_path / "a.log", entry=MILP)

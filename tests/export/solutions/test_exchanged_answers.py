@@ -1,6 +1,6 @@
 """Answers of one problem read as answers of another: no claim is passed on.
 
-The problems have the same columns and rows, and differ in one bound, a weight, the gauge, the facet or a norm.
+The problems have the same columns and rows; they differ in a bound, a weight, the gauge, the facet or a norm.
 """
 
 import re

@@ -80,7 +80,7 @@ def test_a_solver_without_time_gives_back_its_start_and_it_is_said(capsys, tmp_p
     given_back = cf.solve(problem, limits=cf.Limits(1e-6), start=start)
     assert given_back.start_returned is True
     assert given_back.gap is None
-    late = replace(given_back, claimed=Status.LIMIT_WITH_POINT, bound=0.25 * given_back.objective)
+    late = replace(given_back, claimed=Status.LIMIT_WITH_POINT, claimed_bound=0.25 * given_back.objective)
     assert late.gap == pytest.approx(0.75)
     milp = Candidate("MILP", late.field, 1.0, late)
     show_report(Report(instance, (Candidate("start", start, 0.1), milp), (), stages={"start": 0.1}), tmp_path)
