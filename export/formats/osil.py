@@ -2,7 +2,8 @@
 
     <variables numberOfVariables="7">
     <var name="alpha_00_00" type="C" lb="0" ub="1.57"/>            C, B, I; no attribute is left out (O1)
-    <objectives> <obj maxOrMin="min" constant="0.3"> <coef idx="0">-1</coef>
+    <var name="ONE_1a2b3c4d5e6" type="C" lb="1" ub="1"/>           carries the stamp, and as cost the constant
+    <objectives> <obj maxOrMin="min"> <coef idx="0">-1</coef>
     <constraints> <con name="c14_00_00_u" lb="0" ub="INF"/>        constants on the right
     <linearConstraintCoefficients> <start>, <colIdx>, <value>      row by row, one <el> each
     <quadraticCoefficients>
@@ -15,8 +16,7 @@ is stated in <description>, not in comments.
 
 Read in reader_osil.c of SCIP (github.com/scipopt/scip): a cost given twice is not added up but replaced, so
 each stands once; `mult` of variables and rows is not taken, so each has its line; <sum> and <product> take
-any number of arguments, <square> and <cos> one; a constant of the objective becomes a fixed variable
-`objconstvar`. O-numbers: docs/format-rules.md.
+any number of arguments, <square> and <cos> one. O-numbers: docs/format-rules.md.
 """
 
 from __future__ import annotations
@@ -67,10 +67,10 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     problem, names, counts = form.problem, form.names, Counter[str]()
     description = escape("\n".join(header))
     yield _HEAD.format(name=escape(problem.instance.name), description=description).encode()
-    yield f'<variables numberOfVariables="{problem.n_columns}">\n'.encode()
+    yield f'<variables numberOfVariables="{form.column_count}">\n'.encode()
     for block in problem.blocks.values():
         yield from _variables(block, names, _LETTER[form.kind(block)], counts)
-    yield b"</variables>\n"
+    yield b'<var name="%b" type="C" lb="1" ub="1"/>\n</variables>\n' % form.one
     yield from _objective(problem, counts)
     yield f'<constraints numberOfConstraints="{problem.n_rows}">\n'.encode()
     for family in problem.rows:
@@ -126,11 +126,11 @@ def _objective(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
     index, cost = _coefficients(problem, 1)
     constant = float(_coefficients(problem, 0)[1].sum())
     yield b'<objectives numberOfObjectives="1">\n'
-    sizes = f'numberOfObjCoef="{len(cost)}" constant="{number(constant)}"'
-    yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" {sizes}>\n'.encode()
+    size = f'numberOfObjCoef="{len(cost) + 1}"'
+    yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" {size}>\n'.encode()
     value = Counted(counts, "linear costs", words(cost))
     yield from render([b'<coef idx="', Decimals(index[:, 0]), b'">', value, b"</coef>\n"], len(cost))
-    yield b"</obj>\n</objectives>\n"
+    yield f'<coef idx="{problem.n_columns}">{number(constant)}</coef>\n</obj>\n</objectives>\n'.encode()
 
 
 def _constraints(family: PlacedFamily, names: Names, counts: Counter[str]) -> Iterator[bytes]:

@@ -1,8 +1,8 @@
 """SCIP as a reader of LP, MPS, .nl and OSiL, through PySCIPOpt.
 
-SCIP represents a quadratic or nonlinear objective by a row with an additional variable, and the constant of
-OSiL by a fixed variable. It evaluates no nonlinear row at a point, but it judges points. At a feasible one
-the objective is accurate to a small amount if slightly more is feasible and slightly less is not.
+SCIP represents a quadratic or nonlinear objective by a row with an additional variable. It evaluates no
+nonlinear row at a point, but it judges points. At a feasible one the objective is accurate to a small amount
+if slightly more is feasible and slightly less is not.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ import pyscipopt
 
 from ...models.processes.control import on_stop
 from ..solutions.statuses import Status
+from ..writing.stamps import is_one_column
 from ..writing.terms import Terms, listed
 from .protocol import Job, Outcome, RefusedError, complete, file_names
 from .reading import Evaluation, Meaning, Points, finite
 
 _INFINITY: Final = 1e19  # SCIP's is 1e20
-_CONSTANT: Final = "objconstvar"
-_OBJECTIVE_COLUMNS: Final = frozenset({"quadobjvar", "qmatrixvar", "nlobjvar", _CONSTANT})
+_OBJECTIVE_COLUMNS: Final = frozenset({"quadobjvar", "qmatrixvar", "nlobjvar"})
 _OBJECTIVE_ROWS: Final = frozenset({"quadobj", "qmatrix", "objcons"})
 _HAIR: Final = 1e-5
 
@@ -103,7 +103,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
     variables = {v.name: v for v in scip.getVars()}
     rows = {row.name: row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS}
     columns, row_names = file_names(path) if path.suffix == ".nl" else (points.names, list(rows))
-    ours = [v for name, v in variables.items() if name not in _OBJECTIVE_COLUMNS]
+    ours = [v for name, v in variables.items() if name not in _OBJECTIVE_COLUMNS and not is_one_column(name)]
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
     row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in map(rows.get, row_names)])
     given = points.of(columns)
@@ -139,13 +139,12 @@ def _activity(scip: Any, row: Any, columns: list[str], given: Any) -> Any:
 
 def _agreed(scip: Any, variables: dict[str, Any], columns: list[str], point: Any, claim: float) -> float:
     """The claimed objective at a feasible point if SCIP agrees within a small amount, else infinity."""
-    extra = [v for name, v in variables.items() if name in _OBJECTIVE_COLUMNS - {_CONSTANT}]
+    extra = [v for name, v in variables.items() if name in _OBJECTIVE_COLUMNS]
     rest = sum(variables[name].getObj() * value for name, value in zip(columns, point, strict=True))
     solution = scip.createSol()
-    if _CONSTANT in variables:
-        constant = variables[_CONSTANT].getLbOriginal()
-        scip.setSolVal(solution, variables[_CONSTANT], constant)
-        rest += constant
+    for one in filter(is_one_column, variables):
+        scip.setSolVal(solution, variables[one], 1.0)
+        rest += variables[one].getObj()
     for name, value in zip(columns, point, strict=True):
         scip.setSolVal(solution, variables[name], value)
 

@@ -1,7 +1,7 @@
 """The stamp of a problem (`Problem.stamp`) in the files of crossfield, and where answers repeat it.
 
     file            place                                        repeated by
-    LP, MPS         a column ONE_1a2b3c4d5e6 that is fixed to 1  every solution file with names
+    LP, MPS, OSiL   a column ONE_1a2b3c4d5e6 that is fixed to 1  every solution file with names
     LP              the objective obj_sha256_1a2b3c4d5e6         Gurobi .sol, GLPK
     MPS             the name of the model                        GLPK, Xpress .slx
     .nl             the fourth option of the first line          .sol files of the AMPL Solver Library
@@ -28,6 +28,11 @@ _OPTION_DIGITS: Final = 7
 def one_column(stamp: str) -> bytes:
     """Name of the column fixed to 1."""
     return stamp.replace(PREFIX, "ONE_").encode()
+
+
+def is_one_column(name: str) -> bool:
+    """Whether a column is the one fixed to 1."""
+    return _COLUMN.fullmatch(name.encode()) is not None
 
 
 def stamp_option(stamp: str) -> int:

@@ -39,6 +39,6 @@ def notes_of(problem: Problem, name: str) -> list[str]:
         return []
     lifting = held.formulation.lifted
     found = [f"lifted: {lifting}; the class there is {held.problem_class}"] if lifting else []
-    if name in {"lp", "mps"} and Canonical(held).constant:
+    if name in {"lp", "mps", "osil"} and Canonical(held).constant:
         found.append("the constant of the objective is the cost of the column that is fixed to 1")
     return found

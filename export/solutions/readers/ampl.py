@@ -97,8 +97,8 @@ def _read_counts(cursor: Cursor) -> _Counts:
     if count > _MOST_OPTIONS:
         raise cursor.fault(f"{count} options are announced")
     options = [cursor.integer("an option") for _ in range(count)]
-    numbers = (cursor.count("a count of constraints, variables or values") for _ in range(4))
-    counts = _Counts(*numbers, stamps=_stamps(options))
+    rows, duals, columns, values = (cursor.count("a count of rows, columns or values") for _ in range(4))
+    counts = _Counts(rows, duals, columns, values, _stamps(options))
     if counts.complaint:
         raise cursor.fault(counts.complaint)
     return counts
@@ -198,7 +198,8 @@ class _Records:
         count, *numbers = struct.unpack(f"<{size // 4}i", record[len(_OPTIONS_WORD) :]) or (0,)
         if not 0 <= count <= _MOST_OPTIONS or len(numbers) != count + 4:
             raise self.fault(f"the Options record of {len(record)} bytes announces {count} options")
-        return self._checked(_Counts(*numbers[-4:], stamps=_stamps(numbers[:-4])))
+        *options, rows, duals, columns, values = numbers
+        return self._checked(_Counts(rows, duals, columns, values, _stamps(options)))
 
     def _checked(self, counts: _Counts) -> _Counts:
         if min(counts[:4]) < 0 or counts.complaint:

@@ -146,6 +146,7 @@ WRITERS = [
     pytest.param(lambda model, answer: by_highs(model, answer, 4), "lp", "sol", id="highs lp, style 4"),
     pytest.param(by_scip, "lp", "sol", id="scip lp"),
     pytest.param(by_scip, "mps", "sol", id="scip mps"),
+    pytest.param(by_scip, "osil", "sol", id="scip osil"),
     needing("cbc", by_cbc, "lp", "sol"),
     needing("cbc", by_cbc, "mps", "sol"),
     needing("glpk", by_glpk, "lp", "sol"),

@@ -390,20 +390,6 @@ def test_columns_that_programs_add_stand_in_one_table():
     assert not any(check_point.ADDED.fullmatch(name) for name in ("alpha_00_00", "x", "Constant1"))
 
 
-def test_the_column_that_scip_adds_for_a_constant_is_known(tmp_path):
-    pyscipopt = pytest.importorskip("pyscipopt")
-    of = problem("qp")
-    write(of, tmp_path / "m.osil")
-    model = pyscipopt.Model()
-    model.hideOutput()
-    model.readProblem(str(tmp_path / "m.osil"))
-    model.optimize()
-    model.writeBestSol(str(tmp_path / "x.sol"))
-    assert b"objconstvar" in (tmp_path / "x.sol").read_bytes()
-    found = read_solution(tmp_path / "x.sol", of)
-    assert (found.unknown, found.status) == (0, "feasible")
-
-
 # the standalone checker
 
 
