@@ -210,6 +210,7 @@ def read_command(
     output: options.Output,
     *,
     tolerance: options.Tolerance = 1e-5,
+    pick: options.Pick = None,
     printing: options.PrintOptions,
 ) -> None:
     """Read a solver's solution file back as a cross field, and check it.
@@ -225,7 +226,7 @@ def read_command(
     with progress(quiet=printing.quiet) as show:
         show("reading the solution")
         problem, held = described_problem(manifest)
-        found = read_solution(solution, problem, held=held, tolerance=tolerance)
+        found = read_solution(solution, problem, held=held, tolerance=tolerance, solution=pick)
         if found.point is None:
             words = found.caveat and f"; claims {found.caveat}"
             raise InputError(

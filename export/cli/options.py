@@ -268,6 +268,16 @@ Tolerance = Annotated[
         " objective.",
     ),
 ]
+Pick = Annotated[
+    int | None,
+    typer.Option(
+        "--solution",
+        min=1,
+        metavar="K",
+        help="Number of the solution in a file with several; by default the one with the least objective, or"
+        " the first.",
+    ),
+]
 Curves = Annotated[
     int, typer.Option("--curves", min=1, metavar="N", help="Number of hidden curves, the longest first.")
 ]

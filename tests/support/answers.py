@@ -80,6 +80,11 @@ FILES = {
     f"{R}_qp_infeasible_res.lst": ("baron-res", INFEASIBLE),
     f"{R}_other_unbounded_res.lst": ("baron-res", UNBOUNDED),
     f"{R}_other_iterations_without_point_res.lst": ("baron-res", NOTHING),
+    "pulp-3.3.2_milp_optimal.json": ("json", GLOBAL),
+    "pulp-3.3.2_milp_infeasible.json": ("json", INFEASIBLE),
+    "pyomo-6.10.1_milp_optimal.json": ("json", LOCAL),
+    "python-3.11.7_milp_optimal.json": ("json", FEASIBLE),
+    "python-3.11.7_milp_optimal_nested.json": ("json", LOCAL),
     "miplib-by-layout_milp_optimal.sol": ("miplib", FEASIBLE),
     "miplib-by-layout_milp_infeasible.sol": ("miplib", INFEASIBLE),
 }

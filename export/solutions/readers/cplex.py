@@ -1,4 +1,4 @@
-"""Solution files of CPLEX, XML: one solution, or a pool whose first solution is the incumbent.
+"""Solution files of CPLEX, XML: one solution, or a pool, which begins with the incumbent.
 
     <CPLEXSolution version="1.2">          a pool has <CPLEXSolutions> around several of these
      <header objectiveValue="-14.4" writeLevel="1"
@@ -16,7 +16,9 @@ infeasible problem also has values, which are not a point. Without any solution 
 from __future__ import annotations
 
 import re
+import sys
 from array import array
+from dataclasses import dataclass, field
 from typing import Any, Final
 from xml.etree.ElementTree import ParseError
 
@@ -25,7 +27,7 @@ from defusedxml.ElementTree import DefusedXMLParser
 
 from ....models.errors import SolutionError
 from ..statuses import CPLEX, CPLEX_STOPPED, Status
-from .text import RawSolution, Reader, begins, named_pairs, number_of, one_line, without_point
+from .text import RawSolution, Reader, begins, named_pairs, number_of, one_line, pooled, without_point
 
 _OMITS_ZEROS: Final = "3"
 _INTEGERS_ONLY: Final = {"2", "4"}
@@ -33,33 +35,35 @@ _CHUNK: Final = 1 << 20
 
 
 def parse(data: bytes) -> RawSolution:
-    """Read a file; of a pool, the first solution, which the message then states.
+    """Read a file, with all solutions of a pool.
 
     Raises SolutionError, with the line, for XML that is damaged or has entities, and for values that are not
     numbers.
     """
-    first = _parsed(data)
-    if first.header is None:
+    return pooled([_solution(entry) for entry in _parsed(data)])
+
+
+def _solution(entry: _Entry) -> RawSolution:
+    if entry.header is None:
         raise SolutionError("the file has no header with a status; let CPLEX write it again")
-    status = _status(first.header)
-    words = first.header.get("solutionStatusString", "")
-    if first.solutions > 1:
-        name = first.header.get("solutionName", "without a name")
-        words += f"; {name}, the first of {first.solutions} solutions"
+    status = _status(entry.header)
+    words = entry.header.get("solutionStatusString", "")
+    if name := entry.header.get("solutionName"):
+        words += f"; {name}"
     if not status.promises_point:
         return without_point(status, words)
-    return _with_point(first, status, words)
+    return _with_point(entry, status, words)
 
 
-def _with_point(first: _FirstSolution, status: Status, words: str) -> RawSolution:
-    header = first.header or {}
+def _with_point(entry: _Entry, status: Status, words: str) -> RawSolution:
+    header = entry.header or {}
     level = header.get("writeLevel", "1")
     if level in _INTEGERS_ONLY:
         raise SolutionError(
             f"the file was written with writeLevel {level} and holds the integer columns only; "
             "use level 1 (AllVars)"
         )
-    names, values = named_pairs(first.names, first.values)
+    names, values = named_pairs(entry.names, entry.values)
     omits = level == _OMITS_ZEROS
     if not (omits or len(values)):
         raise SolutionError("the file holds no variables; let CPLEX write it again")
@@ -76,43 +80,48 @@ def _status(header: dict[str, str]) -> Status:
     return CPLEX.get(code, Status.ERROR)
 
 
-class _FirstSolution:
-    """Receives elements as they are parsed and keeps the first solution, so that no tree is built."""
+@dataclass
+class _Entry:
+    """One solution of a file."""
+
+    header: dict[str, str] | None = None
+    names: list[str] = field(default_factory=list)
+    values: array[float] = field(default_factory=lambda: array("d"))
+
+
+class _Entries:
+    """Receives elements as they are parsed and keeps headers and variables, so that no tree is built."""
 
     def __init__(self) -> None:
-        self.header: dict[str, str] | None = None
-        self.names: list[str] = []
-        self.values = array("d")
-        self.solutions = 0
+        self.solutions: list[_Entry] = []
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         """Process the start of an element."""
-        if tag == "variable":
-            if self.solutions == 1:
-                self._variable(attributes.get("name"), attributes.get("value", ""))
-        elif tag == "CPLEXSolution":
-            self.solutions += 1
-        elif tag == "header" and self.solutions == 1:
-            self.header = attributes
+        if tag == "CPLEXSolution":
+            self.solutions.append(_Entry())
+        elif tag == "variable" and self.solutions:
+            self._variable(attributes.get("name"), attributes.get("value", ""))
+        elif tag == "header" and self.solutions:
+            self.solutions[-1].header = attributes
 
     def _variable(self, name: str | None, text: str) -> None:
         value = number_of(text.encode(errors="replace"))
         if name is None or value is None:
             raise SolutionError("a variable has no name, or a value that is not a number")
-        self.names.append(name)
-        self.values.append(value)
+        self.solutions[-1].names.append(sys.intern(name))
+        self.solutions[-1].values.append(value)
 
-    def close(self) -> _FirstSolution:
-        """Return the first solution, at the end of the document."""
-        return self
+    def close(self) -> list[_Entry]:
+        """Return all solutions, at the end of the document."""
+        return self.solutions
 
 
-def _parsed(data: bytes) -> _FirstSolution:
-    parser: Any = DefusedXMLParser(target=_FirstSolution(), forbid_dtd=True)
+def _parsed(data: bytes) -> list[_Entry]:
+    parser: Any = DefusedXMLParser(target=_Entries(), forbid_dtd=True)
     try:
         for start in range(0, len(data), _CHUNK):
             parser.feed(data[start : start + _CHUNK])
-        first: _FirstSolution = parser.close()
+        solutions: list[_Entry] = parser.close()
     except ParseError as error:
         raise SolutionError(
             f"line {error.position[0]}: the XML is damaged or cut off; let CPLEX write the file again"
@@ -126,7 +135,7 @@ def _parsed(data: bytes) -> _FirstSolution:
     except SolutionError as error:
         line = parser.parser.CurrentLineNumber
         raise SolutionError(f"line {line}: {error}; let CPLEX write the file again") from error
-    return first
+    return solutions or [_Entry()]
 
 
 READERS: Final = (Reader("cplex", "CPLEX .sol (XML)", begins(rb"(?s)\s*(?=<[?!C]).*<CPLEXSolution"), parse),)

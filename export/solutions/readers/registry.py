@@ -16,29 +16,30 @@ from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
 from ...writing.stamps import digits_in_columns, digits_in_text
-from . import ampl, baron, cbc, cplex, gams, glpk, gurobi, highs, scip, xpress
-from .text import HEAD, RawSolution, Reader, with_unix_ends
+from . import ampl, baron, cbc, cplex, documents, gams, glpk, gurobi, highs, scip, xpress
+from .text import HEAD, RawSolution, Reader, choose, with_unix_ends
 
 _GZIP: Final = b"\x1f\x8b"
 _SMALLER: Final = "let the solver write it without columns at 0"
 
-_MODULES = (highs, gurobi, cplex, scip, xpress, cbc, glpk, gams, baron, ampl)
+_MODULES = (highs, documents, gurobi, cplex, scip, xpress, cbc, glpk, gams, baron, ampl)
 READERS: Final[tuple[Reader, ...]] = tuple(reader for module in _MODULES for reader in module.READERS)
 """The table of readers: the first that recognises a file reads it; no real file matches two."""
 
 
-def read_raw(path: str | Path) -> RawSolution:
+def read_raw(path: str | Path, solution: int | None = None) -> RawSolution:
     """Read a solution file; its content determines its kind, and gzip is unpacked.
 
-    Raises InputError when the file cannot be opened or has more than MAX_SOLUTION bytes, SolutionError when
-    it is empty, malformed or of an unknown kind.
+    solution: number of the solution in a file with several, by default the best. Raises InputError when the
+    file cannot be opened or has more than MAX_SOLUTION bytes, SolutionError when it is empty, malformed or of
+    an unknown kind.
     """
     data = read_bytes(path, MAX_SOLUTION, _SMALLER)
     with naming(path):
-        return parse_raw(_unpacked(data))
+        return parse_raw(_unpacked(data), solution)
 
 
-def parse_raw(data: bytes) -> RawSolution:
+def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
     """Read the content of a solution file, ignoring a byte order mark. Raises SolutionError."""
     data = _without_mark(data)
     if not data or data.isspace():
@@ -46,7 +47,7 @@ def parse_raw(data: bytes) -> RawSolution:
     head = with_unix_ends(data[:HEAD])
     for reader in READERS:
         if reader.recognises(head):
-            raw = reader.parse(with_unix_ends(data) if reader.text else data)
+            raw = choose(reader.parse(with_unix_ends(data) if reader.text else data), solution)
             return replace(raw, reader=reader.name, stamps=raw.stamps | _stamps(head, raw))
     known = "; ".join(reader.description for reader in READERS)
     raise SolutionError(f"this is not a solution file of a known kind; give one of these: {known}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import repeat
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -68,6 +68,8 @@ class RawSolution:
     of rows, whose values are left out.
     stamps: digits of the problem's stamp, or the first of them, wherever the solver repeated it. reader: name
     of the reader of the file.
+    rounded: how the program writes all digits, if it rounded them, or empty. pool: all solutions of a file
+    that holds several, in its order.
     """
 
     status: Status
@@ -82,11 +84,38 @@ class RawSolution:
     of_rows: Bytes | None = None
     stamps: frozenset[str] = frozenset()
     reader: str = ""
+    rounded: str = ""
+    pool: tuple[RawSolution, ...] = ()
 
     @property
     def has_point(self) -> bool:
         """Whether the file holds a point; a file without values is the point 0 if zeros are omitted."""
         return self.values.size > 0 or self.omits_zeros
+
+
+def pooled(solutions: Sequence[RawSolution]) -> RawSolution:
+    """The content of a file with one or more solutions; by default the first of them."""
+    first, *others = solutions
+    return replace(first, pool=(first, *others)) if others else first
+
+
+def choose(raw: RawSolution, number: int | None = None) -> RawSolution:
+    """The solution of a pool with a number from 1, by default the best; its message states which it is.
+
+    The best is that of least objective if each states one, else the first. Raises SolutionError for a
+    number that the file does not have.
+    """
+    pool = raw.pool or (raw,)
+    if number is None:
+        objectives = [np.inf if each.objective is None else each.objective for each in pool]
+        number = 1 + (int(np.argmin(objectives)) if np.isfinite(objectives).all() else 0)
+    if not 1 <= number <= len(pool):
+        raise SolutionError(f"there is no solution {number} in it; choose one of 1 to {len(pool)}")
+    if len(pool) == 1:
+        return raw
+    chosen = pool[number - 1]
+    place = f"solution {number} of {len(pool)}"
+    return replace(chosen, message=f"{chosen.message}; {place}" if chosen.message else place)
 
 
 def without_point(status: Status, message: bytes | str, *, rows: int | None = None) -> RawSolution:

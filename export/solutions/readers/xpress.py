@@ -1,6 +1,6 @@
 """Solution files of Xpress, .slx.
 
-    NAME          mip                          NAME .. ENDATA for each solution, the first is taken
+    NAME          mip                          NAME .. ENDATA for each solution
       C x                       10
     ENDATA                                     only ENDATA: there was no solution
 
@@ -23,6 +23,7 @@ from .text import (
     begins,
     fault,
     labelled_numbers,
+    pooled,
     without_point,
 )
 
@@ -32,23 +33,24 @@ _NO_COLUMN = re.compile(rb"\n(?!  C )")
 
 
 def parse_slx(data: bytes) -> RawSolution:
-    """Read an .slx; of several solutions, the first, which the message then states.
+    """Read an .slx with all its solutions.
 
     Raises SolutionError for words that are not numbers and for a file that is cut off.
     """
     if not data.rstrip().endswith(_END):
         raise SolutionError("the file is cut off: it has no line ENDATA; let Xpress write it again")
     cursor = Cursor(data if data.endswith(b"\n") else data + b"\n")
-    line = cursor.line("NAME")
-    if line == _END:
+    solutions = []
+    while cursor.data[cursor.position :].strip() and cursor.line("NAME") != _END:
+        start = cursor.position
+        cursor.position = stop = data.find(b"\n" + _END, start - 1) + 1
+        _check_kinds(data, start, stop)
+        names, values = labelled_numbers(data, start, stop, 3, label=1, numeric=(2,))
+        solutions.append(RawSolution(Status.FEASIBLE, "", None, names, values[:, 0]))
+        cursor.line("ENDATA")
+    if not solutions:
         return without_point(Status.NO_POINT, "the file holds no solution")
-    start = cursor.position
-    stop = data.find(b"\n" + _END, start - 1) + 1
-    _check_kinds(data, start, stop)
-    names, values = labelled_numbers(data, start, stop, 3, label=1, numeric=(2,))
-    solutions = data.count(b"\n" + _END)
-    words = f"the first of {solutions} solutions" if solutions > 1 else ""
-    return RawSolution(Status.FEASIBLE, words, None, names, values[:, 0])
+    return pooled(solutions)
 
 
 def _check_kinds(data: bytes, start: int, stop: int) -> None:

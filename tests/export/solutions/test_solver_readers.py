@@ -161,10 +161,10 @@ def test_the_incumbent_of_a_pool_is_read():
     assert values.values.tolist() == [first.get(name.decode(), 0) for name in names_of("milp")]
     assert values.unknown == 0
     raw = read_raw(TINY / f"{C}_milp_pool.sol")
-    assert raw.message == "populate solution limit exceeded; incumbent, the first of 3 solutions"
+    assert raw.message == "populate solution limit exceeded; incumbent; solution 1 of 3"
     assert (raw.values == read_raw(TINY / f"{C}_milp_optimal.sol").values).all()
     raw = read_raw(TINY / "xpress-by-layout_milp_two_solutions.slx")
-    assert raw.message == "the first of 2 solutions"
+    assert raw.message == "solution 1 of 2"
     assert (raw.values == read_raw(TINY / f"{X}_milp_optimal.slx").values).all()
 
 
