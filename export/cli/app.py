@@ -18,6 +18,7 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from . import options
 from .evaluate_command import evaluate_command
+from .help_texts import Group
 from .inputs import (
     SAVED,
     described_problem,
@@ -51,6 +52,7 @@ from .verify_command import verify_command
 
 app = typer.Typer(
     name="crossfield",
+    cls=Group,
     help="Example: crossfield run mouse -o out\n\nWrite a concept sketch as optimization problems for any"
     " solver, and turn a solver's answer into a cross field: two line directions at every pixel.",
     no_args_is_help=True,

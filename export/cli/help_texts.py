@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any, Final
 
 from rich.markup import escape
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 
 def _of(
@@ -106,6 +106,25 @@ def _panel(option: Any) -> str:
     return next((_PANEL_OF[name] for name in option.opts if name in _PANEL_OF), "Output")
 
 
+def _flag(option: Any) -> Any:
+    """The option; without a type in its help if it takes no value."""
+    if getattr(option, "is_flag", False):
+        option.metavar = ""
+    return option
+
+
+class Group(TyperGroup):
+    """Commands with common options."""
+
+    def __init__(self, *args: Any, **given: Any) -> None:
+        super().__init__(*args, **given)
+        self.params = [_flag(each) for each in self.params]
+
+    def get_help_option(self, ctx: Any) -> Any:
+        """The option --help."""
+        return _flag(super().get_help_option(ctx))
+
+
 class Command(TyperCommand):
     """Command whose help is filled from the tables when it is shown; brackets are printed as they are."""
 
@@ -113,6 +132,7 @@ class Command(TyperCommand):
         super().__init__(*args, **given)
         for option in (each for each in self.params if each.param_type_name == "option"):
             option.rich_help_panel = option.rich_help_panel or _panel(option)  # type: ignore[attr-defined]
+            _flag(option)
         order = ["", *PANELS]
         self.params.sort(key=lambda each: order.index(getattr(each, "rich_help_panel", None) or ""))
         if self.rich_markup_mode != "rich":  # brackets are no markup then, and a backslash would be printed
@@ -127,7 +147,7 @@ class Command(TyperCommand):
         option = super().get_help_option(ctx)
         if option is not None:
             option.rich_help_panel = _panel(option)
-        return option
+        return _flag(option)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Fill the help texts of the command and of its parameters, then show them."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from .help_texts import FACTS
+from .help_texts import FACTS, Group
 from .option_groups import command as command_of
 from .options import Folder, PrintOptions, Processes, Quiet, Seconds
 from .output import print_line, print_notice, progress, show_table
@@ -21,6 +21,7 @@ _SUMMARY: Final = (
 )
 
 library = typer.Typer(
+    cls=Group,
     help=f"Example: crossfield library build default -o library\n\n{_SUMMARY}",
     short_help=_SUMMARY,
     no_args_is_help=True,

@@ -139,3 +139,8 @@ def test_paths_that_pages_and_comments_name_are_there():
             if not (target.is_dir() or target.with_suffix(".py").exists()):
                 missing.append((place(path), dotted))
     assert missing == []
+
+
+def test_links_have_a_text():
+    """Sphinx fills an empty one with a title; other programs show nothing."""
+    assert [place(page) for page in PAGES if re.search(r"\[\]\(", without_code(text_of(page)))] == []

@@ -118,6 +118,11 @@ def test_brackets_in_a_help_are_shown(text, markup):
         assert "A [bold] word." in shown
 
 
+def test_a_flag_is_shown_without_a_value(text):
+    for command in (*NAMED, *OTHERS):
+        assert "bool" not in text(command).lower(), command
+
+
 def test_choices_are_those_of_the_models_and_of_the_formats(text):
     shown = words(text("export"))
     for table in (GAUGES, FACETS, FORMATS["nl"].dialects):
