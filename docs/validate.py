@@ -1,17 +1,20 @@
 """Make docs/validation.md, one instance through every route: `python docs/validate.py` (four minutes).
 
-Every row is a written file and the answer of a program, checked by `crossfield verify --solve`.
+Every row is a written file and the answer of a program, checked by `crossfield verify --solve`. Free licences
+end, so licensed.json keeps the last results of each program that needs one.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
 import time
 from argparse import ArgumentParser
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
@@ -26,10 +29,12 @@ from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from make import generated, markdown
 
 DOCS: Final = Path(__file__).resolve().parent
+RECORD: Final = DOCS / "licensed.json"
 SECONDS: Final = 15.0
 SHAPE: Final = (2, 4)
 STROKES: Final = 4
 SEED: Final = 1
+ROUTES: Final = ("formulation", "solver", "file", "objective", "bound", "s", "result")
 VARIANTS: Final = ("milp-mccormick", "miqp-mccormick")
 """The formulations that have both options, gauge and facet."""
 
@@ -109,7 +114,7 @@ def routes(main: Run) -> list[str]:
         parts += [
             f"## `{problem.name}`",
             proven,
-            markdown(("solver", "file", "objective", "bound", "s", "result"), [route(f) for f in found]),
+            markdown(ROUTES[1:], [route(f) for f in found]),
         ]
     return parts
 
@@ -135,7 +140,7 @@ def in_short(main: Run, runs: list[Run]) -> str:
     proven = [name for name in FORMULATIONS if main.proven(name)]
     counts = [len(main.proven(name)) for name in proven]
     return (
-        f"{len(PROGRAMS)} programs read {found.count(Verdict.AGREES)} files correctly and "
+        f"{len(main.result.versions)} programs read {found.count(Verdict.AGREES)} files correctly and "
         f"{found.count(Verdict.DIFFERS) + found.count(Verdict.FAILED)} wrongly. "
         f"{len(proven)} of the {len(FORMULATIONS)} formulations are proven optimal, "
         f"each by {min(counts)} to {max(counts)} routes. "
@@ -164,13 +169,60 @@ def readings(runs: list[Run]) -> str:
         found = [f.verdict for f in checks]
         counts = [found.count(verdict) for verdict in (Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED)]
         counts.append(found.count(Verdict.DIFFERS) + found.count(Verdict.FAILED))
-        version = runs[0].result.versions.get(name, entry.missing)
+        version = runs[0].result.versions.get(name, "absent")
         by = ["coefficients"] * bool(entry.algebra) + ["values"] * bool(entry.behaviour)
         rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(by), *map(str, counts)])
     return markdown(
         ("program", "version", "reads", "compared by", "agree", "refused, as stated", "not tried", "differ"),
         rows,
     )
+
+
+def update_record(runs: list[Run]) -> dict[str, dict[str, Any]]:
+    """Store the results of programs that need a licence, and return the last ones of each."""
+    kept: dict[str, dict[str, Any]] = json.loads(RECORD.read_text())
+    main = runs[0]
+    for name, entry in PROGRAMS.items():
+        if entry.free and name in main.result.versions:
+            checks = [check for each in runs for check in each.result.checks if check.program == name]
+            read = [check.verdict for check in checks if check.step == "read"]
+            kept[name] = {
+                "version": main.result.versions[name],
+                "date": datetime.now(UTC).date().isoformat(),
+                "files": [read.count(Verdict.AGREES), *map(read.count, (Verdict.DIFFERS, Verdict.FAILED))],
+                "routes": [
+                    [f"`{problem.name}`", *route(check)]
+                    for problem in smallest_problems()
+                    for check in main.solves(problem.name)
+                    if check.program in entry.solvers and check.verdict != Verdict.NOT_TRIED
+                    if takes(problem, check.program).answer == "yes"
+                ],
+            }
+    RECORD.write_text(json.dumps(kept, indent=1) + "\n")
+    return kept
+
+
+def licences(kept: dict[str, dict[str, Any]], present: dict[str, str]) -> list[str]:
+    """The table of the last runs with a licence, and the results of programs that are absent now."""
+    rows = []
+    for name, last in kept.items():
+        titles = [PROGRAMS[name].title, *(SOLVERS[solver].title for solver in PROGRAMS[name].solvers)]
+        rows.append(
+            [", ".join(dict.fromkeys(titles)), last["version"], last["date"], *map(str, last["files"])]
+        )
+    absent = [line for name, last in kept.items() if name not in present for line in last["routes"]]
+    title = "Results of that run, for programs that are left out above:"
+    return [
+        (
+            "The free licences of these programs end, except that of CPLEX. "
+            "A program that does not accept its licence is left out above. "
+            "The tests also solve `.bar` files of up to 10 columns with BARON, which needs no licence for them."
+        ),
+        markdown(
+            ("program", "version", "last run with a licence", "files that agree", "differ", "failed"), rows
+        ),
+        *([title, markdown(ROUTES, absent)] if absent else []),
+    ]
 
 
 def capabilities() -> list[str]:
@@ -214,6 +266,8 @@ def main() -> None:
 `crossfield verify DIR --solve` makes the same checks for any folder, and writes `verify.json` there.""",
         "## Reading",
         readings(runs),
+        "## Licences",
+        *licences(update_record(runs), main_run.result.versions),
         "## The same problem in several formulations",
         same_problem(main_run),
         *routes(main_run),

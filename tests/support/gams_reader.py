@@ -296,7 +296,7 @@ class _Reader:
             raise WrongTextError(f"{uses[0]} does not define the objective variable alone")
         self.model.unstated -= {f"{objective}.lo", f"{objective}.up"}
         self.model.objective, self.model.type = right, kind.lower()
-        degree, discrete = TYPES[self.model.type]
+        degree, discrete = TYPES.get(self.model.type, (-1, False))
         if self.model.degree > degree or (self.model.is_discrete and not discrete):
             raise WrongTextError(f"the model is not of the type {kind}")
         self.model.start = goal.level

@@ -115,6 +115,13 @@ def test_text_of_odd_instances(name: str, instance: Instance, tmp_path: Path):
     assert_text(make_problem(name, instance), tmp_path, field)
 
 
+@for_each("count", (11, 12, 13, 14, 24, 25))
+def test_lists_of_names_that_fill_a_line(count: int, tmp_path: Path):
+    """12 names of alpha and 13 of beta fill a line."""
+    instance = Instance("line", np.ones((1, count), bool), [[0, 0]], [0.3], [0.5])
+    assert_text(make_problem("miqp-mccormick", instance), tmp_path)
+
+
 @pytest.mark.slow
 @for_each("start", STARTS)
 @for_each("change", CHANGES)
@@ -132,6 +139,14 @@ def test_text_with_everything(
 @for_each("label", CASES)
 def test_text_of_other_shapes(label: str, tmp_path: Path):
     assert_text(problem_of(label), tmp_path)
+
+
+def test_options_of_gams_ask_for_an_optimum_and_a_short_listing(tmp_path: Path):
+    write(make_problem("milp-mccormick", corner()), tmp_path / "model.gms")
+    options = gams_reader.read((tmp_path / "model.gms").read_text("ascii")).options
+    gaps = {name: float(options.pop(name)) for name in ("optca", "optcr")}
+    assert gaps == {"optca": 0.0, "optcr": 1e-6}
+    assert options == {"limrow": "0", "limcol": "0", "solprint": "off", "sysout": "off"}
 
 
 def test_results_of_gams_are_columns_in_order(tmp_path: Path):
@@ -228,6 +243,7 @@ Model m / all /; solve m using {type} minimizing y;
         ("x*n", "mip", "not of the type"),
         ("sqr(x)*n", "miqcp", "not of the type"),
         ("sqr(x)", "nlp", "not of the type"),
+        ("x", "rmip", "not of the type"),
         ("2 x", "minlp", "line 3"),
         ("2*-x", "minlp", "line 3"),
         ("x + - n", "minlp", "line 3"),
