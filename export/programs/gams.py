@@ -28,6 +28,8 @@ _OPTIONS: Final = {
     "baron": "AbsConFeasTol 1e-9\nAbsIntFeasTol 1e-9\n",
 }
 """Option files of the solvers in GAMS: tight tolerances."""
+_GAP: Final = {"cplex": "epgap", "baron": "EpsR"}
+"""The option of each solver that replaces the relative gap of the model, which the command line does not."""
 _TABLE: Final = "gmscmpNT.txt" if os.name == "nt" else "gmscmpun.txt"
 
 
@@ -64,12 +66,17 @@ def _link(source: str | Path, target: str | Path) -> None:
         shutil.copy2(source, target)
 
 
-def _run(path: Path, solver: str, *options: str) -> str:
+def option_file(solver: str, gap: float | None = None) -> str:
+    """Return the content of the option file of a solver in GAMS. gap: None for the gap in the model."""
+    stated = "" if gap is None else f"{_GAP[solver]} {gap:g}\n"
+    return f"{_OPTIONS[solver]}{stated}"
+
+
+def _run(path: Path, solver: str, *options: str, gap: float | None = None) -> str:
     """Log and listing of a run. Raises TooLargeError, and RefusedError when GAMS reports an error."""
     kinds = _LINEAR_AND_QUADRATIC if solver == "cplex" else _LINEAR_AND_QUADRATIC + _NONLINEAR
     chosen = [f"{kind}={solver}" for kind in kinds]
-    for name, lines in _OPTIONS.items():
-        Path(f"{name}.opt").write_text(lines, "ascii", newline="\n")
+    Path(f"{solver}.opt").write_text(option_file(solver, gap), "ascii", newline="\n")
     command = [
         str(_system(solver) / "gams"),
         str(path),
@@ -118,14 +125,11 @@ _NORMAL: Final = 1
 
 
 def solve(job: Job) -> Outcome:
-    """Solve the file with one of GAMS's solvers; the solution is the CSV that our models write.
-
-    The model itself contains the gap.
-    """
+    """Solve the file with one of GAMS's solvers; the solution is the CSV that our models write."""
     solver = job.solver.removeprefix("gams-")
     threads = (f"threads={job.threads}",) if job.threads else ()
     with complete(job.solution) as part:
-        log = _run(job.model, solver, f"reslim={job.seconds:g}", *threads, f"--RESULTS={part}")
+        log = _run(job.model, solver, f"reslim={job.seconds:g}", *threads, f"--RESULTS={part}", gap=job.gap)
     model, state = (
         int(found[1]) if (found := re.search(rf"\*\*\*\* {kind} STATUS +(\d+)", log)) else 0
         for kind in ("MODEL", "SOLVER")
