@@ -27,8 +27,8 @@ from ...models.errors import (
     UnsupportedByFormatError,
 )
 from ...models.field.field import CrossField
-from ...models.formulations.catalogue import FORMULATIONS, declaration_of
-from ...models.formulations.declaration import Declaration, Options
+from ...models.formulations.catalogue import FORMULATIONS, declaration_of, declare
+from ...models.formulations.declaration import Declaration, Formulation, Options
 from ...models.formulations.problem import Problem, formulate, lifted, tightened
 from ...models.formulations.windows import Windows
 from ...models.instance.file import read_document, read_instance, write_instance
@@ -37,7 +37,7 @@ from ...models.instance.instance import Instance
 from ...models.processes.deadline import Progress, silent
 from ...models.processes.side_by_side import checked
 from ...models.storage import make_folder, write_bytes
-from ..formats.registry import DEFAULTS, FORMATS, Written, generator, write
+from ..formats.registry import DEFAULTS, FORMATS, Written, carried, generator, write
 from ..solvers_table import smallest, takers
 from ..writing.canonical import Canonical
 from .starts import write_starts
@@ -174,6 +174,8 @@ def write_problem(
 
     Raises
     ------
+    UnsupportedByFormatError
+        If no file can be written because the formats hold none of the problems.
     InputError
         For an unknown format, and for a problem that no manifest records: with columns fixed one by one, or
         with products lifted beforehand.
@@ -184,6 +186,8 @@ def write_problem(
     if not is_recordable(problem):
         what = f"{problem.name} with columns fixed or products lifted"
         raise InputError(f"a manifest cannot record {what}; write it as a single file")
+    formats = tuple(formats)
+    _check_formats(formats, dialects or {}, [problem.formulation])
     return _write_sets([problem], folder, formats, start, dialects or {}, compress=compress, jobs=jobs)[0]
 
 
@@ -238,6 +242,8 @@ def write_all(
 
     Raises
     ------
+    UnsupportedByFormatError
+        If no file can be written because the formats hold none of the problems.
     InputError
         For an unknown format.
     FormulationError
@@ -251,22 +257,46 @@ def write_all(
     options = options or {}
     declarations = [declaration_of(name) for name in formulations]
 
-    def formulated(declaration: Declaration) -> Problem:
+    def chosen(declaration: Declaration) -> dict[str, Any]:
         unfit = {*Options.__dataclass_fields__} - declaration.settable
-        chosen = {key: value for key, value in options.items() if key not in unfit}
-        jumps = fixed_jumps(instance, declaration.name, jumps_of or start)
-        return _narrowed(formulate(instance, declaration.name, p=jumps, **chosen), windows)
+        return {key: value for key, value in options.items() if key not in unfit}
 
+    def formulated(declaration: Declaration) -> Problem:
+        jumps = fixed_jumps(instance, declaration.name, jumps_of or start)
+        return _narrowed(formulate(instance, declaration.name, p=jumps, **chosen(declaration)), windows)
+
+    formats = tuple(formats)
+    _check_formats(formats, dialects or {}, [declare(each.name, **chosen(each)) for each in declarations])
     problems = (formulated(declaration) for declaration in declarations)
     return _write_sets(
         problems, folder, formats, start, dialects or {}, compress=compress, jobs=jobs, progress=progress
     )
 
 
+def _check_formats(
+    formats: tuple[str, ...], dialects: dict[str, str], formulations: list[Formulation]
+) -> None:
+    """Check the names of formats, and that one of them holds one of the formulations."""
+    for name in (*formats, *dialects):
+        if name not in FORMATS:
+            raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
+    reasons = []
+    for problem in map(smallest, formulations):
+        for name in formats:
+            try:
+                carried(problem, FORMATS[name])
+            except UnsupportedByFormatError as error:
+                reasons.append(str(error))
+            else:
+                return
+    if reasons:
+        raise UnsupportedByFormatError(f"nothing can be written: {', and '.join(reasons)}")
+
+
 def _write_sets(
     problems: Iterable[Problem],
     folder: str | Path,
-    formats: Iterable[str],
+    formats: tuple[str, ...],
     start: CrossField | None,
     dialects: dict[str, str],
     *,
@@ -279,10 +309,7 @@ def _write_sets(
     After a failure or Ctrl-C no further file is started. Files in progress are finished, so that every
     existing file is complete.
     """
-    folder, formats = Path(folder), tuple(formats)
-    for name in formats:
-        if name not in FORMATS:
-            raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
+    folder = Path(folder)
     with ThreadPoolExecutor(checked(jobs)) as pool:
         make_folder(folder)
 
@@ -291,7 +318,13 @@ def _write_sets(
             stem = folder / _stem(problem)
             paths = {name: f"{stem}{FORMATS[name].suffix}{'.gz' if compress else ''}" for name in formats}
             return {
-                name: pool.submit(write, problem, path, dialect=dialects.get(name), start=start)
+                name: pool.submit(
+                    write,
+                    problem,
+                    path,
+                    dialect=dialects.get(name),
+                    start=start if FORMATS[name].starts else None,
+                )
                 for name, path in paths.items()
             }
 

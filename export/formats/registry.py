@@ -197,7 +197,8 @@ def write(
     dialect
         `text` or `binary` for .nl.
     start
-        A field whose point becomes the starting point, in formats that have a place for one.
+        A field whose point becomes the starting point. Only for formats that have a place for one: nl, gms,
+        qplib and bar.
 
     Returns
     -------
@@ -207,7 +208,7 @@ def write(
     Raises
     ------
     UnsupportedByFormatError
-        If the format cannot carry the problem.
+        If the format cannot carry the problem, or has no place for the start.
     InputError
         For an unknown suffix or dialect.
     ConsistencyError
@@ -220,11 +221,19 @@ def write(
     entry = format_of(path)
     chosen = entry.dialects[0] if dialect is None else dialect
     if chosen not in entry.dialects:
-        known = ", ".join(filter(None, entry.dialects)) or "none"
-        raise InputError(f"{entry.name} has no dialect {chosen!r}; choose one of {known}")
+        known = ", ".join(filter(None, entry.dialects))
+        remedy = f"choose one of {known}" if known else "it has one form, so leave the dialect out"
+        raise InputError(f"there is no dialect {chosen!r} of {entry.name}; {remedy}", file=path)
+    if start is not None and not entry.starts:
+        holders = ", ".join(name for name, each in FORMATS.items() if each.starts)
+        raise UnsupportedByFormatError(
+            f"{entry.name} has no place for a start; choose a format that has one ({holders}), or call "
+            "write_problem, which writes a start file for each solver",
+            file=path,
+        )
     held = carried(problem, entry)
     form = Canonical(held)
-    point = held.point(start) if start is not None and entry.starts else None
+    point = None if start is None else held.point(start)
     written = Written(entry.name, chosen, held)
     lines = header(held)
     files = [(path, entry.generate(form, lines, point, chosen)), *_companions(path, entry.name, form, lines)]

@@ -237,7 +237,7 @@ class Solvers:
             taking = format_for(problem, solver)
             stem = f"{problem.instance.name}.{problem.name}"
             files = Files.for_model(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
-            written = write(problem, files.model, start=start)
+            written = write(problem, files.model, start=start if FORMATS[taking.format].starts else None)
             if folder is not None and is_recordable(problem):
                 write_manifest(problem, written, place)
             # Reading the answer takes about as long as writing the problem did.

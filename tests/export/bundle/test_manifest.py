@@ -14,7 +14,7 @@ import pytest
 from cases import make_field, make_instance, make_problem
 from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
 from crossfield.export.bundle.starts import STARTS
-from crossfield.export.formats.registry import format_of, write
+from crossfield.export.formats.registry import FORMATS, format_of, write
 from crossfield.models.errors import (
     FormulationError,
     InputError,
@@ -286,10 +286,16 @@ def test_unknown_formats_dialects_and_folders(tmp_path):
         write_problem(problem, tmp_path, formats=["ps"])
     with pytest.raises(InputError, match=r"model\.ps: no format has the suffix 'ps'"):
         write(problem, tmp_path / "model.ps")
-    with pytest.raises(InputError, match="nl has no dialect 'indexed'; choose one of text, binary"):
+    with pytest.raises(
+        InputError, match=r"model\.nl: there is no dialect 'indexed' of nl; choose one of text, b"
+    ):
         write(problem, tmp_path / "model.nl", dialect="indexed")
-    with pytest.raises(InputError, match="lp has no dialect 'text'; choose one of none"):
+    with pytest.raises(
+        InputError, match="no dialect 'text' of lp; it has one form, so leave the dialect out"
+    ):
         write(problem, tmp_path / "model.lp", dialect="text")
+    with pytest.raises(InputError, match="no format 'nk'; choose one of nl, gms, lp, mps"):
+        write_problem(problem, tmp_path, dialects={"nk": "binary"})
     with pytest.raises(OutputError, match="cannot be written"):
         write(problem, tmp_path / "absent" / "model.lp")
     assert list(tmp_path.iterdir()) == []
@@ -299,6 +305,36 @@ def test_unknown_formats_dialects_and_folders(tmp_path):
     assert format_of("a.b.mps.gz").name == "mps"
     with pytest.raises(InputError, match=r"MODEL\.PS\.GZ: no format has the suffix 'PS'"):
         format_of("MODEL.PS.GZ")
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_start_is_in_the_file_or_refused(tmp_path, name):
+    """It is never dropped; the message names the formats that hold one."""
+    problem, path = make_problem("milp-mccormick", make_instance()), tmp_path / f"model.{name}"
+    field = make_field(problem.instance)
+    if FORMATS[name].starts:
+        write(problem, tmp_path / f"without.{name}")
+        write(problem, path, start=field)
+        assert path.stat().st_size > (tmp_path / f"without.{name}").stat().st_size
+        return
+    with pytest.raises(
+        UnsupportedByFormatError, match=rf"model\.{name}: .* \(nl, gms, qplib, bar\).*write_problem"
+    ):
+        write(problem, path, start=field)
+    assert list(tmp_path.iterdir()) == []
+    manifest = write_problem(problem, tmp_path, formats=[name], start=field)
+    assert manifest.document["refused"] == {}
+    assert list(tmp_path.glob("*.gurobi.mst"))
+
+
+def test_formats_that_hold_nothing_of_what_was_asked_are_refused_before_a_file(tmp_path):
+    instance = make_instance()
+    for formats in (["mps"], ["lp", "qplib"]):
+        with pytest.raises(UnsupportedByFormatError, match="minlp-parity; write minlp-quartic"):
+            write_all(instance, tmp_path, formulations=["minlp-parity"], formats=formats)
+        with pytest.raises(UnsupportedByFormatError, match="minlp-parity; write minlp-quartic"):
+            write_problem(make_problem("minlp-parity", instance), tmp_path, formats=formats)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", ["A.LP", "A.Nl.GZ", "A.MOD.Gz"])

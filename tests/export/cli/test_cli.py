@@ -430,3 +430,14 @@ def test_a_method_and_a_formulation_exclude_each_other(tmp_path, instance_file, 
     assert invoke(["solve", str(instance_file), *options, "-o", str(tmp_path / "out")]) == 2
     assert "method" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_an_export_of_which_nothing_can_be_written_is_an_error_with_the_remedy(tmp_path, capfd):
+    command = ["export", "skew", "--size", "3", "-f", "parity", "-F", "mps", "-o", str(tmp_path / "out")]
+    assert invoke(command) == 1
+    assert "cannot carry minlp-parity; write minlp-quartic" in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert invoke([*command, "-f", "milp"]) == 0
+    assert "not written: mps holds nothing beyond quadratic and cannot carry minlp-parity" in (
+        capfd.readouterr().out
+    )
