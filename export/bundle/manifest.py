@@ -9,6 +9,7 @@ Names come only from the instance and the formulation, so that a later export re
 
 from __future__ import annotations
 
+import gc
 import json
 from collections import deque
 from collections.abc import Iterable
@@ -306,6 +307,7 @@ def _write_sets(
 ) -> list[Manifest]:
     """Write problems by several threads, for NumPy, zlib and hashlib run in parallel; return the manifests.
 
+    Memory holds one problem more than there are jobs: the next one is computed while the others are written.
     After a failure or Ctrl-C no further file is started. Files in progress are finished, so that every
     existing file is complete.
     """
@@ -328,13 +330,26 @@ def _write_sets(
                 for name, path in paths.items()
             }
 
+        def finish() -> None:
+            """Finish the oldest problem and release it."""
+            problem, files = waiting.popleft()
+            progress(problem.name)
+            manifests.append(_finished(problem, files, folder, start))
+            large = problem.instance.grid.size > LARGE
+            del problem, files
+            if large:  # it is in a cycle with its families, and the collector counts objects, not their bytes
+                gc.collect()
+
+        waiting: deque[tuple[Problem, dict[str, Future[Written]]]] = deque()
+        manifests: list[Manifest] = []
         try:
-            waiting = deque((problem, begin(problem)) for problem in problems)
-            manifests = []
+            for problem in problems:
+                waiting.append((problem, begin(problem)))
+                del problem
+                while len(waiting) > jobs:
+                    finish()
             while waiting:
-                problem, files = waiting.popleft()
-                progress(problem.name)
-                manifests.append(_finished(problem, files, folder, start))
+                finish()
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
