@@ -391,7 +391,7 @@ class Problem:
 
         Manifests hold this hash; the stamp is short enough for names.
         """
-        return f"sha256_{self._digest('')[:STAMP_DIGITS]}"
+        return stamp_of(self._digest(""))
 
     def _digest(self, lifting: str) -> str:
         text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {lifting}"
@@ -418,6 +418,11 @@ def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
     slots = (SLOTS[variable.over][symbol] for symbol in symbols)
     arguments = (sources[quantity][way(problem.instance, kind)] for quantity, kind in slots)
     return np.asarray(numeric(symbols, variable.value)(*arguments), dtype=np.float64)
+
+
+def stamp_of(sha256: str) -> str:
+    """Return the stamp of the problem with that hash: short enough for names in files."""
+    return f"sha256_{sha256[:STAMP_DIGITS]}"
 
 
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:

@@ -23,7 +23,7 @@ from ....models.errors import (
 from ....models.field.field import CrossField, Norm
 from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
-from ....models.formulations.problem import Problem, Violation
+from ....models.formulations.problem import Problem, Violation, stamp_of
 from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
@@ -194,11 +194,8 @@ class _Session:
             if not raw.has_point:
                 raise SolutionError(f"holds no point ({raw.status})", file=source.path)
             stamps = set(raw.stamps) or stamps
-        stamped = {
-            each["name"]
-            for each in self.library.entries
-            if stamps and is_stated(self._problem(each).stamp, stamps)
-        }
+        entries = self.library.entries if stamps else ()
+        stamped = {each["name"] for each in entries if is_stated(stamp_of(each["problem_sha256"]), stamps)}
         for found in (stamped, self._named_in(log), {self._by_file_name(path)}):
             if len(found) == 1 and any(found):
                 return found.pop()

@@ -22,6 +22,7 @@ from crossfield.export.library.documents.documents import problem_of, read_sidec
 from crossfield.export.library.ledger.given import read_points
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.library.ledger.points import complete_point
+from crossfield.export.solutions.solution import read_solution
 from crossfield.export.verify.comparison import names_of
 from crossfield.models.errors import CrossfieldError, InputError, InstanceError, SolutionError
 from crossfield.models.field.file import write_field
@@ -521,3 +522,17 @@ def test_submissions_at_one_moment_are_all_kept(lib, sent):
     assert sorted(each.entry for each in records if each.log) == [MILP, f"{OTHER}_milp"]
     assert verify_library(lib) == []
     assert not (lib / ".lock").exists()
+
+
+def test_a_stamp_names_the_entry_without_reading_other_instances(lib, tmp_path):
+    """The sidecars have the stamps; the damage of another instance is none of this entry's business."""
+    sidecar = read_sidecar(lib / f"{MILP}.json")
+    problem = problem_of(lib, sidecar)
+    point = read_solution(lib / sidecar["best"]["point"], problem).point
+    names = problem.to_arrays().column_names
+    lines = [f"{name} {value!r}\n" for name, value in zip(names, point.tolist(), strict=True)]
+    answer = tmp_path / "mine.sol"
+    answer.write_text(f"# Solution for model obj_{problem.stamp}\n{''.join(lines)}")
+    (lib / f"{OTHER}.instance.json").unlink()
+    result = submit_one(lib, answer)
+    assert (result.outcome, result.entries) == ("not better", (MILP,))
