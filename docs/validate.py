@@ -216,7 +216,8 @@ def licences(kept: dict[str, dict[str, Any]], present: dict[str, str]) -> list[s
         (
             "The free licences of these programs end, except that of CPLEX. "
             "A program that does not accept its licence is left out above. "
-            "The tests also solve `.bar` files of up to 10 columns with BARON, which needs no licence for them."
+            "The tests also solve `.bar` files of up to 10 columns with BARON, "
+            "which needs no licence for them."
         ),
         markdown(
             ("program", "version", "last run with a licence", "files that agree", "differ", "failed"), rows
