@@ -42,6 +42,9 @@ TOLERANCE: Final = TRUSTED
 AGREEMENT: Final = 1e-5
 """Largest difference of two objectives that agree, relative to their size, or 1."""
 
+OPTIMAL: Final = 1.01e-4, 1e-6
+"""Largest relative and absolute gap of an optimum: the defaults of solvers."""
+
 ROUNDED: Final = 1e-3
 """Largest violation that a file of few digits explains: listings have four decimals."""
 
@@ -199,12 +202,23 @@ class Solution:
 
     @property
     def status(self) -> Status:
-        """The claim if it is kept; otherwise FEASIBLE for a feasible point, NO_POINT or ERROR, or UNKNOWN."""
+        """The claim if it is kept; otherwise FEASIBLE for a feasible point, NO_POINT or ERROR, or UNKNOWN.
+
+        An optimum far above its own dual bound is the best point at a limit, the gap that the user allowed.
+        """
         if self.keeps_claims or self.claimed in {Status.NO_POINT, Status.ERROR}:
-            return self.claimed
+            return Status.LIMIT_WITH_POINT if self._leaves_gap else self.claimed
         if self.claimed is Status.LIMIT_WITHOUT_POINT:
             return Status.NO_POINT
         return Status.FEASIBLE if self.claimed.promises_point and not self.contradictions else Status.UNKNOWN
+
+    @property
+    def _leaves_gap(self) -> bool:
+        """Whether the file calls a point optimal that is far above its own dual bound."""
+        if self.claimed is not Status.OPTIMAL_GLOBAL or self.objective is None or self.bound is None:
+            return False
+        relative, absolute = OPTIMAL
+        return self.objective - self.bound > max(absolute, relative * abs(self.objective))
 
     @property
     def bound(self) -> float | None:
@@ -237,6 +251,8 @@ class Solution:
     @property
     def caveat(self) -> str:
         """Why claims of the file are not kept although its point can be used; empty if all are kept."""
+        if self._leaves_gap:
+            return f"its dual bound {self.bound:.6g} leaves a gap, so it is not optimal within 1e-4"
         if self.keeps_claims or self.contradictions:
             return ""
         if not self.identified:

@@ -144,8 +144,12 @@ def test_claims_fall_to_objective_bound_and_violation(milp):
         return Solution(problem, at, claimed, "", "by hand", **facts)
 
     assert of(reported=objective, claimed_bound=objective).status == "optimal-global"
-    near = of(reported=objective * (1 + 0.5 * AGREEMENT), claimed_bound=objective - 1)
-    assert (near.status, near.bound, near.caveat) == ("optimal-global", objective - 1, "")
+    near = of(reported=objective * (1 + 0.5 * AGREEMENT), claimed_bound=objective * (1 - 1e-4))
+    assert (near.status, near.bound, near.caveat) == ("optimal-global", objective * (1 - 1e-4), "")
+    stopped = of(reported=objective, claimed_bound=0.6 * objective)
+    assert (stopped.status, stopped.bound) == ("limit-with-point", 0.6 * objective)
+    assert stopped.gap == pytest.approx(0.4)
+    assert "leaves a gap" in stopped.caveat
     (why,) = of(reported=objective + 0.01).contradictions
     assert why.startswith("it states the objective")
     contradicted = of(claimed_bound=objective + 0.01)
