@@ -264,6 +264,17 @@ class Solution:
         """The objective at the point, recomputed."""
         return None if self.point is None else self.problem.objective_value(self.point)
 
+    @cached_property
+    def objective_of_field(self) -> float | None:
+        """The objective of the field itself, with exact products and every slack at its least.
+
+        A point that breaks rows within the solver's tolerance may have an objective below every field's. None
+        without a point, and for a problem whose points are no fields: a relaxation, or the printed facet.
+        """
+        if self.point is None or not self.problem.formulation.holds_only_fields:
+            return None
+        return self.problem.objective_value(self.problem.point(self.field))
+
     @property
     def gap(self) -> float | None:
         """Relative distance of the dual bound below the objective; None without either."""

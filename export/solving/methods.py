@@ -124,6 +124,7 @@ def solution_facts(solution: Solution) -> dict[str, Any]:
         "message": solution.message,
         "objective_reported": solution.reported,
         "objective_recomputed": solution.objective,
+        "objective_of_field": solution.objective_of_field,
         "dual_bound": solution.bound,
         "gap": solution.gap,
         "start_returned": solution.start_returned,

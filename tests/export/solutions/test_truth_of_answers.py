@@ -120,6 +120,7 @@ def test_glpk_answers_relaxations_and_models_in_its_own_order(skew, reading, tmp
     assert (facts["status"], facts["claimed"]) == ("feasible", "optimal-global")
     assert facts["claims"].endswith("the file is of an unidentified problem")
     assert facts["worst_violation"] < 1e-9
+    assert facts["objective_of_field"] == pytest.approx(facts["objective_recomputed"], abs=1e-8)
     assert facts["objective_recomputed"] == pytest.approx(facts["objective_reported"], abs=1e-9)
 
 
@@ -174,6 +175,21 @@ def test_claims_fall_to_objective_bound_and_violation(milp):
     assert of(Status.INFEASIBLE, at=None, identified=False).status == "unknown"
     assert of(Status.LIMIT_WITHOUT_POINT, at=None, identified=False).status == "no-point"
     assert of(Status.ERROR).status == "error"
+
+
+def test_a_point_that_breaks_rows_a_little_has_the_objective_of_its_field_beside(milp):
+    """Slacks lowered by a solver's tolerance save an objective that no field has."""
+    problem, point = milp
+    index, cost = problem.merged_objective(1)
+    lowered = point.copy()
+    lowered[index[cost > 0, 0]] -= 1e-6
+    answer = Solution(problem, lowered, Status.OPTIMAL_GLOBAL, "", "by hand", identified=True)
+    assert answer.status == "optimal-global"
+    assert answer.objective < problem.objective_value(point) - 1e-5
+    assert answer.objective_of_field == pytest.approx(problem.objective_value(point), rel=1e-12)
+    printed = formulate(problem.instance, MILP, facet="printed")
+    answer = Solution(printed, printed.point(answer.field), Status.FEASIBLE, "", "by hand", identified=True)
+    assert answer.objective_of_field is None
 
 
 def test_a_bound_of_gurobi_above_the_objective_contradicts_it(tmp_path):
