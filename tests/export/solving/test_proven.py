@@ -55,6 +55,7 @@ def test_what_proofs_call_is_compiled_once_and_before_the_time_limit_begins(tmp_
     # The clock passes the time limit while the functions are compiled, and stands still otherwise.
     program = """
 import crossfield as cf
+from crossfield.models.processes.deadline import Deadline
 
 lines = []
 deadline = Deadline(500.0, lambda: 1000.0 * any("compiling" in line for line in lines))
