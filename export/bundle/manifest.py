@@ -20,6 +20,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...models.arguments import checked_arguments
 from ...models.errors import (
     CrossfieldError,
     FormulationError,
@@ -119,6 +120,7 @@ class Manifest:
         return jumps
 
 
+@checked_arguments
 def read_manifest(path: str | Path) -> Manifest:
     """Read a manifest, with which `read_solution` reads answers back.
 
@@ -145,6 +147,7 @@ def read_manifest(path: str | Path) -> Manifest:
     return Manifest(document, Path(path))
 
 
+@checked_arguments
 def write_problem(
     problem: Problem,
     folder: str | Path,
@@ -192,6 +195,7 @@ def write_problem(
     return _write_sets([problem], folder, formats, start, dialects or {}, compress=compress, jobs=jobs)[0]
 
 
+@checked_arguments
 def write_all(
     instance: Instance,
     folder: str | Path,

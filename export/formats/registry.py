@@ -15,6 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
 
+from ...models.arguments import checked_arguments
 from ...models.errors import ConsistencyError, InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.families import ANY_DEGREE
@@ -180,6 +181,7 @@ def header(problem: Problem) -> list[str]:
     return lines + [f"{how}: {text}" for how, text in changes.items() if text]
 
 
+@checked_arguments
 def write(
     problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
 ) -> Written:

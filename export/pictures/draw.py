@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...models.arguments import checked_arguments
 from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
@@ -113,8 +114,9 @@ _CHARACTER: Final = 4.0  # width of a character of the caption, at most
 _NARROWEST: Final = 52.0  # room for a heading
 
 
+@checked_arguments
 def draw(
-    what: Subject,
+    what: CrossField | Instance | Surface,
     path: str | Path,
     *,
     kind: str | None = None,
@@ -169,7 +171,8 @@ def draw(
         return write_bytes(path, _saved(_page(what, chosen, title), suffix))
 
 
-def preview(what: Subject) -> bytes:
+@checked_arguments
+def preview(what: CrossField | Instance | Surface) -> bytes:
     """Draw a small picture for notebooks.
 
     Parameters

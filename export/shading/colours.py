@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.arguments import check_fields
 from ...models.errors import InputError
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
@@ -60,6 +61,7 @@ class Light:
 
     def __post_init__(self) -> None:
         """Check both angles."""
+        check_fields(self)
         if not (np.isfinite(self.azimuth) and 0 <= self.elevation <= np.pi / 2 + 1e-9):
             raise InputError(
                 f"a lamp cannot be at azimuth {np.degrees(self.azimuth):g}, elevation "

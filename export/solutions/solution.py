@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...models.arguments import checked_arguments
 from ...models.errors import SolutionError, UnsupportedByFormatError, naming
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, lifted
@@ -298,6 +299,7 @@ class Solution:
         return self.problem.field(self.point)
 
 
+@checked_arguments
 def read_solution(
     path: str | Path,
     problem: Problem,

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...models.arguments import checked_arguments
 from ...models.errors import CrossfieldError, InputError
 from ...models.evaluation.hidden import SHORTEST, HiddenCurve, Summary, hidden_curves, summary
 from ...models.instance.instance import Instance
@@ -89,6 +90,7 @@ class Evaluation:
         }
 
 
+@checked_arguments
 def evaluate(
     instance: Instance,
     *,

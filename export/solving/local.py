@@ -18,6 +18,7 @@ from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
+from ...models.arguments import checked_arguments
 from ...models.errors import (
     InputError,
     MissingSolverError,
@@ -51,6 +52,7 @@ _KILLED: Final = "did not end within its time; the answer is what it had written
 _NO_BETTER: Final = "nothing better than the start"
 
 
+@checked_arguments
 def solve(
     problem: Problem,
     solver: str | None = None,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
+from ...models.arguments import checked_arguments
 from ...models.errors import CrossfieldError, SolverError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
@@ -166,6 +167,7 @@ def plan(limits: Limits) -> str:
     return f"at most {len(timed) * limits.time_limit:g} s: {each}; files and pictures on top"
 
 
+@checked_arguments
 def run(
     instance: Instance,
     folder: str | Path,

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from ...models.arguments import checked_arguments
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import FORMULATIONS
+from ...models.formulations.declaration import Options
 from ...models.formulations.problem import formulate
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline, Stop
@@ -44,6 +46,7 @@ class TwoStage:
         return self.qp.field if self.qp.point is not None else self.milp.field
 
 
+@checked_arguments
 def fit_angles(
     field: CrossField,
     *,
@@ -96,11 +99,13 @@ def find_jumps(
     limits = Limits.bounded(limits)
     deadline = Deadline.after(limits.time_limit)
     start = start or first_field(instance, deadline.share(_STARTING).passed)
-    chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
+    foreign = set(Options.__dataclass_fields__) - set(FORMULATIONS["milp-mccormick"].settable)
+    chosen = {key: value for key, value in options.items() if key not in foreign}
     problem = formulate(instance, "milp-mccormick", **chosen)
     return solve(problem, None, folder=folder, limits=limits.until(deadline), start=start, stop=stop)
 
 
+@checked_arguments
 def two_stage(
     instance: Instance,
     *,

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.arguments import checked_arguments
 from ...models.field.rawfield import vertices_of
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
@@ -51,6 +52,7 @@ _MTL: Final = f"newmtl {_MATERIAL}\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_K
 _WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
 
+@checked_arguments
 def write_surface(
     surface: Surface,
     folder: str | Path,

@@ -8,6 +8,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from ..arguments import check_fields, numbers
 from ..errors import InputError, InstanceError
 from ..instance.angles import MOST_ANGLE, line_difference
 from ..instance.grid import Bools, Floats, Ints
@@ -29,6 +30,16 @@ NARROW: Final = QUARTER  # lines that are less than this apart are a narrow cros
 MOST: Final = 0.9  # share of the stroke pixels that deviate no more than `Shape.most_deviation`
 _EQUAL: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
 _ROUNDING: Final = 1e-12  # quarter turns by which a label may miss its window
+
+
+NORMS: Final = (1, 2, "mixed")
+"""Every norm."""
+
+
+def check_norm(norm: Any) -> None:
+    """Raise InputError unless the value is a norm."""
+    if isinstance(norm, bool) or not isinstance(norm, (int, np.integer, str)) or norm not in NORMS:
+        raise InputError(f"norm is {norm!r}; give 1, 2 or 'mixed'")
 
 
 @dataclass(frozen=True)
@@ -103,10 +114,11 @@ class CrossField(Pictured):
 
     def __post_init__(self) -> None:
         """Store read-only copies, and check shapes and values."""
+        check_fields(self, InstanceError)
         grid = self.instance.grid
         given: dict[str, np.ndarray[Any, Any]] = {
-            "alpha": np.array(self.alpha, dtype=np.float64),
-            "beta": np.array(self.beta, dtype=np.float64),
+            "alpha": numbers(self.alpha, "alpha", InstanceError),
+            "beta": numbers(self.beta, "beta", InstanceError),
             "p": whole_numbers(self.p, "p"),
         }
         for (name, value), size in zip(given.items(), (grid.size, grid.size, len(grid.first)), strict=True):
@@ -209,8 +221,10 @@ class CrossField(Pictured):
 
         The sums run over 2 (phi(A) + phi(B)) of each pair, w_strokes w phi(R) of each stroke pixel, and
         w_beta phi(beta) of each pixel (docs/mathematics.md, 5). phi is the square (2), the absolute value
-        (1), or the absolute value at pairs and the square elsewhere (mixed).
+        (1), or the absolute value at pairs and the square elsewhere (mixed). Raises InputError for another
+        norm.
         """
+        check_norm(norm)
         instance = self.instance
         of_pairs = np.square if norm == 2 else np.abs
         size = np.abs if norm == 1 else np.square
@@ -306,7 +320,13 @@ class CrossField(Pictured):
         return CrossField(self.instance, self.alpha, self.beta, jumps)
 
     def image(self, values: np.ndarray[Any, Any], fill: float = np.nan) -> Floats:
-        """Values (n,) of the pixels as a picture [height, width], `fill` outside the mask."""
+        """Values (n,) of the pixels, or one for all, as a picture [height, width], `fill` outside the mask.
+
+        Raises InputError for another shape.
+        """
+        size = self.instance.grid.size
+        if np.ndim(values) and np.shape(values) != (size,):
+            raise InputError(f"values has shape {np.shape(values)}; give one value for each of {size} pixels")
         picture = np.full(self.instance.mask.shape, fill)
         picture[self.instance.mask] = values
         return picture
@@ -352,10 +372,7 @@ def _steps(instance: Instance, alpha: Floats, beta: Floats, *, inside: bool) -> 
 
 def _angles(instance: Instance, given: Any, name: str) -> Floats:
     """The angles (n,). Raises InputError."""
-    try:
-        angles = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} holds something other than numbers; give angles in radians") from error
+    angles = numbers(given, name)
     size = instance.grid.size
     if angles.shape != (size,):
         raise InputError(

@@ -13,6 +13,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from ..arguments import checked_arguments
 from ..array_archive import ArrayArchive, Expected, pack_arrays
 from ..errors import InputError, InstanceError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
@@ -49,6 +50,7 @@ _MOST_JUMP: Final = 1_000_000
 _Kind = TypeVar("_Kind")
 
 
+@checked_arguments
 def write_field(field: CrossField, path: str | Path) -> Path:
     """Write a field. Equal fields give equal bytes.
 
@@ -81,6 +83,7 @@ def write_field(field: CrossField, path: str | Path) -> Path:
     return write_bytes(path, write(field))
 
 
+@checked_arguments
 def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     """Read a field with its instance.
 

@@ -17,6 +17,7 @@ from typing import Any, Final, Literal, get_args
 
 import sympy as sp
 
+from ..arguments import check_fields
 from ..errors import FormulationError, shortened
 from .symbols import SLOTS, VARIABLES, IndexSet
 
@@ -172,11 +173,14 @@ class Declaration:
                     f"{self.name} has no option {key}; it is always {getattr(self.defaults, key)}"
                 )
         options = replace(self.defaults, **chosen)
-        if options.facet not in FACETS:
+        check_fields(options, FormulationError)
+        if not isinstance(options.facet, str) or options.facet not in FACETS:
             raise FormulationError(f"there is no facet {options.facet!r}; choose one of {', '.join(FACETS)}")
-        if options.stroke_norm not in NORMS or options.beta_norm not in NORMS:
-            raise FormulationError("a norm is 1 or 2")
-        return options
+        for name in ("stroke_norm", "beta_norm"):
+            if getattr(options, name) not in NORMS:
+                raise FormulationError(f"{name} is {getattr(options, name)}; give 1 or 2")
+        # NumPy's numbers are written differently, and the options are a part of the problem's hash.
+        return Options(options.facet, int(options.stroke_norm), int(options.beta_norm), bool(options.relax))
 
 
 @dataclass(frozen=True)

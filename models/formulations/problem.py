@@ -16,7 +16,8 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ..errors import FormulationError
+from ..arguments import check_kind, checked_arguments, numbers
+from ..errors import FormulationError, InputError
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER, Instance, whole_numbers
@@ -88,7 +89,7 @@ class Problem:
                 else f"{self.formulation.name} has the jumps as variables; leave p out"
             )
         if self.jumps is not None:
-            jumps = np.array(self.jumps, dtype=np.int32)
+            jumps = whole_numbers(self.jumps, "p", FormulationError)
             if jumps.shape != (elements(self.instance, "pairs"),):
                 raise FormulationError(
                     f"p has shape {jumps.shape}, but the grid has {elements(self.instance, 'pairs')} pairs"
@@ -342,11 +343,16 @@ class Problem:
         return highs_of(self.to_arrays(), self.instance.name)
 
     def objective_value(self, point: Floats) -> float:
-        """The objective at a point (columns,)."""
+        """The objective at a point (columns,). Raises InputError for another shape."""
+        point = self._checked(point)
         return float(sum(np.sum(family.values(point)) for family in self.objective))
 
     def violation(self, point: Floats) -> Violation:
-        """The worst violations of rows, bounds and integrality at a point (columns,)."""
+        """The worst violations of rows, bounds and integrality at a point (columns,).
+
+        Raises InputError for another shape.
+        """
+        point = self._checked(point)
         worst = {family.family.tag: float(np.max(family.excess(point))) for family in self.rows}
         tag = max(worst, key=lambda name: worst[name], default="")
         bounds = np.maximum(np.maximum(self.lower - point, point - self.upper), 0.0)
@@ -363,12 +369,17 @@ class Problem:
 
         Raises InstanceError when the field is on another instance.
         """
+        check_kind("field", field, "CrossField")
         field.check_instance(self.instance)
         given = _angles_and_jumps(field)
         return np.concatenate([_at_field(self, name, given) for name in self.blocks])
 
     def field(self, point: Floats) -> CrossField:
-        """The cross field of a point, jumps rounded. Raises InstanceError for jumps beyond 32 bits."""
+        """The cross field of a point (columns,), jumps rounded.
+
+        Raises InputError for another shape, and InstanceError for jumps beyond 32 bits.
+        """
+        point = self._checked(point)
         if self.jumps is not None:
             jumps = self.jumps
         elif "p" in self.blocks:
@@ -379,6 +390,14 @@ class Problem:
         return CrossField(
             self.instance, point[self.blocks["alpha"].slice], point[self.blocks["beta"].slice], jumps
         )
+
+    def _checked(self, point: Floats) -> Floats:
+        values = numbers(point, "point")
+        if values.shape != (self.n_columns,):
+            raise InputError(
+                f"point has shape {values.shape}; give one value for each of {self.n_columns} columns"
+            )
+        return values
 
     @cached_property
     def sha256(self) -> str:
@@ -425,6 +444,7 @@ def stamp_of(sha256: str) -> str:
     return f"sha256_{sha256[:STAMP_DIGITS]}"
 
 
+@checked_arguments
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
     """Bind a formulation to an instance.
 
@@ -454,6 +474,7 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
     return Problem(instance, declare(name, **options), p)
 
 
+@checked_arguments
 def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
     """Return a problem with its integer columns fixed at the jumps of a field: a continuous problem.
 

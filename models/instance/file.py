@@ -13,6 +13,7 @@ from typing import Any, Final, cast
 
 import numpy as np
 
+from ..arguments import checked_arguments
 from ..array_archive import ArrayArchive, Expected, pack_arrays
 from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
@@ -43,6 +44,7 @@ _ARCHIVE: Final = {
 }
 
 
+@checked_arguments
 def write_instance(instance: Instance, path: str | Path) -> Path:
     """Write an instance. Equal instances give equal bytes.
 
@@ -69,6 +71,7 @@ def write_instance(instance: Instance, path: str | Path) -> Path:
     return write_bytes(path, pack_arrays(arrays_of(instance)) if packed else to_json(instance).encode())
 
 
+@checked_arguments
 def read_instance(path: str | Path) -> Instance:
     """Read an instance.
 

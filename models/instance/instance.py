@@ -10,7 +10,8 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from ..errors import InstanceError, NoStrokeError
+from ..arguments import check_fields, check_kind, numbers
+from ..errors import CrossfieldError, InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import MOST_ANGLE, wrap
 from .grid import Bools, Floats, Grid, Ints
@@ -74,18 +75,22 @@ class StrokeTerms:
         return StrokeTerms(number[self.pixel[terms]], self.goal[terms], self.weight[terms])
 
 
-def whole_numbers(values: Any, name: str) -> Ints:
-    """The values as int32. Raises InstanceError for fractions and for numbers beyond int32."""
-    given = np.asarray(values)
-    if given.dtype.kind == "f":
-        given = given.astype(np.float64)  # the limits are beyond the numbers of half precision
-    if (
-        given.dtype.kind not in "iuf"
-        or not ((given >= -(2**31)) & (given < 2**31)).all()
-        or (given != np.floor(given)).any()
-    ):
-        raise InstanceError(f"{name} holds something other than whole numbers of 32 bits")
-    return given.astype(np.int32)
+def whole_numbers(values: Any, name: str, error: type[CrossfieldError] = InstanceError) -> Ints:
+    """The values as int32. Raises the error, with their name, for fractions and for numbers beyond int32."""
+    array = values if getattr(values, "dtype", None) == np.int32 else numbers(values, name, error)
+    if not ((array >= -(2**31)) & (array < 2**31)).all() or (array != np.floor(array)).any():
+        raise error(f"{name} holds something other than whole numbers of 32 bits")
+    return array.astype(np.int32)
+
+
+def _mask(values: Any) -> Bools:
+    """The values as booleans. Raises InstanceError unless they are True and False, or 1 and 0."""
+    booleans = isinstance(values, np.ndarray) and values.dtype.kind == "b"
+    array = values if booleans else numbers(values, "mask", InstanceError)
+    mask: Bools = array != 0
+    if (array != mask).any():
+        raise InstanceError("mask holds something other than True and False")
+    return mask
 
 
 def in_digits(value: float) -> float:
@@ -94,6 +99,7 @@ def in_digits(value: float) -> float:
 
 
 def _check_weight(name: str, value: float) -> None:
+    check_kind(name, value, "float", InstanceError)
     if not 0 <= value <= MOST_WEIGHT:
         raise InstanceError(f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}")
 
@@ -169,11 +175,15 @@ class Instance(Pictured):
 
     def __post_init__(self) -> None:
         """Store read-only copies in the documented types, then check every rule."""
-        self._freeze("mask", np.asarray(self.mask, dtype=bool))
+        check_fields(self, InstanceError)
+        self._freeze("mask", _mask(self.mask))
         self._freeze("stroke_pixels", whole_numbers(self.stroke_pixels, "stroke_pixels"))
         for name in ("theta", "w"):
-            self._freeze(name, np.asarray(getattr(self, name), dtype=np.float64))
-        object.__setattr__(self, "origin", (in_digits(self.origin[0]), in_digits(self.origin[1])))
+            self._freeze(name, numbers(getattr(self, name), name, InstanceError))
+        origin = numbers(self.origin, "origin", InstanceError)
+        if origin.shape != (2,):
+            raise InstanceError(f"origin has shape {origin.shape}; give two numbers, x and y")
+        object.__setattr__(self, "origin", (in_digits(origin[0]), in_digits(origin[1])))
         for name in ("stroke_coefficient", "skew_coefficient"):
             object.__setattr__(self, name, float(getattr(self, name)))
         object.__setattr__(self, "pixel_size", in_digits(self.pixel_size))
@@ -197,7 +207,7 @@ class Instance(Pictured):
                 f"the name {self.name[:40]!r} is not allowed; use a lower-case letter, "
                 "then at most 31 lower-case letters, digits and underscores"
             )
-        if self.gauge not in GAUGES:
+        if not isinstance(self.gauge, str) or self.gauge not in GAUGES:
             raise InstanceError(f"there is no gauge {self.gauge!r}; choose one of {', '.join(GAUGES)}")
         for name in ("stroke_coefficient", "skew_coefficient"):
             _check_weight(name, getattr(self, name))
@@ -209,8 +219,8 @@ class Instance(Pictured):
             raise InstanceError(
                 f"origin is {self.origin}; it must be two numbers between {-_FARTHEST:g} and {_FARTHEST:g}"
             )
-        if not isinstance(self.source, str) or _NOT_TEXT.search(self.source):
-            raise InstanceError("source holds a line break, a control character or no text; give one line")
+        if _NOT_TEXT.search(self.source):
+            raise InstanceError("source holds a line break or a control character; give one line")
 
     def _check_strokes(self) -> None:
         if self.mask.ndim != 2 or not self.mask.any():
@@ -355,8 +365,13 @@ class Instance(Pictured):
         ------
         NoStrokeError
             If no stroke is left.
+        InstanceError
+            For another shape, and for other values than True and False.
 
         """
+        kept = np.asarray(kept)
+        if kept.dtype != bool or kept.shape != self.theta.shape:
+            raise InstanceError(f"kept needs {len(self.theta)} values True or False, one per stroke pixel")
         return replace(self, stroke_pixels=self.stroke_pixels[kept], theta=self.theta[kept], w=self.w[kept])
 
     def turned(self) -> Instance:

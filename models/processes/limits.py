@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+from ..arguments import check_fields
 from ..errors import InputError
 from .deadline import Deadline
 from .side_by_side import checked
@@ -41,7 +42,8 @@ class Limits:
     _end: Deadline | None = field(default=None, repr=False, compare=False, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Check the ranges."""
+        """Check kinds and ranges."""
+        check_fields(self)
         if not (self.time_limit > 0 and 0 <= self.gap < math.inf):
             raise InputError(
                 f"a time limit of {self.time_limit} s and a gap of {self.gap} are out of range; "

@@ -48,6 +48,7 @@ from typing import Final, cast
 
 import numpy as np
 
+from ..arguments import checked_arguments
 from ..array_archive import Arrays, Packing
 from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField, Norm
@@ -107,6 +108,7 @@ class Certificate(Claim):
         return self.verdict.forced
 
 
+@checked_arguments
 def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = None) -> Certificate:
     """Write the certificate of a proof, as far as the checker confirms it.
 
@@ -167,6 +169,7 @@ def checked_proof(proof: Proof, over: Over) -> Proof:
     return found
 
 
+@checked_arguments
 def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certificate:
     """Read and check a certificate.
 

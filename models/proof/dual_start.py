@@ -11,6 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final
 
+from ..arguments import checked_arguments
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
@@ -28,6 +29,7 @@ _LEAST_SECONDS: Final = 5.0  # with less, loading compiled code would take a goo
 _COMPILING: Final = 60.0  # seconds; with less, compiling would
 
 
+@checked_arguments
 def search(
     instance: Instance,
     *,

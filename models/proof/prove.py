@@ -8,8 +8,8 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import Final
 
-from ..errors import InputError
-from ..field.field import CrossField, Norm, relabelled
+from ..arguments import check_count, checked_arguments
+from ..field.field import CrossField, Norm, check_norm, relabelled
 from ..instance.instance import Instance
 from ..processes.compiled import crew
 from ..processes.deadline import Deadline, Over, Progress, Stop, silent, stop_function
@@ -32,6 +32,7 @@ _LATE: Final = 0.5  # seconds by which a check may exceed the time limit, rather
 _LATE_SHARE: Final = 0.05  # of the proof's time, by which it may exceed it as well
 
 
+@checked_arguments
 @one_thread()
 def prove(
     instance: Instance,
@@ -99,8 +100,10 @@ def prove(
         When the functions of proofs cannot be compiled.
 
     """
-    if norm not in KINDS:
-        raise InputError(f"a proof is in the norm 1, 2 or 'mixed', not in {norm!r}")
+    check_norm(norm)
+    check_count("seed", seed)
+    if work is not None:
+        check_count("work", work, 1)
     if start is not None:
         start.check_instance(instance)
         start = relabelled(instance.with_gauge("strokes"), start.alpha, start.beta, start.p)

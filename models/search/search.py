@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from ..errors import InputError
+from ..arguments import check_count
 from ..field.field import CrossField
 from ..instance.grid import Bools
 from ..instance.instance import Instance
@@ -92,8 +92,9 @@ def search_patches(
 
     `crossfield.search` documents the other parameters, and the errors.
     """
-    if (rounds is not None and rounds < 0) or jobs < 1:
-        raise InputError("a search needs a positive number of rounds and of jobs")
+    if rounds is not None:
+        check_count("rounds", rounds)
+    check_count("seed", seed)
     checked(jobs)
     if start is not None:
         start.check_instance(instance)

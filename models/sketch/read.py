@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from ..arguments import checked_arguments
 from ..errors import InputError, NoStrokeError, naming
 from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
@@ -70,6 +71,7 @@ class _Sketch:
     stroke_width: float = 0.0
 
 
+@checked_arguments
 def read_sketch(
     path: str | Path,
     *,

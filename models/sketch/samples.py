@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from typing import Final, Literal
 
+from ..arguments import checked_arguments
 from ..errors import InputError
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from .choice import AS_DRAWN, Choice, Silhouette
@@ -53,6 +54,7 @@ def samples() -> list[Sample]:
     return list(SAMPLES.values())
 
 
+@checked_arguments
 def sample(
     name: str,
     size: int = DEFAULT_SIZE,

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from ..arguments import checked_arguments
 from ..errors import InputError
 from ..instance.angles import arctangent, cosine, length, sine, turned, wrap
 from ..instance.grid import Bools, Floats
@@ -191,6 +192,7 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
 """The surfaces by name. Cylinder, wave and cone are developable; the last one has no symmetry of rotation."""
 
 
+@checked_arguments
 def analytic(
     name: str,
     size: int = DEFAULT_SIZE,

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arguments import check_positive, checked_arguments
 from ..field.field import CrossField
 from ..instance.angles import wrap
 from ..instance.grid import Floats, Ints
@@ -39,6 +40,7 @@ _STEPS: Final = 5  # of conjugate gradients; where they do not suffice, a system
 _FALL: Final = 1e-4  # least share of the energy that a round has to remove before another one
 
 
+@checked_arguments
 @one_thread()
 def bend_field(
     start: CrossField, *, harmonic: float | None = None, hold: float = HOLD, stop: Stop | None = None
@@ -82,7 +84,15 @@ def bend_field(
     CrossField
         The field.
 
+    Raises
+    ------
+    InputError
+        For a weight or factor that is not above 0.
+
     """
+    check_positive("hold", hold)
+    if harmonic is not None:
+        check_positive("harmonic", harmonic)
     over = stop_function(stop)
     if over():
         return start

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..arguments import check_positive, checked_arguments
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps, label_of
 from ..instance.grid import Floats
@@ -26,6 +27,7 @@ _HARDEST: Final = 1e4  # weight of a stroke, far above the 2 of a pair; `PULL` s
 _DECIMALS: Final = 9  # of line angles in quarter turns: rounding errors must not decide jumps
 
 
+@checked_arguments
 @one_thread()
 def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float | None = None) -> CrossField:
     """Field of the smoothest polynomials whose roots are the lines, with the best jumps.
@@ -56,7 +58,15 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float 
     CrossField
         The field.
 
+    Raises
+    ------
+    InputError
+        For a factor or tolerance that is not above 0.
+
     """
+    check_positive("hold", hold)
+    if tolerance is not None:
+        check_positive("tolerance", tolerance)
     found = _polynomials(instance, hold, tolerance)
     u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*found))
     alpha, beta = label_of(u, v)
@@ -98,6 +108,7 @@ def roots(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
     return np.angle(apart - x1) / 2, np.angle(-apart - x1) / 2
 
 
+@checked_arguments
 @one_thread()
 def power_field(instance: Instance) -> CrossField:
     """Field of orthogonal crosses from the harmonic extension of exp(4 i theta), with the best jumps.

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from scipy import ndimage
 
+from ..arguments import checked_arguments
 from ..field.field import CrossField
 from ..instance.grid import Floats, Grid
 from ..processes.deadline import Over, Progress, Stop, silent, stop_function
@@ -27,6 +28,7 @@ TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z fr
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
 
 
+@checked_arguments
 @one_thread()
 def surface(
     field: CrossField,

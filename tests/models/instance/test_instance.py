@@ -62,7 +62,7 @@ def instances(draw):
         ({"pixel_size": np.nan}, "pixel_size is nan"),
         ({"origin": (0, np.inf)}, "origin is (0.0, inf); it must be two numbers between -1e+100 and 1e+100"),
         ({"source": "two\nlines"}, "source holds a line break"),
-        ({"source": "\ud800"}, "source holds a line break, a control character or no text"),
+        ({"source": "\ud800"}, "source holds a line break or a control character"),
         ({"mask": np.zeros((2, 3), bool)}, "the mask has no pixel"),
         ({"mask": np.ones(3, bool)}, "the mask has no pixel"),
         ({"mask": np.ones((1, 10000), bool)}, "the grid is 10000 x 1; at most 9999"),

@@ -260,10 +260,18 @@ def test_a_patch_without_time_is_not_whole_and_its_walk_stops():
     assert explore(task) == (None, False)
 
 
-@pytest.mark.parametrize("given", [{"time_limit": 0}, {"time_limit": np.nan}, {"rounds": -1}, {"jobs": 0}])
-def test_limits_that_cannot_be_are_refused(given):
+@pytest.mark.parametrize(
+    "given,message",
+    [
+        ({"time_limit": 0}, "a positive number of seconds"),
+        ({"time_limit": np.nan}, "a positive number of seconds"),
+        ({"rounds": -1}, "rounds is -1"),
+        ({"jobs": 0}, "jobs must be between 1"),
+    ],
+)
+def test_limits_that_cannot_be_are_refused(given, message):
     instance, seconds = cf.sample("skew", 6), given.pop("time_limit", 1)
-    with pytest.raises(cf.CrossfieldError, match="positive"):
+    with pytest.raises(cf.CrossfieldError, match=message):
         cf.search(instance, limits=cf.Limits(seconds), **given)
 
 
