@@ -58,7 +58,8 @@ def build_command(
 
     Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file with all
     facts about it. Complete files in the folder are kept, so an interrupted build continues.
-    A size that is too small for a sketch is skipped with a message.
+    A size that is too small for a sketch is skipped with a message. A tightened entry awaits its certificate.
+    library.json lists both.
     """
     from dataclasses import replace
 
@@ -70,12 +71,13 @@ def build_command(
         wanted = default_spec() if spec == "default" else read_spec(spec)
         wanted = replace(wanted, points=None) if search else wanted
         built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
-    tight = sum(name.endswith("_tight") for name in built.skipped)
-    left = {"instances": len(built.skipped) - tight, "tightened entries": tight}
-    left_out = "".join(f", {count} {kind} skipped" for kind, count in left.items() if count)
-    line = f"{output}: {len(built.document['entries'])} entries{left_out}"
+    waiting = sum(name.endswith("_tight") for name in built.skipped)
+    too_small = {name: why for name, why in built.skipped.items() if not name.endswith("_tight")}
+    line = f"{output}: {len(built.document['entries'])} entries"
+    line += f", {len(too_small)} instances skipped" if too_small else ""
+    line += f"; {waiting} tightened entries await a certificate" if waiting else ""
     printing.show(built.document, lambda: print_line(line))
-    for name, reason in built.skipped.items():
+    for name, reason in too_small.items():
         print_notice(f"{name} is skipped: {reason}")
     if stale := sorted({record.entry for record in unmatched(built)}):
         print_notice(

@@ -6,10 +6,12 @@ from base64 import b64encode
 from pathlib import Path
 from typing import Any, Final
 
+from ...models.formulations.catalogue import declare
 from ...models.storage import read_bytes, write_bytes
 from ...templates import ENVIRONMENT
 from ..bundle.manifest import Manifest
 from ..formats.registry import FORMATS
+from ..solvers_table import BUNDLED, smallest, takes
 from .methods import shown
 
 PAGE: Final = "index.html"
@@ -56,7 +58,7 @@ def write_page(folder: Path, report: dict[str, Any], manifests: tuple[Manifest, 
             [facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""), *shown(facts)]
             for facts in report["methods"]
         ],
-        sets=[_set(manifest.document) for manifest in manifests],
+        sets=sorted(map(_set, manifests), key=lambda each: not each["solve"]),
         files=[(name, meaning) for name, meaning in _FILES.items() if (folder / name).exists()],
     )
     write_bytes(folder / PAGE, text.encode())
@@ -72,10 +74,20 @@ def _picture(path: Path) -> str:
     return f"data:image/png;base64,{b64encode(read_bytes(path)).decode()}" if path.exists() else ""
 
 
-def _set(document: dict[str, Any]) -> dict[str, Any]:
-    """The model files of a formulation, each with the lines that solve it and read its answer."""
+def _set(manifest: Manifest) -> dict[str, Any]:
+    """The model files of a formulation, each with the lines that solve it and read its answer.
+
+    solve: the line that solves the formulation with a solver that is installed with crossfield, if one can.
+    """
+    document = manifest.document
     counts = document["counts"]
+    problem = smallest(declare(manifest.formulation))
+    solver = next((name for name in BUNDLED if takes(problem, name).answer == "yes"), "")
+    name, instance = manifest.formulation, f"models/{document['instance']['file']}"
+    facet = " --facet printed" if document["options"].get("facet") == "printed" else ""
     return {
+        "solve": solver and f"crossfield solve {instance} -f {name}{facet} --solver {solver} -o {name}",
+        "solver": solver and BUNDLED[solver].title,
         "formulation": document["formulation"],
         "kind": document["class"],
         "columns": counts["columns"],

@@ -6,6 +6,7 @@ import shutil
 
 import crossfield as cf
 import pytest
+from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.table import read_table
 from crossfield.export.library.checking.check_library import verify_library
@@ -133,6 +134,14 @@ def test_an_entry_without_a_certificate_is_skipped_with_its_reason(tmp_path):
     assert [each.outcome for each in submit(made.folder, [tmp_path / "it.npz"])] == ["accepted"]
     assert f"{STEM}_exact_tight" in json.loads((made.folder / "library.json").read_text())["entries"]
     assert verify_library(made.folder) == []
+
+
+def test_a_build_counts_the_entries_that_await_a_certificate_and_warns_of_none(tmp_path, capfd):
+    spec_of(tmp_path, SPEC.replace("proven", "greedy"))
+    assert invoke(["library", "build", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "lib")]) == 0
+    shown = capfd.readouterr()
+    assert shown.out.endswith(" entries; 2 tightened entries await a certificate\n")
+    assert complaints(shown.err) == ""
 
 
 def test_a_field_outside_the_windows_is_not_better_and_not_refused(lib, tmp_path):

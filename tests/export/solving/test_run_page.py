@@ -77,6 +77,16 @@ def test_the_line_that_reads_an_answer_back_reads_it(folder, monkeypatch):
     assert (folder / f"{stem}.npz").exists()
 
 
+def test_the_first_line_works_with_what_a_plain_installation_has(folder, monkeypatch):
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    first, *_ = re.findall(r"<pre[^>]*>([^<]*)", page)
+    monkeypatch.chdir(folder)
+    program, *arguments = shlex.split(first)
+    assert program == "crossfield"
+    assert invoke([*arguments, "--time-limit", "2"]) == 0
+    assert list((folder / arguments[-1]).glob("*.field.npz"))
+
+
 def test_a_new_default_format_needs_no_other_edit(tmp_path, monkeypatch):
     """Its entry in the table is enough; without a command in it, the page has the line that reads."""
     monkeypatch.setitem(FORMATS, "ninth", Format("ninth", "LP by another name", 2, "lp"))
