@@ -168,6 +168,7 @@ def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -
             "width": instance.grid.width,
             "pixels": instance.grid.size,
             "pixel_size": instance.pixel_size,
+            "origin": list(instance.origin),
         },
         **(about or {}),
         **surface_facts(surface),

@@ -62,11 +62,17 @@ def freedom_of(firm: float, *, hinted: bool) -> tuple[str, ...]:
     found = [] if hinted else ["inside out it has the same crosses: see whether it bulges the right way"]
     if firm < LOOSE:
         found.append(
-            "other surfaces fit as well, steeper or leaning otherwise: "
-            f"when its normals turn by 10 degrees the angles between its lines change by {10 * firm:.2f}; "
-            "a hint settles it"
+            f"other surfaces fit as well, steeper or leaning otherwise: {in_words(firm)}; a hint settles it"
         )
     return tuple(found)
+
+
+def in_words(firm: float) -> str:
+    """Sentence that describes a firmness."""
+    return (
+        "when its normals turn by 10 degrees, the angles between its lines change by "
+        f"{10 * firm:.2f} degrees or more"
+    )
 
 
 def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:

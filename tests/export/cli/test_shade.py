@@ -65,6 +65,30 @@ def test_a_saved_field_is_flipped_hinted_and_lit(saved, tmp_path, capsys):
     assert "field.npz" not in {path.name for path in plain.iterdir()}
 
 
+def test_the_report_places_the_pictures_on_the_drawing(tmp_path):
+    drawing = tmp_path / "disc.svg"
+    drawing.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="300 -100 400 400" fill="none">'
+        '<circle cx="450" cy="60" r="90" stroke="black"/>'
+        '<path d="M360 60H540M450 -30V150" stroke="red"/></svg>'
+    )
+    assert invoke(["shade", str(drawing), "--size", "24", "-q", "-o", str(tmp_path / "out")]) == 0
+    grid = report(tmp_path / "out")["instance"]
+    with Image.open(tmp_path / "out" / "normals.png") as picture:
+        opaque = np.argwhere(np.asarray(picture)[..., 3] > 0)[:, ::-1]
+    corners = np.array([opaque.min(axis=0), opaque.max(axis=0) + 1])
+    found = np.array(grid["origin"]) + grid["pixel_size"] * corners
+    assert np.abs(found - [(360, -30), (540, 150)]).max() <= 1.5 * grid["pixel_size"]
+
+
+def test_firmness_is_explained_in_words(saved, tmp_path, capsys):
+    assert invoke(["shade", saved, "-o", str(tmp_path / "out")]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    degrees = 10 * report(tmp_path / "out")["firmness"]
+    words = f"the angles between its lines change by {degrees:.2f} degrees or more"
+    assert f"firmness: when its normals turn by 10 degrees, {words}" in shown
+
+
 def test_a_rawfield_and_an_instance_are_taken(field, tmp_path):
     cf.write_field(field, tmp_path / "f.rawfield")
     cf.write_instance(field.instance, tmp_path / "i.json")
