@@ -2,6 +2,7 @@
 
     // comment
     BINARY_VARIABLES p1_00_00_u;             then INTEGER_VARIABLES, VARIABLES (free by default) (B2)
+    VARIABLES ONE_1a2b3c4d5e6, ...;          fixed to 1, in no term: BARON's results repeat the stamp
     LOWER_BOUNDS{                            every finite bound, except those of binaries
     alpha_00_00: 0;
     }
@@ -50,7 +51,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         for block in problem.blocks.values():
             if form.kind(block) != "binary":
                 yield from _bounds(block, names, low=low)
-        yield b"}\n"
+        yield form.one + b": 1;\n}\n"
     if problem.rows:
         lists = [(names.row(family), family.count) for family in problem.rows]
         yield from declared(b"EQUATIONS", lists, counts, "rows")
@@ -58,7 +59,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         yield from _rows(family, names, counts)
     yield from _objective(problem, names, counts)
     if start is not None:
-        yield from _start(problem, names, start)
+        yield from _start(form, start)
     expected = Expected(problem, degree=0)
     check(
         counts,
@@ -74,7 +75,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
 _KEYWORDS: Final[dict[Kind, bytes]] = {
     "binary": b"BINARY_VARIABLES",
     "integer": b"INTEGER_VARIABLES",
-    "continuous": b"VARIABLES",
+    "continuous": b"VARIABLES\n  %b,",  # of the column fixed to 1, which is in no block
 }
 
 
@@ -83,7 +84,7 @@ def _variables(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
         chosen = form.blocks(kind)
         if chosen:
             lists = [(form.names.of(block), block.count) for block in chosen]
-            yield from declared(keyword, lists, counts, "columns")
+            yield from declared(keyword.replace(b"%b", form.one), lists, counts, "columns")
 
 
 def _bounds(block: Block, names: Names, *, low: bool) -> Iterator[bytes]:
@@ -130,9 +131,9 @@ def _objective(problem: Problem, names: Names, counts: Counter[str]) -> Iterator
     yield b";\n"
 
 
-def _start(problem: Problem, names: Names, start: Floats) -> Iterator[bytes]:
+def _start(form: Canonical, start: Floats) -> Iterator[bytes]:
     yield b"STARTING_POINT{\n"
-    for block in problem.blocks.values():
+    for block in form.problem.blocks.values():
         if block.count:
-            yield from _assigned(names.of(block), start[block.slice])
-    yield b"}\n"
+            yield from _assigned(form.names.of(block), start[block.slice])
+    yield form.one + b": 1;\n}\n"

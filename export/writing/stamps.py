@@ -1,7 +1,8 @@
 """The stamp of a problem (`Problem.stamp`) in the files of crossfield, and where answers repeat it.
 
     file            place                                        repeated by
-    LP, MPS, OSiL   a column ONE_1a2b3c4d5e6 that is fixed to 1  every solution file with names
+    LP, MPS, OSiL,  a column ONE_1a2b3c4d5e6 that is fixed to 1  every solution file with names
+    .bar
     LP              the objective obj_sha256_1a2b3c4d5e6         Gurobi .sol, GLPK
     MPS             the name of the model                        GLPK, Xpress .slx
     .nl             the fourth option of the first line          .sol files of the AMPL Solver Library

@@ -8,7 +8,7 @@ refuse every text whose meaning is in doubt.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -175,9 +175,17 @@ def parsed(parser: Lark, transformer: Arithmetic, text: str) -> Any:
         raise
 
 
-def difference(model: Model, problem: Problem, start: Floats | None = None) -> str:
-    """The first difference between a model and a problem; empty if there is none."""
+def difference(model: Model, problem: Problem, start: Floats | None = None, *, one: str = "") -> str:
+    """The first difference between a model and a problem; empty if there is none.
+
+    one: the column that is fixed to 1, if the format has it.
+    """
     columns = names_of(column_names(problem))
+    if one:
+        expected = Column("continuous", 1.0, 1.0, None if start is None else 1.0)
+        if model.columns.get(one) != expected:
+            return f"{one} is {model.columns.get(one)} instead of {expected}"
+        model = replace(model, columns={name: held for name, held in model.columns.items() if name != one})
     rows = names_of(row_names(problem)) if problem.rows else []
     for what, found, expected in (("column", model.columns, columns), ("row", model.rows, rows)):
         for name in sorted(set(found) ^ set(expected)):
@@ -194,7 +202,7 @@ def difference(model: Model, problem: Problem, start: Floats | None = None) -> s
             if value != right:
                 return f"{what} of {name} is {value} instead of {right}"
     points = points_of(problem, 4)
-    values = dict(zip(columns, points.T, strict=True))
+    values = dict(zip(columns, points.T, strict=True)) | ({one: np.ones(len(points))} if one else {})
     objective = [problem.objective_value(point) for point in points]
     return _value_difference("objective", model.objective.value(values), objective) or _row_difference(
         model, problem, points, values

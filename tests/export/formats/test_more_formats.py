@@ -30,6 +30,7 @@ from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.verify.checks import Verdict
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
 from crossfield.export.verify.verify import verify
+from crossfield.export.writing.canonical import Canonical
 from crossfield.export.writing.curvature import probtype
 from crossfield.export.writing.terms import terms
 from crossfield.models.errors import UnsupportedByFormatError
@@ -445,6 +446,8 @@ def test_a_start_has_its_place(name: str, tmp_path: Path):
     text = written(problem, tmp_path / f"model.{name}", start=field)
     labels = names(problem)[0]
     if name == "bar":
+        labels = [*labels, Canonical(problem).one.decode()]
+        point = np.append(point, 1.0)
         found = dict(re.findall(r"(\w+): (\S+);", text[text.index("STARTING_POINT") :]))
         assert {key: float(value) for key, value in found.items()} == dict(
             zip(labels, point.tolist(), strict=True)

@@ -3,9 +3,11 @@
 The problems have the same columns and rows; they differ in a bound, a weight, the gauge, the facet or a norm.
 """
 
+import importlib.util
 import re
 import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import crossfield as cf
 import highspy
@@ -202,6 +204,21 @@ def test_without_a_stamp_no_claim_is_kept(write_answer, model, suffix, solved, t
         assert solution.status in {"feasible", "unknown"}
         assert (solution.identified, solution.bound, solution.gap) == (False, None, None)
         assert solution.status == "unknown" or "of an unidentified problem" in solution.caveat
+
+
+@pytest.mark.needs("baron")
+def test_baron_repeats_the_stamp(tmp_path):
+    """Its free size takes ten columns: two pixels."""
+    package = importlib.util.find_spec("gamspy_baron")
+    problem = tiny("pair")
+    cf.write(problem, tmp_path / "model.bar")
+    program = Path(package.submodule_search_locations[0]) / "baron"
+    subprocess.run([program, "model.bar"], cwd=tmp_path, capture_output=True, check=False)
+    own = read_solution(tmp_path / "res.lst", problem)
+    assert (own.identified, own.status, own.unknown) == (True, "optimal-global", 0)
+    heavier = replace(problem.instance, stroke_coefficient=1.5000001)
+    with pytest.raises(SolutionError, match=r"res\.lst: is of another problem"):
+        read_solution(tmp_path / "res.lst", formulate(heavier, problem.name))
 
 
 def test_files_of_solvers_without_a_stamp_keep_no_claim():
