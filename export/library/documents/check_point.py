@@ -67,6 +67,9 @@ ADDED = re.compile(
 )
 """Columns that solvers and their readers add to a model; in a point they are passed over."""
 
+STAMP = re.compile(r"(?:sha256_|\bONE_)([0-9a-f]{11})", re.IGNORECASE | re.ASCII)
+"""The first digits of a problem's hash, in the name of a model, a column or an objective."""
+
 ON_PIXELS, ON_PAIRS = ("alpha", "beta", "psi", "gamma", "chi"), ("p", "p1", "p2", "s", "t", "z", "d", "u")
 
 Entry = tuple[int, Decimal]
@@ -114,12 +117,13 @@ class Row:
 
 @dataclass
 class Model:
-    """A model: columns and rows by name, and the objective."""
+    """A model: columns and rows by name, the objective, and the stamps of problems in its names."""
 
     columns: list[Column] = field(default_factory=list)
     number: dict[str, int] = field(default_factory=dict)
     rows: dict[str, Row] = field(default_factory=dict)
     objective: Row | None = None
+    stamps: set[str] = field(default_factory=set)
 
     def row(self, name: str) -> Row:
         """The row of that name, or the objective."""
@@ -170,6 +174,11 @@ def number(text: str) -> Decimal:
         if abs(value.adjusted()) <= GREATEST_EXPONENT:
             return value
     raise BadInputError(f"{text[:40]!r} is not a finite number of reasonable length")
+
+
+def stamps_in(text: str) -> set[str]:
+    """The stamps of problems in a text."""
+    return {digits.lower() for digits in STAMP.findall(text)}
 
 
 def _require(condition: object, otherwise: str) -> None:
@@ -243,7 +252,9 @@ class MpsReader:
         """Begin a section, whose line may hold more words."""
         if section in ("QUADOBJ", "QCMATRIX"):
             self.matrix = self.matrices.setdefault((section, words[0] if words else ""), {})
-        elif section not in self.readers and section not in ("NAME", "ENDATA"):
+        elif section == "NAME":
+            self.model.stamps.update(stamps_in(" ".join(words)))
+        elif section not in self.readers and section != "ENDATA":
             raise BadInputError(f"the section {section[:20]} is not known here")
 
     def value(self, text: str) -> Decimal:
@@ -275,6 +286,7 @@ class MpsReader:
         name, model = words[0], self.model
         if name != self.current[0]:
             _require(name not in model.number, f"the entries of column {name[:40]} do not follow each other")
+            model.stamps.update(stamps_in(name))
             model.number[name] = len(model.columns)
             model.columns.append(Column(name, self.integer))
             self.current = (name, set())
@@ -360,10 +372,11 @@ def _products(section: str, matrix: Matrix) -> list[Product]:
 
 @dataclass
 class Point:
-    """Values by name, and the objective that the file claims, if any."""
+    """Values by name, the objective that the file claims, if any, and the stamps of problems in it."""
 
     values: dict[str, Decimal] = field(default_factory=dict)
     claimed: Decimal | None = None
+    stamps: set[str] = field(default_factory=set)
 
     def of(self, columns: Iterable[Column]) -> list[Decimal]:
         """The values of columns in order: 0 where one is left out, or what it is fixed to."""
@@ -382,6 +395,7 @@ def read_point(path: str) -> Point:
         words = line.split()
         if not words:
             continue
+        point.stamps.update(stamps_in(line))
         try:
             if take is None:
                 take = _taker(point, line)
@@ -486,6 +500,8 @@ def _keep(point: Point, name: str, value: str) -> None:
 
 def check_model(model: Model, point: Point) -> Finding:
     """Check a point against a model without rounding errors."""
+    others = sorted(point.stamps - model.stamps) if model.stamps else []
+    _require(not others, f"the point is of another problem: it states {''.join(others[:1])}")
     foreign = [name for name in point.values if name not in model.number]
     _refuse_foreign([name for name in foreign if not ADDED.fullmatch(name)], len(point.values))
     values = point.of(model.columns)
@@ -495,6 +511,7 @@ def check_model(model: Model, point: Point) -> Finding:
     lines = [
         ("model", f"{len(model.columns)} columns ({len(integers)} integer), {len(model.rows)} rows"),
         ("point", _described(len(point.values) - len(foreign), len(model.columns), foreign)),
+        ("problem", "stated in the point" if point.stamps & model.stamps else "not stated in the point"),
         ("objective", _shown(objective)),
     ]
     if point.claimed is not None:

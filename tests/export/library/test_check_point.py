@@ -541,3 +541,31 @@ def test_a_point_of_another_instance_is_named_as_such(tmp_path):
     for model in ("m.mps", "i.json"):
         with pytest.raises(BadInputError, match="another instance or formulation"):
             check(str(tmp_path / model), point)
+
+
+# the problem of a point
+
+
+def test_a_point_that_states_another_problem_is_refused(tmp_path, capsys):
+    """Both models have the same columns and rows, and one weight differs."""
+    problems = [
+        formulate(make_instance("full", skew_coefficient=weight), "milp-mccormick") for weight in (1e-3, 2e-3)
+    ]
+    models = [tmp_path / "own.mps", tmp_path / "other.mps"]
+    for problem, model in zip(problems, models, strict=True):
+        write(problem, model)
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.readModel(str(models[0]))
+    highs.run()
+    highs.writeSolution(str(tmp_path / "p.sol"), 0)
+    code, out, _ = called(capsys, models[0], tmp_path / "p.sol", "--tolerance", "1e-6")
+    assert (code, "problem   stated in the point" in out) == (0, True)
+    code, out, err = called(capsys, models[1], tmp_path / "p.sol")
+    assert (code, out) == (2, "")
+    assert "the point is of another problem: it states" in err
+    silent = save_point(
+        tmp_path / "silent.sol", problems[0], problems[0].point(make_field(problems[0].instance))
+    )
+    code, out, _ = called(capsys, models[1], silent)
+    assert "problem   not stated in the point" in out
