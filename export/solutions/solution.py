@@ -25,7 +25,7 @@ from ..writing.canonical import Canonical
 from ..writing.stamps import is_identified
 from .readers.registry import read_raw
 from .readers.text import RawSolution, values_for, values_in_order
-from .statuses import Status
+from .statuses import Status, closes
 
 ROUND: Final = 1e-5
 """Largest distance from an integer at which an integer column is rounded; other values are kept."""
@@ -42,9 +42,6 @@ TOLERANCE: Final = TRUSTED
 
 AGREEMENT: Final = 1e-5
 """Largest difference of two objectives that agree, relative to their size, or 1."""
-
-OPTIMAL: Final = 1.01e-4, 1e-6
-"""Largest relative and absolute gap of an optimum: the defaults of solvers."""
 
 ROUNDED: Final = 1e-3
 """Largest violation that a file of few digits explains: listings have four decimals."""
@@ -218,8 +215,7 @@ class Solution:
         """Whether the file calls a point optimal that is far above its own dual bound."""
         if self.claimed is not Status.OPTIMAL_GLOBAL or self.objective is None or self.bound is None:
             return False
-        relative, absolute = OPTIMAL
-        return self.objective - self.bound > max(absolute, relative * abs(self.objective))
+        return not closes(self.bound, self.objective)
 
     @property
     def bound(self) -> float | None:

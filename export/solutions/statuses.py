@@ -7,6 +7,7 @@ the child processes of solvers load this module.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import Final
 
@@ -46,6 +47,16 @@ class Status(StrEnum):
         return Status.ERROR if self.promises_point else self
 
 
+OPTIMAL_GAP: Final = 1.01e-4, 1e-6
+"""Largest relative and absolute gap of an optimum: the defaults of solvers."""
+
+
+def closes(bound: float, objective: float) -> bool:
+    """Whether a dual bound is so close to an objective that a claim of optimality holds."""
+    relative, absolute = OPTIMAL_GAP
+    return objective - bound <= max(absolute, relative * abs(objective))
+
+
 HIGHS: Final = {
     "Optimal": Status.OPTIMAL_GLOBAL,
     "Infeasible": Status.INFEASIBLE,
@@ -83,6 +94,24 @@ GUROBI: Final = {
 }
 """Gurobi's status codes, and their words."""
 
+GUROBI_LOG: Final = {
+    "Optimal solution found": Status.OPTIMAL_GLOBAL,
+    "Interrupt request received": Status.LIMIT_WITH_POINT,
+}
+"""The line in which Gurobi states the end of a search in a log, limits left out."""
+
+XPRESS: Final = {
+    "NOTFOUND": Status.LIMIT_WITHOUT_POINT,
+    "OPTIMAL": Status.OPTIMAL_GLOBAL,
+    "FEASIBLE": Status.LIMIT_WITH_POINT,
+    "INFEASIBLE": Status.INFEASIBLE,
+    "UNBOUNDED": Status.UNBOUNDED,
+}
+"""Xpress's names of a solution status (SolStatus)."""
+
+XPRESS_LOG: Final = {"completed": Status.OPTIMAL_GLOBAL, "unfinished": Status.LIMIT_WITH_POINT}
+"""How a search of Xpress ended, by its log."""
+
 _CPLEX_CODES: Final = {
     Status.OPTIMAL_GLOBAL: (1, 101, 102, 129, 130),
     Status.OPTIMAL_LOCAL: (24,),
@@ -96,24 +125,38 @@ _CPLEX_CODES: Final = {
 CPLEX: Final = {code: status for status, codes in _CPLEX_CODES.items() for code in codes}
 """CPLEX's codes of CPXgetstat: 1 to 25 for continuous problems, from 101 for integer ones."""
 
+CPLEX_LOG: Final = {
+    "MIP - Integer optimal": Status.OPTIMAL_GLOBAL,
+    "Proven optimal solution": Status.OPTIMAL_GLOBAL,
+    "MIP - ": Status.LIMIT_WITH_POINT,
+}
+"""The start of the line in which CPLEX, or its link in GAMS, states the end of a search in a log."""
+
 CPLEX_STOPPED: Final = {10, 11, 12, 13, 21, 22, 25}
 """CPLEX's codes of a continuous problem that was stopped: its header states whether the point is feasible."""
 
 SCIP: Final = {
     "optimal solution found": Status.OPTIMAL_GLOBAL,
+    "optimal": Status.OPTIMAL_GLOBAL,
     "infeasible": Status.INFEASIBLE,
     "infeasible or unbounded": Status.INFEASIBLE,  # our objectives are bounded below
+    "inforunbd": Status.INFEASIBLE,
     "unbounded": Status.UNBOUNDED,
     "user interrupt": Status.LIMIT_WITH_POINT,
+    "userinterrupt": Status.LIMIT_WITH_POINT,
     "termination signal received": Status.LIMIT_WITH_POINT,
+    "terminate": Status.LIMIT_WITH_POINT,
     "unknown": Status.FEASIBLE,
 }
-"""SCIP's words (SCIPprintStatus)."""
+"""SCIP's words (SCIPprintStatus), and PySCIPOpt's names for the same."""
+
+SCIP_GAP: Final = "gaplimit"
+"""PySCIPOpt's name for a search that ended at the gap it was given."""
 
 
 def of_scip(words: str) -> Status:
     """The status in SCIP's words; every limit that it reaches has words of its own."""
-    limit = words.endswith("limit reached")
+    limit = words.endswith(("limit reached", "limit"))
     return Status.LIMIT_WITH_POINT if limit else SCIP.get(words, Status.ERROR)
 
 
@@ -190,6 +233,9 @@ GAMS_SOLVER: Final = {
 }
 """GAMS's solver states (solveStat) in words."""
 
+GAMS_INTEGER, GAMS_NORMAL = 8, 1
+"""GAMS's model state and solver state of a search that ended at the gap it was given."""
+
 GAMS_LIMITS: Final = {2, 3, 4, 8}
 """GAMS's solver states at which a limit or the user ended the search."""
 
@@ -234,6 +280,12 @@ def of_ampl(code: int | None, message: str, *, with_point: bool) -> Status:
         return Status.INFEASIBLE
     status = next((status for last, status in AMPL if code <= last), Status.ERROR)
     return status if with_point else status.without_point
+
+
+def of_log(starts: Mapping[str, Status], words: str) -> Status:
+    """The status in the words of a log, by their start; the first that fits counts, and others are limits."""
+    known = (status for start, status in starts.items() if words.startswith(start))
+    return next(known, Status.LIMIT_WITH_POINT)
 
 
 BARON_NORMAL: Final = "Normal completion"

@@ -248,7 +248,7 @@ def _results(task: Entry, best: Best, records: list[Record], bounds: list[dict[s
         "gap": gap,
         "runs": runs_of(records, task.name, best.objective),
         "density": density(best.problem.instance),
-        "difficulty": difficulty(facts["status"], runs, tangent=tangent),
+        "difficulty": difficulty(facts["status"], best.objective, runs, tangent=tangent),
     } | facts
 
 

@@ -31,6 +31,7 @@ from ....models.storage import read_bytes
 from ...formats.registry import generator
 from ...solutions.readers.registry import read_raw
 from ...solutions.solution import read_solution
+from ...solutions.statuses import closes
 from ...writing.stamps import is_stated
 from ..building.build import has_unbuilt_records, rebuilt
 from ..documents.documents import Library, about_file, folder_of, problem_of, read_about, read_library
@@ -268,7 +269,10 @@ class _Session:
             without = objective is None and run.objective is None
             if without and run.bound is None:
                 raise InputError("there is nothing to keep; give a log with a bound, or a solution file")
-            status: RunStatus = "optimal" if run.ended == "optimal" else "no point" if without else "limit"
+            proves = run.ended == "optimal" and run.bound is not None
+            if run.objective is None and run.bound is not None:  # the log could not compare its numbers
+                proves = proves and closes(run.bound, best)
+            status: RunStatus = "optimal" if proves else "no point" if without else "limit"
             record = replace(
                 stated,
                 version=self.facts.version or run.version or stated.version,

@@ -138,12 +138,20 @@ def _program(record: Record, entry: str) -> dict[str, Any]:
     return {"solver": record.solver, "version": record.version} | via
 
 
-def difficulty(status: str, runs: Iterable[Record], *, tangent: bool) -> Difficulty:
-    """Return the grade of an entry. runs: on its problem; tangent: whether the tangent proves the optimum."""
+def difficulty(status: str, objective: float, runs: Iterable[Record], *, tangent: bool) -> Difficulty:
+    """Return the grade of an entry, from its status and the objective of its best point.
+
+    runs: on its problem; the bound of a run must prove that point. tangent: whether the tangent does.
+    """
     if status == "best known":
         return "open"
     quick = (
-        each.status == "optimal" and each.threads == 1 and each.seconds is not None and each.seconds <= EASY
+        each.status == "optimal"
+        and each.threads == 1
+        and each.seconds is not None
+        and each.seconds <= EASY
+        and each.bound is not None
+        and is_proven(objective, cut(each.bound, objective))
         for each in runs
     )
     return "easy" if tangent or any(quick) else "hard"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Final, Literal
 
@@ -12,7 +13,19 @@ from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_LOG
 from ....models.storage import read_bytes
 from ...writing.stamps import digits_in_text
-from .run_log import RunLog, Step, at_least, last, number, seconds, thinned, whole
+from ..statuses import (
+    CPLEX_LOG,
+    GUROBI_LOG,
+    HIGHS,
+    OPTIMAL_GAP,
+    XPRESS_LOG,
+    Status,
+    closes,
+    of_baron,
+    of_log,
+    of_scip,
+)
+from .run_log import RunLog, Step, at_least, last, number, seconds, share, thinned, whole
 
 _LONGEST: Final = 300  # most characters of a line of a table
 
@@ -25,17 +38,18 @@ class LogReader:
     """A reader of the logs of one solver.
 
     start: pattern of the start of a run. version: pattern of the version, which may precede the first run.
-    optimal, ended: patterns that state a proven optimum, and any end of the search. facts: patterns by
-    attribute of RunLog, the preferred one first; `rounded` is a bound that the log rounds. rows: the rows of
-    the table of progress. from_table: attributes that the table gives if no line does.
+    end: pattern of the words that state how the search ended. claim: their status, by the program's table.
+    facts: patterns by attribute of RunLog, the preferred one first; `rounded` is a bound that the log rounds,
+    `tolerance` the relative gap at which the search was to end. rows: the rows of the table of progress.
+    from_table: attributes that the table gives if no line does.
     """
 
     solver: str
     title: str
     start: re.Pattern[str]
     version: str
-    optimal: str
-    ended: str
+    end: str
+    claim: Callable[[str], Status]
     facts: dict[str, tuple[str, ...]]
     rows: Callable[[str], Iterable[Row]]
     from_table: tuple[str, ...] = ()
@@ -50,14 +64,16 @@ class LogReader:
             for row in rows
             if (time := seconds(row[0])) is not None
         )
+        shown = bound
         if bound is None and "bound" in self.from_table:
-            shown = (row[1] for row in reversed(rows) if number(row[1]) is not None)
-            bound = at_least(words.get("rounded") or next(shown, None))
+            in_rows = (row[1] for row in reversed(rows) if number(row[1]) is not None)
+            rounded = words.get("rounded") or next(in_rows, None)
+            shown, bound = number(rounded), at_least(rounded)
         if best is None and "objective" in self.from_table and trace:
             best = trace[-1].objective
         return RunLog(
             self.solver,
-            ended=self._end(text, proven=bound is not None),
+            ended=self._end(text, shown, best, share(words.get("tolerance"))),
             bound=bound,
             objective=best,
             seconds=number(words.get("seconds")),
@@ -68,10 +84,21 @@ class LogReader:
             trace=trace,
         )
 
-    def _end(self, text: str, *, proven: bool) -> Literal["optimal", "limit"] | None:
-        if proven and re.search(self.optimal, text, re.MULTILINE):
-            return "optimal"
-        return "limit" if re.search(f"{self.optimal}|{self.ended}", text, re.MULTILINE) else None
+    def _end(
+        self, text: str, bound: float | None, best: float | None, tolerance: float | None
+    ) -> Literal["optimal", "limit"] | None:
+        """How the search ended; None if the log does not state it.
+
+        A claim of optimality needs a bound close to the objective, or a small tolerance without objective.
+        bound: as the log shows it, without the allowance for its rounding.
+        """
+        words = last(self.end, text)
+        if words is None:
+            return None
+        if bound is None or self.claim(words) is not Status.OPTIMAL_GLOBAL:
+            return "limit"
+        near = (tolerance or 0.0) <= OPTIMAL_GAP[0] if best is None else closes(bound, best)
+        return "optimal" if near else "limit"
 
 
 def _first(patterns: tuple[str, ...], text: str) -> str | None:
@@ -164,8 +191,8 @@ LOG_READERS: Final = (
         "BARON",
         re.compile(r"^ *BARON version \d", re.MULTILINE),
         version=r"^ *BARON version (\d[\d.]*\d)",
-        optimal=r"^ +\*\*\* Normal completion \*\*\* *$",
-        ended=r"^ +\*\*\* .+? \*\*\* *$",
+        end=r"^ +\*\*\* (.+?) \*\*\* *$",
+        claim=partial(of_baron, has_table=True, unbounded=False),
         facts={
             "bound": (r"^Best possible += +(\S+)$",),
             "objective": (r"^Solution += +(\S+)",),
@@ -179,11 +206,12 @@ LOG_READERS: Final = (
         "HiGHS",
         re.compile(r"^(?:Running HiGHS |(?:LP|QP|MIP|MIQP)\b.* has \d+ rows; \d+ cols; )", re.MULTILINE),
         version=r"^Running HiGHS (\S+)",
-        optimal=r"^ +Status +Optimal$",
-        ended=r"^ +Status +\S",
+        end=r"^ +Status +(\S.*?) *$",
+        claim=partial(of_log, HIGHS),
         facts={
             "bound": (r"^ +Dual bound +(\S+)$",),
             "objective": (r"^ +Primal bound +(\S+)$",),
+            "tolerance": (r"^ +Gap +\S+ \(tolerance: (\S+)\)$",),
             "seconds": (r"^ +Timing +(\S+)",),
             "threads": (r"^ +Thread count (\d+) ", r"^ +Thread count: .* across (\d+) threads"),
             "columns": (r"^\S+ .*has \d+ rows; (\d+) cols;",),
@@ -196,11 +224,12 @@ LOG_READERS: Final = (
         "Gurobi",
         re.compile(r"^Gurobi Optimizer version ", re.MULTILINE),
         version=r"^Gurobi Optimizer version (\S+)",
-        optimal=r"^Optimal solution found",
-        ended=r"^(?:\w+ limit reached|Interrupt request received)",
+        end=r"^(Optimal solution found|\w+ limit reached|Interrupt request received)",
+        claim=partial(of_log, GUROBI_LOG),
         facts={
             "bound": (r"^Best objective \S+, best bound (\S+), gap",),
             "objective": (r"^Best objective (\S+), best bound \S+, gap",),
+            "tolerance": (r"^Optimal solution found \(tolerance (\S+)\)",),
             "seconds": (r"^Explored .* in (\S+) seconds",),
             "threads": (r"using up to (\d+) threads?",),
             "limit": (r"^TimeLimit  (\S+)$",),
@@ -214,8 +243,8 @@ LOG_READERS: Final = (
         "SCIP",
         re.compile(r"^(?:SCIP version |original problem has \d+ variables)", re.MULTILINE),
         version=r"^SCIP version (\S+)",
-        optimal=r"^SCIP Status +: .*optimal solution found",
-        ended=r"^SCIP Status +: .",
+        end=r"^SCIP Status +: (?:.*\[)?(.+?)\]? *$",
+        claim=of_scip,
         facts={
             "bound": (r"^Dual Bound +: (\S+)",),
             "objective": (r"^Primal Bound +: (\S+)",),
@@ -230,8 +259,8 @@ LOG_READERS: Final = (
         "Xpress",
         re.compile(r"^FICO Xpress .*v\d", re.MULTILINE),
         version=r"Xpress.* v([\d.]+)",
-        optimal=r"\*\*\* Search completed \*\*\*",
-        ended=r"\*\*\* Search unfinished \*\*\*",
+        end=r"\*\*\* Search (completed|unfinished) \*\*\*",
+        claim=partial(of_log, XPRESS_LOG),
         facts={
             "bound": (r"^Final MIP bound +: (\S+)$",),
             "objective": (r"^Final MIP objective +: (\S+)$",),
@@ -250,8 +279,8 @@ LOG_READERS: Final = (
             r"^(?:Version identifier: \d|Welcome to IBM.*CPLEX|--- GAMS/CPLEX|IBM ILOG CPLEX)", re.MULTILINE
         ),
         version=r"(?:Version identifier:|Interactive Optimizer) +([\d.]+)",
-        optimal=r"^(?:MIP - Integer optimal|Proven optimal solution)",
-        ended=r"^MIP - .*(?:limit|abort|exceeded)",
+        end=r"^(MIP - .*|Proven optimal solution)",
+        claim=partial(of_log, CPLEX_LOG),
         facts={
             "bound": (
                 r"^Current MIP best bound = +(\S+)",
@@ -259,6 +288,7 @@ LOG_READERS: Final = (
             ),
             "rounded": (r"^Best possible: +(\S+)",),
             "objective": (r"^MIP - .*Objective = +(\S+)", r"^MIP Solution: +(\S+)"),
+            "tolerance": (r"^MIP - Integer optimal, tolerance \(([^/]+)/",),
             "seconds": (r"^Total \(root\+branch&cut\) = +(\S+) sec", r"^Solution time = +(\S+) sec"),
             "threads": (r"using (?:up to )?(\d+) threads?\.",),
             "limit": (r"^CPXPARAM_TimeLimit +(\S+)$",),

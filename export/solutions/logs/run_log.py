@@ -28,8 +28,9 @@ class Step(NamedTuple):
 class RunLog:
     """Facts from the log of one run; None or empty if the log lacks them.
 
-    solver: its name in the table of solvers. ended: `optimal` if the log states a proven optimum, else
-    `limit`. bound: the dual bound at the end; if the log rounds it, the least number that rounds to it.
+    solver: its name in the table of solvers. ended: `optimal` if the log states a proven optimum and its
+    numbers agree, else `limit`. bound: the dual bound at the end; if the log rounds it, the least number that
+    rounds to it.
     limit: seconds it was allowed. columns, rows: of the model that it read. trace: in the order of time.
     stamps: digits of the stamps of the problems that it names; text: the whole.
     """
@@ -62,6 +63,13 @@ def number(word: str | None) -> float | None:
     except ValueError:
         return None
     return value if math.isfinite(value) and abs(value) < _HUGE else None
+
+
+def share(word: str | None) -> float | None:
+    """A share as `1e-4` or `0.01%`."""
+    percent = (word or "").endswith("%")
+    value = number((word or "").removesuffix("%"))
+    return value / 100 if percent and value is not None else value
 
 
 def whole(word: str | None) -> int | None:

@@ -221,7 +221,7 @@ def test_there_is_something_to_extrapolate_on_every_rung():
 
 
 def run(**more):
-    facts = {"status": "optimal", "threads": 1, "seconds": EASY} | more
+    facts = {"status": "optimal", "bound": 1.0, "threads": 1, "seconds": EASY} | more
     return Record("cf_a_n004_milp", "0" * 64, "HiGHS", "1", **facts)
 
 
@@ -235,10 +235,14 @@ def run(**more):
         ("optimal", [], False, "hard"),
         ("optimal", [run(seconds=EASY + 1), run(threads=4), run(seconds=None)], False, "hard"),
         ("optimal", [run(status="limit", seconds=1.0)], False, "hard"),
+        ("claimed", [run(bound=0.6)], False, "hard"),
+        ("claimed", [run(bound=1.0 - 2e-6), run(bound=None)], False, "hard"),
+        ("claimed", [run(bound=1.0 - 5e-7)], False, "easy"),
     ],
 )
 def test_grades_follow_the_runs_on_an_entry(status, runs, tangent, grade):
-    assert difficulty(status, runs, tangent=tangent) == grade
+    """The best point has the objective 1; a claim of an optimum counts with a bound that proves it."""
+    assert difficulty(status, 1.0, runs, tangent=tangent) == grade
 
 
 @pytest.mark.slow

@@ -53,6 +53,60 @@ def test_a_bound_that_a_log_rounds_is_the_least_one_that_is_shown_so():
     assert read_log(LOGS / "cplex_gams.log").bound < OPTIMUM
 
 
+CLAIMED = {
+    "gurobi": (
+        "Best objective 2.671078499054e-01, best bound 2.671078499054e-01, gap 0.0000%",
+        "Best objective 2.671078499054e-01, best bound {bound}, gap 40.0%",
+    ),
+    "highs": ("Dual bound        0.267104325999", "Dual bound        {bound}"),
+    "scip": ("Dual Bound         : +2.67107849905365e-01", "Dual Bound         : {bound}"),
+    "xpress": (
+        "bound                       : 2.671176690572225e-01",
+        "bound                       : {bound}",
+    ),
+    "cplex_gams": ("Best possible:           0.267108", "Best possible:           {bound:.6f}"),
+}
+
+
+@pytest.mark.parametrize("name", CLAIMED)
+def test_an_optimum_far_above_its_bound_is_a_limit(name):
+    text = (LOGS / f"{name}.log").read_text()
+    stated, other = CLAIMED[name]
+    assert stated in text
+    for bound, ended in ((0.16, "limit"), (0.26705, "limit"), (0.2671, "optimal")):
+        found = parse_log(text.replace(stated, other.format(bound=bound)).encode())
+        assert (found.ended, found.bound) == (ended, pytest.approx(bound, abs=1e-5))
+
+
+def test_the_tolerance_of_a_log_counts_where_its_objective_is_missing():
+    text = (LOGS / "gurobi.log").read_text()
+    text = text.replace("Best objective 2.671078499054e-01,", "Best objective -,")
+    assert parse_log(text.encode()).ended == "optimal"
+    loose = parse_log(text.replace("(tolerance 1.00e-04)", "(tolerance 5.00e-01)").encode())
+    assert (loose.ended, loose.bound) == ("limit", KNOWN["gurobi"][3])
+    text = (
+        (LOGS / "highs.log").read_text().replace("Primal bound      0.267107849905", "Primal bound      inf")
+    )
+    assert parse_log(text.encode()).ended == "optimal"
+    assert parse_log(text.replace("tolerance: 0.01%", "tolerance: 50%").encode()).ended == "limit"
+
+
+@pytest.mark.parametrize(
+    "status, ended",
+    [
+        ("problem is solved [optimal solution found]", "optimal"),
+        ("solving was interrupted [time limit reached]", "limit"),
+        ("solving was interrupted [gap limit reached]", "limit"),
+        ("problem is solved [infeasible]", "limit"),
+    ],
+)
+def test_a_log_has_the_status_that_the_file_of_its_solver_has(status, ended):
+    text = (LOGS / "scip.log").read_text()
+    stated = "problem is solved [optimal solution found]"
+    assert stated in text
+    assert parse_log(text.replace(stated, status).encode()).ended == ended
+
+
 def test_a_log_to_which_runs_are_added_tells_of_the_last():
     first = (LOGS / "gurobi.log").read_bytes()
     second = first.replace(b"best bound 2.671078499054e-01", b"best bound 2.5e-01")
