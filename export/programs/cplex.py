@@ -14,7 +14,7 @@ import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
 from ...models.processes.control import on_stop
-from ..solutions.statuses import Status
+from ..solutions.statuses import CPLEX, CPLEX_STOPPED, Status
 from ..writing.terms import Terms, listed
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
 from .reading import Meaning, finite, infinite
@@ -117,8 +117,9 @@ def solve(job: Job) -> Outcome:
     nodes = answer.progress.get_num_nodes_processed() if mixed else None
     bound = finite(answer.MIP.get_best_objective()) if mixed else None
     if not answer.is_primal_feasible():
-        status = Status.INFEASIBLE if "infeasible" in words else Status.LIMIT_WITHOUT_POINT
-        return Outcome(status, words, bound, nodes)
+        code = answer.get_status()
+        status = Status.LIMIT_WITHOUT_POINT if code in CPLEX_STOPPED else CPLEX.get(code, Status.ERROR)
+        return Outcome(status.without_point, words, bound, nodes)
     with complete(job.solution) as part:
         answer.write(str(part))
     return Outcome(bound=bound, nodes=nodes)

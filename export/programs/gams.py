@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from ..licence import package_folder
-from ..solutions.statuses import Status
+from ..solutions.statuses import GAMS_INTEGER, GAMS_NORMAL, Status, closes, of_gams
 from . import casadi as casadi_program
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete, run_command
 from .reading import Evaluation, Points
@@ -111,43 +111,46 @@ def evaluate(path: Path, points: Points) -> Evaluation:
     return replace(found, may_lack=True, rounding=1e-14)
 
 
-_MODEL_STATUS: Final = {
-    1: Status.OPTIMAL_GLOBAL,
-    2: Status.OPTIMAL_LOCAL,
-    4: Status.INFEASIBLE,
-    5: Status.INFEASIBLE,
-    7: Status.LIMIT_WITH_POINT,
-    8: Status.LIMIT_WITH_POINT,
-    10: Status.INFEASIBLE,
-}
-_INTEGER_SOLUTION: Final = 8
-_NORMAL: Final = 1
-
-
 def solve(job: Job) -> Outcome:
     """Solve the file with one of GAMS's solvers; the solution is the CSV that our models write."""
     solver = job.solver.removeprefix("gams-")
     threads = (f"threads={job.threads}",) if job.threads else ()
     with complete(job.solution) as part:
         log = _run(job.model, solver, f"reslim={job.seconds:g}", *threads, f"--RESULTS={part}", gap=job.gap)
-    model, state = (
-        int(found[1]) if (found := re.search(rf"\*\*\*\* {kind} STATUS +(\d+)", log)) else 0
-        for kind in ("MODEL", "SOLVER")
-    )
-    words = f"model status {model}, solver status {state}"
     used = re.search(r"^ +SOLVER +(\w+) +FROM LINE", log, re.MULTILINE)
     if used and used[1].lower() != solver:
         raise RefusedError(f"it is of a type that GAMS gives to {used[1]}")
     refusal = re.search(r"\*\*\* (Cannot handle function .*)", log)
     if refusal:
         raise RefusedError(refusal[1])
-    status = _MODEL_STATUS.get(model, Status.ERROR)
-    if model == _INTEGER_SOLUTION and state == _NORMAL:
-        status = Status.OPTIMAL_GLOBAL
-    if status in {Status.ERROR, Status.INFEASIBLE}:
+    outcome = outcome_of(log)
+    if outcome.status is None or not outcome.status.promises_point:
         job.solution.unlink(missing_ok=True)  # its values are not an answer
-        return Outcome(status, words)
-    if not job.solution.exists():
-        raise RefusedError(f"GAMS wrote no solution: {words}")
-    bound = re.search(r"^Best possible *[=:] *(\S+)$", log, re.MULTILINE)
-    return Outcome(status, words, float(bound[1]) if bound else None)
+    elif not job.solution.exists():
+        raise RefusedError(f"GAMS wrote no solution: {outcome.message}")
+    return outcome
+
+
+def outcome_of(log: str) -> Outcome:
+    """Return what log and listing of a run state: status, words and dual bound."""
+    model, state = (_whole(rf"\*\*\*\* {kind} STATUS +(\d+)", log) for kind in ("MODEL", "SOLVER"))
+    status, words = of_gams(model, state)
+    bound = _number(r"^Best possible *[=:] *(\S+)$", log)
+    objective = _number(r"\*\*\*\* OBJECTIVE VALUE +(\S+)$", log)
+    at_gap = (model, state) == (GAMS_INTEGER, GAMS_NORMAL)
+    if at_gap and bound is not None and objective is not None and closes(bound, objective):
+        status = Status.OPTIMAL_GLOBAL
+    return Outcome(status, words, bound)
+
+
+def _whole(pattern: str, log: str) -> int:
+    found = re.search(pattern, log)
+    return int(found[1]) if found else 0
+
+
+def _number(pattern: str, log: str) -> float | None:
+    found = re.search(pattern, log, re.MULTILINE)
+    try:
+        return float(found[1]) if found else None
+    except ValueError:  # NA, or asterisks
+        return None

@@ -15,7 +15,7 @@ import numpy as np
 import pyscipopt
 
 from ...models.processes.control import on_stop
-from ..solutions.statuses import Status
+from ..solutions.statuses import SCIP_GAP, Status, closes, of_scip
 from ..writing.stamps import is_one_column
 from ..writing.terms import Terms, listed
 from .protocol import Job, Outcome, RefusedError, complete, file_names
@@ -160,15 +160,6 @@ def _agreed(scip: Any, variables: dict[str, Any], columns: list[str], point: Any
     return claim if feasible(hair) and not feasible(-hair) else np.inf
 
 
-_STATUS: Final = {
-    "optimal": Status.OPTIMAL_GLOBAL,
-    "gaplimit": Status.OPTIMAL_GLOBAL,
-    "infeasible": Status.INFEASIBLE,
-    "timelimit": Status.LIMIT_WITH_POINT,
-    "userinterrupt": Status.LIMIT_WITH_POINT,
-}
-
-
 def solve(job: Job) -> Outcome:
     """Solve the file; the solution is SCIP's .sol, without a status."""
     scip = _load(job.model)
@@ -186,12 +177,12 @@ def solve(job: Job) -> Outcome:
         scip.addSol(scip.readSolFile(str(job.start)))
     with on_stop(scip.interruptSolve):
         scip.optimizeNogil()
-    words = scip.getStatus()
-    status = _STATUS.get(words, Status.ERROR)
-    bound, nodes = finite(scip.getDualbound()), scip.getNTotalNodes()
-    if scip.getNSols():
-        with complete(job.solution) as part:
-            scip.writeBestSol(str(part))
-    elif status == Status.LIMIT_WITH_POINT:
-        status = Status.LIMIT_WITHOUT_POINT
-    return Outcome(status, words, bound, nodes)
+    words, bound = scip.getStatus(), finite(scip.getDualbound())
+    status = of_scip(words)
+    if not scip.getNSols():
+        return Outcome(status.without_point, words, bound, scip.getNTotalNodes())
+    with complete(job.solution) as part:
+        scip.writeBestSol(str(part))
+    if words == SCIP_GAP and bound is not None and closes(bound, scip.getPrimalbound()):
+        status = Status.OPTIMAL_GLOBAL
+    return Outcome(status, words, bound, scip.getNTotalNodes())

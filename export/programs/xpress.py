@@ -13,7 +13,7 @@ with warnings.catch_warnings(action="ignore"):  # it prints which licence it use
 
 from ...models.processes.control import on_stop
 from ...models.storage import replacing
-from ..solutions.statuses import Status
+from ..solutions.statuses import XPRESS, Status
 from ..writing.terms import Terms, listed, of_triangle, terms
 from .protocol import Job, Outcome, RefusedError, TooLargeError
 from .reading import Meaning, finite, infinite
@@ -84,13 +84,6 @@ def _row_products(model: Any) -> Terms:
     return listed(entries, indices=3, products=2)
 
 
-_STATUS = {
-    "OPTIMAL": Status.OPTIMAL_GLOBAL,
-    "FEASIBLE": Status.LIMIT_WITH_POINT,
-    "INFEASIBLE": Status.INFEASIBLE,
-}
-
-
 def solve(job: Job) -> Outcome:
     """Solve the file; the solution is an .slx, which has no status."""
     model = _load(job.model, log=True)
@@ -110,10 +103,10 @@ def solve(job: Job) -> Outcome:
     except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
         _complain(error)
     words = str(found).removeprefix("SolStatus.")
-    status = _STATUS.get(found.name, Status.LIMIT_WITHOUT_POINT)
+    status = XPRESS.get(found.name, Status.ERROR)
     mixed = model.attributes.mipents or model.attributes.qconstraints
     bound, nodes = (finite(model.attributes.bestbound), model.attributes.nodes) if mixed else (None, None)
-    if status in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
+    if status.promises_point:
         _write_slx(job, names, model.getSolution())
     return Outcome(status, words, bound, nodes)
 
