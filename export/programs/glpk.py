@@ -13,8 +13,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.processes.control import stopped
-from ..solutions.statuses import Status
 from ..writing.terms import listed
 from .protocol import Job, Outcome, RefusedError, complete, run_command, run_program
 from .reading import Evaluation, Meaning, Points
@@ -142,11 +140,6 @@ def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any
 def solve(job: Job) -> Outcome:
     """Solve the file; the solution is the file of `-w`, whose columns have no names."""
     limits = ("--tmlim", str(max(1, int(job.seconds))), "--mipgap", f"{job.gap:g}")
-    try:
-        with complete(job.solution) as part:
-            _run(job.model, *limits, "-w", str(part))
-    except RefusedError:
-        if not stopped():  # an interrupt ends GLPK at once
-            raise
-        return Outcome(Status.LIMIT_WITHOUT_POINT, "interrupted")
+    with complete(job.solution) as part:
+        _run(job.model, *limits, "-w", str(part))
     return Outcome()

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from ...models.errors import CrossfieldError
-from ...models.processes.control import on_stop
+from ...models.processes.control import on_stop, stopped
 from ...models.processes.deadline import Deadline
 from ..solutions.statuses import Status
 
@@ -90,10 +90,15 @@ class Outcome(NamedTuple):
 def call(program: str, step: str, *arguments: Any) -> Any:
     """Call a function of a program's module: `version`, `read`, `evaluate` or `solve` (see protocol.py).
 
-    Raises the module's own errors, and FailedError for errors of the program's interface.
+    A program that ends with an error after a request to stop has no answer: an interrupt ends GLPK and CBC at
+    once. Raises the module's own errors, and FailedError for errors of the program's interface.
     """
     try:
         return getattr(import_module(f"{__package__}.{program}"), step)(*arguments)
+    except RefusedError:
+        if step != "solve" or not stopped():
+            raise
+        return Outcome(Status.LIMIT_WITHOUT_POINT, "interrupted")
     except CrossfieldError:
         raise
     except Exception as error:

@@ -131,6 +131,19 @@ def test_an_event_ends_a_solve_with_its_best_point(tmp_path):
     assert found.field.instance.sha256 == start.instance.sha256
 
 
+@pytest.mark.parametrize(
+    "solver", [pytest.param(name, marks=pytest.mark.needs(name)) for name in ("cbc", "glpk")]
+)
+def test_an_event_at_the_start_of_an_executable_is_no_error_of_it(solver, tmp_path):
+    """An interrupt ends these programs with an error while they read a file."""
+    start, asked = cf.greedy_field(cf.sample("bottle", 12)), threading.Event()
+    problem = cf.formulate(start.instance, "milp-mccormick")
+    asked.set()
+    found = cf.solve(problem, solver, folder=tmp_path, limits=cf.Limits(600.0), start=start, stop=asked)
+    assert found.interrupted
+    assert (found.status, found.doubt) == (Status.LIMIT_WITH_POINT, "")
+
+
 def test_an_event_ends_a_run_with_the_fields_so_far(tmp_path):
     asked = threading.Event()
 
