@@ -326,3 +326,20 @@ PYOMO: Final = {
     "unbounded": Status.UNBOUNDED,
 }
 """Pyomo's termination conditions, also of plain documents: of any solver, so `optimal` counts as local."""
+
+
+WORDS: Final = (
+    (r"infeasible|inconsistent", Status.INFEASIBLE),
+    (r"unbounded", Status.UNBOUNDED),
+    (r"local", Status.OPTIMAL_LOCAL),
+    (r"(?:integer |proven |globally )?optimal", Status.OPTIMAL_GLOBAL),
+    (r".*\b(?:limit|interrupt|stopped|time|abort)", Status.LIMIT_WITH_POINT),
+)
+"""Start of the words of other programs, as in a comment `# Status: Optimal`; other words claim no more than a
+point."""
+
+
+def of_words(words: str) -> Status:
+    """The status in words of any program."""
+    known = (status for start, status in WORDS if re.match(start, words, re.IGNORECASE))
+    return next(known, Status.FEASIBLE)

@@ -17,6 +17,7 @@ from ...writing.records import number
 from ..documents import check_point
 from ..documents.citation import PAPER, REFERENCES, cited, terms
 from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, about_file, as_bytes, read_about, read_sidecar
+from ..documents.standalone import standalone
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
 from ..plan.recipe import NORMS, InstancePlan, norm_minimised
@@ -64,7 +65,7 @@ def general(
     context = _context(spec, sidecars) | {"skipped": skipped}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
-    checkers = {CHECKER: read_bytes(Path(check_point.__file__))}
+    checkers = {CHECKER: standalone(Path(check_point.__file__))}
     if context["certified"]:
         checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
     index = _index(folder, spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -17,8 +16,7 @@ from ....models.input_limits import MAX_HEAD, MAX_LOG
 from ....models.proof import check_certificate
 from ....models.storage import read_bytes
 from ...solutions.logs.registry import LOG_READERS, read_log
-from ...solutions.readers.registry import READERS, read_raw
-from ...solutions.readers.text import HEAD, with_unix_ends
+from ...solutions.readers.registry import head_of, read_raw, recognised
 
 Kind = Literal["solution", "log", "field", "certificate"]
 
@@ -94,10 +92,10 @@ def kinds_of(path: Path) -> set[Kind]:
         return {"field"}
     if data.startswith(b"PK"):
         return {"certificate" if _is_certificate(data) else "field"}
-    head = _unpacked_head(data)
+    head = head_of(data)
     if head.lstrip().startswith(b"{"):
         return {"field"} if _is_field(data) else set()
-    found: set[Kind] = {"solution"} if any(each.recognises(head) for each in READERS) else set()
+    found: set[Kind] = {"solution"} if recognised(head) else set()
     text = data[:MAX_LOG].decode("utf-8-sig", "replace").replace("\r\n", "\n")
     return found | ({"log"} if any(each.start.search(text) for each in LOG_READERS) else set())
 
@@ -113,10 +111,3 @@ def _is_field(data: bytes) -> bool:
     with suppress(ValueError, RecursionError):
         return bool(json.loads(data).get("format") == fields.FORMAT)
     return False
-
-
-def _unpacked_head(data: bytes) -> bytes:
-    if data.startswith(b"\x1f\x8b"):
-        with suppress(OSError, EOFError, zlib.error):
-            data = zlib.decompressobj(zlib.MAX_WBITS | 16).decompress(data, HEAD)
-    return with_unix_ends(data[:HEAD].removeprefix(b"\xef\xbb\xbf"))

@@ -3,8 +3,10 @@
 One file, Python 3.9 or newer, nothing to install, no solver.
 
 MODEL   a .mps or .mps.gz of the library, or the .instance.json that its formulations share
-POINT   a solution file of MIPLIB (`=obj=` first), Gurobi, SCIP, HiGHS or CBC, or a plain list of names and
-        values, one pair per line; also .gz. A column that is left out is 0, or what it is fixed to.
+POINT   a solution file of HiGHS, SCIP, CBC, Gurobi, Xpress (.slx), MIPLIB or GAMS (our CSV), or a plain list
+        of names and values, one pair per line. A column that is left out is 0, or what it is fixed to.
+
+Both files may be packed with gzip, bzip2 or xz.
 
 With an MPS file, the objective and the violations of bounds, rows and integrality are exact: the numbers are
 the decimals in the files, and no sum or product is rounded. With an instance, the energies of the cross field
@@ -19,17 +21,23 @@ its size, or of 1: solvers round theirs to about 1e-6.
 from __future__ import annotations
 
 import argparse
+import bz2
 import decimal
 import gzip
 import json
+import lzma
 import math
 import re
 import sys
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from decimal import Decimal
-from typing import Any, NoReturn, Optional, TypeVar
+from typing import IO, Any, NoReturn, Optional, TypeVar
+
+from ...solutions.readers.grammar import HEAD, LineError, Scan, plain_numbers, plain_text
+from ...solutions.readers.layouts import LAYOUTS
 
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 ZERO, HALF, ONE, TWO = Decimal(0), Decimal("0.5"), Decimal(1), Decimal(2)
@@ -41,6 +49,7 @@ INFINITE = Decimal("1e20")  # bounds from here on are none, as in all solvers
 LONGEST_LINE = 1 << 20
 MOST_BYTES = 1 << 30  # of a file, unpacked: a small .gz that holds more is a trap
 MOST_BYTES_OF_JSON = 1 << 27
+MOST_BYTES_OF_POINT = 1 << 28
 LONGEST_NUMBER = 100
 MOST_WEIGHT = 1e6  # of a term of the energy
 MOST_ANGLE = 1e6
@@ -57,8 +66,10 @@ BOUNDS = {
 }
 """Kinds of bounds: the ends that they set, and whether a value follows."""
 
-CBC_HEAD = re.compile(r"[A-Z].* - objective value +(\S+)\s*$")
-NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+PACKED = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ\0": lzma.open}
+"""How files that begin so are unpacked."""
+
+DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 CLAIM = Decimal("1e-5")  # how far the objective may be from a claimed one, as a part of its size, or of 1
 MARK = "\ufeff"  # a byte order mark, which some editors put before a text
 ADDED = re.compile(
@@ -169,7 +180,7 @@ class Finding:
 
 def number(text: str) -> Decimal:
     """The exact value of a decimal number."""
-    if len(text) <= LONGEST_NUMBER and NUMBER.fullmatch(text):
+    if len(text) <= LONGEST_NUMBER and DECIMAL.fullmatch(text):
         value = Decimal(text)
         if abs(value.adjusted()) <= GREATEST_EXPONENT:
             return value
@@ -187,25 +198,37 @@ def _require(condition: object, otherwise: str) -> None:
         raise BadInputError(otherwise)
 
 
-def lines_of(path: str) -> Iterator[tuple[int, str]]:
-    """The lines of a text file, unpacked where it is a gzip file, with their numbers from 1."""
-    total = 0
+def opened(raw: IO[bytes]) -> IO[bytes]:
+    """A file, unpacked where it is packed."""
+    start = raw.read(6)
+    raw.seek(0)
+    unpack: Any = next((unpack for mark, unpack in PACKED.items() if start.startswith(mark)), None)
+    return raw if unpack is None else unpack(raw)
+
+
+@contextmanager
+def reading(path: str) -> Iterator[IO[bytes]]:
+    """The content of a file, unpacked; errors are those of bad input."""
     try:
-        with open(path, "rb") as raw:  # noqa: PTH123 - a path as it was typed is enough here
-            packed = raw.read(2) == b"\x1f\x8b"
-            raw.seek(0)
-            with gzip.open(raw) if packed else raw as stream:
-                for at, line in enumerate(iter(lambda: stream.readline(LONGEST_LINE), b""), 1):
-                    total += len(line)
-                    _require(len(line) < LONGEST_LINE and total <= MOST_BYTES, "is unreasonably long")
-                    text = line.decode("utf-8")
-                    yield at, text[len(MARK) :] if at == 1 and text.startswith(MARK) else text
+        with open(path, "rb") as raw, opened(raw) as stream:  # noqa: PTH123 - a path as it was typed is enough
+            yield stream
     except UnicodeDecodeError:
         raise BadInputError("is not a text file") from None
-    except (EOFError, zlib.error, gzip.BadGzipFile):
+    except (EOFError, zlib.error, gzip.BadGzipFile, lzma.LZMAError):
         raise BadInputError("the packed file is damaged or cut off") from None
     except OSError as error:
         raise BadInputError(f"cannot be read: {(error.strerror or str(error)).lower()}") from None
+
+
+def lines_of(path: str) -> Iterator[tuple[int, str]]:
+    """The lines of a text file with their numbers from 1."""
+    total = 0
+    with reading(path) as stream:
+        for at, line in enumerate(iter(lambda: stream.readline(LONGEST_LINE), b""), 1):
+            total += len(line)
+            _require(len(line) < LONGEST_LINE and total <= MOST_BYTES, "is unreasonably long")
+            text = line.decode("utf-8")
+            yield at, text[len(MARK) :] if at == 1 and text.startswith(MARK) else text
 
 
 class MpsReader:
@@ -390,109 +413,38 @@ class Point:
 
 def read_point(path: str) -> Point:
     """The point in a file."""
-    point, take = Point(), None
-    for at, line in lines_of(path):
-        words = line.split()
-        if not words:
-            continue
-        point.stamps.update(stamps_in(line))
-        try:
-            if take is None:
-                take = _taker(point, line)
-            take(line, words)
-        except BadInputError as error:
-            raise BadInputError(f"line {at}: {error}") from None
-    _require(point.values or point.claimed is not None, "holds no point: neither a value nor an objective")
+    data = bytearray()
+    with reading(path) as stream:
+        while piece := stream.read(LONGEST_LINE):
+            data += piece
+            _require(len(data) <= MOST_BYTES_OF_POINT, "is unreasonably long")
+    _require(data.strip(), "holds no point: it is empty")
+    try:
+        text = plain_text(bytes(data))
+        layout = next((layout for layout in LAYOUTS if layout.recognises(text[:HEAD])), None)
+        known = "; ".join(layout.description for layout in LAYOUTS)
+        _require(layout, f"is not a solution file of a known kind; give one of these: {known}")
+        assert layout is not None
+        scan = Scan(text, layout)
+        entries = [pair for names, values in scan.read() for pair in zip(names, values)]
+    except LineError as error:
+        raise BadInputError(str(error)) from None
+    _require(scan.has_point, "the file holds no point")
+    point = Point(claimed=_value(scan.claims["objective"]) if "objective" in scan.claims else None)
+    point.stamps = stamps_in(text[:HEAD].decode("utf-8", "replace"))
+    for name, value in entries[scan.first : scan.starts[1] if len(scan.starts) > 1 else None]:
+        point.stamps |= stamps_in(name.decode("utf-8", "replace"))
+        _keep(point, name.decode("utf-8", "replace"), _value(value))
     return point
 
 
-def _taker(point: Point, first: str) -> Callable[[str, list[str]], None]:
-    """The function that reads the lines of a file into a point, by the first line."""
-    if first.strip() == "Model status":
-        return HighsSolution(point).take
-    if CBC_HEAD.match(first):
-        return CbcSolution(point).take
-    return PlainList(point).take
+def _value(word: bytes) -> Decimal:
+    return number(plain_numbers(word).decode("ascii", "replace"))
 
 
-@dataclass
-class HighsSolution:
-    """The lines of a solution file of HiGHS: values are between `# Columns` and `# Rows`."""
-
-    point: Point
-    section: str = ""
-
-    def take(self, line: str, words: list[str]) -> None:
-        """Take a line."""
-        if line.startswith("#"):
-            self.section = " ".join(words[1:3]) if words[1:2] != ["Columns"] else "Columns"
-        elif self.section == "Primal solution":
-            _require(words != ["None"], "the file holds no point")
-            if words[0] == "Objective":
-                self.point.claimed = number(words[-1])
-        elif self.section == "Columns":
-            _require(len(words) in (2, 3), "is not a name and a value")
-            _keep(self.point, *words[:2])
-
-
-@dataclass
-class CbcSolution:
-    """The lines of a solution file of CBC: number, name, value, reduced cost.
-
-    Rows come first if they were asked for; then the numbers begin again.
-    """
-
-    point: Point
-    last: int = -1
-
-    def take(self, line: str, words: list[str]) -> None:
-        """Take a line."""
-        head = CBC_HEAD.match(line)
-        if head:
-            _require("infeasible" not in line.lower() and "continuous" not in line, "the file holds no point")
-            self.point.claimed = number(head.group(1))
-            return
-        words = words[words[0] == "**" :]
-        _require(len(words) == 4 and words[0].isdecimal(), "is not number, name, value and reduced cost")
-        if int(words[0]) <= self.last:
-            self.point.values.clear()
-        self.last = int(words[0])
-        _keep(self.point, *words[1:3])
-
-
-@dataclass
-class PlainList:
-    """The lines of a list of names and values, as MIPLIB, Gurobi and SCIP have it."""
-
-    point: Point
-
-    def take(self, line: str, words: list[str]) -> None:
-        """Take a line."""
-        if not _said(self.point, line, words):
-            _value(self.point, words)
-
-
-def _said(point: Point, line: str, words: list[str]) -> bool:
-    """Whether a line is a comment, a status or an objective, which is kept."""
-    claim = re.match(r"(?:=obj=|objective value:|# ?Objective value ?=?)\s*(\S+)\s*$", line, re.IGNORECASE)
-    if claim:
-        point.claimed = number(claim.group(1))
-    none = words[0] == "=infeas=" or line.startswith("no solution available")
-    _require(not none, "the file holds no point")
-    return bool(claim) or line.startswith(("#", "solution status:"))
-
-
-def _value(point: Point, words: list[str]) -> None:
-    """Keep a name and its value; SCIP adds the objective coefficient in brackets."""
-    fits = len(words) == 2 or (len(words) == 3 and words[2].startswith("(obj:"))
-    known = "MIPLIB, Gurobi, SCIP, HiGHS or CBC"
-    _require(fits, f"is not a name and a value; give a solution file of {known}, or a plain list")
-    _keep(point, words[0], words[1])
-
-
-def _keep(point: Point, name: str, value: str) -> None:
-    _require(name not in point.values, f"{name[:40]} is there twice")
-    point.values[name] = number(value)
+def _keep(point: Point, name: str, value: Decimal) -> None:
+    """Keep the value of a column, which may be there twice if the values are equal."""
+    _require(point.values.setdefault(name, value) == value, f"{name[:40]} has two values")
 
 
 # ------------------------------------------------------------------------------------------ MPS against point

@@ -45,12 +45,15 @@ from ....models.instance.grid import Floats
 from ....models.storage import replacing
 from ...writing.stamps import digits_of_option, stamp_option
 from ..statuses import of_ampl
-from .text import HEAD, Cursor, RawSolution, Reader, begins, is_number, numbers, one_line, shown
+from .grammar import HEAD, Form, place_of_entry, shown
+from .text import Cursor, RawSolution, Reader, begins, entries, fault, one_line
 
 _OPTIONS = re.compile(rb"^Options[ \t]*\n", re.MULTILINE)
 _OBJNO = re.compile(rb"^objno\b.*", re.MULTILINE)
 _CODE = re.compile(rb"objno[ \t]+\d{1,9}(?:[ \t]+(-?\d{1,9}))?[ \t]*")
+_NUMBERS: Final = Form("value")
 _MOST_OPTIONS: Final = 16
+_CODE_DIGITS: Final = 3
 _OUR_OPTIONS: Final = (1, 1, 0)  # and the stamp, as in the first line of our .nl files
 _LONGEST_MESSAGE: Final = 10_000
 _OPTIONS_WORD: Final = b"Options"
@@ -112,32 +115,34 @@ def _stamps(options: Sequence[int]) -> frozenset[str]:
 
 def _read_values(cursor: Cursor, counts: _Counts) -> Floats:
     """The primal values; the cursor moves behind them."""
-    data, start = cursor.data, cursor.position
     needed = counts.duals + counts.values
-    ends = np.flatnonzero(np.frombuffer(data, np.uint8, offset=start) == ord("\n"))[:needed] + 1
-    if len(ends) < needed:
-        raise cursor.fault(
-            f"{needed} numbers are announced, {len(ends)} whole lines follow; the file is cut off"
-        )
-    middle = start + int(ends[counts.duals - 1]) if counts.duals else start
-    cursor.position = start + int(ends[-1]) if needed else start
-    return numbers(data, middle, cursor.position)
+    numbers = entries(cursor.data, cursor.position, _NUMBERS)
+    held = len(numbers.values)
+    if held > needed:
+        place = place_of_entry(cursor.data, cursor.position, needed)
+        raise fault(cursor.data, place, "there are more numbers than announced")
+    if held < needed:
+        rest = cursor.data[numbers.end :].lstrip().split(b"\n", 1)
+        if len(rest) > 1 and not _OBJNO.match(rest[0]):
+            raise fault(cursor.data, numbers.end, _NUMBERS.fault(rest[0]))
+        raise cursor.fault(f"{needed} numbers are announced, {held} whole lines follow; the file is cut off")
+    cursor.position = numbers.end
+    return numbers.values[counts.duals :].copy()
 
 
 def _read_code(cursor: Cursor) -> int | None:
-    """The solve code, or None when the file has none."""
-    if is_number(cursor.data[cursor.position : cursor.position + HEAD].split(b"\n", 1)[0].strip()):
-        cursor.line("objno")
-        raise cursor.fault("there are more numbers than announced")
-    found = _OBJNO.search(cursor.data, cursor.position)
-    if found is None:
+    """The solve code, or None when the file has none, or one that may be cut off."""
+    match = _OBJNO.search(cursor.data, cursor.position)
+    if match is None:
         return None
-    cursor.position = found.start()
+    cursor.position = match.start()
     line = cursor.line("the solve code")
     code = _CODE.fullmatch(line)
     if code is None:
         raise cursor.fault(f"{shown(line)} is not the number of the objective and a solve code")
-    return None if code[1] is None else int(code[1])
+    digits = code[1] or b""
+    whole = cursor.data.endswith(b"\n") or not cursor.at_end or digits == b"0" or len(digits) == _CODE_DIGITS
+    return int(digits) if digits and whole else None
 
 
 def _solution(message: bytes, code: int | None, values: Floats, counts: _Counts) -> RawSolution:
@@ -264,7 +269,5 @@ def _text_parts(message: str, primal: Floats, numbers: tuple[int, ...], code: in
     yield f"objno 0 {code}\n".encode()
 
 
-READERS: Final = (
-    Reader("ampl-binary", "AMPL .sol, binary", begins(_MAGIC), parse_binary, text=False),
-    Reader("ampl-text", "AMPL .sol, text", _recognises_text, parse_text),
-)
+BINARY: Final = Reader("ampl-binary", "AMPL .sol, binary", begins(_MAGIC), parse_binary, text=False)
+TEXT: Final = Reader("ampl-text", "AMPL .sol, text", _recognises_text, parse_text)

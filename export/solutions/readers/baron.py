@@ -23,21 +23,14 @@ from typing import Final
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ..statuses import Status, of_baron
-from .text import (
-    Bytes,
-    Cursor,
-    RawSolution,
-    Reader,
-    begins,
-    labelled_numbers,
-    one_line,
-    without_point,
-)
+from .grammar import Form
+from .text import Bytes, Cursor, RawSolution, Reader, begins, entries, one_line, without_point
 
 _SUMMARY: Final = b"\n Best solution found at node:"
 _BANNER = re.compile(rb"^ *\*\*\* ([^*\n]{3,100}?) \*\*\* *$", re.MULTILINE)
 _TABLE: Final = b"\nThe best solution found is"
 _HEADER: Final = b"variable"
+_ROW: Final = Form("name number value number")
 _OBJECTIVE: Final = b"The above solution has an objective value of:"
 _FIRST = re.compile(rb"^ +first(?:feas|loc) += +1$", re.MULTILINE)
 _POINT: Final = b">>> Objective value is:"
@@ -72,17 +65,17 @@ def parse_results(data: bytes) -> RawSolution:
 def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:
     """Names and values of the best solution, and its objective."""
     cursor = Cursor(data, position)
-    for _ in range(2):
-        cursor.line("the table of the best solution")
+    cursor.line("the table of the best solution")
     cursor.after(_HEADER, "the head of the table")
-    stop = data.find(b"\n\n", cursor.position - 1) + 1
-    if not stop:
-        raise cursor.fault("the table is cut off")
-    names, values = labelled_numbers(data, cursor.position, stop, 4, label=0, numeric=(2,))
-    cursor.position = stop + 1
-    return names, values[:, 0], cursor.number(cursor.after(_OBJECTIVE, "the objective"))
+    table = entries(data, cursor.position, _ROW)
+    cursor.position = table.end
+    line = cursor.line("the objective")
+    if not line.startswith(_OBJECTIVE):
+        cut = b"\n" not in data[cursor.before :]
+        raise cursor.fault("the table is cut off" if cut else _ROW.fault(line))
+    return table.names, table.values, cursor.number(line.removeprefix(_OBJECTIVE).strip())
 
 
-READERS: Final = (
-    Reader("baron-res", "BARON results (res.lst)", begins(rb"=+\n BARON version "), parse_results),
+READER: Final = Reader(
+    "baron-res", "BARON results (res.lst)", begins(rb"\s*=+\n\s*BARON version "), parse_results
 )

@@ -27,11 +27,13 @@ from defusedxml.ElementTree import DefusedXMLParser
 
 from ....models.errors import SolutionError
 from ..statuses import CPLEX, CPLEX_STOPPED, Status
-from .text import RawSolution, Reader, begins, named_pairs, number_of, one_line, pooled, without_point
+from .grammar import float_of, is_number
+from .text import RawSolution, Reader, begins, named_pairs, one_line, pooled, without_point
 
 _OMITS_ZEROS: Final = "3"
 _INTEGERS_ONLY: Final = {"2", "4"}
 _CHUNK: Final = 1 << 20
+_POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED}
 
 
 def parse(data: bytes) -> RawSolution:
@@ -50,7 +52,7 @@ def _solution(entry: _Entry) -> RawSolution:
     words = entry.header.get("solutionStatusString", "")
     if name := entry.header.get("solutionName"):
         words += f"; {name}"
-    if not status.promises_point:
+    if status in _POINTLESS:
         return without_point(status, words)
     return _with_point(entry, status, words)
 
@@ -66,8 +68,11 @@ def _with_point(entry: _Entry, status: Status, words: str) -> RawSolution:
     names, values = named_pairs(entry.names, entry.values)
     omits = level == _OMITS_ZEROS
     if not (omits or len(values)):
+        if not status.promises_point:
+            return without_point(status, words)
         raise SolutionError("the file holds no variables; let CPLEX write it again")
-    objective = number_of(header.get("objectiveValue", "").encode(errors="replace"))
+    stated = header.get("objectiveValue", "").encode(errors="replace")
+    objective = float_of(stated) if is_number(stated) else None
     return RawSolution(status, one_line(words.encode()), objective, names, values, omits_zeros=omits)
 
 
@@ -105,11 +110,11 @@ class _Entries:
             self.solutions[-1].header = attributes
 
     def _variable(self, name: str | None, text: str) -> None:
-        value = number_of(text.encode(errors="replace"))
-        if name is None or value is None:
+        word = text.encode(errors="replace")
+        if name is None or not is_number(word):
             raise SolutionError("a variable has no name, or a value that is not a number")
         self.solutions[-1].names.append(sys.intern(name))
-        self.solutions[-1].values.append(value)
+        self.solutions[-1].values.append(float_of(word))
 
     def close(self) -> list[_Entry]:
         """Return all solutions, at the end of the document."""
@@ -138,4 +143,4 @@ def _parsed(data: bytes) -> list[_Entry]:
     return solutions or [_Entry()]
 
 
-READERS: Final = (Reader("cplex", "CPLEX .sol (XML)", begins(rb"(?s)\s*(?=<[?!C]).*<CPLEXSolution"), parse),)
+READER: Final = Reader("cplex", "CPLEX .sol (XML)", begins(rb"(?s)\s*(?=<[?!C]).*<CPLEXSolution"), parse)

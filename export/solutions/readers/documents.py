@@ -20,7 +20,8 @@ from typing import Any, Final
 
 from ....models.errors import SolutionError
 from ..statuses import GUROBI, PULP, PYOMO, Status
-from .text import RawSolution, Reader, begins, named_pairs, one_line, pooled, shown, without_point
+from .grammar import shown
+from .text import RawSolution, Reader, begins, named_pairs, one_line, pooled, without_point
 
 _INFINITE: Final = 1e100
 _AGAIN: Final = "let the program write the file again"
@@ -197,8 +198,9 @@ def _object(pairs: list[tuple[str, Any]]) -> Any:
     content = dict(pairs)
     if len(content) < len(pairs):
         raise SolutionError(f"an object has a key twice; {_AGAIN}")
-    if "VarName" in content:
-        return content["VarName"], content.get("X", 0), content.get("PoolNX")
+    name = content.get("VarName") or next(iter(content.get("VTag") or ()), None)  # tags replace names
+    if name is not None:
+        return name, content.get("X", 0), content.get("PoolNX")
     if "varValue" in content:
         return content.get("name"), content["varValue"]
     return content

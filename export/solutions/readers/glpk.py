@@ -26,28 +26,24 @@ from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ...writing.canonical import Order
 from ..statuses import GLPK, Status
-from .text import (
-    Cursor,
-    RawSolution,
-    Reader,
-    begins,
-    fault,
-    labelled_numbers,
-    line_after,
-    shown,
-    without_point,
-)
+from .grammar import Form, place_of_entry, shown
+from .text import Cursor, RawSolution, Reader, begins, entries, fault, without_point
 
 _SUMMARY = re.compile(rb"s (mip|bas|ipt) (\d{1,12}) (\d{1,12}) (.+) (\S+)")
 _END: Final = b"e o f"
 _GOAL_OF_MOD: Final = b"energy ="
-_WORDS: Final = {b"mip": 3, b"ipt": 4, b"bas": 5}
+_FORMS: Final = {
+    b"mip": Form("j index value"),
+    b"ipt": Form("j index value number"),
+    b"bas": Form("j index word value number"),
+}
+_COLUMNS = re.compile(rb"^[ \t\f\v]*j[ \t\f\v]", re.MULTILINE)
 
 
 class _Summary(NamedTuple):
     """The line that begins with s: kind, rows, columns, status and objective."""
 
-    words: int
+    form: Form
     rows: int
     columns: int
     status: Status
@@ -63,7 +59,7 @@ def parse(data: bytes) -> RawSolution:
     message = comments.get(b"Status", b"").decode(errors="replace").lower()
     if not data.rstrip().endswith(b"\n" + _END):
         raise SolutionError("the file is cut off: it has no line `e o f`; let the solver write it again")
-    if not summary.status.promises_point:
+    if summary.status in {Status.INFEASIBLE, Status.UNBOUNDED}:
         return without_point(summary.status, message, rows=summary.rows)
     values = _columns(data, cursor.position, summary)
     return RawSolution(
@@ -73,11 +69,14 @@ def parse(data: bytes) -> RawSolution:
 
 def _comments(cursor: Cursor) -> dict[bytes, bytes]:
     """The content of the comments; the cursor moves to the line after them."""
-    found: dict[bytes, bytes] = {}
-    while cursor.data.startswith(b"c", cursor.position):
-        label, _, text = cursor.line("a comment")[1:].partition(b":")
-        found.setdefault(label.strip(), text.strip())
-    return found
+    comments: dict[bytes, bytes] = {}
+    start = cursor.position
+    while re.match(rb"c(?:\s|$)", cursor.line("the line of counts and status")):
+        label, _, text = cursor.data[cursor.before : cursor.position].strip()[1:].partition(b":")
+        comments.setdefault(label.strip(), text.strip())
+        start = cursor.position
+    cursor.position = start
+    return comments
 
 
 def _order(comments: dict[bytes, bytes]) -> Order:
@@ -92,22 +91,26 @@ def _summary(cursor: Cursor) -> _Summary:
     if found is None:
         raise cursor.fault(f"{shown(line)} is not kind, rows, columns, status and objective")
     status = GLPK.get(found[4].decode(errors="replace"), Status.LIMIT_WITHOUT_POINT)
-    return _Summary(_WORDS[found[1]], int(found[2]), int(found[3]), status, cursor.number(found[5]))
+    return _Summary(_FORMS[found[1]], int(found[2]), int(found[3]), status, cursor.number(found[5]))
 
 
 def _columns(data: bytes, start: int, summary: _Summary) -> Floats:
-    start = data.find(b"\nj ", start - 1) + 1 or data.rfind(_END)
-    stop = data.rfind(_END)
-    letters, numbers = labelled_numbers(
-        data, start, stop, summary.words, label=0, numeric=(1, 2 + (summary.words == 5))
-    )
-    if len(letters) != summary.columns:
-        raise fault(data, start, f"{summary.columns} columns are announced, {len(letters)} lines follow")
-    wrong = (letters != b"j") | (numbers[:, 0] != np.arange(1, summary.columns + 1))
+    first = _COLUMNS.search(data, start)
+    start = first.start() if first else data.rfind(_END)
+    columns = entries(data, start, summary.form)
+    rest = data[columns.end :].lstrip()
+    if not rest.startswith(_END):
+        line = rest.split(b"\n", 1)[0]
+        raise fault(data, columns.end, summary.form.fault(line))
+    if len(columns.values) != summary.columns:
+        raise fault(
+            data, start, f"{summary.columns} columns are announced, {len(columns.values)} lines follow"
+        )
+    wrong = columns.numbers != np.arange(1, summary.columns + 1)
     if wrong.any():
         at = int(np.argmax(wrong))
-        raise fault(data, line_after(data, start, at), f"this is not the line of column {at + 1}")
-    return numbers[:, 1].copy()
+        raise fault(data, place_of_entry(data, start, at), f"this is not the line of column {at + 1}")
+    return columns.values
 
 
-READERS: Final = (Reader("glpk", "GLPK, glpsol -w", begins(rb"c Problem:|s (?:mip|bas|ipt) "), parse),)
+READER: Final = Reader("glpk", "GLPK, glpsol -w", begins(rb"\s*(?:c Problem:|s (?:mip|bas|ipt) )"), parse)

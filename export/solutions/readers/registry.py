@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import codecs
+import bz2
 import gzip
 import io
+import lzma
 import zlib
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,19 +20,63 @@ from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
 from ...writing.stamps import digits_in_columns, digits_in_text
-from . import ampl, baron, cbc, cplex, documents, gams, glpk, gurobi, highs, scip, xpress
-from .text import HEAD, RawSolution, Reader, choose, with_unix_ends
+from ..statuses import HIGHS, Status, of_cbc, of_gams, of_scip, of_words
+from . import ampl, baron, cplex, documents, glpk
+from .grammar import HEAD, Scan, fault_at, plain_text
+from .layouts import LAYOUTS
+from .siblings import log_of, sibling_of
+from .text import Claim, RawSolution, Reader, choose, reader_of, refusing
 
-_GZIP: Final = b"\x1f\x8b"
 _SMALLER: Final = "let the solver write it without columns at 0"
+_PACKED: Final[dict[bytes, Callable[[io.BytesIO], Any]]] = {
+    b"\x1f\x8b": lambda stream: gzip.GzipFile(fileobj=stream),
+    b"BZh": bz2.BZ2File,
+    b"\xfd7zXZ\0": lzma.LZMAFile,
+}
+"""How files that begin so are unpacked."""
 
-_MODULES = (highs, documents, gurobi, cplex, scip, xpress, cbc, glpk, gams, baron, ampl)
-READERS: Final[tuple[Reader, ...]] = tuple(reader for module in _MODULES for reader in module.READERS)
-"""The table of readers: the first that recognises a file reads it; no real file matches two."""
+
+def _claim_of_highs(scan: Scan) -> tuple[Status, str]:
+    status = HIGHS.get(scan.status, Status.ERROR)
+    if status is Status.OPTIMAL_GLOBAL and "none" in scan.claims:
+        raise fault_at(scan.data, scan.places["none"], "the file is Optimal but holds no point")
+    denied = scan.claims.get("primal", b"").lower() not in {b"feasible", b""}
+    return status.without_point if denied else status, scan.status
+
+
+def _claim_of_gams(scan: Scan) -> tuple[Status, str]:
+    return of_gams(int(scan.status), int(scan.claims["solver"]))
+
+
+def _stated(table: Callable[[str], Status]) -> Claim:
+    """The claim of a text that states a status in words, or none."""
+    return lambda scan: (table(scan.status) if scan.status else Status.FEASIBLE, scan.status)
+
+
+_CLAIMS: Final[dict[str, Claim]] = {
+    "highs": _claim_of_highs,
+    "gams-csv": _claim_of_gams,
+    "scip": _stated(of_scip),
+    "cbc": _stated(of_cbc),
+}
+"""What texts claim, by layout; the others state a status in words at most."""
+
+_LISTS: Final = tuple(reader_of(layout, _CLAIMS.get(layout.name, _stated(of_words))) for layout in LAYOUTS)
+READERS: Final[tuple[Reader, ...]] = (
+    ampl.BINARY,
+    *documents.READERS,
+    cplex.READER,
+    glpk.READER,
+    baron.READER,
+    *_LISTS[:-1],
+    ampl.TEXT,
+    *_LISTS[-1:],
+)
+"""The table of readers: the first that recognises a file reads it. The plain list is the last."""
 
 
 def read_raw(path: str | Path, solution: int | None = None) -> RawSolution:
-    """Read a solution file; its content determines its kind, and gzip is unpacked.
+    """Read a solution file; its content determines its kind, and gzip, bzip2 and xz are unpacked.
 
     solution: number of the solution in a file with several, by default the best. Raises InputError when the
     file cannot be opened or has more than MAX_SOLUTION bytes, SolutionError when it is empty, malformed or of
@@ -40,27 +88,27 @@ def read_raw(path: str | Path, solution: int | None = None) -> RawSolution:
 
 
 def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
-    """Read the content of a solution file, ignoring a byte order mark. Raises SolutionError."""
-    data = _without_mark(data)
+    """Read the content of a solution file. Raises SolutionError."""
     if not data or data.isspace():
         raise SolutionError("the file is empty; the solver's log should give the reason")
-    head = with_unix_ends(data[:HEAD])
-    for reader in READERS:
-        if reader.recognises(head):
-            raw = choose(reader.parse(with_unix_ends(data) if reader.text else data), solution)
-            return replace(raw, reader=reader.name, stamps=raw.stamps | _stamps(head, raw))
-    known = "; ".join(reader.description for reader in READERS)
-    raise SolutionError(f"this is not a solution file of a known kind; give one of these: {known}")
+    binary = ampl.BINARY.recognises(data[:HEAD])
+    with refusing():
+        text = data if binary else plain_text(data)
+    reader = recognised(text[:HEAD])
+    if reader is None:
+        known = "; ".join(reader.description for reader in READERS)
+        unknown = f"this is not a solution file of a known kind; give one of these: {known}"
+        raise SolutionError(sibling_of(text[:HEAD]) or log_of(text[:HEAD]) or unknown)
+    raw = choose(reader.parse(text), solution)
+    return replace(raw, reader=reader.name, stamps=raw.stamps | _stamps(text[:HEAD], raw))
 
 
-def _without_mark(data: bytes) -> bytes:
-    """The text after a byte order mark, in UTF-8: Windows writes marks, and sometimes UTF-16."""
-    if not data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.removeprefix(codecs.BOM_UTF8)
-    try:
-        return data.decode("utf-16").encode()
-    except UnicodeError as error:
-        raise SolutionError("the text in UTF-16 is damaged or cut off; save it again") from error
+def recognised(head: bytes) -> Reader | None:
+    """The reader of a file with these first bytes, as `plain_text` returns them; None for other files."""
+    if sibling_of(head):
+        return None
+    reader = next((reader for reader in READERS if reader.recognises(head)), None)
+    return None if reader is READERS[-1] and log_of(head) else reader
 
 
 def _stamps(head: bytes, raw: RawSolution) -> frozenset[str]:
@@ -71,12 +119,29 @@ def _stamps(head: bytes, raw: RawSolution) -> frozenset[str]:
 
 
 def _unpacked(data: bytes) -> bytes:
-    if not data.startswith(_GZIP):
-        return data
-    try:
-        content = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MAX_SOLUTION + 1)
-    except (OSError, EOFError, zlib.error) as error:
-        raise SolutionError("the packed file is damaged or cut off; pack it again") from error
+    """The content of a packed file, or the data themselves. Raises SolutionError."""
+    content = _start_of(data, MAX_SOLUTION + 1)
     if len(content) > MAX_SOLUTION:
         raise SolutionError(f"unpacks to more than {MAX_SOLUTION} bytes; {_SMALLER}")
     return content
+
+
+def head_of(data: bytes) -> bytes:
+    """The first bytes of a file, unpacked, as `plain_text` returns them; as they are if they are damaged."""
+    with suppress(SolutionError), refusing():
+        return plain_text(_start_of(data, HEAD))
+    return data[:HEAD]
+
+
+def _start_of(data: bytes, limit: int) -> bytes:
+    """At most `limit` bytes of a packed file, or of the data themselves. Raises SolutionError."""
+    opened = next((opened for start, opened in _PACKED.items() if data.startswith(start)), None)
+    if opened is None:
+        return data[:limit]
+    try:
+        stream = opened(io.BytesIO(data))
+        # Piece by piece: to read a length makes room for all of it.
+        pieces = islice(iter(lambda: stream.read(HEAD), b""), -(-limit // HEAD))
+        return b"".join(pieces)[:limit]
+    except (OSError, EOFError, zlib.error, lzma.LZMAError) as error:
+        raise SolutionError("the packed file is damaged or cut off; pack it again") from error

@@ -1,45 +1,42 @@
-"""The content of a solution file, before it is mapped to a problem, and fast parsing of its columns of text.
-
-A regular expression checks megabytes of text at a time, without line numbers; the place of an error is
-determined only when one occurs.
-"""
+"""The content of a solution file before it is mapped to a problem, as arrays, and the mapping of names."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import repeat
+from itertools import pairwise, repeat
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....models.errors import SolutionError
-from ....models.instance.grid import Floats
+from ....models.instance.grid import Floats, Ints
 from ..statuses import Status
+from .grammar import (
+    HEAD,
+    TOKEN_LIMIT,
+    Form,
+    Layout,
+    LineError,
+    Scan,
+    fault_at,
+    float_of,
+    is_number,
+    plain_numbers,
+    shown,
+)
 
 if TYPE_CHECKING:  # the driver of a solver needs neither the writers nor the formulations
     from ...writing.canonical import Order
 
 Bytes = NDArray[np.bytes_]
 
-TOKEN_LIMIT: Final = 63
-"""Longest name or number, in bytes. Names of this package have at most 15, numbers at most 24."""
-
-HEAD: Final = 1 << 16
-"""Number of bytes at the start of a file that determine its format."""
-
-_PIECE: Final = 1 << 20  # bytes processed at once: their words take some ten times as much
-_WORD: Final = rb"(?=[^\0- ]{1,%d}+[ \t\n])" % TOKEN_LIMIT
-_NUMBER = re.compile(
-    rb"[-+]?(?:1\.#inf0*|inf(?:inity)?|(?:\d+(?:\.\d*)?|\.\d+)(?:[ed][-+]?\d+)?)", re.IGNORECASE
-)
-_NOT_TEXT = re.compile(rb"[^\t -\xff]")
-_WINDOWS_INFINITY = re.compile(rb"1\.#inf0*", re.IGNORECASE)
-_FORTRAN = bytes.maketrans(b"dD", b"eE")
 _CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
+_NOT_A_NUMBER: Final = "is not a number"
 
 
 @cache
@@ -124,6 +121,10 @@ def without_point(status: Status, message: bytes | str, *, rows: int | None = No
     return RawSolution(status, words, None, np.empty(0, dtype="S1"), np.empty(0), rows=rows)
 
 
+Claim = Callable[[Scan], tuple[Status, str]]
+"""The status that a text claims, and its words."""
+
+
 @dataclass(frozen=True)
 class Reader:
     """A reader of one kind of file.
@@ -143,6 +144,99 @@ def begins(pattern: bytes) -> Callable[[bytes], bool]:
     """Return a test for a Reader: whether a file's first bytes match a regular expression."""
     compiled = re.compile(pattern)
     return lambda head: compiled.match(head) is not None
+
+
+def reader_of(layout: Layout, claim: Claim) -> Reader:
+    """The reader of a text layout; claim: what its text claims."""
+    return Reader(
+        layout.name, layout.description, layout.recognises, lambda data: _parse_layout(data, layout, claim)
+    )
+
+
+def _parse_layout(data: bytes, layout: Layout, claim: Claim) -> RawSolution:
+    with refusing():
+        scan = Scan(data, layout)
+        pieces = [(np.array(names), floats(values)) for names, values in scan.read()]
+        status, words = claim(scan)
+        if not scan.has_point:
+            return _without_point(scan, status, words)
+    names = np.concatenate([names for names, _ in pieces] or [np.empty(0, "S1")])
+    values = np.concatenate([values for _, values in pieces] or [np.empty(0)])
+    zeros, first = scan.layout.omits_zeros, scan.first
+    rows, bound = scan.claims.get("rows", b""), _number(scan, "bound")
+    whole = RawSolution(
+        status,
+        one_line("; ".join(filter(None, (words, _note(scan)))).encode()),
+        _number(scan, "objective"),
+        names[first:],
+        values[first:],
+        omits_zeros=scan.sparse or (not (values[first:] == 0).any() if zeros is None else zeros),
+        rows=int(rows) if re.fullmatch(rb"\d{1,12}", rows) else None,
+        bound=bound if bound is not None and np.isfinite(bound) else None,
+        of_rows=names[:first] if first else None,
+    )
+    if len(scan.starts) < 2:
+        return whole
+    parts = (slice(*ends) for ends in pairwise([*scan.starts, None]))
+    return pooled([replace(whole, names=names[part], values=values[part]) for part in parts])
+
+
+def _note(scan: Scan) -> str:
+    """What a reader of the message should know about the text."""
+    name = scan.cut.decode(errors="replace")
+    return f"the last line has no end, so the value of {name} may be cut off" if name else ""
+
+
+def _without_point(scan: Scan, status: Status, words: str) -> RawSolution:
+    """The content of a text without a point. Raises LineError when it must have one."""
+    silent = "status" not in scan.claims
+    if "infeasible" in scan.claims:
+        return without_point(Status.INFEASIBLE, words or scan.claims["infeasible"])
+    if not {"none", "status"} & set(scan.claims) or (status.promises_point and "none" not in scan.claims):
+        raise LineError("the file holds no values")
+    return without_point(
+        Status.NO_POINT if silent or status is Status.FEASIBLE else status.without_point,
+        words or scan.claims.get("none", b""),
+    )
+
+
+def _number(scan: Scan, group: str) -> float | None:
+    return float_of(scan.claims[group]) if group in scan.claims else None
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """Raise SolutionError with a remedy for a fault of the text."""
+    try:
+        yield
+    except LineError as error:
+        remedy = "" if ";" in str(error) else "; let the solver write the file again"
+        raise SolutionError(f"{error}{remedy}") from None
+
+
+class Entries(NamedTuple):
+    """Names, values and indices of entries, as far as their form has them, and the position after them."""
+
+    names: Bytes
+    values: Floats
+    numbers: Ints
+    end: int
+
+
+def entries(data: bytes, start: int, form: Form) -> Entries:
+    """The lines of a text that are entries, from a byte position on; a line without an end is none."""
+    names, values, index, end = [np.empty(0, "S1")], [np.empty(0)], [np.empty(0, np.int64)], start
+    for stop, words in form.read(data, start):
+        end = stop
+        names.append(np.array(form.column(words, "name") or np.empty(0, "S1")))
+        values.append(floats(form.column(words, "value")))
+        index.append(floats(form.column(words, "index")).astype(np.int64))
+    return Entries(np.concatenate(names), np.concatenate(values), np.concatenate(index), end)
+
+
+def floats(words: list[bytes]) -> Floats:
+    """The numbers in words that are numbers. Python's own rounding: exact."""
+    return np.fromstring(plain_numbers(b" ".join(words)), sep=" ")
 
 
 class NamedValues(NamedTuple):
@@ -242,21 +336,9 @@ def one_line(text: bytes) -> str:
     return " ".join(_CONTROLS.sub(" ", text[:HEAD].decode(errors="replace")).split())[:300]
 
 
-def with_unix_ends(data: bytes) -> bytes:
-    r"""The text with \n at the end of its lines."""
-    return data.replace(b"\r\n", b"\n") if b"\r" in data else data
-
-
 def fault(data: bytes, position: int, text: str) -> SolutionError:
     """An error with the line of a byte position in a text, and the remedy."""
-    line = data.count(b"\n", 0, position) + 1
-    return SolutionError(f"line {line}: {text}; let the solver write the file again")
-
-
-def line_after(data: bytes, position: int, count: int) -> int:
-    """Start of the line that comes `count` whole lines after a byte position."""
-    ends = np.flatnonzero(np.frombuffer(data, np.uint8, offset=position) == ord("\n"))
-    return position + (int(ends[count - 1]) + 1 if count else 0)
+    return SolutionError(f"{fault_at(data, position, text)}; let the solver write the file again")
 
 
 @dataclass
@@ -273,12 +355,15 @@ class Cursor:
         return self.position >= len(self.data)
 
     def line(self, expected: str) -> bytes:
-        """The next line, stripped. Raises SolutionError when the text ends before the line does."""
-        end = self.data.find(b"\n", self.position)
-        if end < 0:
-            raise fault(self.data, self.position, f"the file is cut off where {expected} should be")
-        self.before, self.position = self.position, end + 1
-        return self.data[self.before : end].strip()
+        """The next line that is not blank, stripped. Raises SolutionError when there is none."""
+        line = b""
+        while not line:
+            if self.at_end:
+                raise fault(self.data, self.position, f"the file is cut off where {expected} should be")
+            end = self.data.find(b"\n", self.position)
+            self.before, self.position = self.position, len(self.data) if end < 0 else end + 1
+            line = self.data[self.before : self.position].strip()
+        return line
 
     def after(self, label: bytes, expected: str) -> bytes:
         """The text after a label on the next line, stripped. Raises SolutionError for another label."""
@@ -303,65 +388,13 @@ class Cursor:
 
     def number(self, text: bytes) -> float:
         """A number on the line last read. Raises SolutionError."""
-        return _number(self.data, self.before, text)
+        if not is_number(text):
+            raise self.fault(f"{shown(text)} is not a number")
+        return float_of(text)
 
     def fault(self, text: str) -> SolutionError:
         """An error about the line last read."""
         return fault(self.data, self.before, text)
-
-
-def shown(text: bytes) -> str:
-    """A short quotation for a message."""
-    return repr(text[:40].decode(errors="replace"))
-
-
-def is_number(text: bytes) -> bool:
-    """Whether a word is a number in the notation of solvers."""
-    return len(text) <= TOKEN_LIMIT and _NUMBER.fullmatch(text) is not None
-
-
-def number_of(text: bytes) -> float | None:
-    """The number in a word in the notation of solvers, or None."""
-    return float(_plain(text)) if is_number(text) else None
-
-
-def numbers(data: bytes, start: int, stop: int) -> Floats:
-    """The numbers in a text that has one on each line from byte `start` to `stop`.
-
-    Raises SolutionError with the line of a word that is not a number, or of a missing new line.
-    """
-    return labelled_numbers(data, start, stop, 1, label=0, numeric=(0,))[1][:, 0].copy()
-
-
-def named_numbers(data: bytes, start: int, stop: int, per_line: int) -> tuple[Bytes, Floats]:
-    """Names (k,) and values (k,) of a text whose lines are `name value ...` with `per_line` words each.
-
-    Words after the value must be numbers too, and are left out. Raises SolutionError with the line at fault.
-    """
-    names, values = labelled_numbers(data, start, stop, per_line, label=0, numeric=tuple(range(1, per_line)))
-    return names, values[:, 0].copy()
-
-
-def labelled_numbers(
-    data: bytes, start: int, stop: int, per_line: int, *, label: int, numeric: tuple[int, ...]
-) -> tuple[Bytes, Floats]:
-    """Labels (k,) and numbers (k, len(numeric)) of a text of lines of `per_line` words.
-
-    label, numeric: places of the label and of the numbers among the words of a line; others are left out.
-    Raises SolutionError with the line at fault.
-    """
-    # Not `*+`: in Python 3.11.2 a line that does not match moves the end of such a repetition.
-    lines = re.compile(b"(?:%b)*" % _line_of(per_line, numeric), re.IGNORECASE)
-    names: list[Bytes] = [np.empty(0, dtype="S1")]
-    values = [np.empty((0, len(numeric)))]
-    for begin, end in _pieces(data, start, stop):
-        read = lines.match(data, begin, end)
-        if read is None or read.end() < end:
-            raise _line_fault(data, read.end() if read else begin, per_line, numeric)
-        words = data[begin:end].split()
-        names.append(np.array(words[label::per_line]))
-        values.append(np.stack([_floats(words[at::per_line]) for at in numeric], axis=1))
-    return np.concatenate(names), np.concatenate(values)
 
 
 def named_pairs(names: list[str], values: Sequence[float] | Floats) -> tuple[Bytes, Floats]:
@@ -377,57 +410,3 @@ def named_pairs(names: list[str], values: Sequence[float] | Floats) -> tuple[Byt
         at = int(np.argmax(np.isnan(numbers_)))
         raise SolutionError(f"{names[at]} has no value; let the solver write the file again")
     return np.array([name.encode(errors="replace") for name in names] or np.empty(0, "S1")), numbers_
-
-
-def words_of_line(data: bytes, position: int) -> list[bytes]:
-    """The words of the line that begins at a byte position; none at the end of the text."""
-    end = data.find(b"\n", position)
-    return data[position : len(data) if end < 0 else end].split()
-
-
-def _line_of(per_line: int, numeric: tuple[int, ...]) -> bytes:
-    """Pattern of a line of `per_line` words, of which some are numbers."""
-    words = [_WORD + _NUMBER.pattern if at in numeric else _WORD + rb"\S++" for at in range(per_line)]
-    return rb"[ \t]*+%b[ \t]*+\n" % rb"[ \t]++".join(words)
-
-
-def _pieces(data: bytes, start: int, stop: int) -> Iterator[tuple[int, int]]:
-    """Start and end of pieces of whole lines."""
-    while start < stop:
-        end = data.rfind(b"\n", start, min(start + _PIECE, stop)) + 1 or data.find(b"\n", start, stop) + 1
-        if not end:
-            raise fault(data, start, "the file is cut off in the middle of this line")
-        yield start, end
-        start = end
-
-
-def _line_fault(data: bytes, start: int, per_line: int, numeric: tuple[int, ...]) -> SolutionError:
-    """The error about the line from byte `start` on, which does not have these words."""
-    text = data[start : data.index(b"\n", start)]
-    words = text.split()
-    if _NOT_TEXT.search(text):
-        return fault(data, start, "there is a byte that is not text; the file is damaged")
-    if len(words) != per_line:
-        return fault(data, start, f"{len(words)} words stand where {per_line} should")
-    if max(map(len, words)) > TOKEN_LIMIT:
-        return fault(data, start, f"a word is longer than {TOKEN_LIMIT} characters")
-    wrong = next(words[at] for at in numeric if not is_number(words[at]))
-    return fault(data, start, f"{shown(wrong)} is not a number")
-
-
-def _floats(words: list[bytes]) -> Floats:
-    """The numbers in words that are numbers. Python's own rounding: exact."""
-    return np.fromstring(_plain(b" ".join(words)), sep=" ")
-
-
-def _plain(text: bytes) -> bytes:
-    """Numbers in the notation of solvers as Python reads them."""
-    text = text.translate(_FORTRAN)
-    return _WINDOWS_INFINITY.sub(b"inf", text) if b"#" in text else text
-
-
-def _number(data: bytes, position: int, text: bytes) -> float:
-    value = number_of(text)
-    if value is None:
-        raise fault(data, position, f"{shown(text)} is not a number")
-    return value

@@ -20,6 +20,7 @@ from cases import LOW_DEGREE, make_field, make_instance, names_of, points_of, pr
 from crossfield.export.formats.registry import FORMATS, carried, write
 from crossfield.export.library.documents import check_point
 from crossfield.export.library.documents.check_point import BadInputError, check
+from crossfield.export.library.documents.standalone import standalone
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import formulate
@@ -28,7 +29,14 @@ from crossfield.models.instance.instance import Instance
 from loops import for_each
 
 SOLUTIONS = places.SOLUTIONS / "tiny"
-SCRIPT = Path(check_point.__file__)
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory):
+    """The checker as a library contains it."""
+    path = tmp_path_factory.mktemp("library") / "check_point.py"
+    path.write_bytes(standalone(Path(check_point.__file__)))
+    return path
 
 
 def save_point(path, problem, point, *, zeros=True):
@@ -38,9 +46,9 @@ def save_point(path, problem, point, *, zeros=True):
     return str(path)
 
 
-def run(*arguments):
+def run(script, *arguments):
     """The checker as users run it, without any installed package."""
-    command = [sys.executable, "-I", "-S", str(SCRIPT), *map(str, arguments)]
+    command = [sys.executable, "-I", "-S", str(script), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -346,7 +354,7 @@ def test_columns_left_out_are_zero_or_what_they_are_fixed_to_and_those_that_solv
 # as a program
 
 
-def test_it_needs_nothing_but_python(tmp_path):
+def test_it_needs_nothing_but_python(tmp_path, script):
     write(problem_of("milp-mccormick gauge=strokes"), tmp_path / "m.mps.gz")
     problem = problem_of("milp-mccormick gauge=strokes")
     field = make_field(problem.instance)
@@ -355,13 +363,17 @@ def test_it_needs_nothing_but_python(tmp_path):
     write_instance(problem.instance, tmp_path / "i.json")
     for model in ("m.mps.gz", "i.json"):
         for point in ("p.sol", "p.sol.gz"):
-            done = run(tmp_path / model, tmp_path / point)
+            done = run(script, tmp_path / model, tmp_path / point)
             assert (done.returncode, done.stderr) == (0, "")
             assert done.stdout.endswith("feasible within 1e-08\n")
 
 
-def test_it_is_one_file_for_python_3_9_with_the_standard_library_alone():
-    tree = ast.parse(SCRIPT.read_text(), feature_version=(3, 9))
+def test_it_is_one_file_for_python_3_9_with_the_standard_library_alone(script):
+    tree = ast.parse(script.read_text(), feature_version=(3, 9))
+    bound = [node.name for node in tree.body if isinstance(node, ast.ClassDef | ast.FunctionDef)]
+    assigned = (ast.walk(node.targets[0]) for node in tree.body if isinstance(node, ast.Assign))
+    bound += [name.id for names in assigned for name in names if isinstance(name, ast.Name)]
+    assert len(bound) == len(set(bound))  # modules that are joined share no name
     names = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):

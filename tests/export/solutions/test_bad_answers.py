@@ -31,7 +31,7 @@ FAULTS = {
     "ampl_binary_length_too_large": r"byte 93: the file is cut off",
     "ampl_code_is_a_word": r"line 17: 'objno 0 solved' is not",
     "ampl_count_negative": r"line 10: -5 is not a count",
-    "ampl_count_too_large": r"line 11: 4000000000 numbers are announced, 6 whole lines follow",
+    "ampl_count_too_large": r"line 11: 4000000000 numbers are announced, 5 whole lines follow",
     "ampl_count_too_small": r"line 16: there are more numbers than announced",
     "ampl_cut_in_the_values": r"line 11: 5 numbers are announced, 2 whole lines follow",
     "ampl_solved_without_values": r"states solved but holds no values",
@@ -43,18 +43,18 @@ FAULTS = {
     "highs_count_is_a_word": r"line 7: '# Columns five' is not the number",
     "highs_count_too_large": r"line 7: 999999999999 columns are announced, 5 whole lines follow",
     "highs_count_too_small": r"line 7: 4 columns are announced, 5 whole lines follow",
-    "highs_cut_in_a_number": r"line 7: 4 columns are announced, 3 whole lines follow",
+    "highs_cut_in_a_number": r"line 11: the file is cut off in the middle of this line",
     "highs_nul_byte": r"line 9: there is a byte that is not text",
     "highs_optimal_without_point": r"line 5: the file is Optimal but holds no point",
     "highs_sparse_without_index": r"line 10: 2 words stand where 3 should",
     "highs_value_is_a_word": r"line 9: 'minus' is not a number",
     "highs_value_is_nan": r"line 9: 'nan' is not a number",
     "highs_value_missing": r"line 11: 1 words stand where 2 should",
-    "junk": r"not a solution file of a known kind; give one of these: HiGHS",
+    "junk": r"not a solution file of a known kind; give one of these: .*HiGHS",
     "baron-26.5.27_qp_sum": "summary of BARON, which holds no values; give its results",
     "baron_res_cut": "the end of the search is missing",
     "baron_res_cut_after_the_table": "line 183: the file is cut off where the objective should be",
-    "baron_res_cut_in_the_table": "line 173: the table is cut off",
+    "baron_res_cut_in_the_table": "line 180: the file is cut off where the objective should be",
     "baron_res_value_missing": "line 180: 3 words stand where 4 should",
     "cbc_cut_in_a_line": "line 84: the file is cut off in the middle",
     "cbc_numbers_start_again_twice": "line 85: the numbers start again for the second time",
@@ -67,9 +67,9 @@ FAULTS = {
     "cplex_no_variables": "holds no variables",
     "cplex_value_is_nan": "line 33: a variable has no name, or a value that is not a number",
     "gams_csv_na": "line 5: 'NA' is not a number",
-    "gams_csv_no_columns": "line 3: no columns follow",
-    "gams_csv_no_solver_status": "line 2: 'status,1' stands where solver_status should",
-    "gams_csv_state_is_a_word": "line 1: 'two' is not the number of a state",
+    "gams_csv_no_columns": "the file holds no values",
+    "gams_csv_no_solver_status": "it has no solver_status",
+    "gams_csv_state_is_a_word": "line 1: 'two' is not a number",
     "gams_csv_undf": "line 5: 'UNDF' is not a number",
     "glpk_column_missing": "line 57: 35 columns are announced, 34 lines follow",
     "glpk_columns_out_of_order": "line 65: this is not the line of column 9",
@@ -92,13 +92,13 @@ FAULTS = {
     "miplib_objective_is_a_word": "line 1: 'unknown' is not a number",
     "miplib_value_missing": "line 7: 1 words stand where 2 should",
     "scip-10.0_milp_partial": "line 1: this is a partial solution",
-    "scip_cut_after_the_status": "line 2: the file is cut off where the objective should be",
+    "scip_cut_after_the_status": "the file is cut off: it has no objective",
     "scip_cut_in_a_line": "line 12: the file is cut off in the middle",
-    "scip_no_objective": "line 2: 'the objective is 8.8' stands where the objective should",
+    "scip_no_objective": "line 2: 4 words stand where 3 should",
     "scip_value_is_unknown": "line 5: 'unknown' is not a number",
     "xpress_slx_cut": "it has no line ENDATA",
     "xpress_slx_line_of_a_row": "line 4: this line is of no column",
-    "xpress_slx_no_columns": "the file holds no columns",
+    "xpress_slx_no_columns": "the file holds no values",
     "xpress_slx_value_is_a_word": "line 4: 'half' is not a number",
 }
 
@@ -174,6 +174,9 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
         read_raw(path)
 
 
+CUT = "the last line has no end, so the value of"
+
+
 def listed(raw):
     """Entries of a file: pairs of name and value, or of place and value."""
     names = range(len(raw.values)) if raw.names is None else raw.names.tolist()
@@ -197,10 +200,12 @@ def test_a_file_cut_anywhere_never_gives_other_values_or_a_stronger_claim(path):
             continue
         assert raw.status in {whole.status, Status.FEASIBLE, Status.NO_POINT}
         kept = {name: value for name, value in listed(raw).items() if name in listed(whole)}
+        if CUT in raw.message:  # the last number may be cut off, and the message says so
+            kept.pop(raw.message.partition(CUT)[2].split()[0].encode())
         assert kept.items() <= listed(whole).items()
         if path in OTHERS:
             assert raw.values.tolist() == whole.values.tolist()
-        if whole.has_point and not raw.omits_zeros and raw.names is not None:
+        if CUT not in raw.message and whole.has_point and not raw.omits_zeros and raw.names is not None:
             assert (values_for(whole.names, raw).missing == 0) == (len(kept) == len(whole.values))
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import places
 import pytest
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
+from crossfield.export.solutions.readers.grammar import Form
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.text import (
     RawSolution,
-    named_numbers,
-    numbers,
+    entries,
     values_for,
     values_in_order,
 )
@@ -308,19 +308,19 @@ def test_columns_of_text_larger_than_a_piece(monkeypatch):
     ]
     data = "".join(f"{name} {value}\n" for name, value in rows).encode()
     for size in (1, 30, 64, 1000, 4096, len(data) - 1, len(data), len(data) + 1):
-        monkeypatch.setattr("crossfield.export.solutions.readers.text._PIECE", size)
-        names, values = named_numbers(data, 0, len(data), 2)
+        monkeypatch.setattr("crossfield.export.solutions.readers.grammar.PIECE", size)
+        names, values = entries(data, 0, Form("name value"))[:2]
         assert names.tolist() == [name.encode() for name, _ in rows]
         assert values.tolist() == [float(value) for _, value in rows]
         column = "".join(f"{value}\n" for _, value in rows).encode()
-        assert numbers(b"7\n" + column, 2, len(column) + 2).tolist() == values.tolist()
+        assert entries(b"7\n" + column, 2, Form("value")).values.tolist() == values.tolist()
 
 
 @settings(deadline=None)
 @given(st.lists(st.floats(allow_nan=False)))
 def test_numbers_come_back_bit_by_bit(values):
     text = "".join(f"{value!r}\n" for value in values).encode()
-    assert numbers(text, 0, len(text)).tobytes() == np.array(values, dtype=float).tobytes()
+    assert entries(text, 0, Form("value")).values.tobytes() == np.array(values, dtype=float).tobytes()
 
 
 # by name

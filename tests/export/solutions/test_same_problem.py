@@ -7,8 +7,7 @@ from pathlib import Path
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.solutions.readers.gams import parse_csv
-from crossfield.export.solutions.readers.registry import read_raw
+from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.models.errors import SolutionError
 from crossfield.models.search.starts import first_field
 
@@ -144,7 +143,7 @@ def test_the_answers_of_gams_carry_the_stamp(ring, tmp_path):
     old = b"model_status,1\nsolver_status,1\nobjective, 2.0\nx, 1.0\n"
     new = old.replace(b"objective", f"problem,{problem.stamp}\nobjective".encode())
     (tmp_path / "new.csv").write_bytes(new)
-    assert parse_csv(old).objective == parse_csv(new).objective == 2.0
+    assert parse_raw(old).objective == parse_raw(new).objective == 2.0
     assert read_raw(tmp_path / "new.csv").stamps == {problem.stamp.removeprefix("sha256_")}
 
 
