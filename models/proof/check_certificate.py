@@ -18,6 +18,9 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
            + w_beta sum beta^2,     A = alpha_i - alpha_j + p pi/2,   B = (-1)^p beta_i - beta_j.
 
    A field's energy, in any gauge, is at least F of its crosses: a lower bound of F is one of all fields.
+   No pair joins two parts of the mask, and no term is negative. So F is at least the sum of its terms in
+   those parts that have a stroke. All that follows is about these terms and pixels alone, numbered anew; U
+   is the energy of the whole field.
 
 2. A level. Label (k, l) of pixel i stands at (alpha_i + h (k + o), beta_i + h (l + o)), where o is 0 on
    black and 1/2 on white pixels. The domain of a pixel is the union of the cells whose four vertices are
@@ -173,6 +176,7 @@ MOST_ANGLE = 16.0
 MOST_JUMP = 64
 MOST_WEIGHT = 1e6
 MOST_WHOLE = 2.0**53  # of a message
+MOST_SCALE = 1.0  # of a message or a table
 BLOCK = 1 << 16  # numbers of a product that NumPy handles at once
 KEPT = 1 << 23  # numbers of costs that a pass keeps for its combs
 ROWS = 32  # of a product, from which NumPy leaves out terms together
@@ -217,12 +221,15 @@ class StoppedError(Exception):
 class Sketch:
     """The instance: pixels in order, pairs (upper or right neighbours), strokes, windows.
 
-    norm: 1, 2 or "mixed". offset (n,): o. weight, target (n,): W and theta, 0 where there is no stroke. slope
-    (n,): l of 5. lower (n,): least alpha of the gauge. earlier, later: numbers of the pairs of each pixel to
-    later, to earlier pixels. runs: columns and rows of pixels without gaps.
+    pixels (n,), pairs (m,): numbers in the whole mask. norm: 1, 2 or "mixed". offset (n,): o. weight, target
+    (n,): W and theta, 0 where there is no stroke. slope (n,): l of 5. lower (n,): least alpha of the gauge.
+    earlier, later: numbers of the pairs of each pixel to later, to earlier pixels. runs: columns and rows of
+    pixels without gaps.
     """
 
     norm: Any
+    pixels: Array
+    pairs: Array
     offset: Array
     slope: Array
     first: Array
@@ -523,8 +530,11 @@ def _levels(head: dict[str, Any]) -> int:
 # The instance and the field --------------------------------------------------------------------------------
 
 
-def sketch_of(arrays: dict[str, Array]) -> Sketch:
-    """The instance in the certificate, with stroke directions moved into the gauge's own range."""
+def sketch_of(arrays: dict[str, Array], *, whole: bool = False) -> Sketch:
+    """The instance in the certificate, with stroke directions moved into the gauge's own range.
+
+    whole: with the parts of the mask that have no stroke, of which no level says anything.
+    """
     head = _text(arrays, "instance_head")
     _need("instance_crossings" not in arrays, "instance_crossings", "is not covered by certificates")
     mask = _given(arrays, "instance_mask", "|b1", None, None)
@@ -538,7 +548,15 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
     neighbours = np.stack([number[rows, columns], number[rows + 1, columns + 1]], axis=1)
     first, side = np.nonzero(neighbours >= 0)
     second = neighbours[first, side]
-    weight, target, lower = _strokes(arrays, head, number[1:, :-1], n)
+    at, *strokes = _strokes(arrays, head, number[1:, :-1], n)
+    pixels, pairs = np.arange(n), np.arange(len(first))
+    if not whole:
+        held = _joined(at, first, second, n)
+        pixels, pairs = np.flatnonzero(held), np.flatnonzero(held[first])
+        anew = np.cumsum(held) - 1
+        first, second, rows, columns = anew[first[pairs]], anew[second[pairs]], rows[held], columns[held]
+        strokes, n = [each[held] for each in strokes], len(pixels)
+    weight, target, lower = strokes
     later: list[list[int]] = [[] for _ in range(n)]
     earlier: list[list[int]] = [[] for _ in range(n)]
     for e, (i, j) in enumerate(zip(first.tolist(), second.tolist())):
@@ -548,9 +566,25 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
     claim = head_of(arrays)
     norm, white = norm_of(claim), (rows + columns) % 2 == 1
     offset = 0.5 * white if norm == 2 else np.zeros(n)
-    slope = _slopes(arrays, norm, n)
+    slope = np.zeros(n) if whole else _slopes(arrays, norm, n)
     runs = _runs(first, second, first > second, n), _runs(first, second, first < second, n)
-    return Sketch(norm, offset, slope, first, second, weight, target, lower, w_beta, later, earlier, runs)
+    terms = first, second, weight, target, lower, w_beta, later, earlier, runs
+    return Sketch(norm, pixels, pairs, offset, slope, *terms)
+
+
+def _joined(at: Array, first: Array, second: Array, n: int) -> Array:
+    """True for the pixels (n,) that pairs join, directly or by others, to some of the pixels `at`."""
+    near: list[list[int]] = [[] for _ in range(n)]
+    for i, j in zip(first.tolist(), second.tolist()):
+        near[i].append(j)
+        near[j].append(i)
+    held, waiting = np.zeros(n, bool), at.tolist()
+    while waiting:
+        i = waiting.pop()
+        if not held[i]:
+            held[i] = True
+            waiting += near[i]
+    return held
 
 
 def _runs(first: Array, second: Array, chosen: Array, n: int) -> list[Run]:
@@ -579,8 +613,8 @@ def _slopes(arrays: dict[str, Array], norm: Any, n: int) -> Array:
 
 def _strokes(
     arrays: dict[str, Array], head: dict[str, Any], number: Array, n: int
-) -> tuple[Array, Array, Array]:
-    """W and theta of each pixel, 0 without a stroke, and the least alpha of each; shapes (n,)."""
+) -> tuple[Array, Array, Array, Array]:
+    """Pixels of the strokes; W and theta of each pixel, 0 without one, and its least alpha, shapes (n,)."""
     theta = _given(arrays, "instance_theta", "<f8", None)
     w = _given(arrays, "instance_w", "<f8", len(theta))
     places = _given(arrays, "instance_stroke_pixels", "<i4", len(theta), 2).astype(np.int64)
@@ -599,7 +633,7 @@ def _strokes(
         lower[at] = theta - QUARTER
     else:
         target[at] = np.where(theta >= 3 * QUARTER - 1e-9, np.maximum(theta - np.pi, -QUARTER), theta)
-    return weight, target, lower
+    return at, weight, target, lower
 
 
 def field_of(arrays: dict[str, Array], sketch: Sketch) -> Field:
@@ -640,13 +674,13 @@ def sized(residual: Array, squared: bool) -> tuple[Array, Array]:
     return np.abs(residual), np.ones_like(residual)
 
 
-def slack_of(sketch: Sketch, levels: int) -> float:
+def slack_of(weight: Array, w_beta: float, levels: int) -> float:
     """Greatest change of F when every angle moves by SLIVER at each level.
 
     At most four pairs with slopes of 4 |A| and 4 |B|, both at most pi / 2 at the best jumps, 2 W pi/2 and
     2 w_beta pi/4. Those of absolute values are less.
     """
-    slopes = 64.0 + 8.0 * sketch.weight + 4.0 * sketch.w_beta
+    slopes = 64.0 + 8.0 * weight + 4.0 * w_beta
     return 2 * (levels + 1) * SLIVER * float(np.sum(slopes))
 
 
@@ -704,7 +738,7 @@ def _clusters(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) 
     sides = shapes[ends.reshape(-1, 2), 0]
     counts = sides.prod(axis=1)
     scale = _given(arrays, f"{at}table_scale", "<f8", len(counts))
-    _need((scale >= 0) & (scale <= 1), f"{at}table_scale", "is not in [0, 1]")
+    _need((scale >= 0) & (scale <= MOST_SCALE), f"{at}table_scale", "is not in [0, 1]")
     steps = _given(arrays, f"{at}table_steps", "<i4", int(counts.sum()))
     end = 0
     for number, (count, shape) in enumerate(zip(counts.tolist(), sides.tolist())):
@@ -725,7 +759,7 @@ class Messages(Sequence[Array]):
         self.name, self.norm = f"{at}steps", sketch.norm
         counts = labels[np.minimum(sketch.first, sketch.second)]
         self.scale = _given(arrays, f"{at}scale", "<f8", len(counts))
-        _need((self.scale >= 0) & (self.scale <= 1), f"{at}scale", "is not in [0, 1]")
+        _need((self.scale >= 0) & (self.scale <= MOST_SCALE), f"{at}scale", "is not in [0, 1]")
         wide = _given(arrays, f"{at}wide", "|b1", len(counts))
         kinds = {"steps_16": "<i2", "steps_32": "<i4", "steps_64": "<i8"}
         self.steps: list[Array] = [None] * len(counts)
@@ -1455,8 +1489,8 @@ def linear_bound(sketch: Sketch, p: Array, turned: Array, piece: Piece, multipli
         tilt = 4 * (above - below)
     along, upright = sketch.weight * of_r, sketch.w_beta * of_beta - tilt
     slope = 2 * (np.bincount(i, of_a, n) - np.bincount(j, of_a, n)) + along
-    skew = 2 * (np.bincount(i, sign(p) * of_b, n) - np.bincount(j, of_b, n))
-    skew += np.where(by_u, along, -along) + upright
+    pulled = 2 * (np.bincount(i, sign(p) * of_b, n) - np.bincount(j, of_b, n))
+    skew = pulled + np.where(by_u, along, -along) + upright  # without pairs, bincount returns whole numbers
     low, high = np.concatenate(boxes[:, ::2].T), np.concatenate(boxes[:, 1::2].T)
     slopes = np.concatenate([slope, skew])
     terms = [math.pi * of_a * p, -along * goal, -lost, np.minimum(slopes * low, slopes * high)]
@@ -1538,16 +1572,17 @@ def check(arrays: dict[str, Array], over: Over = lambda: False, way: Way = PLAIN
 
 def _check(arrays: dict[str, Array], over: Over, way: Way) -> Verdict:
     head = head_of(arrays)
-    sketch = sketch_of(arrays)
-    field = field_of(arrays, sketch)
-    energy, error = energy_of(sketch, *field)
+    whole, sketch = sketch_of(arrays, whole=True), sketch_of(arrays)
+    field = field_of(arrays, whole)
+    energy, error = energy_of(whole, *field)
     count = _levels(head)
-    slack = slack_of(sketch, count)
+    slack = slack_of(sketch.weight, sketch.w_beta, count)
     most, enough = energy + error + slack, energy - error - OPTIMAL / 2 * max(1.0, energy)
     steps = _last_steps(arrays, sketch)
     regions = _descend(arrays, sketch, most, over, way)
     centres = np.stack([regions[0].level.alpha, regions[0].level.beta], axis=1)
-    own = relabelled(sketch, field, centres)
+    held = field[0][sketch.pixels], field[1][sketch.pixels], field[2][sketch.pairs]
+    own = relabelled(sketch, held, centres)
 
     def last(boxes: tuple[Array, Array]) -> float:
         """A lower bound of F in one of two equivalent sets of boxes."""
@@ -1563,11 +1598,25 @@ def _check(arrays: dict[str, Array], over: Over, way: Way) -> Verdict:
     _need(boxes is not None, "the last level", "leaves nothing, not even the field")
     proven = max(0.0, min(proven, energy - error))
     bound = max(0.0, proven - SPARE * (1 + proven))
-    held = forced(sketch, own[0][2], boxes)
+    boxes, centres, jumps = _of_whole(
+        whole, sketch, field, (boxes, centres, forced(sketch, own[0][2], boxes))
+    )
     bounds = [region.bound for region in regions]
-    verdict = Verdict(status_of(energy, bound), sketch.norm, energy, bound, boxes, centres, held, bounds)
+    verdict = Verdict(status_of(energy, bound), sketch.norm, energy, bound, boxes, centres, jumps, bounds)
     _compare(head, verdict, proven, error)
     return verdict
+
+
+def _of_whole(
+    whole: Sketch, sketch: Sketch, field: Field, proven: tuple[Array, Array, Array]
+) -> tuple[Array, Array, Array]:
+    """Boxes, centres and forced pairs of the whole mask: in parts without strokes, anything is possible."""
+    n = len(whole.pixels)
+    quarter = np.full(n, QUARTER)
+    boxes = np.stack([whole.lower, whole.lower + HALF, -quarter, quarter], axis=1)
+    centres, pairs = np.stack(field[:2], axis=1), np.zeros(len(whole.pairs), bool)
+    boxes[sketch.pixels], centres[sketch.pixels], pairs[sketch.pairs] = proven
+    return boxes, centres, pairs
 
 
 def status_of(energy: float, bound: float) -> str:

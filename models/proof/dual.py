@@ -36,6 +36,8 @@ from ..instance.grid import Floats
 from ..instance.instance import QUARTER
 from ..processes.compiled import Crew
 from ..processes.deadline import Over, never
+from ..smooth.systems import stroke_weight
+from . import check_certificate
 from .clusters import table_work
 from .decoding import Crosses
 from .lattice import Lattice, labels_at
@@ -45,8 +47,7 @@ from .strip import Passed, Strip, part_of
 _TOLERANCE: Final = 1e-7  # excess over the energy with which labels still survive, relative to 1 + it
 _LOST: Final = 0.1  # share of the gap that rounding may cost at most; a fifth of it is usual
 _TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
-_ROUNDING: Final = 32 * 2.0**-53
-"""Relative error of a term: eight numbers, with angles right to four units in the last place, squared."""
+_LEVELS: Final = 64  # more than usual; the checker allows for the sides of domains at each
 
 _KEPT: Final = ("places", "_saved")  # attributes that stay the same when a dual returns to a former state
 
@@ -220,7 +221,9 @@ class Dual:
         # Shares and tables, wrong by half a quantum, enter the minima of pixels and pairs, or of clusters.
         wrong = np.array([2 * len(self.lattice.p), 4 * len(self._least_of_clusters)])
         lost = _LOST * gap * np.array([1 - _TABLES, _TABLES]) / np.maximum(wrong, 1)
-        of_shares, of_tables = (2.0 ** math.floor(math.log2(max(each, least))) for each in lost)
+        of_shares, of_tables = (
+            min(2.0 ** math.floor(math.log2(max(each, least))), check_certificate.MOST_SCALE) for each in lost
+        )
         self._all("quantise", of_shares, of_tables)
         return of_shares, of_tables
 
@@ -232,15 +235,31 @@ class Dual:
     def bound(self) -> float:
         """The bound that any shares prove, as `LevelRecord` defines it."""
         terms = np.concatenate([each for minima in self._all("minima") for each in minima])
-        shares, costs = self._greatest()
-        # No angle's square, cost or sum of shares that enters the bound is greater.
-        largest = 64 + costs + 4 * shares
-        return math.fsum([*terms, -_ROUNDING * len(terms) * largest])
+        return math.fsum([*terms, -self._roundings()[0]])
+
+    def _roundings(self) -> tuple[float, float]:
+        """What the checker takes off the bound of a pass for rounding, and adds to the energy for combs.
+
+        It is more than this process rounds. See models/proof/check_certificate.py, 6 and `Pass`.
+        """
+        lattice, (shares, costs) = self.lattice, self._greatest()
+        instance, n, m = lattice.instance, len(lattice.count), len(lattice.p)
+        weight, skew = stroke_weight(instance), instance.skew_coefficient
+        size = 2 + np.abs([lattice.alpha, lattice.beta]).sum(axis=0)
+        size += lattice.h * np.abs(lattice.alpha_first) + lattice.h * lattice.alpha_count
+        size += lattice.h * np.abs(lattice.beta_first) + lattice.h * lattice.beta_count
+        pixels = float(np.sum((weight + skew) * size * size)) + 4 * n * shares
+        pair = (
+            (3 + 4 * float(size.max())) ** 2 + costs + 4 * shares
+        )  # angles and jumps, squared; tables; excesses
+        unit = 2 * check_certificate.ROUNDING * check_certificate.PRECISION
+        sides = check_certificate.slack_of(weight, skew, _LEVELS)
+        return unit * (2 * pixels + m * pair) + sides, 4 * unit * m * pair
 
     def remaining_cells(self, bound: float, energy: float) -> RemainingCells:
         """The cells that the level leaves below an energy, by a forward pass; see models/proof/pruning.py."""
         self.forward()
-        excess = _excess(bound, energy)
+        excess = self._excess(bound, energy)
         cells = np.concatenate(self._all("cells", excess))
         before = max(int(np.count_nonzero(cells)), 1)
         self._all("begin_combs")
@@ -262,8 +281,12 @@ class Dual:
 
     def count_left(self, bound: float, energy: float) -> int:
         """The number of cells that the last pass leaves, times the share that combs left the last time."""
-        left = sum(map(np.count_nonzero, self._all("cells", _excess(bound, energy))))
+        left = sum(map(np.count_nonzero, self._all("cells", self._excess(bound, energy))))
         return round(self._left_by_combs * left)
+
+    def _excess(self, bound: float, energy: float) -> float:
+        """The excess over a bound up to which labels survive."""
+        return energy + _TOLERANCE * (1 + energy) + self._roundings()[1] - bound
 
     def decoded(self, *, forwards: bool) -> tuple[Floats, Floats]:
         """Alpha and beta (n,) of the crosses that the shares suggest; forwards after a backward pass."""
@@ -280,8 +303,3 @@ class Dual:
 
 def _joined(parts: tuple[Arrays, ...]) -> Arrays:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def _excess(bound: float, energy: float) -> float:
-    """The excess over a bound up to which labels survive."""
-    return energy + _TOLERANCE * (1 + energy) - bound

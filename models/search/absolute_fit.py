@@ -153,8 +153,9 @@ def _best(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple
         _settings(),
     )
     found = program.solve()
-    if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+    if not np.isfinite([*found.x, *found.z]).all():
         raise CrossfieldError(f"Clarabel found no angles for given jumps: {found.status}")
+    # Extreme weights may end it early. The numbers are then worse, but any of them are valid.
     angles = np.clip(np.array(found.x)[:n], lower, upper)
     above, below = np.split(np.array(found.z)[: 2 * m], 2)
     multipliers = 2 * (terms.matrix @ angles + terms.constant)
