@@ -164,7 +164,8 @@ def checked_proof(proof: Proof, over: Over) -> Proof:
     StoppedError if there are none, and one of `REFUSALS` for a proof that does not hold.
     """
     verdict = check_certificate.check(_arrays(proof) | _head(replace(proof, bound=0.0)), over, _quick_way())
-    found = replace(proof, bound=verdict.bound, forced=verdict.forced)
+    ended = "optimal" if verdict.status == "optimal" else proof.ended
+    found = replace(proof, bound=verdict.bound, forced=verdict.forced, ended=ended)
     object.__setattr__(found, "verdict", verdict)
     return found
 
@@ -275,8 +276,8 @@ def _arrays(proof: Proof) -> Arrays:
 
 def _slopes(proof: Proof) -> Arrays:
     """The slopes of strokes, the multipliers by pairs and pixels, 0 for none, and the cuts by pixels."""
-    instance, cuts = proof.field.instance, np.array(proof.cuts, dtype=np.int32)
-    n, m, s = instance.grid.size, len(proof.field.p), len(instance.theta)
+    instance, cuts = proof.levels[0].instance, np.array(proof.cuts, dtype=np.int32)
+    n, m, s = instance.grid.size, len(instance.grid.first), len(instance.theta)
     slopes, multipliers = np.zeros(n), np.zeros((np.count_nonzero(cuts < 0), 2 * m + 2 * n))
     slopes[instance.stroke_index] = proof.levels[0].slopes
     if proof.multipliers is not None:

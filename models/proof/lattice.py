@@ -66,19 +66,19 @@ class Lattice:
         """The lattice of spacing pi / (2 steps) round a field, with every cross of the strip in a cell.
 
         steps: an even number. alpha covers a window of length pi/2 round its centre, beta [-pi/4, pi/4].
-        Cells that stick out are kept. Pixels that no stroke reaches have fewer labels: see `reached`.
+        Cells that stick out are kept.
         """
         h = HALF / steps
-        ranges = whole_ranges(field.instance, field.beta, h, offsets(field.instance.grid))
+        ranges = whole_ranges(field.beta, h, offsets(field.instance.grid))
         return cls(field.instance, h, field.alpha, field.beta, field.p, **ranges)
 
     @classmethod
     def common(cls, field: CrossField, norm: AbsoluteNorm, slopes: Floats, steps: int) -> Lattice:
         """As `whole`, common to all pixels: centres are the multiples of h nearest to alpha, and beta 0."""
         h, beta = HALF / steps, np.zeros(field.instance.grid.size)
-        alpha = h * np.round(field.alpha * reached(field.instance) / h)
+        alpha = h * np.round(field.alpha / h)
         most = 1.0 if norm == 1 else HALF
-        ranges = whole_ranges(field.instance, beta, h, beta)
+        ranges = whole_ranges(beta, h, beta)
         return cls(
             field.instance, h, alpha, beta, field.p, **ranges, norm=norm, slopes=np.clip(slopes, -most, most)
         )
@@ -193,29 +193,8 @@ def offsets(grid: Grid) -> Floats:
     return 0.5 * ((grid.rows + grid.columns) % 2).astype(np.float64)
 
 
-def reached(instance: Instance) -> Bools:
-    """Whether each pixel's part of the mask (4-connected) has a stroke, shape (n,).
-
-    A part without strokes has the least possible cost, zero, if all its crosses are equal with beta = 0, as
-    its centres must be. So other crosses are not considered there: its labels are k, l = -1, 0, 1 on every
-    level.
-    """
-    from scipy import ndimage
-
-    parts = ndimage.label(instance.mask)[0][instance.mask]
-    found: Bools = np.isin(parts, parts[instance.stroke_index])
-    return found
-
-
-def ranges(instance: Instance, *ends: Ints) -> dict[str, Any]:
-    """The ranges of a lattice from its least and greatest k and l, with all labels allowed.
-
-    Where no stroke reaches, they are -1, 0, 1.
-    """
-    few, known = np.array([-1, 1, -1, 1], np.int32), reached(instance)
-    k, last_k, l, last_l = (  # noqa: E741 - the letters of the equation
-        np.where(known, all_, some) for all_, some in zip(ends, few, strict=True)
-    )
+def ranges(k: Ints, last_k: Ints, l: Ints, last_l: Ints) -> dict[str, Any]:  # noqa: E741 - of the equation
+    """The ranges of a lattice from its least and greatest k and l, with all labels allowed."""
     rows, columns = last_k - k + 1, last_l - l + 1
     allowed = np.ones(int((rows.astype(np.int64) * columns).sum()), dtype=bool)
     return {
@@ -223,10 +202,10 @@ def ranges(instance: Instance, *ends: Ints) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def whole_ranges(instance: Instance, beta: Floats, h: float, offset: Floats) -> dict[str, Any]:
+def whole_ranges(beta: Floats, h: float, offset: Floats) -> dict[str, Any]:
     """The ranges round centres of those betas that hold every cross of the strip."""
     k = np.full(len(beta), round(QUARTER / h), np.int32)
-    return ranges(instance, -k, k, *strip(beta, h, offset))
+    return ranges(-k, k, *strip(beta, h, offset))
 
 
 def starts(counts: Ints | Starts) -> Starts:

@@ -22,6 +22,7 @@ from .check_certificate import StoppedError
 from .compiling import compile_proofs
 from .prove_absolute import WorkIn1Norm, WorkInMixedNorm
 from .record import Proof
+from .stroked import extended, restricted, stroked_parts
 from .work import Work, WorkLimits
 from .workers import strips_on
 
@@ -108,6 +109,8 @@ def prove(
         start.check_instance(instance)
         start = relabelled(instance.with_gauge("strokes"), start.alpha, start.beta, start.p)
     instance = instance.with_gauge("strokes")
+    part = stroked_parts(instance)
+    start = None if start is None else restricted(start, part)
     checked(jobs)
     given, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
     divided = nullcontext() if scheduler is None else strips_on(scheduler)
@@ -129,11 +132,11 @@ def prove(
             measured=checking_pace,
         )
         kind = KINDS[norm]
-        proving = kind(
-            instance, kind.first(instance, start, own.over), own, hands, (seed, jobs), progress, divide
-        )
+        proving = kind(part, kind.first(part, start, own.over), own, hands, (seed, jobs), progress, divide)
         proof = proving.proof(0.0, proving.run())
-    proof = replace(proof, seconds=time.monotonic() - began)
+    field = extended(proof.field, instance)
+    energy = field.energy(norm).total
+    proof = replace(proof, field=field, energy=energy, seconds=time.monotonic() - began)
     if not proof.levels:
         return proof
     progress("checking the levels")

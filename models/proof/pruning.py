@@ -10,8 +10,6 @@
    except labels beyond the cells that cover |beta| <= pi/4. In its steps, cell (k, l) begins at
    (2 k + o, 2 l + o): a vertex on black pixels and the middle of a cell on white ones.
 
-Pixels that no stroke reaches are exempt from these rules: see `reached` in models/proof/lattice.py.
-
 The checker tolerates less for its rounding, and takes the final U, which is no greater. So it never keeps a
 cell that was dropped here.
 """
@@ -26,7 +24,7 @@ import numpy as np
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER
 from ..processes.compiled import compiled
-from .lattice import Lattice, Starts, ranges, reached, starts, strip
+from .lattice import Lattice, Starts, ranges, starts, strip
 from .state import State
 
 
@@ -87,23 +85,22 @@ def finer(left: RemainingCells) -> Lattice:
     ends = 2 * _ends(lattice, left.cells)
     ends[:, 1] += half
     ends[:, 2], ends[:, 3] = np.maximum(ends[:, 2], lowest), np.minimum(ends[:, 3] + half, highest)
-    new = replace(lattice, h=h, **ranges(lattice.instance, *ends.T))
+    new = replace(lattice, h=h, **ranges(*ends.T))
     return _covering(left, new, 2, 3 + half)
 
 
 def narrowed(left: RemainingCells) -> Lattice:
     """The vertices of the cells that are left, as a lattice of the same spacing."""
     lattice = left.lattice
-    new = replace(lattice, **ranges(lattice.instance, *_ends(lattice, left.cells).T))
+    new = replace(lattice, **ranges(*_ends(lattice, left.cells).T))
     return _covering(left, new, 1, np.full(len(lattice.count), 2, np.int32))
 
 
 def _covering(left: RemainingCells, new: Lattice, times: int, side: Ints) -> Lattice:
-    """The new lattice with the labels of `_allow` alone, and all labels that no stroke reaches."""
+    """The new lattice with the labels of `_allow` alone."""
     allowed = new.allowed
     allowed[:] = False
     _allow((rectangles(left.lattice), left.cells), (rectangles(new), allowed), times, side)
-    allowed |= np.repeat(~reached(new.instance), new.count)
     return new
 
 

@@ -97,8 +97,9 @@ class Proof(Claim):
     forced
         Number of pairs with the same jump in every field that could be better.
     levels
-        The last chain of lattices, coarsest first. Each follows from the one before, or, if there are
-        branches, from that which they name. The check may have ended before the last ones; see `verdict`.
+        The last chain of lattices, coarsest first, on the parts of the mask that have a stroke. Each follows
+        from the one before, or, if there are branches, from that which they name. The check may have ended
+        before the last ones; see `verdict`.
     seconds
         Duration of the whole work.
     ended

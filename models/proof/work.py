@@ -44,7 +44,7 @@ from .check_certificate import MOST_COUNT, MOST_LEVELS
 from .clusters import table_sizes
 from .dual import Divide, Dual
 from .forced import Forced, forced
-from .lattice import Lattice, labels_at, reached
+from .lattice import Lattice, labels_at
 from .parts import Cut, across_seam, best_cut, island_of
 from .pruning import RemainingCells, finer, narrowed
 from .record import EXACT, Branch, LevelRecord, Proof
@@ -576,8 +576,7 @@ def _at_seam(field: CrossField, lattice: Lattice) -> bool:
 
 
 def _centre(field: CrossField) -> CrossField:
-    """The same crosses in the gauge `strokes`, each pair with its best jump; 0 where no stroke reaches."""
+    """The same crosses in the gauge `strokes`, each pair with its best jump."""
     instance = field.instance.with_gauge("strokes")
-    known = reached(instance)
-    alpha, beta = (np.round(angle, _DECIMALS) * known for angle in (field.alpha, field.beta))
+    alpha, beta = (np.round(angle, _DECIMALS) for angle in (field.alpha, field.beta))
     return relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])
