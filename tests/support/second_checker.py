@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 PI = np.pi
-SLIVER = 1e-14
+SLIVER = 2e-14
 """Radians by which a domain may fall short of the cells that it covers, as places of labels are rounded."""
 TOLERANCE = 1e-8
 """Energy, relative to max(1, U), by which a field may be better than one that counts as optimal."""
@@ -48,6 +48,7 @@ class Problem:
     slope: np.ndarray  # [n]: l of the stroke, unless the norm is 2
     cuts: np.ndarray  # [pieces]: pixel of the cut, -1 for a piece that stays whole; unless the norm is 2
     multipliers: np.ndarray  # [pieces that stay whole, 2m + 2n], unless the norm is 2
+    elsewhere: float = 0.0  # energy of the field in the parts of the mask without strokes, which are left out
 
     def energy(self):
         """Energy U of the field."""
@@ -56,7 +57,8 @@ class Problem:
         b = (-1.0) ** p * self.beta[i] - self.beta[j]
         phi, psi = (np.square if self.norm == 2 else abs), (abs if self.norm == 1 else np.square)
         strokes = self.weight @ psi(self.alpha + self.beta - self.theta)
-        return float(2 * (phi(a) + phi(b)).sum() + strokes + self.w_beta * psi(self.beta).sum())
+        here = 2 * (phi(a) + phi(b)).sum() + strokes + self.w_beta * psi(self.beta).sum()
+        return float(here + self.elsewhere)
 
 
 @dataclass
@@ -167,10 +169,18 @@ def problem_of(arrays, norm):
 
     alpha, beta = (take(arrays, name, "<f8", n) for name in ("alpha", "beta"))
     p = take(arrays, "p", "<i4", len(pairs)).astype(int)
-    outside = (abs(alpha - window - PI / 4) > PI / 4 + SLIVER * 2) | (abs(beta) > PI / 4 + SLIVER * 2)
+    outside = (abs(alpha - window - PI / 4) > PI / 4 + SLIVER) | (abs(beta) > PI / 4 + SLIVER)
     need(not outside.any(), f"alpha, beta: outside the window at pixel {pixels[outside.argmax()]}")
     need((abs(p) <= 64).all(), "p: too large")
-    pairs = np.array(pairs, int).reshape(-1, 2)
+    pairs, w_beta = np.array(pairs, int).reshape(-1, 2), number(head, "w_beta", 0, 1e6)
+    none = np.zeros(n), np.array([-1]), np.zeros((1, 2 * (len(pairs) + n)))
+    whole = Problem(pixels, pairs, theta, weight, w_beta, alpha, beta, p, norm, *none)
+    held = np.isin(np.arange(n), where)
+    while (grown := held | np.isin(np.arange(n), pairs[held[pairs].any(axis=1)])).sum() > held.sum():
+        held = grown
+    inside, anew = held[pairs].all(axis=1), np.cumsum(held) - 1
+    pixels, theta, weight, alpha, beta = (each[held] for each in (pixels, theta, weight, alpha, beta))
+    n, pairs, p = len(pixels), anew[pairs[inside]], p[inside]
     slope, cuts, multipliers = np.zeros(n), np.array([-1]), np.zeros((1, 2 * (len(pairs) + n)))
     if norm != 2:
         slope = take(arrays, "slopes", "<f8", n)
@@ -181,8 +191,8 @@ def problem_of(arrays, norm):
             need(((cuts >= -1) & (cuts < n)).all(), "cuts: no pixel")
         shape = (cuts < 0).sum(), multipliers.shape[1]
         multipliers = take(arrays, "multipliers", "<f8", shape[0] * shape[1]).reshape(shape)
-    w_beta = number(head, "w_beta", 0, 1e6)
-    return Problem(pixels, pairs, theta, weight, w_beta, alpha, beta, p, norm, slope, cuts, multipliers)
+    part = Problem(pixels, pairs, theta, weight, w_beta, alpha, beta, p, norm, slope, cuts, multipliers)
+    return replace(part, elsewhere=whole.energy() - part.energy())
 
 
 def quads_of(arrays, at, count, problem):

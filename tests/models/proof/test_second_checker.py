@@ -11,12 +11,14 @@ import places
 import pytest
 import second_checker
 from allowed_labels import with_allowed
+from crossfield.models.field.field import CrossField
 from crossfield.models.processes.limits import Limits
 from crossfield.models.proof import work
-from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.prove import prove
+from crossfield.models.proof.tightening import windows_left
 from crossfield.models.sketch.samples import sample
-from exhaustive import optimum, random_instance
+from exhaustive import optimum, random_instance, sketch
 from plain_prover import proof_in_parts, proof_of
 from second_checker import Refused, arrays_of, check
 
@@ -48,6 +50,31 @@ def confirmed(instance, path):
 @pytest.mark.parametrize("seed", [305, 306])
 def test_optima_of_nine_pixels_are_confirmed(seed, tmp_path):
     confirmed(random_instance(seed, (3, 3), strokes=9), tmp_path / "it.npz")
+
+
+@pytest.mark.parametrize("norm", [2, 1, "mixed"])
+def test_a_part_without_strokes_has_no_cost_at_the_optimum(norm, tmp_path):
+    """A field that has one there is not optimal, and the windows of that part stay whole."""
+    theta = np.full((2, 5), np.nan)
+    theta[0, 3], theta[1, 4] = 0.3, 1.2
+    mask = np.ones((2, 5), bool)
+    mask[:, 2] = False
+    instance, path = sketch(mask, theta, 0.5), tmp_path / "it.npz"
+    proof = prove(instance, norm=norm, jobs=1)
+    written = write_certificate(proof, path)
+    assert written.status == "optimal"
+    assert written.bound <= check(arrays_of(path)) <= written.energy
+    windows, apart = windows_left(written), instance.grid.columns < 2
+    assert (windows.alpha_lower[apart] == instance.alpha_lower[apart]).all()
+    assert (windows.alpha_upper[apart] == instance.alpha_upper[apart]).all()
+    assert (np.abs([windows.beta_lower[apart], windows.beta_upper[apart]]) == np.pi / 4).all()
+    assert (windows.alpha_upper - windows.alpha_lower)[~apart].min() < 1.0
+    beta = proof.field.beta + np.where(instance.grid.rows + instance.grid.columns == 0, 0.1, 0.0)
+    worse = CrossField(instance, proof.field.alpha, beta, proof.field.p)
+    first = {"levels": proof.levels[:1], "branches": proof.branches[:1]}  # later ones hold for the energy
+    found = write_certificate(replace(proof, field=worse, energy=worse.energy(norm).total, **first), path)
+    assert (found.status, read_certificate(path).status) == ("gap", "gap")
+    assert found.bound <= check(arrays_of(path)) <= written.energy
 
 
 @pytest.mark.parametrize("gauge, seed", [("strokes", 6), ("box", 3)])
