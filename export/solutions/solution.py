@@ -153,9 +153,11 @@ class Solution:
             return ()
         if self.claimed.promises_point:
             return (*self._infeasibilities, *self._wrong_values(self.objective))
-        if self.claimed is Status.INFEASIBLE and not self._infeasibilities:
+        if self._infeasibilities or self.claimed is Status.UNBOUNDED:
+            return ()
+        if self.claimed is Status.INFEASIBLE:
             return ("its point is feasible",)
-        return ()
+        return tuple(self._wrong_values(self.objective))
 
     @cached_property
     def _infeasibilities(self) -> tuple[str, ...]:
@@ -202,13 +204,23 @@ class Solution:
     def status(self) -> Status:
         """The claim if it is kept; otherwise FEASIBLE for a feasible point, NO_POINT or ERROR, or UNKNOWN.
 
-        An optimum far above its own dual bound is the best point at a limit, the gap that the user allowed.
+        A feasible point counts although the file claims none, as after a failure. An optimum far above its
+        own dual bound is the best point at a limit, the gap that the user allowed.
         """
+        if self._has_unclaimed_point:
+            return Status.FEASIBLE
         if self.keeps_claims or self.claimed in {Status.NO_POINT, Status.ERROR}:
             return Status.LIMIT_WITH_POINT if self._leaves_gap else self.claimed
         if self.claimed is Status.LIMIT_WITHOUT_POINT:
             return Status.NO_POINT
         return Status.FEASIBLE if self.claimed.promises_point and not self.contradictions else Status.UNKNOWN
+
+    @property
+    def _has_unclaimed_point(self) -> bool:
+        """Whether a feasible point is in a file whose status neither promises nor excludes one."""
+        silent = {Status.LIMIT_WITHOUT_POINT, Status.NO_POINT, Status.ERROR, Status.UNKNOWN}
+        consistent = not self._infeasibilities and not self.contradictions
+        return self.point is not None and self.claimed in silent and consistent
 
     @property
     def _leaves_gap(self) -> bool:
@@ -227,7 +239,7 @@ class Solution:
         """Reason why the point cannot be used; empty if it can."""
         if self.contradictions:
             return f"claims {self.claimed}, but {'; '.join(self.contradictions)}"
-        if self.point is not None and not self.claimed.promises_point:
+        if self.point is not None and not self.claimed.promises_point and not self._has_unclaimed_point:
             return f"claims {self.claimed} ({self.message or 'no message'}): its values are not a solution"
         return ""
 

@@ -268,6 +268,21 @@ def test_words_of_cbc(words, status):
     assert raw.values.tolist() == ([3] if kept else [])
 
 
+@for_each("words, status", [
+        ("Status unknown", "feasible"), ("Words of a later version", "feasible"),
+        ("Infeasible", INFEASIBLE), ("Stopped on time (no integer solution - continuous used)", SILENT),
+    ])  # fmt: skip
+def test_the_point_of_cbc_is_judged_and_not_its_words(tmp_path, words, status):
+    data = text(f"{B}_milp_optimal.sol")
+    head = re.match(rb"Optimal", data)
+    (tmp_path / "x.sol").write_bytes(words.encode() + data[head.end() :])
+    found = read_solution(tmp_path / "x.sol", problem("milp"), identified=status == INFEASIBLE)
+    assert (found.status, bool(found.doubt)) == (status, False)
+    if status == "feasible":
+        assert found.message == words
+        assert found.objective == pytest.approx(OPTIMA["milp"], abs=2e-6)
+
+
 def test_glpk_has_no_names_and_tells_lp_from_mps():
     raws = {order: read_raw(TINY / f"{K}_milp_optimal_{order}.sol") for order in ("lp", "mps")}
     for order, raw in raws.items():
