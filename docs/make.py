@@ -1,6 +1,6 @@
 """Make the generated pages and pictures of docs/, or one of them by name: `python docs/make.py`.
 
-Every number in the docs comes from here. The tables state sizes, seeds and time limits.
+The tables state sizes, seeds and time limits. Other pages have programs of their own (CONTRIBUTING.md).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import crossfield as cf
 import numpy as np
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import DEFAULTS
+from crossfield.export.solvers_table import PROGRAMS
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.formulations.latex import latex
 from crossfield.models.formulations.symbols import VARIABLES
@@ -233,18 +234,27 @@ def pictures() -> None:
         samples_in_short(),
     ]
     for name, entry in SAMPLES.items():
-        path = cf.draw(
-            cf.search(cf.sample(name, 48), rounds=10).field, folder / f"{name}.png", kind="overview"
-        )
-        with Image.open(path) as picture:
-            small = picture.convert("RGB").quantize(128, dither=Image.Dither.NONE)
-        small.save(path, optimize=True)
+        overview(cf.search(cf.sample(name, 48), rounds=10).field, folder / f"{name}.png")
         parts += [
             f"## `{name}`",
             f"{entry.description[0].upper()}{entry.description[1:]}.",
             f"![{name}](pictures/{name}.png)",
         ]
     (DOCS / "samples.md").write_text("\n\n".join(parts) + "\n")
+
+
+def overview(field: cf.CrossField, path: Path) -> None:
+    """Draw the overview of a field with few colours."""
+    cf.draw(field, path, kind="overview")
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(128, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
+
+
+def solved() -> None:
+    """Draw docs/pictures/ellipsoid_milp.png, the field of docs/tutorials/solver.md."""
+    problem = cf.formulate(cf.sample("ellipsoid", 7), "milp-mccormick")
+    overview(cf.solve(problem, solver="highs").field, DOCS / "pictures" / "ellipsoid_milp.png")
 
 
 def shaded() -> None:
@@ -285,6 +295,15 @@ def readme() -> None:
     )
 
 
+def editions() -> None:
+    """Replace the limits of free editions inside docs/guides/solvers.md."""
+    rows = [
+        [program.title, f"`{program.install}`", program.free] for program in PROGRAMS.values() if program.free
+    ]
+    table = markdown(("program", "installation", "largest model of the free edition"), rows)
+    replace_between(DOCS / "guides" / "solvers.md", "editions", table)
+
+
 def figures() -> None:
     """Draw docs/pictures/math_*.svg: the figures of docs/mathematics.md."""
     import diagrams
@@ -316,7 +335,18 @@ def replace_between(page: Path, name: str, text: str) -> None:
 
 PAGES: dict[str, Callable[[], None]] = {
     page.__name__: page
-    for page in (formulations, errata, pictures, shaded, figures, traps, architecture, readme)
+    for page in (
+        formulations,
+        errata,
+        pictures,
+        solved,
+        shaded,
+        figures,
+        traps,
+        architecture,
+        readme,
+        editions,
+    )
 }
 
 

@@ -289,7 +289,7 @@ def in_short(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
 - Surfaces are good on smooth nets of curvature lines. On {len(errors)} known surfaces at {max(SIZES)} pixels,
   the normals from bend fields have mean errors of {min(errors):.1f} to {max(errors):.1f} degrees.
 - Over drawings by others they can rarely be trusted. crossfield [doubts](#confidence-and-doubts)
-  {sum(others)} of the {len(others)} below, and doubted 18 of 18 others that are not in the table.
+  {sum(others)} of the {len(others)} below, which are not part of this project.
 - A surface without doubts may be wrong: on a known one, the mean error from a bend field is
   {max(undoubted):.1f} degrees, and crossfield has no doubt.
 - Catenoids and saddle sheets come out on the wrong side half of the time, because inside out they are

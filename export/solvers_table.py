@@ -108,7 +108,8 @@ PROGRAMS: Final = {
         Program("highs", "HiGHS", ("lp", "mps"), (), "highspy", "pip install highspy"),
         Program(
             "gurobi", "Gurobi", ("lp", "mps"), (), "gurobipy", "pip install gurobipy",
-            free="2000 columns and rows, 200 columns with quadratic terms", adds=r"Constant|(?:MPS_)?Rg.*",
+            free="2000 columns and 2000 rows, 200 columns if any term is quadratic",
+            adds=r"Constant|(?:MPS_)?Rg.*",
         ),
         Program(
             "cplex", "CPLEX", ("lp", "mps"), (), "cplex", "pip install cplex", 1e-15,
@@ -116,7 +117,7 @@ PROGRAMS: Final = {
         ),
         Program(
             "xpress", "Xpress", ("lp", "mps"), (), "xpress", "pip install xpress",
-            free="5000 rows and columns, 200 with quadratic terms",
+            free="5000 columns and rows in total, 200 if any term is quadratic",
         ),
         Program(
             "scip", "SCIP", ("lp", "mps"), ("nl", "osil"), "pyscipopt", "pip install pyscipopt",

@@ -14,6 +14,8 @@ from pathlib import Path
 import crossfield
 import places
 import pytest
+import typer
+from crossfield.export.cli.app import app
 from crossfield.export.licence import package_folder
 from crossfield.export.solvers_table import PROGRAMS
 
@@ -29,6 +31,10 @@ def programs() -> str:
     """The search path, with the folder of GAMS where it is installed for Python."""
     gams = package_folder("gamspy_base")
     return os.pathsep.join([*([] if gams is None else [str(gams)]), os.environ["PATH"]])
+
+
+UNTESTED = {"text", "console", "ampl", "julia"}
+"""Languages of blocks that nothing here runs: sessions, and programs that CI does not have."""
 
 
 def is_there(program: str) -> bool:
@@ -54,6 +60,8 @@ def run_block(language: str, text: str, folder: Path) -> None:
         subprocess.run([sys.executable, "-c", text], cwd=folder, check=True, stdout=subprocess.DEVNULL)
     elif saved := SAVED.search(text):
         (folder / saved[1]).write_text(text)
+    else:
+        assert language in UNTESTED, f"nothing runs or saves a block of {language}"
 
 
 @pytest.mark.slow
@@ -65,12 +73,33 @@ def test_every_block_of_a_page_runs_in_turn(page, tmp_path):
         needed = ""
         for needs, language, text in FENCE.findall(section):
             needed = needs or needed
-            if needed and not is_there(needed):
+            if needed and language not in UNTESTED and not is_there(needed):
                 missing.add(needed)
             else:
                 run_block(language, text, tmp_path)
     if missing:
         pytest.skip(f"absent, so their blocks did not run: {', '.join(sorted(missing))}")
+
+
+def commands(text: str) -> list[list[str]]:
+    """The words of every command of crossfield in a page, in blocks and within lines."""
+    inline = re.findall(r"`(crossfield [^`]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
+    lines = [line for _, _, block in FENCE.findall(text) for line in block.splitlines()]
+    return [shlex.split(line, comments=True) for line in (*inline, *lines) if line.startswith("crossfield ")]
+
+
+@pytest.mark.parametrize(
+    "page", sorted([*PAGES, *DOCS.glob("*.md")]), ids=lambda page: page.relative_to(DOCS.parent).as_posix()
+)
+def test_every_command_and_option_of_a_page_exists(page):
+    for _, *words in commands(page.read_text(encoding="utf-8")):
+        command = typer.main.get_command(app)
+        while hasattr(command, "commands") and words and not words[0].startswith("-"):
+            assert words[0] in command.commands, words
+            command = command.commands[words.pop(0)]
+        options = {name for option in command.params for name in (*option.opts, *option.secondary_opts)}
+        used = {word.partition("=")[0] for word in words if re.match(r"--?[a-zA-Z]", word)}
+        assert used - options - {"--help", "-h"} == set(), words
 
 
 def test_the_api_reference_has_every_public_name():

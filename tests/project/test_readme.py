@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 
 import crossfield as cf
 import places
+import pytest
 
 ROOT = places.ROOT
 README = (ROOT / "README.md").read_text()
@@ -21,16 +23,25 @@ def test_the_number_of_solver_files_is_that_of_a_run(tmp_path):
     assert f"{len(models)} solver files" in README
 
 
-def test_generated_tables_are_up_to_date(tmp_path):
+GENERATED = {
+    ("make.py", "readme", "formulations", "editions"): (
+        "README.md",
+        "docs/formulations.md",
+        "docs/guides/solvers.md",
+    ),
+    ("shipped_library.py",): ("docs/library.md", "docs/guides/libraries.md"),
+    ("surface.py",): ("docs/surface.md",),
+}
+"""Programs with their arguments, and the pages in which they replace tables and counts."""
+
+
+@pytest.mark.parametrize("command", GENERATED, ids=lambda command: command[0])
+def test_generated_tables_and_counts_are_up_to_date(tmp_path, command):
     copy = tmp_path / "project"
-    (copy / "docs").mkdir(parents=True)
-    (copy / "README.md").write_text(README)
-    (copy / "docs" / "make.py").write_text((ROOT / "docs" / "make.py").read_text())
-    subprocess.run(
-        [sys.executable, "docs/make.py", "readme", "formulations"],
-        cwd=copy,
-        check=True,
-        env=os.environ | {"PYTHONHASHSEED": "7"},
-    )
-    assert (copy / "README.md").read_text() == README
-    assert (copy / "docs" / "formulations.md").read_text() == (ROOT / "docs" / "formulations.md").read_text()
+    shutil.copytree(ROOT / "docs", copy / "docs", ignore=shutil.ignore_patterns("pictures", "data"))
+    shutil.copy(ROOT / "README.md", copy)
+    program, *pages = command
+    environment = os.environ | {"PYTHONHASHSEED": "7"}
+    subprocess.run([sys.executable, f"docs/{program}", *pages], cwd=copy, check=True, env=environment)
+    for page in GENERATED[command]:
+        assert (copy / page).read_text() == (ROOT / page).read_text(), page

@@ -1,0 +1,49 @@
+"""Queries and scripts of the pages on libraries return what the pages say."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import crossfield as cf
+import places
+import pytest
+from libraries import OPEN, library_of
+
+PAGES = [places.ROOT / "README.md", *sorted((places.ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
+
+
+def test_every_query_of_a_page_finds_entries():
+    quoted = re.compile(r'(?:where=|--where )"([^"]+)"')
+    queries = [query for page in PAGES for query in quoted.findall(page.read_text(encoding="utf-8"))]
+    assert len(queries) >= 3
+    assert [query for query in queries if not cf.entries(where=query)] == []
+
+
+def blocks(*words):
+    """The blocks of Python in docs/library.md that have these words."""
+    page = (places.ROOT / "docs" / "library.md").read_text(encoding="utf-8")
+    return [block for block in BLOCK.findall(page) if all(word in block for word in words)]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("short_searches")
+def test_the_script_for_open_entries_lists_these_alone(tmp_path):
+    (script,) = blocks("library.json", "print(")
+    library = library_of(tmp_path, OPEN)
+    shown = subprocess.run(
+        [sys.executable, "-c", script], cwd=library.folder, check=True, capture_output=True, text=True
+    ).stdout
+    named = [line.split()[0] for line in shown.splitlines()]
+    status = {name: library.entry(name)["status"] for name in library.document["entries"]}
+    assert named == [name for name in status if status[name] == "best known"]
+    assert 0 < len(named) < len(status)
+
+
+@pytest.mark.slow
+def test_an_entry_by_name_has_what_the_page_uses(tmp_path):
+    (script,) = blocks("cf.entry(", "entry.write")
+    subprocess.run([sys.executable, "-c", f"{script}\nassert small"], cwd=tmp_path, check=True)
+    assert (tmp_path / "skew.mps").exists()
