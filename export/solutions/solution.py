@@ -23,6 +23,7 @@ from ...models.previews import table_of
 from ..formats.registry import FORMATS, carried
 from ..writing.canonical import Canonical
 from ..writing.stamps import is_identified
+from .misfit import check_names, check_range
 from .readers.registry import read_raw
 from .readers.text import RawSolution, values_for, values_in_order
 from .statuses import Status, closes
@@ -399,21 +400,9 @@ def _solution(raw: RawSolution, problem: Problem, point: Floats | None, **facts:
 def _mapped(raw: RawSolution, form: Canonical, **facts: Any) -> Solution:
     problem = form.problem
     point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
-    _check_range(point, problem)
+    check_range(point, form, LARGEST)
     point, moved = _rounded(point, problem)
     return _solution(raw, problem, point, rounded=moved, unknown=unknown, **facts)
-
-
-def _check_range(point: Floats, problem: Problem) -> None:
-    if not np.isfinite(point).all():
-        raise SolutionError("holds values that are not finite numbers; let the solver write it again")
-    at = int(np.argmax(np.abs(point)))
-    if abs(point[at]) > LARGEST:
-        name = Canonical(problem).column_names[at].decode()
-        raise SolutionError(
-            f"{name} has the value {point[at]:g}, which no column of {problem.name} can have; "
-            "let the solver write it again"
-        )
 
 
 def _by_position(raw: RawSolution, form: Canonical) -> Floats:
@@ -425,18 +414,9 @@ def _by_position(raw: RawSolution, form: Canonical) -> Floats:
 
 
 def _by_name(raw: RawSolution, form: Canonical) -> tuple[Floats, int]:
-    problem, found = form.problem, values_for(form.column_names, raw)
-    if found.missing:
-        raise SolutionError(
-            f"{found.missing} of {problem.n_columns} columns of {problem.name} are missing and "
-            f"{found.unknown} names are unknown; it is of another instance, formulation or option"
-        )
-    if found.unknown > len(raw.values) // 2:
-        raise SolutionError(
-            f"{found.unknown} of its {len(raw.values)} names are unknown; "
-            "it is of another instance or formulation"
-        )
-    return found.values, found.unknown
+    mapped = values_for(form.column_names, raw)
+    check_names(raw, form, mapped)
+    return mapped.values, mapped.unknown
 
 
 def _rounded(point: Floats, problem: Problem) -> tuple[Floats, float]:

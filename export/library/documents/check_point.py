@@ -36,7 +36,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import IO, Any, NoReturn, Optional, TypeVar
 
-from ...solutions.readers.grammar import HEAD, LineError, Scan, plain_numbers, plain_text
+from ...solutions.readers.grammar import HEAD, LineError, Scan, plain_numbers, plain_text, spellings
 from ...solutions.readers.layouts import LAYOUTS
 
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
@@ -74,7 +74,8 @@ CLAIM = Decimal("1e-5")  # how far the objective may be from a claimed one, as a
 MARK = "\ufeff"  # a byte order mark, which some editors put before a text
 ADDED = re.compile(
     r"ONE(?:_[0-9a-f]{11})?|Constant|(?:MPS_)?Rg.*|nlobjvar|quadobjvar|qmatrixvar|objconstvar|~r_\d+|objvar|"
-    r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"
+    r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE",
+    re.IGNORECASE,
 )
 """Columns that solvers and their readers add to a model; in a point they are passed over."""
 
@@ -410,6 +411,15 @@ class Point:
             values.append(self.values.get(column.name, default))
         return values
 
+    def spelled(self, names: Iterable[str]) -> Point:
+        """The point under the names of columns that it has in another case, in quotes or with a prefix."""
+        own = {name.lower(): name for name in names}
+        known, renamed = set(own.values()), Point(claimed=self.claimed, stamps=self.stamps)
+        for name, value in self.values.items():
+            words = [word.decode() for word in spellings(name.encode())] if name not in known else []
+            _keep(renamed, next((own[word] for word in words if word in own), name), value)
+        return renamed
+
 
 def read_point(path: str) -> Point:
     """The point in a file."""
@@ -454,6 +464,7 @@ def check_model(model: Model, point: Point) -> Finding:
     """Check a point against a model without rounding errors."""
     others = sorted(point.stamps - model.stamps) if model.stamps else []
     _require(not others, f"the point is of another problem: it states {''.join(others[:1])}")
+    point = point.spelled(model.number)
     foreign = [name for name in point.values if name not in model.number]
     _refuse_foreign([name for name in foreign if not ADDED.fullmatch(name)], len(point.values))
     values = point.of(model.columns)

@@ -90,6 +90,12 @@ def plain_numbers(text: bytes) -> bytes:
     return WINDOWS_INFINITY.sub(b"inf", text) if b"#" in text else text
 
 
+def spellings(name: bytes) -> tuple[bytes, bytes]:
+    """A name in lower case without quotes, and also without the prefix of a problem that SCIP transformed."""
+    plain = name.strip(b"\"'").lower()
+    return plain, plain[2:] if plain.startswith(b"t_") else plain
+
+
 def shown(text: bytes) -> str:
     """A short quotation for a message."""
     return repr(text[:40].decode(errors="replace"))

@@ -28,6 +28,7 @@ from .grammar import (
     is_number,
     plain_numbers,
     shown,
+    spellings,
 )
 
 if TYPE_CHECKING:  # the driver of a solver needs neither the writers nor the formulations
@@ -251,7 +252,8 @@ def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     """The values of `names` (n,), unique byte strings, in their order.
 
     A name that is not in the file is 0 if its format omits zeros, else NaN and counted as missing. Names in
-    the file that are not among `names` are counted as unknown, except for the columns that programs add.
+    the file that are not among `names` may be in another case, in quotes, or have the prefix of a transformed
+    problem. Others are counted as unknown, except for the columns that programs add.
 
     Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of
     `names` as the name of a row.
@@ -260,15 +262,36 @@ def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     _check_rows(names, raw)
     if np.array_equal(listed, names):
         return NamedValues(raw.values.copy(), 0, 0)
-    place = dict(zip(names.tolist(), range(len(names)), strict=True))
-    index = np.fromiter(map(place.get, listed.tolist(), repeat(-1)), np.int64, len(listed))
+    index = _places(names, listed)
     known = index >= 0
     values = np.full(len(names), 0.0 if raw.omits_zeros else np.nan)
     values[index[known]] = raw.values[known]
     _check_repeats(listed[known], raw.values[known], values[index[known]])
-    added = re.compile("|".join(added_columns().values()).encode(), re.DOTALL)
-    strangers = sum(added.fullmatch(name) is None for name in listed[~known].tolist())
-    return NamedValues(values, int(np.isnan(values).sum()), strangers)
+    return NamedValues(values, int(np.isnan(values).sum()), len(_strangers(listed[~known])))
+
+
+def unknown_names(names: Bytes, raw: RawSolution) -> list[bytes]:
+    """The names in a file that are neither among `names` nor added by programs."""
+    listed = _listed(raw)
+    return _strangers(listed[_places(names, listed) < 0])
+
+
+def _places(names: Bytes, listed: Bytes) -> NDArray[np.int64]:
+    """The place of each listed name among `names`, -1 for an unknown one."""
+    place = dict(zip(names.tolist(), range(len(names)), strict=True))
+    index = np.fromiter(map(place.get, listed.tolist(), repeat(-1)), np.int64, len(listed))
+    others = np.flatnonzero(index < 0)
+    if len(others):
+        folded = {name.lower(): at for name, at in place.items()}
+        for at, name in zip(others.tolist(), listed[others].tolist(), strict=True):
+            index[at] = next((folded[word] for word in spellings(name) if word in folded), -1)
+    return index
+
+
+def _strangers(names: Bytes) -> list[bytes]:
+    """The names that are not of columns that programs add."""
+    added = re.compile("|".join(added_columns().values()).encode(), re.DOTALL | re.IGNORECASE)
+    return [name for name in names.tolist() if not any(map(added.fullmatch, spellings(name)))]
 
 
 def _listed(raw: RawSolution) -> Bytes:

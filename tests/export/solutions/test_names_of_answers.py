@@ -1,0 +1,106 @@
+"""Names of answers: spelled differently, or of another problem, with the likely cause."""
+
+import crossfield as cf
+import pytest
+from cases import names_of
+from crossfield.export.formats.registry import write
+from crossfield.export.library.documents import check_point
+from crossfield.export.solutions.solution import read_solution
+from crossfield.models.errors import SolutionError
+from crossfield.models.formulations.names import column_names
+from crossfield.models.formulations.problem import formulate
+from loops import for_each
+
+INSTANCE, LARGER = (cf.sample("skew", size) for size in (4, 6))
+FIELD = cf.greedy_field(INSTANCE)
+MILP = formulate(INSTANCE, "milp-mccormick")
+
+
+def entries_of(formulation, instance=INSTANCE):
+    """Names and values of the point of a field."""
+    problem = formulate(instance, formulation)
+    point = problem.point(FIELD if instance is INSTANCE else cf.greedy_field(instance))
+    return list(zip(names_of(column_names(problem)), point.tolist(), strict=True))
+
+
+ENTRIES = entries_of("milp-mccormick")
+
+
+def listed(entries):
+    return "".join(f"{name} {value!r}\n" for name, value in entries)
+
+
+def renamed(rename):
+    return [(rename(name), value) for name, value in ENTRIES]
+
+
+@for_each(
+    "rename",
+    [
+        str.upper,
+        str.title,
+        lambda name: f"t_{name}",
+        lambda name: f'"{name}"',
+        lambda name: f"'T_{name.upper()}'",
+    ],
+)
+def test_other_spellings_of_names_are_read(rename, tmp_path):
+    write(MILP, tmp_path / "m.mps")
+    path = tmp_path / "x.sol"
+    path.write_text(listed(renamed(rename)))
+    found = read_solution(path, MILP)
+    assert (found.status, found.unknown) == ("feasible", 0)
+    assert found.point.tolist() == [value for _, value in ENTRIES]
+    assert check_point.check(str(tmp_path / "m.mps"), str(path)).worst < 1e-14
+
+
+def test_two_spellings_of_a_name_are_refused_if_their_values_differ(tmp_path):
+    name, value = ENTRIES[0]
+    path = tmp_path / "x.sol"
+    path.write_text(listed([*ENTRIES, (name.upper(), value)]))
+    assert read_solution(path, MILP).status == "feasible"
+    path.write_text(listed([*ENTRIES, (name.upper(), 7.0)]))
+    with pytest.raises(SolutionError, match="has two values"):
+        read_solution(path, MILP)
+
+
+CAUSES = {
+    "other instance": (
+        entries_of("milp-mccormick", LARGER),
+        r"86 of 148 columns .* 84 of its 146 names are unknown \(first 'alpha_01_04'\); of another instance",
+    ),
+    "other formulation": (
+        entries_of("minlp-parity"),
+        r"\(first 'p_00_01_r'\); it is probably of minlp-parity",
+    ),
+    "fewer blocks": (entries_of("minlp-quartic"), "probably of minlp-quartic or minlp-cubic"),
+    "cut off": (
+        ENTRIES[:-5],
+        r"5 of 148 columns .* missing \(psi_02_02 is the first\); the file may be cut off",
+    ),
+    "cut off in a block": (ENTRIES[:60], "88 of 148 columns .* the file may be cut off"),
+    "zeros left out": (
+        [(name, value) for name, value in ENTRIES if value],
+        "left out columns at 0, which this layout lists; .* `=obj= VALUE`",
+    ),
+    "lines missing": ([*ENTRIES[:7], *ENTRIES[9:]], "2 of 148 columns .* lines are missing in it"),
+    "renamed x1": (
+        [(f"x{at}", value) for at, (_, value) in enumerate(ENTRIES)],
+        r"148 of its 148 names are unknown \(first 'x0'\); the program renamed the columns",
+    ),
+    "renamed C0001": ([(f"C{at:07d}", 1.0) for at in range(148)], "the program renamed the columns"),
+    "other model": ([("foo", 1.0), ("bar", 2.0)], r"\(first 'foo'\); it is of another formulation or model"),
+    "infinite": (
+        [(ENTRIES[0][0], float("inf")), *ENTRIES[1:]],
+        "alpha_00_01 has the value inf, .* not finite",
+    ),
+    "huge": ([(ENTRIES[0][0], 1e300), *ENTRIES[1:]], r"alpha_00_01 has the value 1e\+300, which no column"),
+}
+
+
+@for_each("name", CAUSES)
+def test_names_that_do_not_fit_are_shown_with_the_likely_cause(name, tmp_path):
+    entries, message = CAUSES[name]
+    (tmp_path / "x.sol").write_text(listed(entries))
+    with pytest.raises(SolutionError, match=message):
+        read_solution(tmp_path / "x.sol", MILP)
