@@ -164,7 +164,7 @@ def test_a_size_beyond_the_memory_is_estimated_and_refused(tmp_path, refused):
 
 
 def test_a_refused_format_is_reported_and_recorded(files, capsys):
-    assert invoke(["export", "tiny.json", "-f", "minlp-parity", "-F", "lp", "-o", "out"]) == 0
+    assert invoke(["export", "tiny.json", "-f", "minlp-parity", "-F", "lp", "-F", "nl", "-o", "out"]) == 0
     assert "write minlp-quartic, which is the same problem" in capsys.readouterr().out
     document = cf.read_manifest("out/tiny.minlp-parity.manifest.json").document
     assert document["refused"].keys() == {"lp"}
