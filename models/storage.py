@@ -49,6 +49,44 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
             temporary.unlink()
 
 
+@contextmanager
+def replacing_files(folder: str | Path) -> Iterator[Path]:
+    """A temporary folder, whose files replace those of `folder`, one after the other, on success.
+
+    On any failure, Ctrl-C included, the old files stay. Raises OutputError when the folder cannot be written.
+    """
+    folder = make_folder(folder)
+    temporary = neighbour(folder / "files")
+    try:
+        remove_dead(folder)
+        temporary.mkdir()
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written: {_reason(error)}; choose another folder", file=folder
+        ) from error
+    try:
+        yield temporary
+        for path in sorted(path for path in temporary.rglob("*") if path.is_file()):
+            target = folder / path.relative_to(temporary)
+            make_folder(target.parent)
+            try:
+                path.replace(target)
+            except OSError as error:
+                reason = f"cannot be replaced: {_reason(error)}; choose another folder"
+                raise OutputError(reason, file=target) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def remove_file(path: Path) -> None:
+    """Remove a file, if there is one; a folder stays. Raises OutputError when that is impossible."""
+    try:
+        if not path.is_dir():
+            path.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot be removed: {_reason(error)}; choose another folder", file=path) from error
+
+
 def neighbour(path: Path) -> Path:
     """A name in the folder of `path` that no other writer uses, because it contains machine and process."""
     return path.with_name(f".{path.name[:_LONGEST]}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}{PART}")

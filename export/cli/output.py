@@ -224,14 +224,10 @@ def show_report(report: Report, folder: Path) -> None:
 
 
 def _print_proof(report: Report, best: dict[str, Any]) -> None:
-    """Print the bound, or that a method failed to prove one."""
-    from ..solving.proven import NOTHING
-
+    """Print the bound; that none was proven is among the failures."""
     if report.proven:
         bound = f"{best['bound_2_norm']:.10g}"
         print_line(f"  no field has less than {bound}; certificate: {report.proven.certificate}")
-    elif any(candidate.proof for candidate in report.candidates):
-        print_line(_wrapped(NOTHING))
 
 
 def _wrapped(text: str, width: int = WIDTH, indent: str = "  ") -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from ...models.errors import SolverError
+from ...models.errors import CrossfieldError
 from . import options
 from .inputs import read_start
 from .output import print_line, print_notice, progress, show_facts
@@ -65,7 +65,7 @@ def prove_command(
             scheduler=scheduler,
             progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
         )
-        document = _write(proof, output)
+        document, failure = _write(proof, output)
     printing.show(document, lambda: _show(proof, document, output))
     if instance.gauge == "box":
         print_notice("the proof is of the gauge strokes; its bound also holds in the gauge box")
@@ -79,24 +79,27 @@ def prove_command(
             f"the check ended early: the certificate has {checked} of {len(proof.levels)} levels, and its "
             "bound is theirs; with a greater --time-limit it has more"
         )
-    if document["status"] == UNPROVEN:
-        from ..solving.proven import NOTHING
-
-        raise SolverError(f"{NOTHING}; field and report were written. Increase --time-limit", file=output)
+    if failure is not None:
+        raise failure
 
 
-def _write(proof: Proof, folder: Path) -> dict[str, Any]:
-    """Write field, certificate and report of a proof; return the report."""
+def _write(proof: Proof, folder: Path) -> tuple[dict[str, Any], CrossfieldError | None]:
+    """Write field, certificate and report of a proof; return the report, and why there is no certificate."""
     from ...models.field.file import write_field
-    from ...models.storage import make_folder, write_bytes
+    from ...models.storage import make_folder, remove_file, write_bytes
     from ..solving.proven import certified
 
     stem = f"{proof.field.instance.name}.proof"
     path = make_folder(folder) / f"{stem}.certificate.npz"
-    certificate = certified(proof, path)
-    proven, bounds = _proven(proof, certificate)
     write_field(proof.field, folder / f"{stem}.field.npz")
+    certificate, failure = None, None
+    try:
+        certificate = certified(proof, path)
+    except CrossfieldError as error:
+        failure = error
+    proven, bounds = _proven(proof, certificate)
     document = proven | {
+        "reason": None if failure is None else str(failure),
         "seconds": proof.seconds,
         "ended": proof.ended,
         "levels": [
@@ -105,7 +108,9 @@ def _write(proof: Proof, folder: Path) -> dict[str, Any]:
         ],
     }
     write_bytes(folder / f"{stem}.json", (json.dumps(document, indent=1) + "\n").encode())
-    return document
+    if failure is not None:
+        remove_file(path)  # it is of an earlier proof
+    return document, failure
 
 
 def _proven(proof: Proof, certificate: Certificate | None) -> tuple[dict[str, Any], list[float]]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from ...models.errors import InputError, SolutionError
+from ...models.errors import InputError, SolutionError, SolverError
 from ...models.processes.deadline import Deadline
 from . import options
 from .inputs import formulations_of, known, read_start
@@ -59,11 +59,13 @@ def solve_command(
         )
         if method is not None:
             _check_method(method, solver, relax=formulating.relax)
-            candidate, proven, target = _by_method(method, request)
+            candidate, proven, reason, target = _by_method(method, request)
         else:
             solution, target = _by_solver(str(formulation), solver, request)
     if method is not None:
         _print_candidate(candidate, proven, target, printing)
+        if reason:
+            print_notice(reason)
         return
     print_solution(solution, target, printing)
     if solution.point is None:
@@ -90,18 +92,24 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
         raise typer.BadParameter(f"--solver {solver}: the method {name} has its own solvers")
 
 
-def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, Path]:
-    """Final field of a method, its proof if any, and the file to which the field was written."""
+def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, str, Path]:
+    """Final field of a method, its proof if any, why a proof has no bound, and the file of the field."""
     from ...models.field.file import write_field
-    from ...models.storage import make_folder
+    from ...models.storage import make_folder, remove_file
     from ..solving.methods import METHODS
     from ..solving.proven import Proven
 
     target = make_folder(request.folder) / f"{request.instance.name}.{name}.field.npz"
     *_, candidate = METHODS[name].find(request)
     write_field(candidate.field, target)
+    if candidate.proof is None:
+        return candidate, None, "", target
     certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
-    return candidate, Proven.by(candidate.proof, certificate), target
+    try:
+        return candidate, Proven.by(candidate.proof, certificate), "", target
+    except SolverError as error:
+        remove_file(certificate)  # it is of an earlier proof
+        return candidate, None, str(error), target
 
 
 def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solution, Path]:
@@ -131,16 +139,12 @@ def _print_candidate(
     candidate: Candidate, proven: Proven | None, field: Path, printing: options.PrintOptions
 ) -> None:
     """Print the facts of a method's field and the path of its file."""
-    from ..solving.proven import NOTHING
-
     facts = candidate.facts()
     if proven:
         facts |= proven.facts(facts["energy_2_norm"])
 
     lines = [f"field: {field}", *([f"certificate: {proven.certificate}"] if proven else [])]
     printing.show_facts(candidate.field.instance.summary, facts, *lines)
-    if candidate.proof is not None and proven is None:
-        print_notice(NOTHING)
     if candidate.interrupted:
         print_notice("interrupted; the best field so far was kept")
 

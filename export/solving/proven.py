@@ -6,14 +6,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from ...models.errors import SolverError
 from ...models.proof.check_certificate import gap_of, status_of
 from ...models.proof.record import Proof
 
 if TYPE_CHECKING:
     from ...models.proof.certificate import Certificate
 
-NOTHING: Final = "nothing was proven within the time limit: the bound is 0, and there is no certificate"
-"""Statement of a proof without a result."""
+_ENDED: Final = {
+    "time": "the time limit ended before a bound was proven; increase it",
+    "interrupted": "the proof was interrupted before",
+    "work": "the limit of work ended before a bound was proven; increase it",
+    "workers": "a worker of the scheduler was lost before",
+    "gap": "the requested gap allows the bound 0; request a smaller one",
+    "labels": "the next level would have too many labels",
+}
+"""Reasons of a proof without a bound, by what ended it."""
 
 
 @dataclass(frozen=True)
@@ -24,13 +32,9 @@ class Proven:
     certificate: Path
 
     @classmethod
-    def by(cls, proof: Proof | None, path: Path) -> Proven | None:
-        """Return the result of a proof, with its certificate at `path`; None without a result.
-
-        Errors are those of `certified`.
-        """
-        found = certified(proof, path)
-        return None if found is None else cls(found.bound, path)
+    def by(cls, proof: Proof, path: Path) -> Proven:
+        """Return the result of a proof, with its certificate at `path`. Errors are those of `certified`."""
+        return cls(certified(proof, path).bound, path)
 
     def facts(self, energy: float) -> dict[str, Any]:
         """Bound and relative gap of a field with that 2-norm energy, and whether the gap is zero."""
@@ -48,15 +52,21 @@ class Proven:
         return {"status": status, **facts, "certificate": self.certificate.name}
 
 
-def certified(proof: Proof | None, path: Path) -> Certificate | None:
-    """Write the certificate of a proof to `path`, if it proves something.
+def certified(proof: Proof, path: Path) -> Certificate:
+    """Write the certificate of a proof to `path`.
 
-    If nothing is proven, there is none, and a file of an earlier call is removed. Raises InputError for a
-    proof that the checker refuses, and OutputError when the file cannot be written.
+    Raises SolverError, with the reason, for a proof without a bound, InputError for a proof that the checker
+    refuses, and OutputError when the file cannot be written. A file of an earlier call then stays.
     """
-    path.unlink(missing_ok=True)
-    if proof is None or not proof.levels or (proof.verdict is not None and proof.bound <= 0 < proof.energy):
-        return None
     from ...models.proof.certificate import write_certificate
 
+    if not proof.levels or (proof.verdict is not None and proof.bound <= 0 < proof.energy):
+        raise SolverError(f"nothing was proven, and there is no certificate: {_reason(proof)}")
     return write_certificate(proof, path)
+
+
+def _reason(proof: Proof) -> str:
+    """The reason why a proof has no bound."""
+    if not proof.levels and proof.ended in {"optimal", "gap", "labels"}:
+        return "the time limit or Ctrl-C ended the check before the coarsest level was checked"
+    return _ENDED.get(proof.ended, "its levels prove no bound above 0")

@@ -17,7 +17,7 @@ from ...models.processes.deadline import Clock, Deadline, Over, Progress, Stop, 
 from ...models.processes.groups import interruptible
 from ...models.processes.limits import Limits
 from ...models.search.starts import first_field
-from ...models.storage import make_folder, write_bytes
+from ...models.storage import make_folder, remove_file, replacing_files, write_bytes
 from ...models.surface.lift import surface
 from ...models.surface.surface import Surface
 from ..bundle.manifest import Manifest, write_all
@@ -27,14 +27,13 @@ from ..pictures.mask import has_mask, write_mask
 from ..surfaces.files import SHADED, surface_facts, write_shaded
 from .methods import METHODS, Candidate, Request, instance_facts
 from .proven import Proven
-from .run_page import PAGE, write_page
+from .run_page import REPORT, write_page
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 OVERLAY: Final = ("overlay.svg", "overlay.png")
 """The field over its drawing: layers in the drawing's coordinates, and the same as a picture."""
 LONGEST_LIFT: Final = 10.0
 """Seconds after which the surface's present heights are kept; grids up to 64 pixels take a few."""
-REPORT: Final = "report.json"
 MASK: Final = "mask.png"
 KEPT: Final = "bend"
 """The method whose field is kept; docs/evidence.md has the measurements."""
@@ -194,7 +193,9 @@ def run(
     - DIR/mask.png: the mask, as `read_sketch` accepts it; not for an instance from a file
     - DIR/certificate.npz: the certificate of the proven bound, with the field of the method `prove`
     - DIR/index.html: a page that shows all of these
-    - DIR/report.json: written last, so its presence means that the run has ended
+    - DIR/report.json: written last
+
+    Files of an earlier run stay until the new ones of their kind are complete, also when the run is killed.
 
     The report names methods that failed and what interrupted the run. Ctrl-C ends the current method with its
     best field; then no further method is tried and nothing is drawn. Before the solver files are written,
@@ -237,7 +238,6 @@ def run(
     over = stop_function(stop)
     below = None if drawing is None else read_drawing(drawing, on=instance)
     limits, folder = Limits.bounded(limits), make_folder(folder)
-    _clear(folder)
     progress(plan(limits))
     watch = Stopwatch()
     progress("greedy field")
@@ -246,15 +246,17 @@ def run(
     from ...models.proof.compiling import compiling  # it loads Numba
 
     with compiling():
-        manifests = write_all(
-            instance,
-            folder / "models",
-            start=start,
-            options=options,
-            dialects=dialects,
-            jobs=jobs,
-            progress=lambda name: progress(f"writing {name}"),
-        )
+        with replacing_files(folder / "models") as new:
+            sets = write_all(
+                instance,
+                new,
+                start=start,
+                options=options,
+                dialects=dialects,
+                jobs=jobs,
+                progress=lambda name: progress(f"writing {name}"),
+            )
+        manifests = tuple(replace(each, path=folder / "models" / each.path.name) for each in sets)
         watch.lap("models")
         request = Request(
             instance, folder / "solve", limits, options or {}, start, progress=progress, stop=over
@@ -263,34 +265,39 @@ def run(
         watch.lap(COMPILING)
     if not found.interrupted:
         _find(found, request, watch)
-    proven = _certified(found, folder / CERTIFICATE)
-    watch.lap("certificate")
-    report = Report(instance, found.ranked, tuple(manifests), found.failures, found.interrupted, proven)
-    for suffix in (".npz", ".json", ".rawfield"):
-        write_field(report.kept.field, folder / f"field{suffix}")
-    write_field(report.best.field, folder / LOWEST)
-    if has_mask(instance):
-        write_mask(instance, folder / MASK)
+    report = Report(instance, found.ranked, manifests, found.failures, found.interrupted)
+    fresh = _write_fields(report, folder)
     watch.lap("fields")
+    report = _certified(report, folder / CERTIFICATE)
+    fresh |= {CERTIFICATE} if report.proven else set()
+    watch.lap("certificate")
     # An exception at Ctrl-C could be raised in a callback, where Python discards it.
-    with interruptible() as pressed:
+    with interruptible() as pressed, replacing_files(folder) as new:
         if not report.interrupted:
-            report = _drawn(report, folder, below, progress, lambda: over() or pressed())
+            report = _drawn(report, new, below, progress, lambda: over() or pressed())
             watch.lap("pictures")
         if not report.interrupted:
-            report = _shaded(report, folder, progress, lambda: over() or pressed())
+            report = _shaded(report, new, progress, lambda: over() or pressed())
             watch.lap("surface")
+        fresh |= {path.name for path in new.iterdir()}
     report = replace(report, stages=watch.stages)
     document = report.document()
-    write_page(folder, document, report.manifests)
+    write_page(folder, document, report.manifests, fresh)
+    for name in {CERTIFICATE, MASK, SHADED, *OVERLAY, *map(_picture, PICTURES)} - fresh:
+        remove_file(folder / name)
     write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
     return report
 
 
-def _clear(folder: Path) -> None:
-    """Remove files of an earlier run that this run may not write."""
-    for stale in (REPORT, PAGE, CERTIFICATE, MASK, LOWEST, SHADED, *OVERLAY, *map(_picture, PICTURES)):
-        (folder / stale).unlink(missing_ok=True)
+def _write_fields(report: Report, folder: Path) -> set[str]:
+    """Write the kept field, the lowest one and the mask, and return the names of the files."""
+    with replacing_files(folder) as new:
+        for suffix in (".npz", ".json", ".rawfield"):
+            write_field(report.kept.field, new / f"field{suffix}")
+        write_field(report.best.field, new / LOWEST)
+        if has_mask(report.instance):
+            write_mask(report.instance, new / MASK)
+        return {path.name for path in new.iterdir()}
 
 
 @dataclass
@@ -338,18 +345,18 @@ def _find(found: _Found, request: Request, watch: Stopwatch) -> None:
             break
 
 
-def _certified(found: _Found, path: Path) -> Proven | None:
-    """The proven bound, with its certificate at the path; a refusal or Ctrl-C is recorded."""
-    by = next((each for each in found.candidates if each.proof is not None), None)
-    if by is None:
-        return None
+def _certified(report: Report, path: Path) -> Report:
+    """The report with the proven bound, whose certificate is at the path; a failure or Ctrl-C is recorded."""
+    proof = next((each.proof for each in report.candidates if each.proof is not None), None)
+    if proof is None:
+        return report
     try:
-        return Proven.by(by.proof, path)
+        return replace(report, proven=Proven.by(proof, path))
     except CrossfieldError as error:
-        found.failures["certificate"] = str(error)
+        report.failures["certificate"] = str(error)
     except KeyboardInterrupt:
-        found.interrupted = "certificate"
-    return None
+        return replace(report, interrupted="certificate")
+    return report
 
 
 def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progress, stop: Over) -> Report:

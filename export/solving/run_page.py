@@ -15,6 +15,7 @@ from ..solvers_table import BUNDLED, smallest, takes
 from .methods import shown
 
 PAGE: Final = "index.html"
+REPORT: Final = "report.json"
 _LAYERS: Final = (
     ("drawing", True),
     ("strokes", False),
@@ -42,36 +43,41 @@ _FILES: Final = {
 }
 
 
-def write_page(folder: Path, report: dict[str, Any], manifests: tuple[Manifest, ...]) -> None:
-    """Write the page of a run. report: the document of report.json. Raises InputError, OutputError."""
-    overlay = _svg(folder / "overlay.svg")
+def write_page(
+    folder: Path, report: dict[str, Any], manifests: tuple[Manifest, ...], names: set[str]
+) -> None:
+    """Write the page of a run. report: the document of report.json. names: the files that the run wrote.
+
+    Raises InputError, OutputError.
+    """
+    overlay = _svg(folder / "overlay.svg") if "overlay.svg" in names else ""
     text = ENVIRONMENT.get_template("run/index.html.j2").render(
         report=report,
         seconds=f"{report['seconds']:.0f}",
         bound=report["proof"] and f"{report['proof']['bound_2_norm']:.6g}",
         layers=[each for each in _LAYERS if each[0] != "drawing" or 'id="drawing"' in overlay],
         overlay=overlay,
-        overview=_picture(folder / "overview.png"),
-        shaded=_picture(folder / "shaded.png"),
+        overview=_picture(folder / "overview.png") if "overview.png" in names else "",
+        shaded=_picture(folder / "shaded.png") if "shaded.png" in names else "",
         columns=["method", "2-norm", *["gap"] * bool(report["proof"]), *_COLUMNS],
         methods=[
             [facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""), *shown(facts)]
             for facts in report["methods"]
         ],
         sets=sorted(map(_set, manifests), key=lambda each: not each["solve"]),
-        files=[(name, meaning) for name, meaning in _FILES.items() if (folder / name).exists()],
+        files=[(name, meaning) for name, meaning in _FILES.items() if name in names | {REPORT}],
     )
     write_bytes(folder / PAGE, text.encode())
 
 
 def _svg(path: Path) -> str:
-    """Our own SVG without its XML declaration; empty if it was not drawn."""
-    return read_bytes(path).decode().partition("?>\n")[2] if path.exists() else ""
+    """Our own SVG without its XML declaration."""
+    return read_bytes(path).decode().partition("?>\n")[2]
 
 
 def _picture(path: Path) -> str:
-    """A PNG as the address that contains it; empty if it was not drawn."""
-    return f"data:image/png;base64,{b64encode(read_bytes(path)).decode()}" if path.exists() else ""
+    """A PNG as the address that contains it."""
+    return f"data:image/png;base64,{b64encode(read_bytes(path)).decode()}"
 
 
 def _set(manifest: Manifest) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import write
 from crossfield.export.solving.local import Files, Solvers
 from crossfield.export.solving.methods import METHODS, Request
-from crossfield.export.solving.proven import NOTHING, certified
+from crossfield.export.solving.proven import certified
 from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.processes.limits import Limits
@@ -66,6 +66,9 @@ def test_a_solver_process_is_told_seconds_and_no_time_of_this_clock(tmp_path):
     assert 500 < float(first.rpartition("at most ")[2].removesuffix(" s")) <= 600
 
 
+UNPROVEN = "nothing was proven, and there is no certificate: the time limit ended before a bound was proven"
+
+
 @pytest.fixture
 def passed():
     """A deadline in the past."""
@@ -78,8 +81,8 @@ def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
     path = tmp_path / "certificate.npz"
     with pytest.raises(SolverError, match="nothing was proven"):
         write_certificate(proof, path)
-    path.write_bytes(b"of an earlier call")
-    assert certified(proof, path) is None
+    with pytest.raises(SolverError, match=UNPROVEN):
+        certified(proof, path)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -99,7 +102,8 @@ def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsy
     given = ["prove", "mouse", "--size", "24", "--norm", norm, "--time-limit", "0.1", "--json"]
     assert invoke([*given, "-o", str(tmp_path)]) == 1
     output = capsys.readouterr()
-    assert NOTHING in output.err
+    assert UNPROVEN in output.err
+    assert UNPROVEN in json.loads(output.out)["reason"]
     document = json.loads(output.out)
     assert document == json.loads((tmp_path / "mouse.proof.json").read_text())
     assert (document["status"], document["bound"], document["levels"]) == ("unproven", 0.0, [])
@@ -110,7 +114,7 @@ def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
     cf.prove(cf.sample("mouse", 4))  # compiles what proofs need
     given = ["solve", "mouse", "--size", "24", "-m", "prove", "--time-limit", "0.1", "-o", str(tmp_path)]
     assert invoke(given) == 0
-    assert NOTHING in " ".join(capsys.readouterr().err.split())
+    assert UNPROVEN in " ".join(capsys.readouterr().err.split())
     assert [path.name for path in tmp_path.iterdir()] == ["mouse.prove.field.npz"]
 
 

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import crossfield as cf
 import pytest
@@ -48,6 +49,22 @@ def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
     assert facts["energy_2_norm"] == pytest.approx(field.energy().total, rel=1e-12)
     assert (facts["proven_optimal"], facts["bound_2_norm"]) == (True, certificate.bound)
     assert METHODS["prove"].timed
+
+
+@pytest.mark.parametrize(
+    "ended,words",
+    [
+        ("time", "the time limit ended before a bound was proven"),
+        ("interrupted", "the proof was interrupted"),
+        ("work", "the limit of work ended"),
+        ("workers", "a worker of the scheduler was lost"),
+        ("gap", "ended the check before the coarsest level was checked"),
+    ],
+)
+def test_the_reason_of_a_missing_certificate_is_the_true_one(tmp_path, ended, words):
+    proof = replace(cf.prove(cf.sample("skew", 4), work=1), bound=0.0, levels=(), ended=ended)
+    with pytest.raises(cf.SolverError, match=words):
+        Proven.by(proof, tmp_path / "certificate.npz")
 
 
 @pytest.mark.slow

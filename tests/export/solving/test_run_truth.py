@@ -60,8 +60,8 @@ def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
         "models",
         "compiling",
         *METHODS,
-        "certificate",
         "fields",
+        "certificate",
         "pictures",
         "surface",
     ]

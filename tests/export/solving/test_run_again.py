@@ -1,0 +1,157 @@
+"""A run over the files of an earlier one: whatever ends it, a folder has whole sets of files, old or new."""
+
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import crossfield as cf
+import pytest
+from children import complaints
+from crossfield.models.proof.certificate import read_certificate
+from PIL import Image
+
+RUN = """
+import sys, crossfield as cf
+show = lambda line: print(line, flush=True)
+cf.run(cf.sample("mouse", 8), sys.argv[1], limits=cf.Limits(float(sys.argv[2])), progress=show)
+"""
+FIELDS = ["field.npz", "field.json", "field.rawfield", "field.obj", "field.sings", "lowest.npz", "mask.png"]
+PICTURES = [
+    "overview.png",
+    "field.png",
+    "crosses.png",
+    "angle.png",
+    "instance.png",
+    "overlay.svg",
+    "overlay.png",
+]
+
+
+@pytest.fixture(scope="module")
+def earlier(tmp_path_factory):
+    """The folder of a run of another instance, and its files."""
+    folder = tmp_path_factory.mktemp("earlier")
+    cf.run(cf.sample("skew", 6), folder, limits=cf.Limits(1.0))
+    return folder, files(folder)
+
+
+def files(folder):
+    paths = [path for path in folder.iterdir() if path.is_file()]
+    return {path.name: path.read_bytes() for path in paths}
+
+
+def end_at(folder, line, number, times=1, seconds="600"):
+    """Run into the folder, and send a signal after a line of this start; return exit code and complaints."""
+    with subprocess.Popen(
+        [sys.executable, "-c", RUN, folder, seconds],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as child:
+        while not child.stdout.readline().startswith(line):
+            assert child.poll() is None
+        for _ in range(times):
+            child.send_signal(number)
+        err = child.communicate()[1]
+    return child.returncode, complaints(err)
+
+
+def assert_whole(folder, old):
+    """Every kind of file is that of one run, can be read, and the page names existing files only."""
+    new = files(folder)
+    for kind in (FIELDS[:-1], PICTURES):
+        assert len({new.get(name) == old[name] for name in kind if name in new or name in old}) == 1
+    for name in ("field.npz", "field.json", "lowest.npz"):
+        cf.read_field(folder / name)
+    for path in folder.glob("[!.]*.png"):
+        with Image.open(path) as picture:
+            picture.verify()
+    for path in folder.glob("certificate.npz"):
+        read_certificate(path)
+    for manifest in (folder / "models").glob("*.manifest.json"):
+        cf.read_manifest(manifest).problem()
+    links = re.findall(r'href="([^"#]+)"', new["index.html"].decode())
+    assert links
+    assert [link for link in links if not (folder / link).exists()] == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "writing",
+        pytest.param("search: energy", marks=pytest.mark.slow),
+    ],
+)
+def test_a_run_that_is_killed_leaves_the_files_of_the_earlier_one(earlier, tmp_path, line):
+    source, old = earlier
+    folder = shutil.copytree(source, tmp_path / "run")
+    code, _ = end_at(folder, line, signal.SIGKILL)
+    assert code == -signal.SIGKILL
+    assert {name: data for name, data in files(folder).items() if not name.startswith(".")} == old
+    assert_whole(folder, old)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", ["drawing field", "surface over"])
+def test_a_run_that_is_killed_while_it_draws_leaves_earlier_pictures_and_its_fields(earlier, tmp_path, line):
+    source, old = earlier
+    folder = shutil.copytree(source, tmp_path / "run")
+    code, _ = end_at(folder, line, signal.SIGKILL, seconds="0.5")
+    assert code == -signal.SIGKILL
+    assert_whole(folder, old)
+    new = files(folder)
+    assert all(new[name] == old[name] for name in (*PICTURES, "index.html", "report.json"))
+    assert cf.read_field(folder / "field.npz").instance.name == "mouse"
+    cf.run(cf.sample("skew", 6), folder, limits=cf.Limits(0.5), stop=lambda: True)
+    assert list(folder.rglob(".*")) == []
+
+
+@pytest.mark.slow
+def test_ctrl_c_while_it_draws_leaves_no_picture_of_the_earlier_run(earlier, tmp_path):
+    source, old = earlier
+    folder = shutil.copytree(source, tmp_path / "run")
+    assert end_at(folder, "drawing field", signal.SIGINT, seconds="0.5") == (0, "")
+    new = files(folder)
+    assert json.loads(new["report.json"])["interrupted"] == "drawing"
+    drawn = [name for name in PICTURES if name in new]
+    assert drawn[0] == "overview.png"
+    assert len(drawn) < len(PICTURES)
+    assert all(new[name] != old.get(name) for name in drawn)
+    assert_whole(folder, old)
+
+
+@pytest.mark.slow
+def test_two_times_ctrl_c_leaves_whole_files(earlier, tmp_path):
+    source, old = earlier
+    folder = shutil.copytree(source, tmp_path / "run")
+    end_at(folder, "search: energy", signal.SIGINT, times=2)
+    assert_whole(folder, old)
+    assert list(folder.rglob(".*.part")) == []
+
+
+def test_a_failing_certificate_leaves_field_and_report(tmp_path, capsys):
+    from crossfield.export.cli.app import invoke
+
+    (tmp_path / "mouse.proof.certificate.npz").mkdir()
+    assert invoke(["prove", "mouse", "--size", "4", "-o", str(tmp_path), "--time-limit", "60", "-q"]) == 1
+    err = capsys.readouterr().err
+    assert "mouse.proof.certificate.npz: cannot be written" in err
+    assert "time" not in err
+    report = json.loads((tmp_path / "mouse.proof.json").read_text())
+    assert (report["status"], report["bound"], report["ended"]) == ("unproven", 0.0, "optimal")
+    assert "cannot be written" in report["reason"]
+    assert cf.read_field(tmp_path / "mouse.proof.field.npz").energy().total == report["energy"]
+
+
+@pytest.mark.slow
+def test_a_failing_certificate_leaves_the_rest_of_a_run(tmp_path):
+    (tmp_path / "certificate.npz").mkdir()
+    report = cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(20.0))
+    assert report.proven is None
+    assert "certificate.npz: cannot be written" in report.failures["certificate"]
+    assert Path(tmp_path / "field.npz").exists()
+    assert json.loads((tmp_path / "report.json").read_text())["failures"] == report.failures
