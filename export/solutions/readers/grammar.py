@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import compress, count
+from math import isclose
 from operator import le
 
 TOKEN_LIMIT = 63
@@ -45,6 +46,9 @@ CLAIMS = (
     rb"[#*;%]\s*(?:solution[ _])?status(?:\s*[=:]\s*|\s+)(?P<status>.+?)",
 )
 """Lines that state an objective or a status in every layout, with or without a mark of a comment."""
+
+AGREEMENT = 1e-5
+"""Largest difference of two statements of the same objective: CBC writes eight digits."""
 
 NUMBERS = frozenset({"objective", "bound"})
 NO_NUMBERS = frozenset({b"NA", b"UNDF", b"NONE"})
@@ -345,7 +349,9 @@ class Scan:
                     continue
                 raise fault_at(self.data, match.start(group), f"{shown(text)} is not a number")
             before = self.claims.setdefault(group, text)
-            if group == "objective" and float_of(before) != float_of(text):
+            if group == "objective" and not isclose(
+                float_of(before), float_of(text), rel_tol=AGREEMENT, abs_tol=AGREEMENT
+            ):
                 line = self.data.count(10, 0, place) + 1
                 raise fault_at(self.data, match.start(group), f"this is not the objective of line {line}")
 

@@ -1,0 +1,178 @@
+"""One grammar of lines: odd and faulty files are accepted or refused alike by `read` and by the checker."""
+
+import bz2
+import codecs
+import gzip
+import lzma
+import re
+
+import pytest
+from answers import TINY, problem
+from crossfield.export.formats.registry import write
+from crossfield.export.library.documents import check_point
+from crossfield.export.solutions.readers.registry import parse_raw
+from crossfield.export.solutions.solution import read_solution
+from crossfield.models.errors import SolutionError
+from loops import for_each
+
+BASES = {
+    "list": "gurobi-13.0.3_milp_optimal.sol",
+    "scip": "scip-10.0_milp_optimal.sol",
+    "miplib": "miplib-by-layout_milp_optimal.sol",
+    "cbc": "cbc-2.10.8_milp_optimal.sol",
+    "cbc with rows": "cbc-2.10.8_milp_optimal_all.sol",
+    "xpress": "xpress-9.9.1_milp_optimal.slx",
+    "gams": "gams-54.6.1_cplex_milp_optimal.csv",
+}
+"""Answers of real programs to one problem, in every layout of lines that both read."""
+
+
+def lines_of(data):
+    return data.splitlines(keepends=True)
+
+
+def inserted(data, place, line):
+    lines = lines_of(data)
+    return b"".join([*lines[:place], line, *lines[place:]])
+
+
+def with_blank_lines(data):
+    return b"\n \t\n" + data.replace(b"\n", b"\n\n") + b"\n\n\f\n"
+
+
+ODD = {
+    "as it is": lambda data: data,
+    "blank lines everywhere": with_blank_lines,
+    "a blank line first": lambda data: b"\n" + data,
+    "a comment inside": lambda data: inserted(data, 12, b"# a remark\n"),
+    "comments at both ends": lambda data: b"# first\n" + data + b"# last\n",
+    "a comment after an entry": lambda data: re.sub(rb"(?m)^(.*alpha_00_01.*)$", rb"\1 # checked", data),
+    "Windows": lambda data: data.replace(b"\n", b"\r\n"),
+    "old Macs": lambda data: data.replace(b"\n", b"\r"),
+    "a byte order mark": lambda data: codecs.BOM_UTF8 + data,
+    "UTF-16": lambda data: data.decode().encode("utf-16"),
+    "no last newline": lambda data: data.rstrip(b"\n"),
+    "tabs": lambda data: re.sub(rb"(?m)^ *([a-z]+\d?_\S+) +", b"\t\\1\t", data),
+    "form feeds": lambda data: re.sub(rb"(?m)^(?= *[a-z]+\d?_)", b"\f", data),
+    "trailing blanks": lambda data: data.replace(b"\n", b"  \t\n"),
+    "gzip": gzip.compress,
+    "bzip2": bz2.compress,
+    "xz": lzma.compress,
+    "the objective again": lambda data: inserted(data, 12, b"# Objective value: 0.556536082845935\n"),
+    "upper case": lambda data: re.sub(
+        rb"(?m)\b[a-z]+\d?_\d\d_\d\d(?:_[ur])?\b", lambda name: name[0].upper(), data
+    ),
+}
+
+FAULTY = {
+    "a word for a value": lambda data: re.sub(rb"(alpha_00_01[ ,]+)\S+", rb"\1about", data),
+    "a value missing": lambda data: re.sub(rb"(?m)(alpha_00_01).*$", rb"\1", data),
+    "a line too long": lambda data: re.sub(rb"(?m)(alpha_00_01.*)$", rb"\1 7 7", data),
+    "not a number": lambda data: re.sub(rb"(alpha_00_01[ ,]+)\S+", rb"\1nan", data),
+    "infinite": lambda data: re.sub(rb"(alpha_00_01[ ,]+)\S+", rb"\1inf", data),
+    "two values": lambda data: data.replace(b"alpha_01_01", b"alpha_00_00"),
+    "foreign names": lambda data: data.replace(b"alpha_", b"angle_"),
+    "a byte that is not text": lambda data: data.replace(b"alpha_00_01", b"alpha_00\x0001"),
+    "damaged UTF-16": lambda data: codecs.BOM_UTF16_LE + b"x",
+    "nothing": lambda data: b"\n\n",
+    "another claim in a comment": lambda data: inserted(data, 12, b"# Objective value: 99\n"),
+}
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory):
+    """Run both programs on a file: values and objective of each, or None where it refuses."""
+    folder = tmp_path_factory.mktemp("grammar")
+    write(problem("milp"), folder / "m.mps")
+
+    def by_read(path):
+        try:
+            found = read_solution(path, problem("milp"), tolerance=1e-5)
+        except SolutionError:
+            return None
+        return None if found.point is None else ("" if found.contradictions else found.objective)
+
+    def by_checker(path):
+        try:
+            found = check_point.check(str(folder / "m.mps"), str(path))
+        except check_point.BadInputError:
+            return None
+        return "" if not found.agrees or found.worst > 1e-5 else float(found.objective)
+
+    def run(data):
+        path = folder / "x.sol"
+        path.write_bytes(data)
+        return by_read(path), by_checker(path)
+
+    return run
+
+
+@for_each("change", ODD)
+@for_each("base", BASES)
+def test_odd_files_are_read_alike(base, change, judged):
+    data = (TINY / BASES[base]).read_bytes()
+    if base == "list" and change == "a comment inside":
+        assert data.count(b"#") == 2  # its own comments, and the claim among them, stay
+    ours, theirs = judged(ODD[change](data))
+    assert ours == pytest.approx(0.556536082845935, abs=1e-6)
+    assert theirs == pytest.approx(ours, rel=1e-12)
+
+
+@for_each("change", FAULTY)
+@for_each("base", BASES)
+def test_faulty_files_are_refused_or_contradicted_alike(base, change, judged):
+    data = FAULTY[change]((TINY / BASES[base]).read_bytes())
+    ours, theirs = judged(data)
+    assert ours in {None, ""}
+    assert theirs in {None, ""}
+    if change != "foreign names":  # of which `read` allows some, for columns that programs add
+        assert (ours is None) == (theirs is None)
+
+
+@for_each("text, objective", [
+        ("# Objective value: 99", 99), ("# Objective value = 99", 99), ("# Objective value 99", 99),
+        ("#Objective value:99", 99), ("# objective: 99", 99), ("=obj= 99", 99), ("Objective value: 99", 99),
+        ("* Objective value: 9.9D+01", 99), ("# obj = 99", 99), ("# Objective sense: minimize", None),
+        ("# the objective value is 99", None),
+    ])  # fmt: skip
+def test_objectives_in_comments_and_later_lines_are_claims(text, objective):
+    for lines in ([text, "x 1", "y 2"], ["x 1", "y 2", text], ["x 1", text, "y 2"]):
+        raw = parse_raw("\n".join(lines).encode() + b"\n")
+        assert (raw.objective, raw.values.tolist()) == (objective, [1, 2])
+
+
+@for_each("words, status", [
+        ("Optimal", "optimal-global"), ("optimal solution", "optimal-global"), ("Infeasible", "infeasible"),
+        ("locally optimal", "optimal-local"), ("Time limit reached", "limit-with-point"),
+        ("unbounded", "unbounded"), ("whatever", "feasible"),
+    ])  # fmt: skip
+def test_statuses_in_comments_are_claims(words, status):
+    for mark in ("# Status: ", "# Solution status = ", "# status "):
+        raw = parse_raw(f"{mark}{words}\n# Objective value: 3\nx 1\n".encode())
+        assert (raw.status, raw.message, raw.objective) == (status, words, 3)
+
+
+def test_two_objectives_in_one_file_are_refused_unless_they_agree():
+    assert parse_raw(b"=obj= 3\n# Objective value: 3.0e0\nx 1\n").objective == 3
+    with pytest.raises(SolutionError, match="line 2: this is not the objective of line 1"):
+        parse_raw(b"=obj= 3\n# Objective value: 4\nx 1\n")
+
+
+@for_each("line", range(1, 7))
+def test_a_fault_in_the_first_lines_is_reported_with_its_line(line):
+    entries = [f"alpha_00_{at:02d} {at}" for at in range(8)]
+    entries[line - 1] = "alpha_00_99 about"
+    with pytest.raises(SolutionError, match=f"line {line}: 'about' is not a number"):
+        parse_raw("\n".join(entries).encode())
+
+
+def test_a_last_value_without_an_end_is_read_and_noted():
+    raw = parse_raw(b"x 1\ny 2.5")
+    assert raw.values.tolist() == [1, 2.5]
+    assert raw.message == "the last line has no end, so the value of y may be cut off"
+    assert parse_raw(b"objective value: 3\nx 1 (obj:3)").message == ""
+
+
+def test_a_list_of_lines_and_comments_in_turn_is_read_in_linear_time():
+    lines = "".join(f"# a remark\nalpha_{at:06d} {at}\n" for at in range(20_000))
+    assert len(parse_raw(lines.encode()).values) == 20_000
