@@ -435,14 +435,14 @@ def read_point(path: str) -> Point:
         known = "; ".join(layout.description for layout in LAYOUTS)
         _require(layout, f"is not a solution file of a known kind; give one of these: {known}")
         assert layout is not None
-        scan = Scan(text, layout)
+        scan = Scan(next(layout.answers(text)), layout)
         entries = [pair for names, values in scan.read() for pair in zip(names, values)]
     except LineError as error:
         raise BadInputError(str(error)) from None
     _require(scan.has_point, "the file holds no point")
     point = Point(claimed=_value(scan.claims["objective"]) if "objective" in scan.claims else None)
     point.stamps = stamps_in(text[:HEAD].decode("utf-8", "replace"))
-    for name, value in entries[scan.first : scan.starts[1] if len(scan.starts) > 1 else None]:
+    for name, value in entries[scan.first :]:
         point.stamps |= stamps_in(name.decode("utf-8", "replace"))
         _keep(point, name.decode("utf-8", "replace"), _value(value))
     return point

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import compress, count
@@ -128,6 +128,7 @@ class Form:
         line = rb"%b*(?!(?i:%b))%b%b*\n" % (BLANK, reserved, between.join(tokens), BLANK)
         self.line = re.compile(line)
         self.run = re.compile(rb"(?:%b|%b*\n)*" % (line, BLANK))
+        self.anywhere = re.compile(rb"^" + line, re.MULTILINE)
         self.spaces = bytes.maketrans(separator, b" " * len(separator)) if separator else None
 
     @property
@@ -176,15 +177,16 @@ class Form:
 class Layout:
     """The look of a kind of text. Patterns are regular expressions of bytes that ignore case.
 
-    signature: pattern of the start of a line near the start of the text. forms: words of an entry (`Form`);
-    the first that fits the first entry is that of the whole text. claims: patterns of whole lines, with
-    groups objective, bound, status and others that the reader knows; `none` states that there is no point.
-    begin: pattern of the line before the entries, with groups `count` (negative: without zeros) and `sparse`;
-    empty if they start at once. end: pattern of the line after them. further: whether more lists may follow.
-    needs: groups, `begin` or `end`, without which a text is cut off, and what is missing then. pointless:
-    pattern of a status whose values are no point. refusals: patterns of lines that no answer has, and what
-    the text is. omits_zeros: whether columns at 0 are left out; None: if there is no 0 in the text. rewrites:
-    a literal, and the pattern and replacement of the places that have it.
+    signature: pattern of the start of the first line of an answer, or of a line in it if `heads` is false. A
+    group `answer` begins with the only answer. forms: words of an entry (`Form`); the first that fits the
+    first entry is that of the whole text. claims: patterns of whole lines, with groups objective, bound,
+    status and others that the reader knows; `none` states that there is no point. begin: pattern of the line
+    before the entries, with groups `count` (negative: without zeros) and `sparse`; empty if they start at
+    once. end: pattern of the line after them. needs: groups, `begin` or `end`, without which a text is cut
+    off, and what is missing then. pointless: pattern of a status whose values are no point. refusals:
+    patterns of lines that no answer has, and what the text is. omits_zeros: whether columns at 0 are left
+    out; None: if there is no 0 in the text. rewrites: a literal, and pattern and replacement of the places
+    that have it. digits: how the program writes all digits, if it rounds them here.
     """
 
     name: str
@@ -197,16 +199,32 @@ class Layout:
     claims: tuple[bytes, ...] = ()
     begin: bytes = b""
     end: bytes = b""
-    further: bool = False
     needs: tuple[tuple[str, str], ...] = ()
     pointless: bytes = b""
     refusals: tuple[tuple[bytes, str], ...] = ()
     omits_zeros: bool | None = False
-    rewrites: tuple[tuple[bytes, bytes, bytes], ...] = ()
+    rewrites: tuple[tuple[bytes, bytes, bytes | Callable[[re.Match[bytes]], bytes]], ...] = ()
+    heads: bool = True
+    digits: str = ""
 
     def recognises(self, head: bytes) -> bool:
         """Whether a text with this start has the layout."""
         return _compiled(self)["signature"].search(head) is not None
+
+    def answers(self, data: bytes) -> Iterator[bytes]:
+        """The answers in a text, each in its lines: empty lines replace the text before it."""
+        starts: list[int] = []
+        for match in _compiled(self)["signature"].finditer(data) if self.heads else ():
+            if "answer" in match.groupdict():
+                starts = [match.start("answer")]
+                break
+            # A line like the first one may stand among the claims of an answer, before its entries.
+            at = match.start()
+            if not starts or any(form.anywhere.search(data, starts[-1], at) for form in _forms(self)):
+                starts.append(at)
+        starts = starts or [0]
+        for start, stop in zip(starts, [*starts[1:], len(data)]):
+            yield b"\n" * data.count(b"\n", 0, start) + data[start:stop] if start else data[:stop]
 
 
 @cache
@@ -234,8 +252,7 @@ class Scan:
 
     claims: texts by group. entries: number of entries. first: number of the first entry that counts, if the
     numbering of lines starts again there. sparse: whether the text states that it omits zeros. cut: name of
-    the last entry, if its value ends the text without the end of a line, and so may be cut off. starts:
-    number of the first entry of each list.
+    the last entry, if its value ends the text without the end of a line, and so may be cut off.
     """
 
     def __init__(self, data: bytes, layout: Layout) -> None:
@@ -253,7 +270,7 @@ class Scan:
         self.entries = self.first = self.last_index = 0
         self.restarts = 0
         self.sparse = self.ended = False
-        self.starts = [] if layout.begin else [0]
+        self.begun = not layout.begin
         self.cut = b""
 
     def read(self) -> Iterator[tuple[list[bytes], list[bytes]]]:
@@ -311,32 +328,28 @@ class Scan:
         line = data[at:end].strip()
         for key, pattern in patterns.items() if line else ():
             match = pattern.match(data, at) if key != "signature" else None
-            if match is None:
+            if match is None or key == ("begin" if self.begun else "end"):
                 continue
-            if key == "end":
-                return self._end(match, end + 1, inside=inside), False
-            if key == "begin":
-                self.starts.append(self.entries)
-                self.ended = False
-                self._keep(match)
-                return end + 1, True
             if key.startswith("refusal"):
                 raise fault_at(data, at, self.layout.refusals[int(key[8:])][1])
             self._keep(match)
-            return data.index(b"\n", match.end()) + 1, inside
+            if key == "end":
+                self.ended = True
+                return len(data), False
+            self.begun = self.begun or key == "begin"
+            return data.index(b"\n", match.end()) + 1, self.begun
         if not line or not inside or (self.layout.comment and line.startswith(self.layout.comment)):
             return end + 1, inside
+        if self._is_other_text(at):
+            return len(data), False
         if self.unended and end + 1 == len(data):
             raise fault_at(data, at, "the file is cut off in the middle of this line")
         raise fault_at(data, at, self.form.fault(data[at:end]))
 
-    def _end(self, match: re.Match[bytes], after: int, *, inside: bool) -> int:
-        """The position behind the line that ends a list; such a line alone states that there is no point."""
-        self.ended = True
-        self._keep(match)
-        if self.layout.further and not self.starts:
-            self.claims["none"], self.places["none"] = match[0].strip(), match.start()
-        return after if self.layout.further or not inside else len(self.data)
+    def _is_other_text(self, at: int) -> bool:
+        """Whether the text from a line on is no part of the answer: after an empty line, without entries."""
+        before = self.data[self.data.rfind(b"\n", 0, max(at - 1, 0)) + 1 : at]
+        return self.entries > 0 and not before.strip() and not self.form.anywhere.search(self.data, at)
 
     def _keep(self, match: re.Match[bytes]) -> None:
         """Keep what a line states."""
@@ -369,7 +382,7 @@ class Scan:
                 raise fault_at(self.data, place, words)
         none = {"none", "infeasible"} & set(self.claims)
         for group, missing in () if none else self.layout.needs:
-            marks = {"end": self.ended, "begin": bool(self.starts)}
+            marks = {"end": self.ended or not self.begun, "begin": self.begun}
             if not marks.get(group, group in self.places):
                 raise LineError(f"the file is cut off: it has no {missing}")
 
@@ -386,7 +399,7 @@ class Scan:
         pattern = self.layout.pointless
         if pattern and re.match(pattern, self.claims.get("status", b""), re.IGNORECASE):
             return False
-        return self.entries > 0 or self.layout.omits_zeros is True or self.sparse
+        return self.entries > 0 or (self.begun and self.layout.omits_zeros is True) or self.sparse
 
 
 def place_of_entry(data: bytes, start: int, entry: int) -> int:

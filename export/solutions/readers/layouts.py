@@ -48,7 +48,10 @@ classes. The caller checks the class of the problem."""
 SCIP = Layout(
     "scip",
     "SCIP .sol",
-    signature=rb"solution status:|objective value:|no solution available",
+    signature=(
+        rb"solution status:(?:[^\n]*\n(?:\s*#[^\n]*\n)*\s*(?:objective value:|no solution available))?"
+        rb"|(?-i:objective value:)|no solution available"
+    ),
     forms=("name value word", "name value"),
     claims=(rb"solution status:\s*(?P<status>.*?)", rb"(?P<none>no solution available)"),
     refusals=((rb"objective value:\s+unknown", "this is a partial solution, with columns of unknown value"),),
@@ -68,16 +71,16 @@ quadobjvar, qmatrixvar, objconstvar). Without a status a point counts as feasibl
 XPRESS = Layout(
     "xpress-slx",
     "Xpress .slx",
-    signature=rb"NAME\b[^\n]*\n\s*(?:[A-Z] |ENDATA)|ENDATA[ \t]*(?:\n|\Z)",
+    signature=rb"NAME\b[^\n]*\n\s*(?:[A-Z] |ENDATA)|\A\s*ENDATA[ \t]*(?:\n|\Z)",
     forms=("C name value",),
+    claims=(rb"(?P<none>ENDATA)",),
     begin=rb"NAME(?: .*)?",
     end=rb"ENDATA",
-    further=True,
     needs=(("end", "line ENDATA"),),
 )
 """As Xpress 9.9.1 writes it:
 
-    NAME          mip                          NAME .. ENDATA for each solution, the first is taken
+    NAME          mip                          NAME .. ENDATA for each solution
       C x                       10
     ENDATA                                     only ENDATA: there was no solution
 
@@ -90,6 +93,7 @@ CBC = Layout(
     signature=rb"[A-Z][^\n]{2,100}? - objective value",
     forms=("index name value number",),
     claims=(rb"(?P<status>[A-Z][^\n]{2,100}?) - objective value +(?P<objective>\S+)",),
+    end=rb"Total time .*",
     pointless=rb"(?:integer |linear relaxation )?(?:infeasible|unbounded)|.*continuous used",
     omits_zeros=None,
     rewrites=((b"**", rb"(?m)^([ \t]*)\*\*", rb"\1  "),),
@@ -138,6 +142,7 @@ MIPLIB = Layout(
     "miplib",
     "MIPLIB .sol",
     signature=rb"=(?:obj|infeas)=",
+    heads=False,
     needs=(("objective", "objective"),),
     omits_zeros=True,
 )

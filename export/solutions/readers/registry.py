@@ -20,10 +20,11 @@ from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
 from ...writing.stamps import digits_in_columns, digits_in_text
-from ..statuses import HIGHS, Status, of_cbc, of_gams, of_scip, of_words
+from ..statuses import HIGHS, PYOMO, Status, of_cbc, of_gams, of_scip, of_words
 from . import ampl, baron, cplex, documents, glpk
 from .grammar import HEAD, Scan, fault_at, plain_text
 from .layouts import LAYOUTS
+from .listings import LISTINGS
 from .siblings import log_of, sibling_of
 from .text import Claim, RawSolution, Reader, choose, reader_of, refusing
 
@@ -56,23 +57,31 @@ def _stated(table: Callable[[str], Status]) -> Claim:
 _CLAIMS: Final[dict[str, Claim]] = {
     "highs": _claim_of_highs,
     "gams-csv": _claim_of_gams,
+    "gams-listing": _claim_of_gams,
     "scip": _stated(of_scip),
     "cbc": _stated(of_cbc),
+    "pyomo": _stated(lambda words: PYOMO.get(words, Status.FEASIBLE)),
 }
 """What texts claim, by layout; the others state a status in words at most."""
 
-_LISTS: Final = tuple(reader_of(layout, _CLAIMS.get(layout.name, _stated(of_words))) for layout in LAYOUTS)
+_LISTS: Final = tuple(
+    reader_of(layout, _CLAIMS.get(layout.name, _stated(of_words)))
+    for layout in (*LAYOUTS[:-1], *LISTINGS, LAYOUTS[-1])
+)
+PLAIN: Final = _LISTS[-3:]
+"""Readers of lists without a mark of their program, for files that no other reader recognises."""
+
 READERS: Final[tuple[Reader, ...]] = (
     ampl.BINARY,
     *documents.READERS,
     cplex.READER,
     glpk.READER,
     baron.READER,
-    *_LISTS[:-1],
+    *_LISTS[:-3],
     ampl.TEXT,
-    *_LISTS[-1:],
+    *PLAIN,
 )
-"""The table of readers: the first that recognises a file reads it. The plain list is the last."""
+"""The table of readers. Plain lists are the last."""
 
 
 def read_raw(path: str | Path, solution: int | None = None) -> RawSolution:
@@ -94,21 +103,29 @@ def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
     binary = ampl.BINARY.recognises(data[:HEAD])
     with refusing():
         text = data if binary else plain_text(data)
-    reader = recognised(text[:HEAD])
-    if reader is None:
+    head, readers = text[:HEAD], recognised(text)
+    if not readers:
         known = "; ".join(reader.description for reader in READERS)
         unknown = f"this is not a solution file of a known kind; give one of these: {known}"
-        raise SolutionError(sibling_of(text[:HEAD]) or log_of(text[:HEAD]) or unknown)
-    raw = choose(reader.parse(text), solution)
-    return replace(raw, reader=reader.name, stamps=raw.stamps | _stamps(text[:HEAD], raw))
+        raise SolutionError(sibling_of(head) or log_of(head) or unknown)
+    if len(readers) > 1:
+        kinds = " and ".join(reader.description for reader in readers)
+        raise SolutionError(f"the text holds answers of several kinds: {kinds}; leave one of them in it")
+    raw = choose(readers[0].parse(text), solution)
+    return replace(raw, reader=readers[0].name, stamps=raw.stamps | _stamps(head, raw))
 
 
-def recognised(head: bytes) -> Reader | None:
-    """The reader of a file with these first bytes, as `plain_text` returns them; None for other files."""
+def recognised(text: bytes) -> list[Reader]:
+    """The readers that recognise a text, as `plain_text` returns it; an answer may stand in other text."""
+    head = text[:HEAD]
     if sibling_of(head):
-        return None
-    reader = next((reader for reader in READERS if reader.recognises(head)), None)
-    return None if reader is READERS[-1] and log_of(head) else reader
+        return []
+    marked = [reader for reader in READERS if reader not in PLAIN and reader.recognises(head)]
+    if not marked and len(text) > HEAD:
+        marked = [reader for reader in _LISTS if reader not in PLAIN and reader.recognises(text)]
+    if marked or log_of(head):
+        return marked
+    return [reader for reader in PLAIN if reader.recognises(head)][:1]
 
 
 def _stamps(head: bytes, raw: RawSolution) -> frozenset[str]:

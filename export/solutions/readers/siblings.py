@@ -34,7 +34,7 @@ SIBLINGS: Final[tuple[tuple[bytes, str], ...]] = (
         "this is the header of a solution of Xpress (.hdr), without columns; write the .slx with writeslxsol",
     ),
     (
-        rb"\A\f?GAMS +\d[\d.]+ +[^\n]*\n",
+        rb"\A\f?GAMS +\d[\d.]+ +[^\n]*\n(?![\s\S]*^---- VAR )",
         _REPORT.format("a listing of GAMS", "run the model with --RESULTS=FILE.csv, and give that CSV"),
     ),
     (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import pairwise, repeat
+from itertools import repeat
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -156,16 +156,20 @@ def reader_of(layout: Layout, claim: Claim) -> Reader:
 
 def _parse_layout(data: bytes, layout: Layout, claim: Claim) -> RawSolution:
     with refusing():
-        scan = Scan(data, layout)
-        pieces = [(np.array(names), floats(values)) for names, values in scan.read()]
-        status, words = claim(scan)
-        if not scan.has_point:
-            return _without_point(scan, status, words)
+        return pooled([_parse_answer(answer, layout, claim) for answer in layout.answers(data)])
+
+
+def _parse_answer(data: bytes, layout: Layout, claim: Claim) -> RawSolution:
+    scan = Scan(data, layout)
+    pieces = [(np.array(names), floats(values)) for names, values in scan.read()]
+    status, words = claim(scan)
+    if not scan.has_point:
+        return _without_point(scan, status, words)
     names = np.concatenate([names for names, _ in pieces] or [np.empty(0, "S1")])
     values = np.concatenate([values for _, values in pieces] or [np.empty(0)])
     zeros, first = scan.layout.omits_zeros, scan.first
     rows, bound = scan.claims.get("rows", b""), _number(scan, "bound")
-    whole = RawSolution(
+    return RawSolution(
         status,
         one_line("; ".join(filter(None, (words, _note(scan)))).encode()),
         _number(scan, "objective"),
@@ -175,11 +179,8 @@ def _parse_layout(data: bytes, layout: Layout, claim: Claim) -> RawSolution:
         rows=int(rows) if re.fullmatch(rb"\d{1,12}", rows) else None,
         bound=bound if bound is not None and np.isfinite(bound) else None,
         of_rows=names[:first] if first else None,
+        rounded=layout.digits,
     )
-    if len(scan.starts) < 2:
-        return whole
-    parts = (slice(*ends) for ends in pairwise([*scan.starts, None]))
-    return pooled([replace(whole, names=names[part], values=values[part]) for part in parts])
 
 
 def _note(scan: Scan) -> str:

@@ -21,6 +21,7 @@ from answers import (
     NOTHING,
     OPTIMA,
     RELAXATIONS,
+    ROUNDED,
     SILENT,
     TINY,
     UNBOUNDED,
@@ -84,19 +85,15 @@ def test_reader_status_and_point(path):
 
 @for_each("path", [*GOOD, *BAD, *(path for path in HERE.rglob("*.sol") if TINY not in path.parents)])
 def test_no_file_is_claimed_by_two_readers(path):
-    head = path.read_bytes()[:HEAD]
-    claimed = [reader.name for reader in READERS[:-1] if reader.recognises(head)]
-    if path.stem in {"empty", "junk"} or sibling_of(head):
-        assert recognised(head) is None
-    else:
-        assert len(claimed or [recognised(head)]) == 1
+    text = path.read_bytes()
+    assert len(recognised(text)) == (0 if path.stem in {"empty", "junk"} or sibling_of(text[:HEAD]) else 1)
 
 
 @for_each("path", [path for path in GOOD if FILES[path.name][1] in WITH_POINT and problem_of(path)])
 def test_the_point_is_the_one_that_the_solver_had(path):
     status, name = FILES[path.name][1], problem_of(path)
     solution = read_solution(path, problem(name), identified=True)
-    assert (solution.unknown, solution.claimed) == (0, status)
+    assert (solution.unknown, solution.claimed) == (path.stem.endswith("_prints"), status)  # Total, of PuLP
     if solution.reported is not None:
         assert solution.objective == pytest.approx(solution.reported, abs=1e-6)
     worst = solution.violation.worst
@@ -105,10 +102,11 @@ def test_the_point_is_the_one_that_the_solver_had(path):
         assert solution.status == "unknown"
         return
     assert solution.status == status
-    assert worst < 1e-6
-    assert solution.objective > OPTIMA[name] - 2e-6
+    digits = 1e-4 if path.stem in ROUNDED else 1e-6
+    assert worst < digits
+    assert solution.objective > OPTIMA[name] - 2 * digits
     if "optimal" in path.name or "pool" in path.name:
-        assert solution.objective == pytest.approx(OPTIMA[name], abs=2e-6)
+        assert solution.objective == pytest.approx(OPTIMA[name], abs=2 * digits)
 
 
 # what is particular about each
