@@ -52,10 +52,13 @@ def _instance(sidecar: dict[str, Any]) -> str:
 
 
 def role_of(sidecar: dict[str, Any]) -> str:
-    """Return the role of an entry's field: with its fixed jumps, or else the best in its norm."""
+    """Return the role of an entry's field: with its fixed jumps, or else the best in its norm.
+
+    The best in the 2-norm stands for an objective that is the energy in no norm.
+    """
     if sidecar["jumps"] is not None:
         return "baseline"
-    return f"least_{norm_minimised(sidecar['formulation'])}"
+    return f"least_{norm_minimised(sidecar['formulation']) or 2}"
 
 
 def _status(sidecar: dict[str, Any]) -> str:

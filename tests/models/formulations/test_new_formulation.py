@@ -8,6 +8,7 @@ import pytest
 from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS
+from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.verify.checks import Verdict
 from crossfield.export.verify.verify import verify
 from crossfield.models.formulations import declaration
@@ -15,6 +16,18 @@ from crossfield.models.formulations.catalogue import jump_bounds, skew, strokes
 from crossfield.models.formulations.declaration import FORMULATIONS, E, formulation, row, term
 from crossfield.models.formulations.latex import latex
 from crossfield.models.formulations.symbols import A, s
+from libraries import library_of
+
+LIBRARY = """formulations = ["toy"]
+[rungs.medium]
+sizes = [3]
+formats = ["mps"]
+[[sketches]]
+name = "rand"
+random = "full"
+seeds = [1]
+points = "greedy"
+"""
 
 
 @pytest.fixture
@@ -22,6 +35,8 @@ def toy():
     """The declaration of a formulation that smooths directions alone,
     in the table as long as the test runs.
     """
+
+    before = list(FORMULATIONS)
 
     @formulation(
         "toy", paper="a test", kind="MILP", short="toy", minimises="changes of direction", how="alone"
@@ -37,6 +52,7 @@ def toy():
 
     yield directions
     del declaration._TABLE["toy"]
+    assert list(FORMULATIONS) == before
 
 
 @pytest.mark.slow
@@ -62,8 +78,7 @@ def test_a_toy_formulation_is_one_function(toy, tmp_path):
     checked = verify(tmp_path / "verified")
     assert checked.ok
     assert sum(check.verdict is Verdict.AGREES for check in checked.checks) >= 2  # HiGHS and CasADi at least
-
-
-def test_the_table_is_as_before_when_it_is_gone():
-    assert "toy" not in FORMULATIONS
-    assert len(FORMULATIONS) == 9
+    library = library_of(tmp_path / "library", LIBRARY)
+    assert library.document["entries"] == ["cf_rand_n003_s1_toy"]
+    assert library.entry("cf_rand_n003_s1_toy")["best"]["objective"] >= 0
+    assert verify_library(library.folder) == []
