@@ -35,4 +35,5 @@ def extended(field: CrossField, instance: Instance) -> CrossField:
     angles, jumps = np.zeros((2, len(held))), np.zeros(len(instance.grid.first), np.int32)
     angles[:, held] = field.alpha, field.beta
     jumps[held[instance.grid.first]] = field.p
-    return CrossField(instance, *angles, jumps)
+    alpha, beta = angles
+    return CrossField(instance, alpha, beta, jumps)
