@@ -68,7 +68,10 @@ class _InProcess(Executor):
 
     def submit(self, fn: Callable[P, Found], /, *args: P.args, **kwargs: P.kwargs) -> Future[Found]:
         future: Future[Found] = Future()
-        future.set_result(fn(*args, **kwargs))
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001 - the future raises it, as with several jobs
+            future.set_exception(error)
         return future
 
 

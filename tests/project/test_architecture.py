@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from importlib import import_module
 from pathlib import Path
@@ -57,6 +58,32 @@ def test_no_arrow_leads_upwards_and_so_there_is_no_circle(listed):
     absolute = re.compile(r"^\s*(from|import) crossfield\b", re.MULTILINE)  # these the table does not see
     paths = [path for part in ("models", "export", "templates") for path in (ROOT / part).rglob("*.py")]
     assert [path for path in paths if absolute.search(path.read_text(encoding="utf-8"))] == []
+
+
+SOLVERS = set("casadi clarabel cplex gamspy_base gamspy_baron gurobipy highspy pyomo".split()) | set(
+    "pyqplib pyscipopt pytoulbar2 xpress".split()
+)
+
+
+def imports(path):
+    """The packages that a module imports anywhere in its text, our own left out."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield node.module.split(".")[0]
+
+
+def test_two_modules_of_the_mathematics_call_a_solver_in_memory():
+    users = {
+        path.relative_to(ROOT).as_posix(): solvers
+        for path in (ROOT / "models").rglob("*.py")
+        if (solvers := SOLVERS & set(imports(path)))
+    }
+    assert users == {
+        "models/formulations/arrays.py": {"highspy"},
+        "models/search/absolute_fit.py": {"clarabel"},
+    }
 
 
 def test_the_picture_is_that_of_the_folders(rooms):

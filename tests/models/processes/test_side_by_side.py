@@ -10,7 +10,7 @@ from children import descendants
 from crossfield.models.errors import InputError
 from crossfield.models.processes import side_by_side as module
 from crossfield.models.processes.control import WorkerError
-from crossfield.models.processes.side_by_side import MOST, checked, side_by_side
+from crossfield.models.processes.side_by_side import MOST, checked, side_by_side, workers
 
 
 def test_answers_come_in_the_order_of_the_tasks():
@@ -128,6 +128,15 @@ class Sent:
 
     def __reduce__(self):
         return bool, (int(self.path.exists()),)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_error_waits_in_the_future_of_its_task(jobs):
+    with workers(jobs) as chosen:
+        futures = [chosen.submit(int, text) for text in ("1", "x", "3")]
+        assert (futures[0].result(), futures[2].result()) == (1, 3)
+        with pytest.raises(ValueError, match="'x'"):
+            futures[1].result()
 
 
 def test_no_process_stays_behind():
