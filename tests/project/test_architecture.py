@@ -60,9 +60,9 @@ def test_no_arrow_leads_upwards_and_so_there_is_no_circle(listed):
     assert [path for path in paths if absolute.search(path.read_text(encoding="utf-8"))] == []
 
 
-SOLVERS = set("casadi clarabel cplex gamspy_base gamspy_baron gurobipy highspy pyomo".split()) | set(
-    "pyqplib pyscipopt pytoulbar2 xpress".split()
-)
+SOLVERS = set(
+    ["casadi", "clarabel", "cplex", "gamspy_base", "gamspy_baron", "gurobipy", "highspy", "pyomo"]
+) | set(["pyqplib", "pyscipopt", "pytoulbar2", "xpress"])
 
 
 def imports(path):
