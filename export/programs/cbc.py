@@ -10,6 +10,9 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from ..writing.stamps import is_one_column
 from . import highs as highs_program
 from .protocol import Job, NotReportedError, Outcome, RefusedError, complete, run_program
 from .reading import Meaning
@@ -38,10 +41,26 @@ def read(path: Path) -> Meaning:
     if re.search(r"ERROR|too many errors|not valid", output) or not copy.exists():
         raise RefusedError(f"CBC cannot read it: {' '.join(re.findall(r'.*(?:ERROR|errors).*', output)[:1])}")
     model = highs_program.read(copy)
-    names = [line.removeprefix("**").split()[1] for line in listed.read_text("utf-8").splitlines()[1:]]
+    lines = [line.removeprefix("**").split() for line in listed.read_text("utf-8").splitlines()[1:]]
+    names = [words[1] for words in lines]
+    one = next((at for at, name in enumerate(names) if is_one_column(name)), None)
+    if one is not None and len(names) == len(model.rows) + len(model.columns) + 1:
+        model = _with_column(model, one - len(model.rows), float(lines[one][2]))
     if len(names) != len(model.rows) + len(model.columns):
         raise NotReportedError("CBC does not export what its presolve removes, and its numbers have no names")
     return replace(model, rows=names[: len(model.rows)], columns=names[len(model.rows) :])
+
+
+def _with_column(model: Meaning, place: int, value: float) -> Meaning:
+    """The model with a column that is fixed to a value, and in no term.
+
+    CBC does not export such a column, ONE of a problem without a constant; its table of values shows it.
+    """
+    at = model.matrix_at.copy()
+    at[:, 1] += at[:, 1] >= place
+    fixed = {"lower": value, "upper": value, "costs": 0.0, "integer": False}
+    arrays = {name: np.insert(getattr(model, name), place, number) for name, number in fixed.items()}
+    return replace(model, columns=[*model.columns, ""], matrix_at=at, **arrays)
 
 
 def solve(job: Job) -> Outcome:
