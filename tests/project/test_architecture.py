@@ -60,9 +60,8 @@ def test_no_arrow_leads_upwards_and_so_there_is_no_circle(listed):
     assert [path for path in paths if absolute.search(path.read_text(encoding="utf-8"))] == []
 
 
-SOLVERS = set(
-    ["casadi", "clarabel", "cplex", "gamspy_base", "gamspy_baron", "gurobipy", "highspy", "pyomo"]
-) | set(["pyqplib", "pyscipopt", "pytoulbar2", "xpress"])
+SOLVERS = {"casadi", "clarabel", "cplex", "gamspy_base", "gamspy_baron", "gurobipy", "highspy"}
+SOLVERS |= {"pyomo", "pyqplib", "pyscipopt", "pytoulbar2", "xpress"}
 
 
 def imports(path):
