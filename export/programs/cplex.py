@@ -14,7 +14,7 @@ import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
 from ...models.processes.control import on_stop
-from ..solutions.statuses import CPLEX, CPLEX_STOPPED, Status
+from ..statuses import CPLEX, CPLEX_STOPPED, Status
 from ..writing.terms import Terms, listed
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
 from .reading import Meaning, finite, infinite

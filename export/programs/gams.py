@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from ..licence import package_folder
-from ..solutions.statuses import GAMS_INTEGER, GAMS_NORMAL, Status, closes, of_gams
+from ..statuses import GAMS_INTEGER, GAMS_NORMAL, Status, closes, of_gams
 from . import casadi as casadi_program
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete, run_command
 from .reading import Evaluation, Points

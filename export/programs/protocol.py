@@ -26,7 +26,7 @@ from typing import Any, Final, NamedTuple
 from ...models.errors import CrossfieldError
 from ...models.processes.control import on_stop, stopped
 from ...models.processes.deadline import Deadline
-from ..solutions.statuses import Status
+from ..statuses import Status
 
 _WRITING: Final = 0.2
 _LEAST: Final = 0.01

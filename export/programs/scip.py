@@ -15,7 +15,7 @@ import numpy as np
 import pyscipopt
 
 from ...models.processes.control import on_stop
-from ..solutions.statuses import SCIP_GAP, Status, closes, of_scip
+from ..statuses import SCIP_GAP, Status, closes, of_scip
 from ..writing.stamps import is_one_column
 from ..writing.terms import Terms, listed
 from .protocol import Job, Outcome, RefusedError, complete, file_names

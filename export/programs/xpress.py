@@ -13,7 +13,7 @@ with warnings.catch_warnings(action="ignore"):  # it prints which licence it use
 
 from ...models.processes.control import on_stop
 from ...models.storage import replacing
-from ..solutions.statuses import XPRESS, Status
+from ..statuses import XPRESS, Status
 from ..writing.terms import Terms, listed, of_triangle, terms
 from .protocol import Job, Outcome, RefusedError, TooLargeError
 from .reading import Meaning, finite, infinite

@@ -21,12 +21,12 @@ from ...models.formulations.problem import Problem, Violation, lifted
 from ...models.instance.grid import Floats
 from ...models.previews import table_of
 from ..formats.registry import FORMATS, carried
+from ..statuses import Status, closes
 from ..writing.canonical import Canonical
 from ..writing.stamps import is_identified
 from .misfit import check_names, check_range
 from .readers.registry import read_raw
 from .readers.text import RawSolution, values_for, values_in_order
-from .statuses import Status, closes
 
 ROUND: Final = 1e-5
 """Largest distance from an integer at which an integer column is rounded; other values are kept."""

@@ -39,8 +39,8 @@ from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, carried, write
 from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError, call, part_of
 from ..solutions.solution import Solution, read_solution
-from ..solutions.statuses import Status
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in
+from ..statuses import Status
 from ..writing.sink import save
 
 FEASIBLE: Final = 1e-6

@@ -33,9 +33,9 @@ from ..formats.registry import FORMATS, carried
 from ..programs.protocol import NotReportedError, RefusedError, TooLargeError
 from ..programs.reading import Points
 from ..solutions.solution import Solution
-from ..solutions.statuses import Status
 from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
 from ..solving.local import Files, Solvers
+from ..statuses import Status
 from .checks import Check, Verdict, Verification
 from .comparison import difference, evaluation_difference, names_of
 from .leeway import saved

@@ -25,9 +25,9 @@ from ....models.processes.deadline import Progress, silent
 from ....models.processes.groups import interruptible
 from ....models.processes.limits import Limits
 from ...solutions.solution import Solution, read_solution
-from ...solutions.statuses import Status
 from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, format_for
+from ...statuses import Status
 from ..building.build import has_unbuilt_records, rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked

@@ -31,7 +31,7 @@ from ....models.storage import read_bytes
 from ...formats.registry import generator
 from ...solutions.readers.registry import read_raw
 from ...solutions.solution import read_solution
-from ...solutions.statuses import closes
+from ...statuses import closes
 from ...writing.stamps import is_stated
 from ..building.build import has_unbuilt_records, rebuilt
 from ..documents.documents import Library, about_file, folder_of, problem_of, read_about, read_library

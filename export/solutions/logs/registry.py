@@ -12,8 +12,7 @@ from typing import Final, Literal
 from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_LOG
 from ....models.storage import read_bytes
-from ...writing.stamps import digits_in_text
-from ..statuses import (
+from ...statuses import (
     CPLEX_LOG,
     GUROBI_LOG,
     HIGHS,
@@ -25,6 +24,7 @@ from ..statuses import (
     of_log,
     of_scip,
 )
+from ...writing.stamps import digits_in_text
 from .run_log import RunLog, Step, at_least, last, number, seconds, share, thinned, whole
 
 _LONGEST: Final = 300  # most characters of a line of a table

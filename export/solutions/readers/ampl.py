@@ -43,8 +43,8 @@ import numpy as np
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ....models.storage import replacing
+from ...statuses import of_ampl
 from ...writing.stamps import digits_of_option, stamp_option
-from ..statuses import of_ampl
 from .grammar import HEAD, Form, place_of_entry, shown
 from .text import Cursor, RawSolution, Reader, begins, entries, fault, one_line
 

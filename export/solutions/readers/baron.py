@@ -22,7 +22,7 @@ from typing import Final
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
-from ..statuses import Status, of_baron
+from ...statuses import Status, of_baron
 from .grammar import Form
 from .text import Bytes, Cursor, RawSolution, Reader, begins, entries, one_line, without_point
 

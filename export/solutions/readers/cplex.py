@@ -26,7 +26,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
 from ....models.errors import SolutionError
-from ..statuses import CPLEX, CPLEX_STOPPED, Status
+from ...statuses import CPLEX, CPLEX_STOPPED, Status
 from .grammar import float_of, is_number
 from .text import RawSolution, Reader, begins, named_pairs, one_line, pooled, without_point
 

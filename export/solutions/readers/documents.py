@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from ....models.errors import SolutionError
-from ..statuses import GUROBI, PULP, PYOMO, Status
+from ...statuses import GUROBI, PULP, PYOMO, Status
 from .grammar import shown
 from .text import RawSolution, Reader, begins, named_pairs, one_line, pooled, without_point
 

@@ -24,8 +24,8 @@ import numpy as np
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
+from ...statuses import GLPK, Status
 from ...writing.canonical import Order
-from ..statuses import GLPK, Status
 from .grammar import Form, place_of_entry, shown
 from .text import Cursor, RawSolution, Reader, entries, fault, without_point
 

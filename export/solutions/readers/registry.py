@@ -19,8 +19,8 @@ import numpy as np
 from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
+from ...statuses import HIGHS, PYOMO, Status, of_cbc, of_gams, of_scip, of_words
 from ...writing.stamps import digits_in_columns, digits_in_text
-from ..statuses import HIGHS, PYOMO, Status, of_cbc, of_gams, of_scip, of_words
 from . import ampl, baron, cplex, documents, glpk
 from .grammar import HEAD, Scan, fault_at, plain_text
 from .layouts import LAYOUTS

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats, Ints
-from ..statuses import Status
+from ...statuses import Status
 from .grammar import (
     HEAD,
     TOKEN_LIMIT,

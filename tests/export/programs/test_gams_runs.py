@@ -2,7 +2,7 @@
 
 import pytest
 from crossfield.export.programs import gams
-from crossfield.export.solutions.statuses import Status, of_gams
+from crossfield.export.statuses import Status, of_gams
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from crossfield.export.solutions.readers import registry
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.text import values_for, values_in_order
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.solutions.statuses import Status
+from crossfield.export.statuses import Status
 from crossfield.models.errors import InputError, SolutionError
 from crossfield.models.input_limits import MAX_SOLUTION
 from hypothesis import given, settings

@@ -15,7 +15,7 @@ from crossfield.export.solutions.readers.text import (
     values_for,
     values_in_order,
 )
-from crossfield.export.solutions.statuses import Status
+from crossfield.export.statuses import Status
 from crossfield.models.errors import OutputError, SolutionError
 from hypothesis import given, settings
 from hypothesis import strategies as st

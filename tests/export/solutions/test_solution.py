@@ -6,7 +6,7 @@ from cases import make_field, make_instance
 from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.solution import ROUND, read_solution
-from crossfield.export.solutions.statuses import Status
+from crossfield.export.statuses import Status
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names

@@ -22,7 +22,7 @@ from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.text import added_columns
 from crossfield.export.solutions.solution import AGREEMENT, LARGEST, TOLERANCE, Solution, read_solution
-from crossfield.export.solutions.statuses import Status
+from crossfield.export.statuses import Status
 from crossfield.models.errors import InstanceError, SolutionError
 from crossfield.models.formulations.problem import formulate
 

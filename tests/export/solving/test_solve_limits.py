@@ -7,8 +7,8 @@ import threading
 import crossfield as cf
 import pytest
 from crossfield.export.programs.protocol import part_of
-from crossfield.export.solutions.statuses import Status
 from crossfield.export.solving.local import Solvers
+from crossfield.export.statuses import Status
 from crossfield.models.processes.child import Child, KilledError
 from crossfield.models.processes.deadline import Deadline
 

@@ -16,11 +16,11 @@ import pytest
 from children import command_lines, complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
-from crossfield.export.solutions.statuses import Status
 from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.local import solver_for
 from crossfield.export.solving.methods import Request
 from crossfield.export.solving.run import plan
+from crossfield.export.statuses import Status
 from crossfield.models.errors import (
     InputError,
     MissingSolverError,

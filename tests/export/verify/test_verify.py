@@ -16,9 +16,9 @@ from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.solutions.solution import Solution
-from crossfield.export.solutions.statuses import Status
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
 from crossfield.export.solving.local import Files, Solvers
+from crossfield.export.statuses import Status
 from crossfield.export.verify.checks import Verdict, Verification
 from crossfield.export.verify.verify import _energy_difference, _judged, _subjects, random_field, same, verify
 from crossfield.models.errors import CrossfieldError, InputError
