@@ -22,7 +22,6 @@ from ....models.errors import (
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
 from ....models.processes.deadline import Progress, silent
-from ....models.processes.groups import interruptible
 from ....models.processes.limits import Limits
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
@@ -87,10 +86,8 @@ def solve_library(
                     progress(f"{document['name']}: {error}")
                     continue
                 record = replace(record, by=by, machine=machine)
-                with locked(library.folder, _PURPOSE, progress), interruptible() as pressed:
+                with locked(library.folder, _PURPOSE, progress):
                     records.append(asdict(add_record(library.folder, record, field)))
-                if pressed():
-                    raise KeyboardInterrupt
     finally:  # records count although Ctrl-C or an error ended the runs
         if has_unbuilt_records(library):
             _bring_up_to_date(library, progress)

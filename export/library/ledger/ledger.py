@@ -19,6 +19,7 @@ from ....models.errors import InputError, InstanceError, naming, shortened
 from ....models.field.field import CrossField, Norm
 from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import read_document, schema_error
+from ....models.processes.groups import interruptible
 from ....models.storage import read_bytes, write_bytes
 from .. import documents
 from ..plan.spec import day
@@ -213,13 +214,19 @@ def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
 
 
 def write_ledger(ledger: Ledger) -> None:
-    """Write a ledger and, before it, the files that are not in its folder yet. Raises OutputError."""
-    for name, data in ledger.unwritten.items():
-        write_bytes(ledger.folder / name, data)
+    """Write a ledger and, before it, the files that are not in its folder yet. Raises OutputError.
+
+    Ctrl-C is raised at the end, because a ledger does not fit a part of its files.
+    """
     path = ledger.folder / FILE
     data = (json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n").encode()
-    if not path.exists() or read_bytes(path) != data:
-        write_bytes(path, data)
+    with interruptible() as pressed:
+        for name, content in ledger.unwritten.items():
+            write_bytes(ledger.folder / name, content)
+        if not path.exists() or read_bytes(path) != data:
+            write_bytes(path, data)
+    if pressed():
+        raise KeyboardInterrupt
 
 
 def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
