@@ -28,6 +28,7 @@ from .listings import LISTINGS
 from .siblings import log_of, sibling_of
 from .text import Claim, RawSolution, Reader, choose, reader_of, refusing
 
+_NEAR_ONE: Final = 1e-5
 _SMALLER: Final = "let the solver write it without columns at 0"
 _PACKED: Final[dict[bytes, Callable[[io.BytesIO], Any]]] = {
     b"\x1f\x8b": lambda stream: gzip.GzipFile(fileobj=stream),
@@ -129,10 +130,19 @@ def recognised(text: bytes) -> list[Reader]:
 
 
 def _stamps(head: bytes, raw: RawSolution) -> frozenset[str]:
-    """Digits of the stamps (`Problem.stamp`) that a solver repeats in a message, a name or a column."""
+    """Digits of the stamps (`Problem.stamp`) that a solver repeats in a message, a name or a column.
+
+    Raises SolutionError for a column that is fixed to 1 and has another value.
+    """
     names = np.empty(0, "S1") if raw.names is None else raw.names
-    columns = names[np.strings.find(np.strings.upper(names), b"ONE_") >= 0]
-    return digits_in_text(head) | digits_in_columns(columns.tolist())
+    chosen = np.strings.find(np.strings.upper(names), b"ONE_") >= 0
+    for name, value in zip(names[chosen].tolist(), raw.values[chosen].tolist(), strict=True):
+        if digits_in_columns([name]) and not abs(value - 1) <= _NEAR_ONE:
+            raise SolutionError(
+                f"{name.decode(errors='replace')} has the value {value:g}, but it is fixed to 1: names and "
+                "values do not belong together; let the solver write the file again"
+            )
+    return digits_in_text(head) | digits_in_columns(names[chosen].tolist())
 
 
 def _unpacked(data: bytes) -> bytes:

@@ -243,6 +243,16 @@ def test_files_of_solvers_without_a_stamp_keep_no_claim():
     assert unidentified > len(GOOD) // 2
 
 
+def test_the_column_fixed_to_1_has_the_value_1(solved, tmp_path):
+    """Otherwise the values belong to other names, as in a list that is shifted by a line."""
+    cf.write(solved, tmp_path / "model.mps")
+    by_highs(tmp_path / "model.mps", tmp_path / "answer.sol", 0)
+    text = re.sub(r"(ONE_\w+) 1\n", r"\1 0.5\n", (tmp_path / "answer.sol").read_text())
+    (tmp_path / "answer.sol").write_text(text)
+    with pytest.raises(SolutionError, match=r"ONE_\w+ has the value 0\.5, but it is fixed to 1"):
+        read_solution(tmp_path / "answer.sol", solved)
+
+
 def test_read_passes_on_no_proof_of_another_gauge(tmp_path, capsys):
     """The optimum with the gauge `box` is 2.93, and 0.699 with the other: nothing else differs."""
     for gauge in ("box", "strokes"):
