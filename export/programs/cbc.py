@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,9 @@ def _with_column(model: Meaning, place: int, value: float) -> Meaning:
     at = model.matrix_at.copy()
     at[:, 1] += at[:, 1] >= place
     fixed = {"lower": value, "upper": value, "costs": 0.0, "integer": False}
-    arrays = {name: np.insert(getattr(model, name), place, number) for name, number in fixed.items()}
+    arrays: dict[str, Any] = {
+        name: np.insert(getattr(model, name), place, number) for name, number in fixed.items()
+    }
     return replace(model, columns=[*model.columns, ""], matrix_at=at, **arrays)
 
 
