@@ -122,11 +122,12 @@ def recognised(text: bytes) -> list[Reader]:
     if sibling_of(head):
         return []
     marked = [reader for reader in READERS if reader not in PLAIN and reader.recognises(head)]
-    if not marked and len(text) > HEAD:
-        marked = [reader for reader in _LISTS if reader not in PLAIN and reader.recognises(text)]
-    if marked or log_of(head):
+    if marked:
         return marked
-    return [reader for reader in PLAIN if reader.recognises(head)][:1]
+    plain = [] if log_of(head) else [reader for reader in PLAIN if reader.recognises(head)]
+    if plain or len(text) <= HEAD:
+        return plain[:1]
+    return [reader for reader in _LISTS if reader not in PLAIN and reader.recognises(text)]
 
 
 def _stamps(head: bytes, raw: RawSolution) -> frozenset[str]:

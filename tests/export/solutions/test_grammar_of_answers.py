@@ -149,7 +149,8 @@ def test_objectives_in_comments_and_later_lines_are_claims(text, objective):
 def test_statuses_in_comments_are_claims(words, status):
     for mark in ("# Status: ", "# Solution status = ", "# status "):
         raw = parse_raw(f"{mark}{words}\n# Objective value: 3\nx 1\n".encode())
-        assert (raw.status, raw.message, raw.objective) == (status, words, 3)
+        assert (raw.status, raw.message) == (status, words)
+        assert raw.objective == 3 or not raw.has_point  # cuOpt's values of an infeasible problem are none
 
 
 def test_two_objectives_in_one_file_are_refused_unless_they_agree():
