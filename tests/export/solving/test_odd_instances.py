@@ -5,9 +5,9 @@ from collections import Counter
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.solutions.statuses import Status
 from crossfield.export.solvers_table import takes_in
 from crossfield.export.solving.local import Files, Solvers
+from crossfield.export.statuses import Status
 from crossfield.export.verify.leeway import saved
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS, norm_of
