@@ -31,7 +31,7 @@ from .text import Cursor, RawSolution, Reader, entries, fault, without_point
 
 _SUMMARY = re.compile(rb"s (mip|bas|ipt) (\d{1,12}) (\d{1,12}) (.+) (\S+)")
 _END: Final = b"e o f"
-_BEGIN = re.compile(rb"^\s*(?:c Problem:|s (?:mip|bas|ipt) )", re.MULTILINE)
+_BEGIN = re.compile(rb"^[ \t]*(?:c Problem:|s (?:mip|bas|ipt) )", re.MULTILINE)
 _LAST = re.compile(rb"^[ \t]*e o f[ \t]*$", re.MULTILINE)
 _GOAL_OF_MOD: Final = b"energy ="
 _FORMS: Final = {

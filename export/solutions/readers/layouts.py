@@ -16,9 +16,9 @@ HIGHS = Layout(
     signature=rb"Model status[ \t]*\n",
     forms=("name value", "name value number"),
     claims=(
-        rb"Model status\s*\n\s*(?P<status>\S.*?)",
-        rb"# Primal solution values\s*\n\s*(?P<none>None)",
-        rb"# Primal solution values\s*\n\s*(?P<primal>\S.*?)",
+        rb"Model status[ \t]*\n\s*(?P<status>\S.*?)",
+        rb"# Primal solution values[ \t]*\n\s*(?P<none>None)",
+        rb"# Primal solution values[ \t]*\n\s*(?P<primal>\S.*?)",
         rb"Objective\s+(?P<objective>\S+)",
         rb"Objective_bound\s+(?P<bound>\S+)",
     ),
@@ -154,9 +154,9 @@ LIST = Layout(
     "gurobi",
     "Gurobi .sol, or any list of names and values",
     signature=(
-        rb"\A(?:[ \t]*(?:#[^\n]*)?\n)*[ \t]*(?:# ?(?:Solution for model|Objective value|MIP start)\b"
-        rb"|%b%b[ \t]+\S+[ \t]*(?:\n|\Z)"
-        rb"|%b[ \t]*(?![#=])[^\0- ]*[^\0- \d.+\-][^\0- ]*[ \t]+%b[ \t]*(?:\n|\Z))"
+        rb"\A(?:[ \t]*(?:#[^\n]*)?\n)*(?:[ \t]*# ?(?:Solution for model|Objective value|MIP start)\b"
+        rb"|%b[ \t]*%b[ \t]+\S+[ \t]*(?:\n|\Z)"
+        rb"|%b[ \t]*(?![#=]|[\d.+\-]*[\0- ])[^\0- ]+[ \t]+%b[ \t]*(?:\n|\Z))"
     )
     % (FEW_LINES, OUR_NAME, FEW_LINES, NUMBER),
     refusals=(

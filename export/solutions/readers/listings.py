@@ -11,8 +11,8 @@ from .grammar import NUMBER, Layout
 
 _SOLVED = rb"(?:CPLEX> )?(?:MIP|Barrier|Primal simplex|Dual simplex) - "
 _QUOTES = (b'"', rb'"', b" ")
-_PAIR = rb'[ \t]*"?[^\s=:,;#"]+"?[ \t]*[%b][ \t]*"?%b"?[ \t]*[,;]?[ \t]*(?:\n|\Z)'
-_HEADING = rb"[^\d\n,;=:]*[,;][^\d\n,;=:]*0?\n"
+_PAIR = rb'"?[^\s=:,;#"]{1,63}"?[ \t]*[%b][ \t]*"?%b"?[ \t]*[,;]?[ \t]*(?:\n|\Z)'
+_HEADING = rb"(?:[^\s\d,;=:][^\d\n,;=:]{0,99})?[,;][^\d\n,;=:]{0,99}0?\n"
 
 
 def _quotient(match: re.Match[bytes]) -> bytes:
@@ -27,8 +27,8 @@ def _list_of(name: str, title: str, separator: bytes, value: bytes) -> Layout:
     return Layout(
         name,
         f"names and values with {title} between",
-        signature=rb"(?!model_status)(?P<answer>\A\s*(?:%b)?%b|(?:%b)?(?:%b){5})"
-        % (_HEADING, pair, _HEADING, pair),
+        signature=rb"(?!model_status)(?P<answer>\A\s*(?:%b)?%b|(?:%b)?%b(?:[ \t]*%b){4})"
+        % (_HEADING, pair, _HEADING, pair, pair),
         separator=separator,
         rewrites=(
             _QUOTES,
@@ -86,7 +86,7 @@ LISTINGS = (
             rb"Solution Cost:\s+(?P<objective>\S+)",
             rb"(?P<none>No Solution Found)",
         ),
-        begin=rb"Column names and values of nonzeros in the solution\s*\n\+*",
+        begin=rb"Column names and values of nonzeros in the solution[ \t]*\n\+*",
         pointless=rb"infeasible|unbounded",
         needs=(("status", "status"),),
         omits_zeros=True,
@@ -116,7 +116,7 @@ LISTINGS = (
             rb"SOLUTION STATUS\s*:\s*(?:INTEGER_|PRIMAL_)?(?P<status>\S+)",
             rb"PRIMAL OBJECTIVE\s*:\s*(?P<objective>\S+)",
         ),
-        begin=rb"VARIABLES\s*\n\s*INDEX .*",
+        begin=rb"VARIABLES[ \t]*\n\s*INDEX .*",
         end=rb"SYMMETRIC MATRIX VARIABLES",
         pointless=rb"infeasible|dual_infeasible",
     ),
@@ -137,7 +137,7 @@ LISTINGS = (
     Layout(
         "gams-listing",
         "GAMS listing (.lst)",
-        signature=rb"\*\*\*\* SOLVER STATUS (?=[\s\S]*^---- VAR )",
+        signature=rb"\*\*\*\* SOLVER STATUS (?=(?:[^\n]*\n){0,2000}?---- VAR )",
         forms=("---- VAR name word value word word",),
         comment=b"",
         claims=(
@@ -179,7 +179,7 @@ LISTINGS = (
         claims=(
             rb"Termination condition: (?P<status>\S+)",
             rb"Lower bound: (?P<bound>\S*\d)",
-            rb"Objective:\s*\n\s*\S+ (?P<objective>\S+)",
+            rb"Objective:[ \t]*\n\s*\S+ (?P<objective>\S+)",
         ),
         begin=rb"Variable:.*",
         end=rb"Constraint:.*",

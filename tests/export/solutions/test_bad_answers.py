@@ -259,6 +259,16 @@ HEADS = [
     b"model_status,1\nsolver_status,1\nobjective,3\n", b"===\n BARON version 1\n",
     b"===\n BARON version 1\n *** Normal completion ***\n\nThe best solution found is:\n\n  variable\n",
     b"=obj= 3\n", b"=infeas=\n",
+    b"# Status: Optimal\n", b"Feasible solution - objective 0.0\n",
+    b"# Attribute file for model a\nSECTION SOLUTION\n",
+    b'1,"a ","C","SB",', b"Value of objective function: 3\n\nActual values of the variables:\n",
+    b"* Optimal Solution Found  *\n* Now\nColumn names and values of nonzeros in the solution\n",
+    b"status = OPTIMAL\nVARS:\n", b"PROBLEM STATUS : A\nVARIABLES\nINDEX NAME\n",
+    b"MIP - Integer optimal solution:  Objective = 3\nVariable Name   Solution Value\n",
+    b"**** SOLVER STATUS     1 \n**** MODEL STATUS      1\n---- VAR ", b"----    1 VARIABLE a.L  =  3\n",
+    b":  _varname  _var  :=\n", b"# = Solver Results =\n  Variable:\n", b"a = 1\n", b"a;1,5\n",
+    b"name,value\na,1\n",
+    b'{"parameters": {"sol_status": 1}, "variables": [', b'{"a": 1, ', b"c Problem:\ns mip 1 1 o 1\n",
 ]  # fmt: skip
 
 
