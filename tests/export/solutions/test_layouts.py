@@ -2,14 +2,18 @@
 
 import json
 import re
+from dataclasses import replace
 
+import crossfield as cf
 import numpy as np
 import pytest
-from answers import TINY, problem
+from answers import GOOD, TINY, problem, problem_of
+from crossfield.export.cli.app import invoke
 from crossfield.export.solutions.readers.grammar import plain_text
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw, recognised
 from crossfield.export.solutions.solution import read_solution
 from crossfield.models.errors import SolutionError
+from crossfield.models.formulations.problem import formulate
 from loops import for_each
 
 POOL = TINY / "cplex-22.2.0.1_milp_pool.sol"
@@ -248,6 +252,36 @@ def test_the_pool_of_xpress():
     first, second = read_raw(path, 1), read_raw(path, 2)
     assert (first.names == second.names).all()
     assert np.abs(first.values - second.values).max() > 0.1
+
+
+def test_read_takes_the_number_of_a_solution(tmp_path, capsys):
+    instance = tmp_path / "tiny.json"
+    cf.write_instance(problem("milp").instance, instance)
+    files = ["-f", "milp-mccormick", "-F", "mps", "-o", str(tmp_path), "-q"]
+    assert invoke(["export", str(instance), *files]) == 0
+    (manifest,) = tmp_path.glob("*.manifest.json")
+    arguments = ["read", str(POOL), "--manifest", str(manifest), "-o", str(tmp_path / "field.npz"), "--json"]
+    capsys.readouterr()
+    for chosen in ([], ["--solution", "3"]):
+        assert invoke([*arguments, *chosen]) == 0
+        field = cf.read_field(tmp_path / "field.npz")
+        number = int(chosen[1]) if chosen else 1
+        expected = read_solution(POOL, problem("milp"), solution=number).field
+        assert (field.p == expected.p).all()
+        assert f"solution {number} of 3" in capsys.readouterr().out
+    assert invoke([*arguments, "--solution", "4"]) == 1
+    assert "there is no solution 4 in it; choose one of 1 to 3" in capsys.readouterr().err
+
+
+# identity
+
+
+@for_each("path", [path for path in GOOD if problem_of(path) == "milp" and read_raw(path).stamps])
+def test_a_file_that_states_its_problem_is_refused_for_another(path):
+    assert read_solution(path, problem("milp")).identified
+    other = replace(problem("milp").instance, stroke_coefficient=1.5000001)
+    with pytest.raises(SolutionError, match="is of another problem: it states"):
+        read_solution(path, formulate(other, "milp-mccormick"))
 
 
 # speed
