@@ -121,6 +121,7 @@ FILES = {
     f"{K}_milp_optimal_log.txt": ("glpk", GLOBAL),
     "neos-by-layout_milp_optimal_scip.txt": ("scip", FEASIBLE),
     "neos-by-layout_milp_optimal_ampl.txt": ("ampl-display", FEASIBLE),
+    "mail-by-layout_milp_list.txt": ("list-in-text", FEASIBLE),
 }
 """Every file of the folder: its reader and what it claims."""
 

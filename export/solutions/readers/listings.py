@@ -8,11 +8,13 @@ from __future__ import annotations
 import re
 
 from .grammar import NUMBER, Layout
+from .layouts import OUR_NAME
 
 _SOLVED = rb"(?:CPLEX> )?(?:MIP|Barrier|Primal simplex|Dual simplex) - "
 _QUOTES = (b'"', rb'"', b" ")
 _PAIR = rb'"?[^\s=:,;#"]{1,63}"?[ \t]*[%b][ \t]*"?%b"?[ \t]*[,;]?[ \t]*(?:\n|\Z)'
 _HEADING = rb"(?:[^\s\d,;=:][^\d\n,;=:]{0,99})?[,;][^\d\n,;=:]{0,99}0?\n"
+_PROSE = rb"(?![ \t]*(?:#|%b[ \t]|\S+[ \t]+%b[ \t]*\n))" % (OUR_NAME, NUMBER)
 
 
 def _quotient(match: re.Match[bytes]) -> bytes:
@@ -188,7 +190,13 @@ LISTINGS = (
         omits_zeros=True,
         rewrites=((b"Variable:", rb"(?m)^ {4}(\S+):\n {6}Value: (\S+)\n", rb"\1 \2\n\n"),),
     ),
+    Layout(
+        "list-in-text",
+        "names and values in other text",
+        signature=rb"\A\s*%b(?:%b[^\n]*\n)+?(?P<answer>(?:[ \t]*(?:ONE|%b)\w*[ \t]+%b[ \t]*\n){5})"
+        % (_PROSE, _PROSE, OUR_NAME, NUMBER),
+    ),
     _list_of("pairs", "=, : or a comma", b"=:,", NUMBER),
     _list_of("pairs-semicolon", "a semicolon", b";", rb"[-+]?\d*[.,]?\d*(?:e[-+]?\d+)?"),
 )
-"""The last two have no mark of a program, and count only where nothing else is found."""
+"""The last three have no mark of a program, and count only where nothing else is found."""

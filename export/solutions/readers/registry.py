@@ -69,7 +69,7 @@ _LISTS: Final = tuple(
     reader_of(layout, _CLAIMS.get(layout.name, _stated(of_words)))
     for layout in (*LAYOUTS[:-1], *LISTINGS, LAYOUTS[-1])
 )
-PLAIN: Final = _LISTS[-3:]
+PLAIN: Final = _LISTS[-4:]
 """Readers of lists without a mark of their program, for files that no other reader recognises."""
 
 READERS: Final[tuple[Reader, ...]] = (
@@ -78,7 +78,7 @@ READERS: Final[tuple[Reader, ...]] = (
     cplex.READER,
     glpk.READER,
     baron.READER,
-    *_LISTS[:-3],
+    *_LISTS[: -len(PLAIN)],
     ampl.TEXT,
     *PLAIN,
 )

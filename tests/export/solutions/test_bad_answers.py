@@ -267,6 +267,7 @@ HEADS = [
     b"MIP - Integer optimal solution:  Objective = 3\nVariable Name   Solution Value\n",
     b"**** SOLVER STATUS     1 \n**** MODEL STATUS      1\n---- VAR ", b"----    1 VARIABLE a.L  =  3\n",
     b":  _varname  _var  :=\n", b"# = Solver Results =\n  Variable:\n", b"a = 1\n", b"a;1,5\n",
+    b"Dear X\na_00_00 1\n",
     b"name,value\na,1\n",
     b'{"parameters": {"sol_status": 1}, "variables": [', b'{"a": 1, ', b"c Problem:\ns mip 1 1 o 1\n",
 ]  # fmt: skip
