@@ -1322,6 +1322,21 @@ def beyond_windows(turned: Array, boxes: Array) -> Array:
     return found
 
 
+def convex_error(
+    weight: Array, w_beta: float, angles: tuple[Array, Array, Array], terms: float, far: Array
+) -> float:
+    """The greatest rounding error of a bound of `Quadratic`.
+
+    angles: x (2n,), directions of lines, and jumps. terms: the sum of the value and of the sizes of its
+    residuals with their weights; a residual is wrong by three units of `size` at most, its square by 16 times
+    the residual. far (2n,): the distances from x to both sides of the box; at each, the slope may be wrong.
+    """
+    x, goal, p = angles
+    size = 1 + float(2 * np.abs(x).max() + np.abs(goal).max(initial=0) + HALF * np.abs(p).max(initial=0))
+    slopes = ROUNDING * float(np.sum((1 + w_beta + np.tile(weight, 2)) * far))
+    return PRECISION * size * (16 * terms + slopes)
+
+
 @dataclass
 class Piece:
     """A part of the boxes (n, 4), and the lines that carry the strokes there.
@@ -1391,17 +1406,14 @@ class Quadratic:
 
     def bound(self, x: Array) -> float:
         """A lower bound on the piece: the value at x plus the least change that its gradient allows."""
-        value, slope = self.value(x), self.slope(x)
-        sketch, weights = self.sketch, np.tile(self.sketch.weight, 2)
-        size = 1 + float(2 * np.abs(x).max() + np.abs(self.goal).max() + HALF * np.abs(self.p).max(initial=0))
-        error = PRECISION * ROUNDING * (1 + weights + sketch.w_beta) * size
+        value, slope, sketch = self.value(x), self.slope(x), self.sketch
         falls = np.maximum(slope * (x - self.low), slope * (x - self.high))
-        falls += error * (np.abs(x - self.low) + np.abs(x - self.high))
-        # A residual is wrong by three units of `size` at most, its square by 16 times the residual.
         a, b, r = (np.abs(each) for each in self._residuals(x))
-        terms = math.fsum([*(a + b), *(sketch.weight * r), *(self.above + self.below)])
-        wrong = 16 * terms + sketch.w_beta * float(np.abs(x).sum()) + value
-        return value - math.fsum(falls) - PRECISION * size * wrong
+        terms = math.fsum([value, *(a + b), *(sketch.weight * r), *(self.above + self.below)])
+        terms += sketch.w_beta * float(np.abs(x[len(x) // 2 :]).sum())
+        far = np.abs(x - self.low) + np.abs(x - self.high)
+        lost = convex_error(sketch.weight, sketch.w_beta, (x, self.goal, self.p), terms, far)
+        return value - math.fsum(falls) - lost
 
     def least(self, x: Array) -> Array:
         """A point near the minimum of the piece, by Newton steps on the angles that no bound holds.

@@ -24,12 +24,14 @@ from ..instance.instance import HALF, QUARTER
 from ..processes.deadline import Over, never
 from ..search.box_qp import field_at, least_in_box
 from ..search.energy import Quadratic, energy_at
+from ..smooth.systems import stroke_weight
+from .check_certificate import convex_error
 from .pruning import RemainingCells
 from .record import EXACT
 
 _MOST_PIECES: Final = 60
 _MOST_CROSSED: Final = 6  # strokes whose windows the boxes exceed; with more, all pieces are too many
-_MARGIN: Final = 1e-9  # radians
+MARGIN: Final = 2e-9  # radians by which conditions hold here, as the checker's boxes are wider by less
 _ROUNDING: Final = 1e-10  # deduction from a bound, relative to 1 + its value: float64 loses some 1e-12 in it
 
 
@@ -136,8 +138,21 @@ class Piece:
         gradient = 2 * quadratic.slope(x)
         field = field_at(lattice.instance, x, lattice.p)
         value = field.energy().total - float(self._given(field).sum())
-        value += float(np.minimum(gradient * (lower - x), gradient * (upper - x)).sum())
-        return Least(field, value - _ROUNDING * (1 + abs(value)))
+        bound = value + float(np.minimum(gradient * (lower - x), gradient * (upper - x)).sum())
+        return Least(field, bound - _ROUNDING * (1 + abs(bound)) - self._error(field, upper - lower))
+
+    def _error(self, field: CrossField, far: Floats) -> float:
+        """What the checker takes off the bound for rounding, or a little more."""
+        instance, at = field.instance, field.instance.stroke_index
+        weight, skew = stroke_weight(instance), instance.skew_coefficient
+        angles, goal = np.concatenate([field.alpha, field.beta]), self.target + HALF * self.lines
+        r = field.alpha[at] + np.where(self.lines == 0, 1, -1) * field.beta[at] - goal
+        sizes = (
+            skew * np.abs(field.beta).sum() + np.abs(field.residual_a).sum() + np.abs(field.residual_b).sum()
+        )
+        sizes += weight[at] @ (np.abs(r) + 4 * np.add(*self.beyond))
+        terms = field.energy().total + float(sizes)
+        return convex_error(weight, skew, (angles, goal, self.left.lattice.p), terms, far)
 
     def crossed(self, field: CrossField) -> int:
         """The stroke with the largest deduction whose window the piece exceeds, or -1."""
@@ -157,8 +172,8 @@ class Piece:
             high[at] = min(high[at], ends[line + 2])
             low[at] = max(low[at], ends[line + 1])
             lines[stroke] = line
-            # The checker's boxes are wider by less than this: a part that is empty here may not be there.
-            if low[at] > high[at] + _MARGIN:
+            # A part that is empty here by less may not be empty for the checker.
+            if low[at] > high[at] + MARGIN:
                 parts.append(None)
                 continue
             low[at] = min(low[at], high[at])
@@ -207,8 +222,8 @@ def forced(left: RemainingCells, target: Floats | None = None) -> Forced:
     at, target = instance.stroke_index, instance.target if target is None else target
     away = np.maximum(np.abs(left.alpha_low[at] - target), np.abs(left.alpha_high[at] - target))
     most, products = at_pairs(left)
-    pairs = (most <= HALF) & (np.pi * most - np.pi**2 / 4 <= 4 * products.min(axis=0))
-    return Forced(left, pairs, away <= 3 * QUARTER, target)
+    pairs = (most <= HALF - MARGIN) & (np.pi * (most + MARGIN) - np.pi**2 / 4 <= 4 * products.min(axis=0))
+    return Forced(left, pairs, away <= 3 * QUARTER - MARGIN, target)
 
 
 def at_pairs(left: RemainingCells) -> tuple[Floats, Floats]:

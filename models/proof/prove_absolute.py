@@ -19,7 +19,7 @@ from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
 from ..search.absolute_fit import absolute_fit, fitted_absolute, settled_absolute
 from ..search.box_qp import field_at
-from .forced import Forced, Least, Piece, at_pairs
+from .forced import MARGIN, Forced, Least, Piece, at_pairs
 from .lattice import Lattice
 from .pruning import RemainingCells
 from .work import COARSEST, Work, first_of
@@ -70,11 +70,11 @@ def forced_absolute(left: RemainingCells, target: Floats | None = None) -> Force
     unlike = np.maximum(np.minimum(above[i], other), np.minimum(below[i], same))
     least = np.maximum(np.maximum(left.beta_low, -left.beta_high), 0.0)
     given = np.where(unlike > 0, unlike, -np.minimum(least[i], least[j]))
-    pairs = (most <= HALF) & (most + given <= QUARTER)
+    pairs = (most <= HALF - MARGIN) & (most + given <= QUARTER - MARGIN)
     instance = left.lattice.instance
     at, target = instance.stroke_index, instance.target if target is None else target
     away = np.maximum(left.alpha_high[at] - target, target - left.alpha_low[at])
-    return ForcedAbsolute(left, pairs, away - QUARTER <= reach, target)
+    return ForcedAbsolute(left, pairs, away - QUARTER <= reach - MARGIN, target)
 
 
 class WorkAbsolute(Work):

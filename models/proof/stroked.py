@@ -32,8 +32,8 @@ def restricted(field: CrossField, part: Instance) -> CrossField:
 def extended(field: CrossField, instance: Instance) -> CrossField:
     """A field on `stroked_parts` as one of the instance, with equal crosses in all other parts."""
     held = field.instance.mask[instance.mask]
-    angles, jumps = np.zeros((2, len(held))), np.zeros(len(instance.grid.first), np.int32)
-    angles[:, held] = field.alpha, field.beta
+    alpha, beta = np.zeros((2, len(held)))
+    alpha[held], beta[held] = field.alpha, field.beta
+    jumps = np.zeros(len(instance.grid.first), np.int32)
     jumps[held[instance.grid.first]] = field.p
-    alpha, beta = angles
     return CrossField(instance, alpha, beta, jumps)
