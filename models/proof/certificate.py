@@ -149,6 +149,8 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
         raise SolverError(reason, file=path) from error
     except REFUSALS as error:
         raise InputError(f"would hold a proof that is not valid: {error}", file=path) from error
+    except MemoryError as error:
+        raise SolverError("is not written: its check takes more memory than there is", file=path) from error
     verdict, packing = cast("Verdict", checked.verdict), Packing()
     count = len(verdict.levels)
     written = replace(checked, levels=checked.levels[:count], branches=checked.branches[:count])
@@ -213,7 +215,7 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
     except check_certificate.UnreadableError as error:
         raise InputError(f"is not a certificate: {error}", file=path) from error
     except MemoryError as error:
-        raise InputError("needs more memory than there is to be checked", file=path) from error
+        raise InputError("takes more memory to check than there is", file=path) from error
     return Certificate(field, field.energy(verdict.norm).total, head["bound"], verdict)
 
 

@@ -6,7 +6,8 @@ numbers are the same.
 
 It recomputes everything from the instance in float64: the energy U of the field, and at every level of the
 lattice the costs, a bound, the cells that it excludes, and that the next level covers the rest. Exit code 0:
-the claim is proven. 1: it is not; a line names the place. 2: the file is not a certificate.
+the claim is proven. 1: it is not; a line names the place. 2: the file is not a certificate. 3: there is too
+little memory to check it.
 
 "Optimal" means: no field has an energy below U by more than the number printed, which is at most OPTIMAL
 times the greater of 1 and U. "Gap" means: no field has an energy below the bound.
@@ -167,6 +168,7 @@ PRECISION = 2.0**-52
 ROUNDING = 64.0
 SLIVER = 2e-14
 MOST_BYTES = 1 << 31  # of a file, and of all its arrays
+ROOM, MORE_ROOM = 1 << 28, 128  # memory for a certificate: a number, and one for each byte of its file
 MOST_LEVELS = 256
 MOST_SIDE = 9999
 MOST_PIECES = 200  # of the boxes
@@ -364,12 +366,14 @@ def unpacked(data: bytes) -> dict[str, Array]:
 
     It consists of the members, stored or deflated, the directory and its end record, without other bytes
     before, between or after them, and without a comment. The header of each member repeats its directory
-    entry. Each name appears once. Sizes are checked before anything is unpacked; no pickles.
+    entry. Each name appears once. Sizes are checked before anything is unpacked; no pickles. What it takes to
+    check the arrays is limited by the size of the file.
     """
     try:
         arrays = _members(data)
         _need_names(arrays)
-    except (UnreadableError, RefusedError):
+        _need_room(arrays, len(data))
+    except (UnreadableError, RefusedError, MemoryError):
         raise
     except Exception as error:  # a damaged archive can raise anything
         raise UnreadableError(f"is no .npz that can be read ({type(error).__name__})") from error
@@ -400,6 +404,9 @@ def _members(data: bytes) -> dict[str, Array]:
         _require(key not in arrays, f"has {key} twice")
         total += facts[7]
         _require(total <= MOST_BYTES, "holds more than 2 GiB")
+        _require(
+            4 * total <= ROOM + MORE_ROOM * len(data), "has larger arrays than a file of its size may have"
+        )
         begin = _content(data, place, key, facts)
         place = begin + facts[6]
         arrays[key] = _array(key, data[begin:place], facts)
@@ -457,6 +464,27 @@ def _need_names(arrays: dict[str, Array]) -> None:
         raise UnreadableError(f"has no array {name}")
     for name in sorted(set(arrays) - names):
         raise UnreadableError(f"has an array {name[:40]} too many for a certificate with {levels} levels")
+
+
+def _need_room(arrays: dict[str, Array], size: int) -> None:
+    """Raise UnreadableError unless a file of that size may take the memory that the check would take.
+
+    The bytes for each number are more than what the check was measured to take.
+    """
+    bits = np.array([bin(byte).count("1") for byte in range(256)], np.uint8)
+    mask, most = arrays["instance_mask"], 0
+    for number in range(_levels(head_of(arrays))):
+        at = f"level_{number}_"
+        counts = np.clip(_given(arrays, f"{at}ranges", "<i4", None, 4)[:, 1::2], 0, MOST_COUNT).astype(
+            np.int64
+        )
+        allowed = int(bits[_given(arrays, f"{at}allowed", "|u1", None)].sum(dtype=np.int64))
+        side = int(counts.max(initial=0))
+        need = 160 * allowed + 4 * int(counts.prod(axis=1).sum()) + 56 * side * side
+        most = max(most, need + 32 * arrays[f"{at}table_steps"].size)
+    most += 24 * mask.size + 1500 * int(mask.sum()) + sum(array.nbytes for array in arrays.values())
+    enough = most <= ROOM + MORE_ROOM * size
+    _require(enough, f"takes {most >> 20} MB of memory to check, more than a file of its size may")
 
 
 def head_of(arrays: dict[str, Array]) -> dict[str, Any]:
@@ -883,10 +911,12 @@ class Pair:
         squared = sketch.norm == 2
         parts: list[tuple[Array, Array]] = []
         for parity in (0, 1):
-            a = [np.abs(apart + HALF * p) for p in span if p % 2 == parity]
+            a = [p for p in span if p % 2 == parity]
             b = np.abs((1 - 2 * parity) * beta_i[:, None] - beta_j[None, :])
             if a:
-                least = a[0] if len(a) == 1 else np.minimum.reduce(a)
+                least = np.abs(apart + HALF * a[0])
+                for p in a[1:]:
+                    least = np.minimum(least, np.abs(apart + HALF * p), out=least)
                 along, b = (2 * (each * each if squared else each) for each in (least, b))
                 along = along - squared * level.h * level.h + tables
                 parts.append((along, b) if i < j else (along.T, b.T))
@@ -1578,7 +1608,7 @@ def check(arrays: dict[str, Array], over: Over = lambda: False, way: Way = PLAIN
     """
     try:
         return _check(arrays, over, way)
-    except (ValueError, TypeError, KeyError, IndexError, OverflowError, MemoryError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError, RecursionError) as error:
         raise UnreadableError(f"is damaged ({type(error).__name__}: {str(error)[:80]})") from error
 
 
@@ -1788,6 +1818,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UnreadableError as error:
         print(f"unreadable: {given.file} {error}")
         return 2
+    except MemoryError:
+        print(f"unchecked: {given.file} takes more memory than there is")
+        return 3
     for number, bound in enumerate(verdict.levels):
         print(f"level {number}: bound {bound:.9f}")
     print(f"energy {verdict.energy!r}")

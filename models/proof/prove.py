@@ -147,8 +147,8 @@ def _checked(proof: Proof, deadline: Deadline, asked: Over) -> Proof:
     """The proof as the checker confirms it; without levels if none was checked in time.
 
     The check may end after the deadline, by half a second and 5 % of the time of the proof. A request to stop
-    that ended the proof does not end the check. A proof that the checker refuses has no bound, and
-    `write_certificate` names the reason.
+    that ended the proof does not end the check. A proof that the checker refuses, or has no memory
+    for, has no bound, and `write_certificate` names the reason.
     """
     last, before = deadline.later(_LATE + _LATE_SHARE * proof.seconds), asked()
     with interruptible() as interrupted:
@@ -156,5 +156,5 @@ def _checked(proof: Proof, deadline: Deadline, asked: Over) -> Proof:
             return checked_proof(proof, lambda: last.passed() or interrupted() or (not before and asked()))
         except StoppedError:
             return replace(proof, bound=0.0, forced=0, levels=(), branches=())
-        except REFUSALS:
+        except (*REFUSALS, MemoryError):
             return replace(proof, bound=0.0, forced=0)
