@@ -45,7 +45,7 @@ class _Layout:
     omits_zeros: bool = False
 
 
-_PLAIN: Final = {word: (status, word) for word, status in PYOMO.items()}
+_PLAIN: Final = {word.casefold(): (status, word) for word, status in PYOMO.items()}
 _GUROBI: Final = _Layout(
     "Gurobi .json",
     ("Vars",),
@@ -93,11 +93,12 @@ def parse_other(data: bytes) -> RawSolution:
 def _solution(content: dict[str, Any], layout: _Layout) -> RawSolution:
     """The solution of a document; a status that is no point leaves its values out."""
     code, columns = _at(content, layout.status), _at(content, layout.columns)
-    known = code if isinstance(code, str | int) else None
-    status, words = layout.states.get(
-        known,
-        (Status.FEASIBLE if known is None else Status.ERROR, "" if known is None else f"status {known}"),
-    )
+    if isinstance(code, str):
+        status, words = layout.states.get(code.casefold(), (Status.FEASIBLE, ""))[0], code
+    elif isinstance(code, int):
+        status, words = layout.states.get(code, (Status.ERROR, f"status {code}"))
+    else:
+        status, words = Status.FEASIBLE, ""
     if columns is None or status in _POINTLESS:
         if status is Status.OPTIMAL_GLOBAL:
             raise SolutionError(f"the file states optimal but holds no values; {_AGAIN}")

@@ -67,7 +67,7 @@ def test_faults_in_lists_and_documents(data, fault):
 @for_each("word, status", [
         ("optimal", "optimal-local"), ("feasible", "feasible"), ("infeasible", "infeasible"),
         ("unbounded", "unbounded"), ("maxTimeLimit", "limit-with-point"),
-        ("globallyOptimal", "optimal-global"),
+        ("globallyOptimal", "optimal-global"), ("Optimal", "optimal-local"), ("words of a tool", "feasible"),
     ])  # fmt: skip
 def test_claims_of_a_plain_document(word, status):
     document = {"status": word, "objective": 3.5, "bound": 3, "variables": {"x": 2}}
