@@ -68,6 +68,12 @@ def test_starts_that_crossfield_writes_are_called_starts(written):
         assert "this is a MIP start (.mst)" in refusal(path)
 
 
+def test_starts_in_a_layout_of_answers_are_read(written):
+    for pattern in ("*.highs.sol", "*.scip.sol", "*.xpress.slx"):
+        (path,) = written.glob(pattern)
+        assert read_raw(path).has_point
+
+
 @pytest.fixture(scope="module")
 def highs(model, tmp_path_factory):
     """Files that HiGHS writes besides its solution: its basis, its log and its pretty styles."""
