@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import re
 
-from .grammar import NUMBER, Layout
-from .layouts import OUR_NAME
+from .grammar import BLANK, NUMBER, Layout
+from .layouts import LAYOUTS, OUR_NAME
 
 _SOLVED = rb"(?:CPLEX> )?(?:MIP|Barrier|Primal simplex|Dual simplex) - "
 _QUOTES = (b'"', rb'"', b" ")
 _PAIR = rb'"?[^\s=:,;#"]{1,63}"?[ \t]*[%b][ \t]*"?%b"?[ \t]*[,;]?[ \t]*(?:\n|\Z)'
+_OURS = rb'"?' + OUR_NAME + rb'"?[ \t]*[%b]'
+_REMARKS = rb"(?:%b*(?:#[^\n]*)?\n)*" % BLANK
 _HEADING = rb"(?:[^\s\d,;=:][^\d\n,;=:]{0,99})?[,;][^\d\n,;=:]{0,99}0?\n"
 _PROSE = rb"(?![ \t]*(?:#|%b[ \t]|\S+[ \t]+%b[ \t]*\n))" % (OUR_NAME, NUMBER)
 
@@ -29,8 +31,8 @@ def _list_of(name: str, title: str, separator: bytes, value: bytes) -> Layout:
     return Layout(
         name,
         f"names and values with {title} between",
-        signature=rb"(?!model_status)(?P<answer>\A\s*(?:%b)?%b|(?:%b)?%b(?:[ \t]*%b){4})"
-        % (_HEADING, pair, _HEADING, pair, pair),
+        signature=rb"(?!model_status)(?P<answer>\A%b(?:%b)?%b*(?:%b|%b)|(?:%b)?%b(?:[ \t]*%b){4})"
+        % (_REMARKS, _HEADING, BLANK, pair, _OURS % separator, _HEADING, pair, pair),
         separator=separator,
         rewrites=(
             _QUOTES,
@@ -200,3 +202,6 @@ LISTINGS = (
     _list_of("pairs-semicolon", "a semicolon", b";", rb"[-+]?\d*[.,]?\d*(?:e[-+]?\d+)?"),
 )
 """The last three have no mark of a program, and count only where nothing else is found."""
+
+TEXT_LAYOUTS = (*LAYOUTS[:-1], *LISTINGS, LAYOUTS[-1])
+"""All text layouts: the first whose signature is found has the text, and the plain list is the last."""

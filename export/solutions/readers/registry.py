@@ -23,8 +23,7 @@ from ...statuses import HIGHS, PYOMO, Status, of_cbc, of_gams, of_scip, of_words
 from ...writing.stamps import digits_in_columns, digits_in_text
 from . import ampl, baron, cplex, documents, glpk
 from .grammar import HEAD, Scan, fault_at, plain_text
-from .layouts import LAYOUTS
-from .listings import LISTINGS
+from .listings import TEXT_LAYOUTS
 from .siblings import log_of, sibling_of
 from .text import Claim, RawSolution, Reader, choose, reader_of, refusing
 
@@ -66,8 +65,7 @@ _CLAIMS: Final[dict[str, Claim]] = {
 """What texts claim, by layout; the others state a status in words at most."""
 
 _LISTS: Final = tuple(
-    reader_of(layout, _CLAIMS.get(layout.name, _stated(of_words)))
-    for layout in (*LAYOUTS[:-1], *LISTINGS, LAYOUTS[-1])
+    reader_of(layout, _CLAIMS.get(layout.name, _stated(of_words))) for layout in TEXT_LAYOUTS
 )
 PLAIN: Final = _LISTS[-4:]
 """Readers of lists without a mark of their program, for files that no other reader recognises."""

@@ -30,6 +30,14 @@ BASES = {
 }
 """Answers of real programs to one problem, in every layout of lines that both read."""
 
+SIGNS = {
+    "name = value": rb"\1 = \2",
+    "name: value": rb"\1: \2",
+    "name,value": rb"\1,\2",
+    "name;value": rb"\1;\2",
+}
+"""The same in lists with a sign between name and value."""
+
 STYLES = {"highs raw": 0, "highs sparse": 4}
 """HiGHS's styles of the same, which it writes here."""
 
@@ -39,6 +47,8 @@ def answer(base):
     """The answer of a real program, in its layout."""
     if base in BASES:
         return (TINY / BASES[base]).read_bytes()
+    if base in SIGNS:
+        return re.sub(rb"(?m)^([a-zA-Z]\S*) (\S+)$", SIGNS[base], answer("list"))
     with TemporaryDirectory() as folder:
         write(problem("milp"), Path(folder) / "m.mps")
         solver = highspy.Highs()
@@ -87,11 +97,11 @@ ODD = {
 }
 
 FAULTY = {
-    "a word for a value": lambda data: re.sub(rb"(alpha_00_01[ ,]+)\S+", rb"\1about", data),
+    "a word for a value": lambda data: re.sub(rb"(alpha_00_01[ ,:;=]+)\S+", rb"\1about", data),
     "a value missing": lambda data: re.sub(rb"(?m)(alpha_00_01).*$", rb"\1", data),
     "a line too long": lambda data: re.sub(rb"(?m)(alpha_00_01.*)$", rb"\1 7 7", data),
-    "not a number": lambda data: re.sub(rb"(alpha_00_01[ ,]+)\S+", rb"\1nan", data),
-    "infinite": lambda data: re.sub(rb"(alpha_00_01[ ,]+)\S+", rb"\1inf", data),
+    "not a number": lambda data: re.sub(rb"(alpha_00_01[ ,:;=]+)\S+", rb"\1nan", data),
+    "infinite": lambda data: re.sub(rb"(alpha_00_01[ ,:;=]+)\S+", rb"\1inf", data),
     "two values": lambda data: data.replace(b"alpha_01_01", b"alpha_00_00"),
     "foreign names": lambda data: data.replace(b"alpha_", b"angle_"),
     "a byte that is not text": lambda data: data.replace(b"alpha_00_01", b"alpha_00\x0001"),
@@ -130,7 +140,7 @@ def judged(tmp_path_factory):
 
 
 @for_each("change", ODD)
-@for_each("base", [*BASES, *STYLES])
+@for_each("base", [*BASES, *SIGNS, *STYLES])
 def test_odd_files_are_read_alike(base, change, judged):
     ours, theirs = judged(ODD[change](answer(base)))
     assert ours == pytest.approx(0.556536082845935, abs=1e-6)
@@ -138,7 +148,7 @@ def test_odd_files_are_read_alike(base, change, judged):
 
 
 @for_each("change", FAULTY)
-@for_each("base", [*BASES, *STYLES])
+@for_each("base", [*BASES, *SIGNS, *STYLES])
 def test_faulty_files_are_refused_or_contradicted_alike(base, change, judged):
     ours, theirs = judged(FAULTY[change](answer(base)))
     assert ours in {None, ""}
