@@ -43,7 +43,7 @@ def like(picture, colour, tolerance=12):
 
 def frame_of(picture):
     """First and last row and column of the outline of a full mask."""
-    grey = like(picture, marks.BORDER, 40) & (np.ptp(picture, axis=-1) < 12)
+    grey = like(picture, marks.BORDER, 40) & (np.ptp(picture, axis=-1) < 20)
     sides = (np.flatnonzero(grey.sum(axis) > 0.3 * grey.sum(axis).max()) for axis in (1, 0))
     return [side[at] for side in sides for at in (0, -1)]
 
