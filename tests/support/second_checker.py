@@ -673,6 +673,8 @@ def check(arrays):
     optimal = bound >= energy - TOLERANCE * max(1, energy)
     need(optimal or head["status"] == "gap", f"head: not optimal, with a bound of {bound}{why}")
     need(number(head, "bound", -1e300, 1e300) <= bound, f"head: the bound is {bound}, not {head['bound']}")
+    close = claimed - head["bound"] <= TOLERANCE * max(1, claimed)
+    need(close or head["status"] == "gap", "head: optimal, but not by its own bound")
     return bound
 
 
