@@ -22,7 +22,7 @@ from ...models.errors import SolutionError
 PREFIX: Final = "sha256_"
 
 _IN_TEXT: Final = re.compile(rb"sha256_([0-9a-f]{11,64})(?![0-9a-z])")
-_COLUMN: Final = re.compile(rb"\bONE_([0-9a-f]{11})\b", re.IGNORECASE)
+_COLUMN: Final = re.compile(rb"(?:\b|\bt_)ONE_([0-9a-f]{11})\b", re.IGNORECASE)
 _OPTION_DIGITS: Final = 7
 
 

@@ -77,7 +77,7 @@ def test_problems_and_solutions_are_tables_that_load_nothing(problem, solution):
 def test_a_solution_without_a_point_is_reported(problem):
     from crossfield.export.statuses import Status
 
-    empty = cf.Solution(problem, None, Status.INFEASIBLE, "<no> & never", "highs")
+    empty = cf.Solution(problem, None, Status.INFEASIBLE, "<no> & never", "highs", identified=True)
     assert repr(empty) == "<Solution of milp-mccormick on skew: infeasible>"
     assert "<img" not in empty._repr_html_()
     assert "&lt;no&gt; &amp; never" in empty._repr_html_()

@@ -243,6 +243,18 @@ def test_files_of_solvers_without_a_stamp_keep_no_claim():
     assert unidentified > len(GOOD) // 2
 
 
+def test_names_of_a_transformed_problem_carry_the_stamp(solved, tmp_path):
+    """SCIP prefixes the names of its presolved problem with `t_`."""
+    cf.write(solved, tmp_path / "model.mps")
+    by_highs(tmp_path / "model.mps", tmp_path / "answer.sol", 0)
+    text = re.sub(r"(?m)^(\w+_\w+) (?=\S+$)", r"t_\1 ", (tmp_path / "answer.sol").read_text())
+    (tmp_path / "answer.sol").write_text(text)
+    assert "t_ONE_" in text
+    assert read_solution(tmp_path / "answer.sol", solved).status == "optimal-global"
+    with pytest.raises(SolutionError, match="is of another problem"):
+        read_solution(tmp_path / "answer.sol", OTHERS["weight"]())
+
+
 def test_the_column_fixed_to_1_has_the_value_1(solved, tmp_path):
     """Otherwise the values belong to other names, as in a list that is shifted by a line."""
     cf.write(solved, tmp_path / "model.mps")
