@@ -1,4 +1,4 @@
-"""What a solver claims about its answer, and the words and codes by which each program claims it.
+"""Claims of solvers about their answers, and the words and codes by which each program states them.
 
 One table per program, for readers of solution files, readers of logs and drivers. Nothing heavy is imported:
 the child processes of solvers load this module.

@@ -228,19 +228,19 @@ def read_command(
     with progress(quiet=printing.quiet) as show:
         show("reading the solution")
         problem, held = described_problem(manifest)
-        found = read_solution(solution, problem, held=held, tolerance=tolerance, solution=pick)
-        if found.point is None:
-            words = found.caveat and f"; claims {found.caveat}"
+        answer = read_solution(solution, problem, held=held, tolerance=tolerance, solution=pick)
+        if answer.point is None:
+            words = answer.caveat and f"; claims {answer.caveat}"
             raise InputError(
-                f"holds no point: {found.status}; {found.message or 'the solver gives no reason'}{words}",
+                f"holds no point: {answer.status}; {answer.message or 'the solver gives no reason'}{words}",
                 file=solution,
             )
-        if not found.doubt:
-            write_field(found.field, output)
-    print_solution(found, output, printing)
-    if found.doubt:
-        remedy = found.remedy and f"; {found.remedy}"
-        raise SolutionError(f"{found.doubt}; no field was written{remedy}", file=solution)
+        if not answer.doubt:
+            write_field(answer.field, output)
+    print_solution(answer, output, printing)
+    if answer.doubt:
+        remedy = answer.remedy and f"; {answer.remedy}"
+        raise SolutionError(f"{answer.doubt}; no field was written{remedy}", file=solution)
 
 
 @command("draw")

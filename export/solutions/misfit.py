@@ -38,7 +38,7 @@ class _Misfit:
 
     @property
     def message(self) -> str:
-        """What is missing and unknown, and the likely cause with its remedy."""
+        """Missing and unknown names, and the likely cause with its remedy."""
         columns, missing, unknown = self.form.column_names, self._missing, self._unknown
         parts = []
         if missing:

@@ -246,7 +246,7 @@ class Solution:
 
     @property
     def remedy(self) -> str:
-        """What may explain a doubt about the point, and what to do; empty without an explanation."""
+        """Likely explanation of a doubt about the point, and the remedy; empty if there is none."""
         if self.order and not self.identified:
             return (
                 f"its values have no names and were taken in the order of the .{self.order} file that "

@@ -338,7 +338,7 @@ def _start_file(held: Problem, solver: str, start: CrossField | None, path: Path
 
 
 def _outcome_of_killed(files: Files, held: Problem) -> Outcome:
-    """What is known of a solver that was killed: its solution file counts if the solver completed it."""
+    """Outcome of a solver that was killed: its solution file counts if the solver completed it."""
     part_of(files.solution).unlink(missing_ok=True)
     try:
         status = read_solution(files.solution, held).claimed
@@ -370,7 +370,7 @@ def _answer(held: Problem, files: Files, outcome: Outcome, entry: Solver) -> Sol
             nodes=outcome.nodes,
         )
     try:
-        found = read_solution(files.solution, held, identified=True)
+        solution = read_solution(files.solution, held, identified=True)
     except SolutionError:
         files.solution.unlink(missing_ok=True)  # cut off, for example by a full disk: it must not be used
         raise
@@ -380,7 +380,7 @@ def _answer(held: Problem, files: Files, outcome: Outcome, entry: Solver) -> Sol
         "claimed_bound": outcome.bound,
         "nodes": outcome.nodes,
     }
-    return replace(found, **{key: value for key, value in reported.items() if value not in (None, "")})
+    return replace(solution, **{key: value for key, value in reported.items() if value not in (None, "")})
 
 
 def _is_start(point: Floats | None, start: Floats | None) -> bool | None:

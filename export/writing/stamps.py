@@ -62,8 +62,8 @@ def digits_in_columns(names: Iterable[bytes]) -> frozenset[str]:
 
 def is_stated(stamp: str, stated: Iterable[str]) -> bool:
     """Whether an answer states a stamp, or the first digits of it."""
-    own = stamp.removeprefix(PREFIX)
-    return any(own.startswith(digits[: len(own)]) for digits in stated)
+    stamp_digits = stamp.removeprefix(PREFIX)
+    return any(stamp_digits.startswith(digits[: len(stamp_digits)]) for digits in stated)
 
 
 def is_identified(stated: Iterable[str], stamp: str) -> bool:
@@ -71,10 +71,10 @@ def is_identified(stated: Iterable[str], stamp: str) -> bool:
 
     False if it states none. Raises SolutionError if it states the digits of another problem.
     """
-    other = next((digits for digits in sorted(stated) if not is_stated(stamp, [digits])), None)
-    if other is not None:
+    foreign = next((digits for digits in sorted(stated) if not is_stated(stamp, [digits])), None)
+    if foreign is not None:
         raise SolutionError(
-            f"is of another problem: it states {other}, and this one is {stamp.removeprefix(PREFIX)}; "
+            f"is of another problem: it states {foreign}, and this one is {stamp.removeprefix(PREFIX)}; "
             "instance, options or fixed jumps differ, give the manifest next to the solver's model"
         )
     return bool(list(stated))

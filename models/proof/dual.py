@@ -238,7 +238,7 @@ class Dual:
         return math.fsum([*terms, -self._roundings()[0]])
 
     def _roundings(self) -> tuple[float, float]:
-        """What the checker takes off the bound of a pass for rounding, and adds to the energy for combs.
+        """Margin that the checker takes off the bound of a pass, and adds to the energy for combs.
 
         It is more than this process rounds. See models/proof/check_certificate.py, 6 and `Pass`.
         """

@@ -142,7 +142,7 @@ class Piece:
         return Least(field, bound - _ROUNDING * (1 + abs(bound)) - self._error(field, upper - lower))
 
     def _error(self, field: CrossField, far: Floats) -> float:
-        """What the checker takes off the bound for rounding, or a little more."""
+        """Margin that the checker takes off the bound for rounding, or a little more."""
         instance, at = field.instance, field.instance.stroke_index
         weight, skew = stroke_weight(instance), instance.skew_coefficient
         angles, goal = np.concatenate([field.alpha, field.beta]), self.target + HALF * self.lines

@@ -62,7 +62,7 @@ _CLAIMS: Final[dict[str, Claim]] = {
     "cbc": _stated(of_cbc),
     "pyomo": _stated(lambda words: PYOMO.get(words, Status.FEASIBLE)),
 }
-"""What texts claim, by layout; the others state a status in words at most."""
+"""Functions that return the claim of a text, by layout; the others state a status in words at most."""
 
 _LISTS: Final = tuple(
     reader_of(layout, _CLAIMS.get(layout.name, _stated(of_words))) for layout in TEXT_LAYOUTS

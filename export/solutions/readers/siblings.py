@@ -95,12 +95,12 @@ _PATTERNS: Final = tuple((re.compile(pattern, re.MULTILINE), words) for pattern,
 
 
 def sibling_of(head: bytes) -> str:
-    """What a file with these first bytes is, and the remedy, if it is known to be no answer; or nothing."""
+    """Kind of a file that is known to be no answer, by its first bytes, with the remedy; else empty."""
     return next((words for pattern, words in _PATTERNS if pattern.search(head)), "")
 
 
 def log_of(head: bytes) -> str:
-    """What a file with these first bytes is, if it is a solver's log, and the remedy; or nothing."""
+    """Kind of a file that is a solver's log, by its first bytes, with the remedy; else empty."""
     # Not at the top: readers of logs are loaded only for a file that no reader recognises.
     from ..logs.registry import LOG_READERS
 

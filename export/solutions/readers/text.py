@@ -184,7 +184,7 @@ def _parse_answer(data: bytes, layout: Layout, claim: Claim) -> RawSolution:
 
 
 def _note(scan: Scan) -> str:
-    """What a reader of the message should know about the text."""
+    """Note about the text for the message."""
     name = scan.cut.decode(errors="replace")
     return f"the last line has no end, so the value of {name} may be cut off" if name else ""
 
