@@ -189,7 +189,7 @@ class Solution:
             yield f"the dual bound {bound} lies above the objective {objective:.9g} of the point"
 
     @property
-    def keeps_claims(self) -> bool:
+    def is_trusted(self) -> bool:
         """Whether status and bound of the file hold for the problem.
 
         The file must state the problem, and nothing may contradict it. A point must satisfy the problem
@@ -210,7 +210,7 @@ class Solution:
         """
         if self._has_unclaimed_point:
             return Status.FEASIBLE
-        if self.keeps_claims or self.claimed in {Status.NO_POINT, Status.ERROR}:
+        if self.is_trusted or self.claimed in {Status.NO_POINT, Status.ERROR}:
             return Status.LIMIT_WITH_POINT if self._leaves_gap else self.claimed
         if self.claimed is Status.LIMIT_WITHOUT_POINT:
             return Status.NO_POINT
@@ -233,7 +233,7 @@ class Solution:
     @property
     def bound(self) -> float | None:
         """The dual bound of the file if it is kept, else None."""
-        return self.claimed_bound if self.keeps_claims else None
+        return self.claimed_bound if self.is_trusted else None
 
     @property
     def doubt(self) -> str:
@@ -263,7 +263,7 @@ class Solution:
         """Why claims of the file are not kept although its point can be used; empty if all are kept."""
         if self._leaves_gap:
             return f"its dual bound {self.bound:.6g} leaves a gap, so it is not optimal within 1e-4"
-        if self.keeps_claims or self.contradictions:
+        if self.is_trusted or self.contradictions:
             return ""
         if not self.identified:
             return f"not kept ({self.claimed}): the file is of an unidentified problem"
@@ -281,7 +281,7 @@ class Solution:
         A point that breaks rows within the solver's tolerance may have an objective below every field's. None
         without a point, and for a problem whose points are no fields: a relaxation, or the printed facet.
         """
-        if self.point is None or not self.problem.formulation.holds_only_fields:
+        if self.point is None or not self.problem.formulation.has_only_fields:
             return None
         return self.problem.objective_value(self.problem.point(self.field))
 

@@ -283,7 +283,7 @@ def _energy_difference(
     problem: Problem, objective: float, energy: float, leeway: float, *, proven: bool
 ) -> str:
     """Fault of an objective compared with its field's energy; only an optimum has tight slacks."""
-    if not problem.formulation.holds_only_fields:
+    if not problem.formulation.has_only_fields:
         return ""  # z may differ from p1 beta, and then the field is another point
     if same(energy, objective) or (objective < energy and not _above(energy, objective + leeway)):
         return ""

@@ -232,7 +232,7 @@ class Formulation:
         return "" if self.options.relax else self.declaration.equivalent
 
     @property
-    def holds_only_fields(self) -> bool:
+    def has_only_fields(self) -> bool:
         """Whether every feasible point is a field's; a relaxation and the printed facet allow other z."""
         return not self.options.relax and self.options.facet != "printed"
 
