@@ -185,7 +185,11 @@ BAD = {
     ),
     "name in capitals": (HEAD + RUNG + SKETCH.replace('"a"', '"A"'), "'A' is not allowed"),
     "name too long": (
-        HEAD + RUNG + 'facets = ["printed"]\ngauges = ["box"]\n' + SKETCH.replace('"a"', '"abcdefghijklmn"'),
+        HEAD
+        + 'formulations = ["milp-mccormick"]\n'
+        + RUNG
+        + 'facets = ["printed"]\ngauges = ["box"]\n'
+        + SKETCH.replace('"a"', '"abcdefghijklmn"'),
         "has 39 characters; shorten",
     ),
     "unknown sample": (HEAD + RUNG + SKETCH.replace("mouse", "cat"), "there is no sample 'cat'"),

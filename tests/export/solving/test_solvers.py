@@ -555,9 +555,8 @@ def test_ctrl_c_elsewhere_leaves_whole_files_only(tmp_path):
     code, out, err = interrupted(tmp_path, "*.instance.json", ["run", "mouse", "--size", "100"], "}$")
     assert (code, out.splitlines()) == (1, [plan(cf.Limits())])
     assert err == "crossfield: interrupted; all written files are complete\n"
-    assert not list(tmp_path.rglob("*.part"))
-    assert not (tmp_path / "report.json").exists()
-    cf.read_instance(tmp_path / "models" / "mouse.instance.json")
+    # Models appear together, once all are written.
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
 @pytest.mark.slow
