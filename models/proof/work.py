@@ -576,7 +576,7 @@ def _at_seam(field: CrossField, lattice: Lattice) -> bool:
 
 
 def _centre(field: CrossField) -> CrossField:
-    """The same crosses in the gauge `strokes`, each pair with its best jump."""
+    """The crosses of a field in the gauge `strokes`, each pair with its best jump."""
     instance = field.instance.with_gauge("strokes")
     alpha, beta = (np.round(angle, _DECIMALS) for angle in (field.alpha, field.beta))
     return relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])

@@ -80,7 +80,7 @@ ADDED = re.compile(
 )
 """Columns that solvers and their readers add to a model; in a point they are passed over."""
 
-STAMP = re.compile(r"(?:sha256_|\bONE_)([0-9a-f]{11})", re.IGNORECASE | re.ASCII)
+STAMP = re.compile(r"(?:sha256_|\b(?:t_)?ONE_)([0-9a-f]{11})", re.IGNORECASE | re.ASCII)
 """The first digits of a problem's hash, in the name of a model, a column or an objective."""
 
 ON_PIXELS, ON_PAIRS = ("alpha", "beta", "psi", "gamma", "chi"), ("p", "p1", "p2", "s", "t", "z", "d", "u")

@@ -6,6 +6,7 @@ import ast
 import gzip
 import json
 import math
+import re
 import subprocess
 import sys
 import tracemalloc
@@ -576,6 +577,12 @@ def test_a_point_that_states_another_problem_is_refused(tmp_path, capsys):
     code, out, err = called(capsys, models[1], tmp_path / "p.sol")
     assert (code, out) == (2, "")
     assert "the point is of another problem: it states" in err
+    prefixed = tmp_path / "prefixed.sol"
+    prefixed.write_text(re.sub(r"(?m)^(\w+_\w+) (?=\S+$)", r"t_\1 ", (tmp_path / "p.sol").read_text()))
+    code, out, _ = called(capsys, models[0], prefixed, "--tolerance", "1e-6")
+    assert (code, "problem   stated in the point" in out) == (0, True)
+    code, _, err = called(capsys, models[1], prefixed)
+    assert (code, "the point is of another problem" in err) == (2, True)
     silent = save_point(
         tmp_path / "silent.sol", problems[0], problems[0].point(make_field(problems[0].instance))
     )
