@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 _ENDED: Final = {
     "time": "the time limit ended before a bound was proven; increase it",
-    "interrupted": "the proof was interrupted before",
+    "interrupted": "the proof was interrupted before a bound was proven",
     "work": "the limit of work ended before a bound was proven; increase it",
-    "workers": "a worker of the scheduler was lost before",
+    "workers": "a worker of the scheduler was lost before a bound was proven",
     "gap": "the requested gap allows the bound 0; request a smaller one",
     "labels": "the next level would have too many labels",
 }
