@@ -19,6 +19,7 @@ from .errors import InputError, OutputError
 
 PART: Final = ".part"  # suffix of the names of temporary neighbours, which begin with a dot
 _MARK: Final = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]+\.part", re.DOTALL)
+_UNFINISHED: Final[set[Path]] = set()
 _LONGEST: Final = 50  # characters of a name that a neighbour's name repeats, at most 200 of 255 bytes
 
 
@@ -31,22 +32,28 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
     """
     path = Path(path)
     temporary = neighbour(path)
+    _UNFINISHED.add(temporary)
     try:
-        remove_dead(path.parent)
-        stream = temporary.open("xb")
-    except OSError as error:
-        raise OutputError(f"cannot be written: {_reason(error)}; choose another folder", file=path) from error
-    try:
-        with stream:
-            yield stream
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written: {_reason(error)}; free some space or choose another folder", file=path
-        ) from error
-    finally:
+        try:
+            remove_dead(path.parent)
+            stream = temporary.open("xb")
+        except OSError as error:
+            raise OutputError(
+                f"cannot be written: {_reason(error)}; choose another folder", file=path
+            ) from error
+        try:
+            with stream:
+                yield stream
+            temporary.replace(path)
+        except OSError as error:
+            raise OutputError(
+                f"cannot be written: {_reason(error)}; free some space or choose another folder", file=path
+            ) from error
+    except BaseException:
         with suppress(OSError):
             temporary.unlink()
+        raise
+    _UNFINISHED.discard(temporary)
 
 
 @contextmanager
@@ -57,14 +64,15 @@ def replacing_files(folder: str | Path) -> Iterator[Path]:
     """
     folder = make_folder(folder)
     temporary = neighbour(folder / "files")
+    _UNFINISHED.add(temporary)
     try:
-        remove_dead(folder)
-        temporary.mkdir()
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written: {_reason(error)}; choose another folder", file=folder
-        ) from error
-    try:
+        try:
+            remove_dead(folder)
+            temporary.mkdir()
+        except OSError as error:
+            raise OutputError(
+                f"cannot be written: {_reason(error)}; choose another folder", file=folder
+            ) from error
         yield temporary
         for path in sorted(path for path in temporary.rglob("*") if path.is_file()):
             target = folder / path.relative_to(temporary)
@@ -76,6 +84,17 @@ def replacing_files(folder: str | Path) -> Iterator[Path]:
                 raise OutputError(reason, file=target) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def remove_unfinished() -> None:
+    """Remove the temporary files that this process still has when it ends early.
+
+    Ctrl-C can come between two lines of the blocks above, where none of their handlers sees it.
+    """
+    for path in tuple(_UNFINISHED):
+        shutil.rmtree(path, ignore_errors=True)
+        with suppress(OSError):
+            path.unlink()
 
 
 def remove_file(path: Path) -> None:
@@ -99,17 +118,18 @@ def remove_dead(folder: Path) -> None:
     Keeps files of processes whose state is unknown: on Windows, and for other machines. No write needs the
     removal, because names are never used twice. Raises OSError when the folder cannot be listed.
     """
-    for entry in os.scandir(folder):
-        mark = _MARK.fullmatch(entry.name)
+    for path in folder.iterdir():
+        mark = _MARK.fullmatch(path.name)
         if mark is None or mark[1] != _machine() or _lives(int(mark[2])):
             continue
         with suppress(OSError):
-            if entry.stat(follow_symlinks=False).st_uid != os.geteuid():
+            status = path.lstat()
+            if status.st_uid != os.geteuid():
                 continue
-            if entry.is_dir(follow_symlinks=False):
-                shutil.rmtree(entry.path, ignore_errors=True)
+            if stat.S_ISDIR(status.st_mode):
+                shutil.rmtree(path, ignore_errors=True)
             else:
-                Path(entry.path).unlink()
+                path.unlink()
 
 
 def _machine() -> str:

@@ -16,6 +16,7 @@ from typing import Annotated, Final, NoReturn
 import typer
 
 from ...models.errors import CrossfieldError, InputError, shortened
+from ...models.storage import remove_unfinished
 from . import options
 from .evaluate_command import evaluate_command
 from .help_texts import Group
@@ -309,7 +310,10 @@ def main() -> NoReturn:
     escape_unencodable()
     logging.getLogger("PIL").addHandler(logging.NullHandler())  # every error is one line, printed by `invoke`
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
-    sys.exit(invoke(sys.argv[1:]))
+    try:
+        sys.exit(invoke(sys.argv[1:]))
+    finally:
+        remove_unfinished()
 
 
 def invoke(arguments: list[str]) -> int:

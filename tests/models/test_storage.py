@@ -3,10 +3,11 @@
 import os
 import subprocess
 import sys
+from itertools import count
 from pathlib import Path
 
 import pytest
-from crossfield.models.storage import write_bytes
+from crossfield.models.storage import remove_unfinished, write_bytes
 
 NOBODY = 65534
 AS_NOBODY = f"""
@@ -22,6 +23,7 @@ write_bytes("a.json", b"mine")
 def left_by_the_dead(path):
     """The name of a temporary file beside a path whose process has ended."""
     code = """import sys
+from itertools import count
 from pathlib import Path
 from crossfield.models.storage import neighbour
 print(neighbour(Path(sys.argv[1])))"""
@@ -48,3 +50,39 @@ def test_a_name_as_long_as_the_disk_takes_can_be_written(tmp_path, letter):
     path = tmp_path / (letter * (255 // len(letter.encode())))
     assert write_bytes(path, b"mine").read_bytes() == b"mine"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def interrupt_call(number):
+    """Raise KeyboardInterrupt when the `number`-th call of a function of C returns, as Ctrl-C can."""
+    returned = count(1)
+
+    def profile(_frame, event, _function):
+        if event == "c_return" and next(returned) == number:
+            raise KeyboardInterrupt
+
+    return profile
+
+
+# What an interrupted call returns has no name yet: an open file is then closed by the garbage collector.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("earlier", [None, b"earlier"])
+def test_ctrl_c_at_any_moment_leaves_one_whole_file_and_nothing_beside_it(tmp_path, earlier):
+    path = tmp_path / "model.lp"
+    for number in count(1):
+        if earlier is not None:
+            path.write_bytes(earlier)
+        sys.setprofile(interrupt_call(number))
+        try:
+            write_bytes(path, b"whole")
+        except KeyboardInterrupt:
+            sys.setprofile(None)
+            remove_unfinished()
+            written = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+        else:
+            break
+        finally:
+            sys.setprofile(None)
+        assert written in ({}, {"model.lp": earlier}, {"model.lp": b"whole"})
+        path.unlink(missing_ok=True)
+    assert number > 10
+    assert path.read_bytes() == b"whole"
