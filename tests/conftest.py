@@ -7,6 +7,7 @@ import shutil
 import signal
 import sys
 from collections import Counter
+from importlib import import_module
 from pathlib import Path
 
 # pytest-xdist gives every core a test; linear algebra with as many threads in each would only wait for one
@@ -16,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent / "support"))
 
 import pytest
 from hypothesis import HealthCheck, settings
+from places import ROOT
 
 # The same examples in every run: a chance find must not decide whether a change passes.
 # `--hypothesis-profile=fuzz` draws others. Neither must the clock: how long an example takes on a busy
@@ -54,6 +56,17 @@ def hidden(monkeypatch, tmp_path_factory):
         monkeypatch.setenv("PATH", os.pathsep.join(map(str, folders)))
 
     return hide
+
+
+@pytest.fixture(scope="session")
+def docs_module():
+    """A function that imports a program of docs/ by its name."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT / "docs")
+        patch.delitem(
+            sys.modules, ROOT.name, raising=False
+        )  # pytest imports the checkout by its folder's name
+        yield import_module
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

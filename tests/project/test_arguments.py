@@ -178,5 +178,4 @@ def test_every_public_function_with_arguments_is_among_them():
     public = {name: getattr(cf, name) for name in cf.__all__}
     functions = [name for name, value in public.items() if inspect.isfunction(value)]
     with_arguments = [name for name in functions if inspect.signature(public[name]).parameters]
-    assert len(with_arguments) > 30
     assert [name for name in with_arguments if f"cf.{name}(" not in WRONG] == []

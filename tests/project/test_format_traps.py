@@ -5,24 +5,19 @@ docs/format-rules.md lists the others.
 from __future__ import annotations
 
 import re
-from importlib import import_module
-from pathlib import Path
 
+import places
 import pytest
-
-ROOT = next(path for path in Path(__file__).resolve().parents if (path / "pyproject.toml").exists())
 
 
 @pytest.fixture(scope="module")
-def traps():
+def traps(docs_module):
     """The program with the files and the programs."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(ROOT / "docs")
-        return import_module("traps")
+    return docs_module("traps")
 
 
 def test_the_page_lists_every_trap(traps):
-    page = (ROOT / "docs" / "format-rules.md").read_text()
+    page = (places.ROOT / "docs" / "format-rules.md").read_text()
     rows = re.findall(
         r"^\| ([LMW]\d+) \| (.+?) \| ([\w-]+) \|", page.partition("<!-- traps:")[2], re.MULTILINE
     )

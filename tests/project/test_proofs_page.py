@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from pathlib import Path
-
+import places
 import pytest
-
-DOCS = next(path for path in Path(__file__).resolve().parents if (path / "pyproject.toml").exists()) / "docs"
 
 
 @pytest.fixture(scope="module")
-def proofs():
+def proofs(docs_module):
     """The program that makes the page."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(DOCS)
-        return import_module("proofs")
+    return docs_module("proofs")
 
 
 def test_the_page_is_made_from_the_rows_beside_it(proofs):
-    assert (DOCS / "proofs.md").read_text() == proofs.page(proofs.read())
+    assert (places.ROOT / "docs" / "proofs.md").read_text() == proofs.page(proofs.read())
 
 
 def test_no_bound_is_above_an_energy_and_every_optimum_is_that_of_other_solvers(proofs):
@@ -40,8 +34,8 @@ def test_no_solver_contradicts_what_is_proven(proofs):
             assert bound is None or bound <= row["energy"] + proofs.WITHIN, (name, what)
 
 
-def test_layers_of_a_drawing_are_named_by_it_and_masks_by_their_layer(proofs, tmp_path):
-    public = import_module("public_drawings")
+def test_layers_of_a_drawing_are_named_by_it_and_masks_by_their_layer(docs_module, proofs, tmp_path):
+    public = docs_module("public_drawings")
     root = tmp_path / "emmanueliarussi.github.io" / "papers" / "supplemental_material" / "Sketches"
     layers = ("bag/input_layers/l1", "bag/input_layers/l1_mask", "bag/normals/normals_l1")
     whole = ("jug/clean/input_layers/input_all", "jug/clean/input_layers/mask_all")

@@ -4,21 +4,13 @@ import inspect
 import re
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
-from types import FunctionType
 
 import crossfield
 import pytest
 from crossfield.models import errors
 
 ROOT = Path(crossfield.__file__).parent
-MODULES = [
-    ".".join(path.relative_to(ROOT).with_suffix("").parts)
-    for part in ("models", "export")
-    for path in sorted((ROOT / part).rglob("*.py"))
-    if path.name != "__init__.py"
-]
 
 
 def loaded_after(code):
@@ -32,9 +24,7 @@ def loaded_after(code):
     return set(done.stdout.split())
 
 
-def test_the_public_names_are_sorted_and_there():
-    assert list(crossfield.__all__) == sorted(crossfield.__all__)
-    assert len(set(crossfield.__all__)) == len(crossfield.__all__) > 25
+def test_the_public_names_are_there():
     for name in crossfield.__all__:
         assert getattr(crossfield, name) is not None
     assert set(crossfield.__all__) <= set(dir(crossfield))
@@ -44,18 +34,11 @@ def test_the_public_names_are_sorted_and_there():
 
 def test_every_error_that_is_raised_on_purpose_is_public():
     family = {name for name, thing in vars(errors).items() if is_error(thing)}
-    assert len(family) > 10
     assert family <= set(crossfield.__all__)
 
 
 def is_error(thing):
     return inspect.isclass(thing) and issubclass(thing, crossfield.CrossfieldError)
-
-
-def test_results_have_the_field_that_was_found():
-    for name in ("Proof", "Report", "Search", "Solution", "TwoStage"):
-        result = getattr(crossfield, name)
-        assert hasattr(result, "field") or "field" in result.__dataclass_fields__, name
 
 
 WORDS = {
@@ -99,58 +82,6 @@ def test_type_checkers_see_the_same_names():
     assert static == set(crossfield.__all__)
 
 
-def documented():
-    for name in crossfield.__all__:
-        yield name, getattr(crossfield, name)
-    for module_name in MODULES:
-        module = _module(f"crossfield.{module_name}")
-        if module is None:
-            continue
-        yield module_name, module
-        for name, thing in vars(module).items():
-            if name.startswith("_") or getattr(thing, "__module__", None) != module.__name__:
-                continue
-            if inspect.isclass(thing) or inspect.isfunction(thing):
-                yield f"{module_name}.{name}", thing
-            if inspect.isclass(thing):
-                yield from _methods(f"{module_name}.{name}", thing)
-
-
-def _module(name):
-    """The module, or None when it is about a program that is not installed here."""
-    try:
-        return import_module(name)
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.startswith("crossfield"):
-            raise
-        return None
-
-
-def _methods(path, thing):
-    for name, member in vars(thing).items():
-        function = member.fget if isinstance(member, property) else getattr(member, "func", member)
-        if (
-            not name.startswith("_")
-            and isinstance(function, FunctionType)
-            and function.__qualname__.startswith(thing.__name__)
-        ):
-            yield f"{path}.{name}", function
-
-
-def test_everything_public_says_what_it_is_in_a_first_sentence():
-    found = list(documented())
-    assert len(found) > 1000
-    faults = [
-        name for name, thing in found if not _is_sentence((inspect.getdoc(thing) or "-").splitlines()[0])
-    ]
-    assert faults == []
-
-
-def _is_sentence(line):
-    """Whether it begins and ends like a sentence, or continues with details on the next line."""
-    return bool(re.match(r"[A-Z0-9`.]", line)) and line[-1] in ".:"
-
-
 SOLVERS_AND_LAYOUT = {
     "jinja2",
     "matplotlib",
@@ -162,13 +93,6 @@ SOLVERS_AND_LAYOUT = {
     "rich",
     "typer",
 }
-
-
-def test_the_models_know_no_solver_and_no_template():
-    imports = "\n".join(f"import crossfield.{name}" for name in MODULES if name.startswith("models."))
-    loaded = loaded_after(imports)
-    assert {"numpy", "sympy"} <= loaded
-    assert not loaded & SOLVERS_AND_LAYOUT
 
 
 def test_a_sketch_becomes_a_field_without_solvers_or_pictures():

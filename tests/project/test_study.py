@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from importlib import import_module
 from types import SimpleNamespace
 
 import places
@@ -32,12 +31,9 @@ work.carry_out(None, Path({data!r}), jobs=1, scheduler={scheduler!r}, progress=l
 
 
 @pytest.fixture(scope="module")
-def study():
+def study(docs_module):
     """The modules of the study."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(DOCS)
-        names = ("page", "plan", "practice_page", "rows", "work")
-        yield SimpleNamespace(**{name: import_module(f"studying.{name}") for name in names})
+    return SimpleNamespace(**{name: docs_module(f"studying.{name}") for name in ("page", "plan", "rows")})
 
 
 def lines_of(path):
@@ -97,51 +93,11 @@ def test_a_second_row_of_a_run_and_a_file_of_another_study_are_refused(study, tm
         study.rows.Rows(tmp_path / "b.csv")
 
 
-def practice_rows(study, errors, size=24.0):
-    for number, (way, (error, energy, seconds, limit)) in enumerate(errors.items()):
-        for drawing in ("mouse", "ring", "saddle"):
-            row = dict.fromkeys(study.rows.COLUMNS) | {"part": "practice", "instance": drawing, "way": way}
-            row |= {"size": size, "hidden": 0.0, "status": "field", "energy_2": energy, "off": 1.0}
-            row |= {"error": error + 0.01 * number, "seconds": seconds, "limit": limit}
-            yield row
-
-
-def test_the_recommendation_follows_the_rows(study):
-    slow = {"search": (5.0, 1.0, 10.0, 10.0), "two-stage": (6.0, 2.0, 10.0, 10.0)}
-    texts = []
-    for bend, greedy in ((3.0, 4.0), (4.0, 3.0)):
-        ways = {"bend": (bend, 1.5, 0.1, 0.0), "greedy": (greedy, 1.2, 0.1, 0.0)} | slow
-        kept = {"practice": list(practice_rows(study, ways))}
-        texts.append(study.practice_page.recommendation(kept))
-    assert [sentences[0].split("`")[1] for sentences in texts] == ["bend", "greedy"]
-    assert {sentences[1] for sentences in texts} == {
-        "For the lowest energy, use `search, 10 s` at 24 pixels."
-    }
-    assert all(len(sentences) == 2 for sentences in texts)
-    sizes = {
-        24.0: {"bend": (3.0, 1.5, 0.1, 0.0), "greedy": (4.0, 1.2, 0.1, 0.0)} | slow,
-        48.0: {"bend": (3.0, 1.5, 2.0, 0.0), "greedy": (4.0, 1.2, 0.9, 0.0)} | slow,
-        128.0: {"bend": (3.0, 1.5, 9.0, 0.0), "greedy": (4.0, 1.2, 8.0, 0.0)} | slow,
-    }
-    rows = [row for size, ways in sizes.items() for row in practice_rows(study, ways, size)]
-    first, second = study.practice_page.recommendation({"practice": rows})
-    assert all(each in first for each in ("`bend` at 24 pixels", "`greedy` at 48 pixels"))
-    assert second == "For the lowest energy, use `search, 10 s` at 24, 48 and 128 pixels."
-    nothing = {"practice": []}
-    assert study.practice_page.recommendation(nothing) == ["The methods are not measured yet."]
-
-
-@pytest.mark.slow
-def test_every_planned_run_is_another_one(study):
-    runs = [run for stage in study.plan.stages(study.plan.QUICK, None) for run in stage.runs]
-    assert len({run.key for run in runs}) == len(runs) > 50
-
-
 @pytest.mark.slow
 def test_the_page_and_its_tables_are_made_from_the_rows(study, tmp_path):
     study.page.write_page(DATA, tmp_path, study.plan.FULL)
     names = ["evidence.md", *(f"evidence/{path.name}" for path in (DOCS / "evidence").iterdir())]
-    assert len(list((tmp_path / "evidence").iterdir())) == len(names) - 1 > 10
+    assert len(list((tmp_path / "evidence").iterdir())) == len(names) - 1
     for name in names:
         assert (tmp_path / name).read_text() == (DOCS / name).read_text(), name
     short = study.page.in_short(study.page.read(DATA), study.plan.FULL)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from importlib import import_module
 
 import places
 import pytest
@@ -16,11 +15,9 @@ DOCS = places.ROOT / "docs"
 
 
 @pytest.fixture(scope="module")
-def validate():
+def validate(docs_module):
     """The program that makes the page."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(DOCS)
-        yield import_module("validate")
+    return docs_module("validate")
 
 
 def test_each_program_with_a_licence_has_a_last_run_on_the_page(validate):
