@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from .export.solving.two_stage import fit_angles as fit_angles
     from .export.solving.two_stage import two_stage as two_stage
     from .export.surfaces.files import write_surface as write_surface
-    from .models.errors import ConsistencyError as ConsistencyError
     from .models.errors import CrossfieldError as CrossfieldError
     from .models.errors import FormulationError as FormulationError
     from .models.errors import InputError as InputError
@@ -91,7 +90,6 @@ if TYPE_CHECKING:
 
 _HOME: Final = {
     "Certificate": ".models.proof.certificate",
-    "ConsistencyError": ".models.errors",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
     "Evaluation": ".export.solving.evaluate",

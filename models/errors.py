@@ -106,16 +106,3 @@ class SolutionError(CrossfieldError):
 
 class OutputError(CrossfieldError):
     """A file or folder that cannot be written."""
-
-
-class ConsistencyError(CrossfieldError):
-    """A file whose content would differ from its problem: a defect of crossfield. No file is written."""
-
-    def __init__(self, message: str, *, file: str | Path | None = None) -> None:
-        """Add the request to report the defect, unless `message` already has it."""
-        super().__init__(message if message.endswith(_REPORT) else message + _REPORT, file=file)
-
-
-_REPORT: Final = (
-    "; no file was written: this is a defect of crossfield, please report it with the command and its input"
-)

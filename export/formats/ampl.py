@@ -19,7 +19,6 @@ ends with comments that print an answer with our names, as a readable solution f
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -31,15 +30,13 @@ from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.names import name_length
 from ...models.formulations.problem import Problem
-from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet, Variable, elements, pixel_of
+from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet, Variable, pixel_of
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
-from ..writing.counting import Expected, check
 from ..writing.expressions import Language, wrapped
 from ..writing.records import (
-    Counted,
     Decimals,
     Piece,
     Pieces,
@@ -100,39 +97,33 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
 
 def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
     """The bytes of the .dat file, block by block. header: lines of comment, without the comment sign."""
-    instance, counts = problem.instance, Counter[str]()
+    instance = problem.instance
     for line in header:
         yield f"# {line}\n".encode()
     yield b"data;\nset I :=\n"
     rows, columns = _place(instance, "pixels")
-    yield from render(
-        [Counted(counts, "pixels"), b"(", Decimals(rows), b",", Decimals(columns), b")\n"], len(rows)
-    )
+    yield from render([b"(", Decimals(rows), b",", Decimals(columns), b")\n"], len(rows))
     yield b";\nparam: S_c: theta w :=\n"
-    strokes: Pieces = [Counted(counts, "strokes", words(instance.w))]
-    yield from _listed(instance, "strokes", [words(instance.target), b" ", *strokes])
+    yield from _listed(instance, "strokes", [words(instance.target), b" ", words(instance.w)])
     weights = {"w_strokes": instance.stroke_coefficient, "w_beta": instance.skew_coefficient}
     lines = "\n".join(f"param {name} := {number(value)};" for name, value in weights.items())
     yield b";\n" + lines.encode() + b"\n"
     if problem.jumps is not None and len(problem.jumps):
         at = np.nonzero(problem.jumps)[0]
         yield b"param p :=\n"
-        jumps = Counted(counts, "jumps", words(problem.jumps[at].astype(np.float64)))
-        yield from _listed(instance, "pairs", [jumps], at)
+        yield from _listed(instance, "pairs", [words(problem.jumps[at].astype(np.float64))], at)
         yield b";\n"
-    yield from _windows(problem, counts)
+    yield from _windows(problem)
     yield b"end;\n"
-    narrow = {f"bounds of {over}": elements(instance, over) for over in _narrowed(problem)}
-    check(counts, Expected(problem).data() | narrow)
 
 
-def _windows(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
+def _windows(problem: Problem) -> Iterator[bytes]:
     """The windows, and the ranges of jumps that are variables, where they are narrower than the gauge's."""
     for over, names in _narrowed(problem).items():
         yield f"param: {' '.join(names)} :=\n".encode()
         values = (words(problem.data[name].astype(np.float64)) for name in names)
         parts = [part for each in values for part in (b" ", each)][1:]
-        yield from _listed(problem.instance, over, [Counted(counts, f"bounds of {over}"), *parts])
+        yield from _listed(problem.instance, over, parts)
         yield b";\n"
 
 

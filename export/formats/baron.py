@@ -20,7 +20,6 @@ docs/format-rules.md; sections and grammar: BARON's user manual, section 4.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from typing import Final
 
@@ -30,10 +29,9 @@ from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical, Kind, coefficient
-from ..writing.counting import Expected, check
 from ..writing.expressions import Language, wrapped
 from ..writing.names import Names
-from ..writing.records import Counted, Piece, Tagged, render, scalar_when_constant, signed, words
+from ..writing.records import Piece, Tagged, render, scalar_when_constant, signed, words
 from .gams import Scalar, declared
 
 WIDTH = 160
@@ -42,10 +40,10 @@ WIDTH = 160
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the .bar file, block by block. header: lines of comment. start: a point (columns,)."""
-    problem, names, counts = form.problem, form.names, Counter[str]()
+    problem, names = form.problem, form.names
     for line in header:
         yield f"// {line}\n".encode()
-    yield from _variables(form, counts)
+    yield from _variables(form)
     for title, low in ((b"LOWER", True), (b"UPPER", False)):
         yield title + b"_BOUNDS{\n"
         for block in problem.blocks.values():
@@ -54,22 +52,12 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         yield form.one + b": 1;\n}\n"
     if problem.rows:
         lists = [(names.row(family), family.count) for family in problem.rows]
-        yield from declared(b"EQUATIONS", lists, counts, "rows")
+        yield from declared(b"EQUATIONS", lists)
     for family in problem.rows:
-        yield from _rows(family, names, counts)
-    yield from _objective(problem, names, counts)
+        yield from _rows(family, names)
+    yield from _objective(problem, names)
     if start is not None:
         yield from _start(form, start)
-    expected = Expected(problem, degree=0)
-    check(
-        counts,
-        expected.in_rows()
-        | {
-            "columns": expected.columns,
-            "rows with an expression": expected.rows,
-            "columns in the objective": expected.declared,
-        },
-    )
 
 
 _KEYWORDS: Final[dict[Kind, bytes]] = {
@@ -79,12 +67,12 @@ _KEYWORDS: Final[dict[Kind, bytes]] = {
 }
 
 
-def _variables(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
+def _variables(form: Canonical) -> Iterator[bytes]:
     for kind, keyword in _KEYWORDS.items():
         chosen = form.blocks(kind)
         if chosen:
             lists = [(form.names.of(block), block.count) for block in chosen]
-            yield from declared(keyword.replace(b"%b", form.one), lists, counts, "columns")
+            yield from declared(keyword.replace(b"%b", form.one), lists)
 
 
 def _bounds(block: Block, names: Names, *, low: bool) -> Iterator[bytes]:
@@ -98,21 +86,19 @@ def _assigned(name: Tagged, values: Floats) -> Iterator[bytes]:
         yield from render([name, b": ", words(scalar_when_constant(values)), b";\n"], len(values))
 
 
-def _rows(family: PlacedFamily, names: Names, counts: Counter[str]) -> Iterator[bytes]:
-    terms = [_monomial(term, names, counts) for term in (*family.of_degree(1), *family.of_degree(2))]
+def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
+    terms = [_monomial(term, names) for term in (*family.of_degree(1), *family.of_degree(2))]
     sense = f" {family.family.sense} ".encode()
-    name = Counted(counts, "rows with an expression", names.row(family))
-    parts = [name, b":", *(piece for term in terms for piece in term), sense]
+    parts = [names.row(family), b":", *(piece for term in terms for piece in term), sense]
     yield from render([*parts, words(scalar_when_constant(family.limit)), b";\n"], family.count)
 
 
-def _monomial(term: Monomial, names: Names, counts: Counter[str]) -> list[Piece]:
+def _monomial(term: Monomial, names: Names) -> list[Piece]:
     """A signed term of a row, without a coefficient of 1."""
     assert term.degree in {1, 2}  # no declaration has other rows
-    what = "coefficients of rows" if term.degree == 1 else "products of rows"
-    lead: list[Piece] = [b" ", Counted(counts, what, words(coefficient(term), signed)), b"*"]
+    lead: list[Piece] = [b" ", words(coefficient(term), signed), b"*"]
     if np.ndim(term.coefficient) == 0 and abs(term.coefficient) == 1:
-        lead = [Counted(counts, what, b" + " if term.coefficient == 1 else b" - ")]
+        lead = [b" + " if term.coefficient == 1 else b" - "]
     first, *rest = (names.at(term.family, symbol) for symbol in term.symbols)
     return [*lead, first, *(piece for name in rest for piece in (b"*", name))]
 
@@ -123,10 +109,10 @@ class _Baron(Scalar):
     power = Language.power
 
 
-def _objective(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
+def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
     yield b"OBJ: minimize\n"
     for family in problem.objective:
-        terms = _Baron(family, names, counts).summands(family.family.expression)
+        terms = _Baron(family, names).summands(family.family.expression)
         yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)
     yield b";\n"
 

@@ -24,7 +24,6 @@ G-numbers: docs/format-rules.md.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -37,11 +36,9 @@ from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...templates import stream
 from ..writing.canonical import Canonical
-from ..writing.counting import Expected, check
 from ..writing.expressions import Language, is_data, wrapped
 from ..writing.names import Names
 from ..writing.records import (
-    Counted,
     Piece,
     Tagged,
     Texts,
@@ -77,13 +74,13 @@ WIDTH: Final = 160
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the GAMS file, block by block. header: lines of comment. start: a point (columns,)."""
-    problem, names, counts = form.problem, form.names, Counter[str]()
+    problem, names = form.problem, form.names
     blocks = {
-        "variables": _variables(form, counts),
-        "equations": _equations(problem, names, counts),
-        "objective": _objective(problem, names, counts),
-        "rows": _rows(problem, names, counts),
-        "bounds": _bounds(problem, names, counts),
+        "variables": _variables(form),
+        "equations": _equations(problem, names),
+        "objective": _objective(problem, names),
+        "rows": _rows(problem, names),
+        "bounds": _bounds(problem, names),
         "start": () if start is None else _start(problem, names, start),
         "results": _results(problem, names),
     }
@@ -96,18 +93,6 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         model_type=MODEL_TYPES[problem.problem_class],
         start=objective,
     )
-    expected = Expected(problem, degree=0)
-    check(
-        counts,
-        {
-            "columns": expected.columns,
-            "columns with bounds": expected.columns,
-            "rows": expected.rows,
-            "rows with an expression": expected.rows,
-            "columns in the objective": expected.declared,
-            "columns in rows": expected.declared_rows,
-        },
-    )
 
 
 def bracketed(values: Floats) -> Texts:
@@ -119,16 +104,13 @@ def bracketed(values: Floats) -> Texts:
 class Scalar(Language):
     """GAMS's language for one family: symbols are column names, data are numbers, one per record."""
 
-    def __init__(self, family: PlacedFamily, names: Names, counts: Counter[str]) -> None:
-        """Store the counts of places with columns."""
+    def __init__(self, family: PlacedFamily, names: Names) -> None:
         self._family = family
         self._names = names
-        self._counts = counts
-        self._where = "columns in rows" if family.family.is_row else "columns in the objective"
 
     def symbol(self, symbol: sp.Symbol) -> Piece:
         """A column's name at each element."""
-        return Counted(self._counts, self._where, self._names.at(self._family, symbol))
+        return self._names.at(self._family, symbol)
 
     def is_data(self, expression: sp.Expr) -> bool:
         """Whether it holds no column."""
@@ -154,13 +136,8 @@ def _number_words(values: Floats | float, *, signed: bool) -> Piece:
     return words(given, with_sign if signed else bracketed)
 
 
-def declared(
-    keyword: bytes, lists: list[tuple[Tagged, int]], counts: Counter[str], what: str
-) -> Iterator[bytes]:
-    """A statement that declares names as one wrapped list.
-
-    lists: the names, with their numbers. counts: receives their sum at `what`.
-    """
+def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]:
+    """A statement that declares names as one wrapped list. lists: the names, with their numbers."""
     per_line = WIDTH // (max(name.width for name, _ in lists) + 2)
     total = sum(count for _, count in lists)
     yield keyword + b"\n  "
@@ -168,51 +145,47 @@ def declared(
     for name, count in lists:
         place = np.arange(start + 1, start + count + 1)
         separator = np.where(place == total, 2, place % per_line == 0)
-        yield from render(
-            [Counted(counts, what, name), Words(table([b", ", b",\n  ", b";\n"]), separator)], count
-        )
+        yield from render([name, Words(table([b", ", b",\n  ", b";\n"]), separator)], count)
         start += count
 
 
 KEYWORDS: Final = {"continuous": b"Variables", "binary": b"Binary Variables", "integer": b"Integer Variables"}
 
 
-def _variables(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
+def _variables(form: Canonical) -> Iterator[bytes]:
     for block in form.problem.blocks.values():
         if block.count:
             lists = [(form.names.of(block), block.count)]
-            yield from declared(KEYWORDS[form.kind(block)], lists, counts, "columns")
+            yield from declared(KEYWORDS[form.kind(block)], lists)
 
 
-def _equations(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
+def _equations(problem: Problem, names: Names) -> Iterator[bytes]:
     if problem.rows:
         lists = [(names.row(family), family.count) for family in problem.rows]
-        yield from declared(b"Equations", lists, counts, "rows")
+        yield from declared(b"Equations", lists)
 
 
-def _objective(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
+def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
     """The terms of the objective, one line per element (more if it is long)."""
     for family in problem.objective:
-        terms = Scalar(family, names, counts).summands(family.family.expression)
+        terms = Scalar(family, names).summands(family.family.expression)
         yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)
 
 
-def _rows(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
+def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
     for family in problem.rows:
-        language, relation = Scalar(family, names, counts), family.family.expression
+        language, relation = Scalar(family, names), family.family.expression
         left, right = language.expression(relation.lhs), language.expression(relation.rhs)
-        head: list[Piece] = [Counted(counts, "rows with an expression", names.row(family)), b".. "]
-        parts = [*head, *left, SENSES[family.family.sense], *right, b";\n"]
+        parts: list[Piece] = [names.row(family), b".. ", *left, SENSES[family.family.sense], *right, b";\n"]
         yield from render(parts, family.count)
 
 
-def _bounds(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
+def _bounds(problem: Problem, names: Names) -> Iterator[bytes]:
     for block in problem.blocks.values():
         fixed = block.lower == block.upper
         for chosen, suffixes in ((fixed, ("fx",)), (~fixed, ("lo", "up"))):
             at = np.nonzero(chosen)[0]
-            parts = [Counted(counts, "columns with bounds"), *_bound_parts(block, names, at, suffixes)]
-            yield from render(parts, len(at))
+            yield from render(_bound_parts(block, names, at, suffixes), len(at))
 
 
 def _bound_parts(block: Block, names: Names, at: NDArray[Any], suffixes: tuple[str, ...]) -> list[Piece]:

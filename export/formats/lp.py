@@ -22,35 +22,31 @@ one term, so that no line is long (L30). A model without rows gets the row `c_ON
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 
 from ...models.formulations.families import Block, PlacedFamily
-from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
-from ..writing.counting import Expected, check
 from ..writing.names import Names
-from ..writing.records import Counted, Piece, Pieces, bounds, render, scalar_when_constant, signed, words
+from ..writing.records import Piece, Pieces, bounds, render, scalar_when_constant, signed, words
 
 
 def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     """The bytes of the LP file, block by block. header: lines of comment, without the comment sign."""
-    problem, names, counts = form.problem, form.names, Counter[str]()
+    problem, names = form.problem, form.names
     for line in header:
         yield f"\\ {line}\n".encode()
     yield f"Minimize\n obj_{problem.stamp}:".encode()
     yield from render([b" ", words(form.constant, signed), b" ", form.one, b"\n"], 1)
-    products = form.products()
-    yield from _objective(form, products, counts)
+    yield from _objective(form)
     yield b"Subject To\n"
     if not problem.rows:
         yield b" c_ONE: + 1 %b = 1\n" % form.one
     for family in problem.rows:
-        yield from _rows(family, names, counts)
+        yield from _rows(family, names)
     yield b"Bounds\n"
     yield b" 1 <= %b <= 1\n" % form.one
     for block in problem.blocks.values():
-        yield from _bounds(block, names, counts)
+        yield from _bounds(block, names)
     if form.blocks("integer"):
         yield b"Generals\n"
     for block in form.blocks("integer"):
@@ -60,41 +56,37 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     for block in form.blocks("binary"):
         yield from render([b" ", names.of(block), b"\n"], block.count)
     yield b"End\n"
-    expected = Expected(problem)
-    check(counts, expected.as_coefficients(products[1]) | {"columns with bounds": expected.columns})
 
 
-def _objective(form: Canonical, products: tuple[Ints, Floats], counts: Counter[str]) -> Iterator[bytes]:
+def _objective(form: Canonical) -> Iterator[bytes]:
     names = form.names
     for block in form.problem.blocks.values():
         cost = words(scalar_when_constant(form.costs[block.slice]), signed)
-        counted, name = Counted(counts, "linear costs", cost), Counted(counts, "columns", names.of(block))
-        yield from render([b" ", counted, b" ", name, b"\n"], block.count)
-    index, factor = products
+        yield from render([b" ", cost, b" ", names.of(block), b"\n"], block.count)
+    index, factor = form.products()
     if not len(factor):
         return
     square = index[:, 0] == index[:, 1]
     yield b" + [\n"
     for chosen in (square, ~square):
         pair = index[chosen]
-        value = Counted(counts, "products of the objective", words(2 * factor[chosen], signed))
+        value = words(2 * factor[chosen], signed)
         tail: Pieces = [b" ^2\n"] if chosen is square else [b" * ", names.all.at(pair[:, 1]), b"\n"]
         yield from render([b" ", value, b" ", names.all.at(pair[:, 0]), *tail], len(pair))
     yield b" ] / 2\n"
 
 
-def _rows(family: PlacedFamily, names: Names, counts: Counter[str]) -> Iterator[bytes]:
-    parts: list[Piece] = [b" ", Counted(counts, "rows", names.row(family)), b":"]
+def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
+    parts: list[Piece] = [b" ", names.row(family), b":"]
     for term in family.of_degree(1):
-        value = Counted(counts, "coefficients of rows", words(coefficient(term), signed))
-        parts += [b" ", value, b" ", names.at(family, term.symbols[0])]
+        parts += [b" ", words(coefficient(term), signed), b" ", names.at(family, term.symbols[0])]
     products = family.of_degree(2)
     if products:
         parts.append(b" + [")
         for term in products:
             parts += [
                 b" ",
-                Counted(counts, "products of rows", words(coefficient(term), signed)),
+                words(coefficient(term), signed),
                 b" ",
                 names.at(family, term.symbols[0]),
                 b" * ",
@@ -106,7 +98,6 @@ def _rows(family: PlacedFamily, names: Names, counts: Counter[str]) -> Iterator[
     yield from render(parts, family.count)
 
 
-def _bounds(block: Block, names: Names, counts: Counter[str]) -> Iterator[bytes]:
+def _bounds(block: Block, names: Names) -> Iterator[bytes]:
     lower, upper = (words(scalar_when_constant(end), bounds) for end in (block.lower, block.upper))
-    name = Counted(counts, "columns with bounds", names.of(block))
-    yield from render([b" ", lower, b" <= ", name, b" <= ", upper, b"\n"], block.count)
+    yield from render([b" ", lower, b" <= ", names.of(block), b" <= ", upper, b"\n"], block.count)

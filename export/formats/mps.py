@@ -17,7 +17,6 @@ M-numbers: docs/format-rules.md.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -25,15 +24,12 @@ import numpy as np
 from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SLOTS
-from ...models.instance.grid import Bools, Floats, Grid, Ints
+from ...models.instance.grid import Bools, Grid, Ints
 from ..writing.canonical import Canonical, coefficient
-from ..writing.counting import Expected, check
 from ..writing.names import Names, problem_name
 from ..writing.records import (
-    Counted,
     OnlyWhere,
     Piece,
-    Pieces,
     Tagged,
     number,
     render,
@@ -42,38 +38,34 @@ from ..writing.records import (
 )
 
 _KIND = {">=": b"G", "<=": b"L", "==": b"E"}
-_ENTRIES = "coefficients of rows"
 
 
 def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     """The bytes of the MPS file, block by block. header: lines of comment, without the comment sign."""
-    problem, names, counts = form.problem, form.names, Counter[str]()
+    problem, names = form.problem, form.names
     for line in header:
         yield f"* {line}\n".encode()
     yield f"NAME {problem_name(problem)} FREE\nROWS\n N obj\n".encode()
     if not problem.rows:
         yield b" E c_ONE\n"
     for family in problem.rows:
-        name = Counted(counts, "rows", names.row(family))
-        yield from render([b" " + _KIND[family.family.sense] + b" ", name, b"\n"], family.count)
+        head = b" " + _KIND[family.family.sense] + b" "
+        yield from render([head, names.row(family), b"\n"], family.count)
     yield b"COLUMNS\n"
-    yield from _columns(form, counts)
+    yield from _columns(form)
     yield b"RHS\n"
     yield from _right_sides(problem, names)
     yield b"BOUNDS\n"
     for block in problem.blocks.values():
-        yield from _bounds(block, names, counts)
+        yield from _bounds(block, names)
     yield b" FX BND1 %b 1\n" % form.one
-    products = form.products()
-    yield from _objective_matrix(names, products, counts)
+    yield from _objective_matrix(form)
     for family in problem.rows:
-        yield from _row_matrices(family, names, counts)
+        yield from _row_matrices(family, names)
     yield b"ENDATA\n"
-    expected = Expected(problem)
-    check(counts, expected.as_coefficients(products[1]) | {"columns with bounds": expected.columns})
 
 
-def _columns(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
+def _columns(form: Canonical) -> Iterator[bytes]:
     """Matrix entries column by column; a record is a column: its cost first, then by row."""
     problem, names = form.problem, form.names
     rows = {family.family.tag: names.row(family) for family in problem.rows}
@@ -86,10 +78,9 @@ def _columns(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
             entries = [
                 entry
                 for family in problem.rows
-                for entry in _entries(family, block, name, rows[family.family.tag], counts)
+                for entry in _entries(family, block, name, rows[family.family.tag])
             ]
-            head: Pieces = [b" ", Counted(counts, "columns", name), b" obj "]
-            yield from render([*head, Counted(counts, "linear costs", cost), b"\n", *entries], block.count)
+            yield from render([b" ", name, b" obj ", cost, b"\n", *entries], block.count)
         if integer:
             yield f" MARKER{markers + 1} 'MARKER' 'INTEND'\n".encode()
             markers += 2
@@ -98,19 +89,16 @@ def _columns(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
         yield b" %b c_ONE 1\n" % form.one
 
 
-def _entries(
-    family: PlacedFamily, block: Block, name: Tagged, rows: Tagged, counts: Counter[str]
-) -> Iterator[Piece | OnlyWhere]:
+def _entries(family: PlacedFamily, block: Block, name: Tagged, rows: Tagged) -> Iterator[Piece | OnlyWhere]:
     """The lines of a column of a block for the rows of a family, in the order of rows."""
     chosen = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
     lines = [line for term in chosen for line in _incident(family, term)]
     for _, row, term in sorted(lines, key=lambda line: line[0]):
         value = words(coefficient(term))
         if row is None:
-            line: Pieces = [b" ", name, b" ", rows, b" ", Counted(counts, _ENTRIES, value), b"\n"]
-            yield from line
+            yield from (b" ", name, b" ", rows, b" ", value, b"\n")
         else:
-            at_row = Counted(counts, _ENTRIES, value if isinstance(value, bytes) else value.at(row))
+            at_row = value if isinstance(value, bytes) else value.at(row)
             yield OnlyWhere(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
 
 
@@ -166,7 +154,7 @@ def _right_sides(problem: Problem, names: Names) -> Iterator[bytes]:
         yield from render([b" RHS1 ", names.row(family).at(at), b" ", value, b"\n"], len(at))
 
 
-def _bounds(block: Block, names: Names, counts: Counter[str]) -> Iterator[bytes]:
+def _bounds(block: Block, names: Names) -> Iterator[bytes]:
     """Bounds kind by kind; within a kind one record per column, two lines where both ends are named."""
     low, high = np.isfinite(block.lower), np.isfinite(block.upper)
     fixed = block.lower == block.upper
@@ -180,7 +168,7 @@ def _bounds(block: Block, names: Names, counts: Counter[str]) -> Iterator[bytes]
     for chosen, first, second in kinds:
         at = np.nonzero(chosen)[0]
         name = names.of(block) if len(at) == block.count else names.of(block).at(at)
-        parts: list[Piece] = [Counted(counts, "columns with bounds")]
+        parts: list[Piece] = []
         for kind in filter(None, (first, second)):
             value = {b"FX": block.lower, b"LO": block.lower, b"UP": block.upper}.get(kind)
             parts += [b" " + kind + b" BND1 ", name]
@@ -190,19 +178,17 @@ def _bounds(block: Block, names: Names, counts: Counter[str]) -> Iterator[bytes]
         yield from render(parts, len(at))
 
 
-def _objective_matrix(names: Names, products: tuple[Ints, Floats], counts: Counter[str]) -> Iterator[bytes]:
-    index, factor = products
+def _objective_matrix(form: Canonical) -> Iterator[bytes]:
+    names, (index, factor) = form.names, form.products()
     if not len(factor):
         return
     hessian = np.where(index[:, 0] == index[:, 1], 2 * factor, factor)
-    value = Counted(counts, "products of the objective", words(hessian))
+    one, two = (names.all.at(column) for column in index.T)
     yield b"QUADOBJ\n"
-    yield from render(
-        [b" ", names.all.at(index[:, 0]), b" ", names.all.at(index[:, 1]), b" ", value, b"\n"], len(index)
-    )
+    yield from render([b" ", one, b" ", two, b" ", words(hessian), b"\n"], len(index))
 
 
-def _row_matrices(family: PlacedFamily, names: Names, counts: Counter[str]) -> Iterator[bytes]:
+def _row_matrices(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     products = family.of_degree(2)
     if not products:
         return
@@ -210,7 +196,6 @@ def _row_matrices(family: PlacedFamily, names: Names, counts: Counter[str]) -> I
     for term in products:
         first, second = (names.at(family, symbol) for symbol in term.symbols)
         half = words(np.asarray(coefficient(term)) / 2)
-        counted = Counted(counts, "products of rows", half)
-        parts += [b" ", first, b" ", second, b" ", counted, b"\n"]
+        parts += [b" ", first, b" ", second, b" ", half, b"\n"]
         parts += [b" ", second, b" ", first, b" ", half, b"\n"]
     yield from render(parts, family.count)

@@ -21,7 +21,6 @@ the constant in r. Binary: one letter, little-endian int32 and float64.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
@@ -33,12 +32,10 @@ from ...models.formulations.families import Monomial, PlacedFamily
 from ...models.formulations.names import name_length
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
-from ..writing.counting import Expected, check
 from ..writing.expressions import is_data, split
 from ..writing.names import OBJECTIVE
 from ..writing.nl_layout import Layout, nonlinear_terms, runs
 from ..writing.records import (
-    Counted,
     Decimals,
     Part,
     Piece,
@@ -54,7 +51,6 @@ from ..writing.stamps import stamp_option
 __all__ = ["Layout", "generate"]
 
 ADD, MULTIPLY, POWER, NEGATE, COSINE, SUM = 0, 2, 5, 16, 46, 54
-_FACTORS: Final = "factors of products in rows"
 _FUNCTIONS: Final = {sp.cos: COSINE}
 
 
@@ -67,10 +63,6 @@ class Text:
     letter, arithmetic = b"g", 0
     padded = True
 
-    def __init__(self) -> None:
-        """Begin to count the content of one file."""
-        self.counts = Counter[str]()
-
     def number(self, value: Numbers) -> bytes | Part:
         """A number within a token, decimal if it is whole by its type."""
         if isinstance(value, int):
@@ -78,12 +70,12 @@ class Text:
         values = np.asarray(value)
         return Decimals(values) if values.dtype.kind == "i" else words(values)
 
-    def token(self, name: bytes, *numbers: Numbers | Counted) -> list[Piece]:
+    def token(self, name: bytes, *numbers: Numbers) -> list[Piece]:
         """A letter with numbers, numbers alone, or a digit with numbers, which then stand apart from it."""
         parts: list[Piece] = [name] if name else []
         for place, each in enumerate(numbers):
             parts += [b" "] if place or name.isdigit() else []
-            parts.append(each if isinstance(each, Counted) else self.number(each))
+            parts.append(self.number(each))
         return [*parts, b"\n"]
 
     def constant(self, value: Floats | float) -> list[Piece]:
@@ -115,10 +107,10 @@ class Binary(Text):
         values = values.astype("<i4" if values.dtype.kind == "i" else "<f8")
         return Raw(values) if values.ndim else values.tobytes()
 
-    def token(self, name: bytes, *numbers: Numbers | Counted) -> list[Piece]:
+    def token(self, name: bytes, *numbers: Numbers) -> list[Piece]:
         """A letter or a digit, if any, and numbers."""
-        found = (each if isinstance(each, Counted) else self.number(each) for each in numbers)
-        return [name, *found] if name else [*found]
+        parts: list[Piece] = [name] if name else []
+        return parts + [self.number(value) for value in numbers]
 
 
 def generate(
@@ -133,7 +125,7 @@ def generate(
             code, [_monomial(layout, code, term) for term in nonlinear_terms(family)]
         ) or code.constant(0.0)
         head = code.token(b"C", np.arange(first, first + family.count, dtype=np.int32))
-        yield from code.records([Counted(code.counts, "rows"), *head, *body], family.count)
+        yield from code.records([*head, *body], family.count)
         first += family.count
     yield from _objective(layout, code)
     if start is not None:
@@ -143,18 +135,6 @@ def generate(
     yield from _limits(layout, code)
     yield from _bounds(layout, code)
     yield from _jacobian(layout, code)
-    expected = Expected(problem, degree=1)
-    check(
-        code.counts,
-        dict.fromkeys(("rows", "rows with limits", "rows with coefficients"), expected.rows)
-        | {
-            "columns": expected.columns,
-            "linear costs": expected.costs(noise=True),
-            "columns in the objective's tree": expected.declared,
-            "coefficients of rows": expected.nonzeros(1),
-            _FACTORS: expected.factors,
-        },
-    )
 
 
 def _counts(layout: Layout, code: Text) -> bytes:
@@ -196,7 +176,7 @@ def _tree(layout: Layout, code: Text, family: PlacedFamily, expression: sp.Expr)
     if is_data(family, expression):
         return code.constant(family.data(expression))
     if expression.is_Symbol:
-        return _counted(code, "columns in the objective's tree", layout.places(family, expression))
+        return code.token(b"v", layout.places(family, expression))
     if expression.is_Add or expression.is_Mul:
         return _chain(layout, code, family, expression)
     if expression.is_Pow:
@@ -235,13 +215,8 @@ def _monomial(layout: Layout, code: Text, term: Monomial) -> Pieces:
     parts: list[Any] = [*code.token(b"o", MULTIPLY), *code.constant(coefficient(term))]
     *others, last = (layout.places(term.family, symbol) for symbol in term.symbols)
     for factor in others:
-        parts += [*code.token(b"o", MULTIPLY), *_counted(code, _FACTORS, factor)]
-    return [*parts, *_counted(code, _FACTORS, last)]
-
-
-def _counted(code: Text, what: str, column: Ints) -> Pieces:
-    """A variable, counted."""
-    return [Counted(code.counts, what), *code.token(b"v", column)]
+        parts += [*code.token(b"o", MULTIPLY), *code.token(b"v", factor)]
+    return [*parts, *code.token(b"v", last)]
 
 
 def _limits(layout: Layout, code: Text) -> Iterator[bytes]:
@@ -250,8 +225,7 @@ def _limits(layout: Layout, code: Text) -> Iterator[bytes]:
     yield from code.records(code.token(b"r"))
     for family in layout.rows:
         kind = {">=": b"2", "<=": b"1", "==": b"4"}[family.family.sense]
-        bound = code.token(kind, scalar_when_constant(family.limit))
-        yield from code.records([Counted(code.counts, "rows with limits"), *bound], family.count)
+        yield from code.records(code.token(kind, scalar_when_constant(family.limit)), family.count)
 
 
 def _bounds(layout: Layout, code: Text) -> Iterator[bytes]:
@@ -266,8 +240,7 @@ def _bounds(layout: Layout, code: Text) -> Iterator[bytes]:
         for part in runs(kind):
             low, high = scalar_when_constant(lower[part]), scalar_when_constant(upper[part])
             values = {0: (low, high), 1: (high,), 2: (low,), 3: ()}[int(kind[part.start])]
-            bound = [Counted(code.counts, "columns"), *code.token(b"%d" % kind[part.start], *values)]
-            yield from code.records(bound, part.stop - part.start)
+            yield from code.records(code.token(b"%d" % kind[part.start], *values), part.stop - part.start)
 
 
 def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:
@@ -304,15 +277,12 @@ def _jacobian(layout: Layout, code: Text) -> Iterator[bytes]:
         )
     first = 0
     for family, entries in rows:
-        head = code.token(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries))
-        parts = [Counted(code.counts, "rows with coefficients"), *head]
+        parts = code.token(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries))
         for symbol, value in entries:
-            number = Counted(code.counts, "coefficients of rows", code.number(value))
-            parts += code.token(b"", layout.places(family, symbol), number)
+            parts += code.token(b"", layout.places(family, symbol), np.asarray(value, dtype=np.float64))
         yield from code.records(parts, family.count)
         first += family.count
     place, costs = _gradient(layout)
     if len(place):
         yield from code.records(code.token(b"G", 0, len(place)))
-        number = Counted(code.counts, "linear costs", code.number(costs))
-        yield from code.records(code.token(b"", place, number), len(place))
+        yield from code.records(code.token(b"", place, costs), len(place))

@@ -21,7 +21,6 @@ any number of arguments, <square> and <cos> one. O-numbers: docs/format-rules.md
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from html import escape
 from typing import Final
@@ -33,11 +32,9 @@ from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
-from ..writing.counting import Expected, check
 from ..writing.expressions import is_data, split
 from ..writing.names import OBJECTIVE, Names
 from ..writing.records import (
-    Counted,
     Decimals,
     Piece,
     Pieces,
@@ -64,25 +61,22 @@ xsi:schemaLocation="os.optimizationservices.org http://www.optimizationservices.
 
 def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     """The bytes of the OSiL file, block by block. header: lines that describe the content."""
-    problem, names, counts = form.problem, form.names, Counter[str]()
+    problem, names = form.problem, form.names
     description = escape("\n".join(header))
     yield _HEAD.format(name=escape(problem.instance.name), description=description).encode()
     yield f'<variables numberOfVariables="{form.column_count}">\n'.encode()
     for block in problem.blocks.values():
-        yield from _variables(block, names, _LETTER[form.kind(block)], counts)
+        yield from _variables(block, names, _LETTER[form.kind(block)])
     yield b'<var name="%b" type="C" lb="1" ub="1"/>\n</variables>\n' % form.one
-    yield from _objective(problem, counts)
+    yield from _objective(problem)
     yield f'<constraints numberOfConstraints="{problem.n_rows}">\n'.encode()
     for family in problem.rows:
-        yield from _constraints(family, names, counts)
+        yield from _constraints(family, names)
     yield b"</constraints>\n"
-    yield from _linear_rows(problem, counts)
-    products = _coefficients(problem, 2)
-    yield from _quadratic(problem, products, counts)
-    yield from _nonlinear(problem, counts)
+    yield from _linear_rows(problem)
+    yield from _quadratic(problem)
+    yield from _nonlinear(problem)
     yield b"</instanceData>\n</osil>\n"
-    expected = Expected(problem)
-    check(counts, expected.as_coefficients(products[1]) | {_PLACES: expected.declared})
 
 
 def ends(values: Floats) -> Texts:
@@ -90,15 +84,13 @@ def ends(values: Floats) -> Texts:
     return np.where(np.isinf(values), np.where(values > 0, b"INF", b"-INF"), numbers(values))
 
 
-_PLACES: Final = "columns in expressions"
 _LETTER: Final = {"continuous": "C", "binary": "B", "integer": "I"}
 
 
-def _variables(block: Block, names: Names, kind: str, counts: Counter[str]) -> Iterator[bytes]:
+def _variables(block: Block, names: Names, kind: str) -> Iterator[bytes]:
     lower, upper = (words(scalar_when_constant(end), ends) for end in (block.lower, block.upper))
     kind_lower = f'" type="{kind}" lb="'.encode()
-    name = Counted(counts, "columns", names.of(block))
-    parts: Pieces = [b'<var name="', name, kind_lower, lower, b'" ub="', upper, b'"/>\n']
+    parts: Pieces = [b'<var name="', names.of(block), kind_lower, lower, b'" ub="', upper, b'"/>\n']
     yield from render(parts, block.count)
 
 
@@ -122,27 +114,25 @@ def _quadratic_part(problem: Problem, degree: int) -> tuple[Ints, Floats]:
     return merged.at[:, 1:], merged.value
 
 
-def _objective(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
+def _objective(problem: Problem) -> Iterator[bytes]:
     index, cost = _coefficients(problem, 1)
     constant = float(_coefficients(problem, 0)[1].sum())
     yield b'<objectives numberOfObjectives="1">\n'
     size = f'numberOfObjCoef="{len(cost) + 1}"'
     yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" {size}>\n'.encode()
-    value = Counted(counts, "linear costs", words(cost))
-    yield from render([b'<coef idx="', Decimals(index[:, 0]), b'">', value, b"</coef>\n"], len(cost))
+    yield from render([b'<coef idx="', Decimals(index[:, 0]), b'">', words(cost), b"</coef>\n"], len(cost))
     yield f'<coef idx="{problem.n_columns}">{number(constant)}</coef>\n</obj>\n</objectives>\n'.encode()
 
 
-def _constraints(family: PlacedFamily, names: Names, counts: Counter[str]) -> Iterator[bytes]:
+def _constraints(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     limit = words(scalar_when_constant(family.limit))
     lower: Piece = b"-INF" if family.family.sense == "<=" else limit
     upper: Piece = b"INF" if family.family.sense == ">=" else limit
-    name = Counted(counts, "rows", names.row(family))
-    parts: Pieces = [b'<con name="', name, b'" lb="', lower, b'" ub="', upper, b'"/>\n']
+    parts: Pieces = [b'<con name="', names.row(family), b'" lb="', lower, b'" ub="', upper, b'"/>\n']
     yield from render(parts, family.count)
 
 
-def _linear_rows(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
+def _linear_rows(problem: Problem) -> Iterator[bytes]:
     """The matrix row by row: the start of each row, then columns, then values."""
     if not problem.rows:
         return
@@ -159,9 +149,7 @@ def _linear_rows(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
         yield from render(parts, family.count)
     yield b"</colIdx>\n<value>\n"
     for family in problem.rows:
-        values = (words(coefficient(term)) for term in family.of_degree(1))
-        counted = (Counted(counts, "coefficients of rows", value) for value in values)
-        parts = [piece for value in counted for piece in _element(value)]
+        parts = [piece for term in family.of_degree(1) for piece in _element(words(coefficient(term)))]
         yield from render(parts, family.count)
     yield b"</value>\n</linearConstraintCoefficients>\n"
 
@@ -170,22 +158,21 @@ def _element(value: Piece) -> list[Piece]:
     return [b"<el>", value, b"</el>\n"]
 
 
-def _quadratic(problem: Problem, products: tuple[Ints, Floats], counts: Counter[str]) -> Iterator[bytes]:
+def _quadratic(problem: Problem) -> Iterator[bytes]:
     """The products of objective and rows."""
-    index, value = products
+    index, value = _coefficients(problem, 2)
     total = len(value) + sum(family.count * len(family.of_degree(2)) for family in problem.rows)
     if not total:
         return
     yield f'<quadraticCoefficients numberOfQuadraticTerms="{total}">\n'.encode()
-    counted = Counted(counts, "products of the objective", words(value))
-    yield from render(_product(b"-1", Decimals(index[:, 0]), Decimals(index[:, 1]), counted), len(value))
+    one, two = map(Decimals, index.T)
+    yield from render(_product(b"-1", one, two, words(value)), len(value))
     first = 0
     for family in problem.rows:
         row = Decimals(np.arange(first, first + family.count))
         for term in family.of_degree(2):
             one, two = map(Decimals, term.factors)
-            counted = Counted(counts, "products of rows", words(coefficient(term)))
-            yield from render(_product(row, one, two, counted), family.count)
+            yield from render(_product(row, one, two, words(coefficient(term))), family.count)
         first += family.count
     yield b"</quadraticCoefficients>\n"
 
@@ -194,7 +181,7 @@ def _product(row: Piece, one: Piece, two: Piece, value: Piece) -> Pieces:
     return [b'<qTerm idx="', row, b'" idxOne="', one, b'" idxTwo="', two, b'" coef="', value, b'"/>\n']
 
 
-def _nonlinear(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
+def _nonlinear(problem: Problem) -> Iterator[bytes]:
     """The terms of the objective beyond quadratic, as one sum."""
     families = [family for family in problem.objective if family.degree > 2]
     assert all(family.degree <= 2 for family in problem.rows)  # no declaration has others
@@ -202,30 +189,29 @@ def _nonlinear(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
         return
     yield b'<nonlinearExpressions numberOfNonlinearExpressions="1">\n<nl idx="-1">\n<sum>\n'
     for family in families:
-        yield from render([*_tree(family, family.family.body, counts), b"\n"], family.count)
+        yield from render([*_tree(family, family.family.body), b"\n"], family.count)
     yield b"</sum>\n</nl>\n</nonlinearExpressions>\n"
 
 
-def _tree(family: PlacedFamily, expression: sp.Expr, counts: Counter[str]) -> list[Piece]:
+def _tree(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
     """An expression as nodes; parts free of columns become one number."""
     if is_data(family, expression):
         return _constant(family, expression)
     if expression.is_Symbol:
-        column = Decimals(family.column_of(expression))
-        return [Counted(counts, _PLACES, b'<variable idx="'), column, b'"/>']
+        return [b'<variable idx="', Decimals(family.column_of(expression)), b'"/>']
     if expression.is_Add or expression.is_Mul:
-        return _chain(family, expression, counts)
+        return _chain(family, expression)
     if expression.is_Pow and expression.exp == 2:
-        return _node(b"square", _tree(family, expression.base, counts))
+        return _node(b"square", _tree(family, expression.base))
     assert isinstance(expression, sp.cos)  # no declaration holds anything else
-    return _node(b"cos", _tree(family, expression.args[0], counts))
+    return _node(b"cos", _tree(family, expression.args[0]))
 
 
-def _chain(family: PlacedFamily, expression: sp.Expr, counts: Counter[str]) -> list[Piece]:
+def _chain(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
     """A sum or a product, its parts free of columns joined into one number in front."""
     data, others = split(family, expression)
     constant = [] if data is None else _constant(family, data)
-    inside = constant + [piece for part in others for piece in _tree(family, part, counts)]
+    inside = constant + [piece for part in others for piece in _tree(family, part)]
     return _node(b"sum" if expression.is_Add else b"product", inside)
 
 

@@ -28,7 +28,6 @@ programming instances, Mathematical Programming Computation 11 (2019).
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -37,22 +36,19 @@ import numpy as np
 from ...models.formulations.families import PlacedFamily
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
-from ..writing.counting import Expected, check
 from ..writing.curvature import probtype
-from ..writing.records import Counted, Decimals, Piece, number, render, words
+from ..writing.records import Decimals, Piece, number, render, words
 
 INFINITY: Final = 1e20
-
-_COSTS: Final = "linear costs"
 
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the .qplib file, block by block. header: lines of comment. start: a point (columns,)."""
-    problem, counts, products = form.problem, Counter[str](), form.products()
+    problem = form.problem
     yield from _head(form, header)
-    yield from _objective(form, products, counts)
+    yield from _objective(form)
     if problem.rows:
-        yield from _rows(form, counts)
+        yield from _rows(form)
     yield _line(number(INFINITY), "infinity")
     if problem.rows:
         yield from _vector(form.row_lower, "left side of a row")
@@ -65,8 +61,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
     if problem.rows:
         yield from _vector(np.zeros(problem.n_rows), "start of a row's dual")
     yield from _vector(np.zeros(problem.n_columns), "start of a bound's dual")
-    yield from _names(form, counts)
-    check(counts, Expected(problem).as_coefficients(products[1]))
+    yield from _names(form)
 
 
 def _line(value: str, comment: str) -> bytes:
@@ -83,28 +78,23 @@ def _head(form: Canonical, header: list[str]) -> Iterator[bytes]:
     yield from map(_line, values, comments)
 
 
-def _vector(values: Floats, comment: str, counts: Counter[str] | None = None) -> Iterator[bytes]:
-    """A vector: its most frequent value, the number of other values, and these. counts: of linear costs."""
+def _vector(values: Floats, comment: str) -> Iterator[bytes]:
+    """A vector: its most frequent value, the number of other values, and these."""
     finite = np.clip(values, -INFINITY, INFINITY)
     distinct, count = np.unique(finite, return_counts=True)
     usual = float(distinct[count.argmax()])
     at = np.nonzero(finite != usual)[0]
     yield _line(number(usual), f"{comment}, where not listed")
     yield _line(str(len(at)), "listed")
-    value = words(finite[at])
-    listed = value if counts is None else Counted(counts, _COSTS, value)
-    if counts is not None:
-        counts[_COSTS] += (len(values) - len(at)) * (usual != 0)
-    yield from render([Decimals(at + 1), b" ", listed, b"\n"], len(at))
+    yield from render([Decimals(at + 1), b" ", words(finite[at]), b"\n"], len(at))
 
 
-def _objective(form: Canonical, products: tuple[Ints, Floats], counts: Counter[str]) -> Iterator[bytes]:
+def _objective(form: Canonical) -> Iterator[bytes]:
     if form.problem.objective_degree == 2:
-        index, value = products
+        index, value = form.products()
         yield _line(str(len(value)), "quadratic terms of the objective")
-        counted = Counted(counts, "products of the objective", words(2 * value))
-        yield from _products([], index[:, 0], index[:, 1], counted)
-    yield from _vector(form.costs, "linear coefficient of the objective", counts)
+        yield from _products([], index[:, 0], index[:, 1], words(2 * value))
+    yield from _vector(form.costs, "linear coefficient of the objective")
     yield _line(number(form.constant), "constant of the objective")
 
 
@@ -115,7 +105,7 @@ def _products(before: list[Any], one: Ints, two: Ints, value: Piece) -> Iterator
     yield from render(parts, len(one))
 
 
-def _rows(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
+def _rows(form: Canonical) -> Iterator[bytes]:
     """Coefficients of the rows: products, if there are any, then linear terms."""
     problem = form.problem
     for degree in (2, 1) if problem.row_degree == 2 else (1,):
@@ -123,34 +113,32 @@ def _rows(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
         yield _line(str(total), f"{'quadratic' if degree == 2 else 'linear'} terms of rows")
         first = 1
         for family in problem.rows:
-            yield from _row_terms(family, degree, first, counts)
+            yield from _row_terms(family, degree, first)
             first += family.count
 
 
-def _row_terms(family: PlacedFamily, degree: int, first: int, counts: Counter[str]) -> Iterator[bytes]:
+def _row_terms(family: PlacedFamily, degree: int, first: int) -> Iterator[bytes]:
     row = Decimals(np.arange(first, first + family.count))
     linear: list[Any] = []
     for term in family.of_degree(degree):
         value = coefficient(term)
         if degree == 2:
             one, two = term.factors
-            counted = Counted(counts, "products of rows", words(2 * np.asarray(value)))
-            yield from _products([row, b" "], one, two, counted)
+            yield from _products([row, b" "], one, two, words(2 * np.asarray(value)))
         else:
-            counted = Counted(counts, "coefficients of rows", words(value))
-            linear += [row, b" ", Decimals(term.factors[0] + 1), b" ", counted, b"\n"]
+            linear += [row, b" ", Decimals(term.factors[0] + 1), b" ", words(value), b"\n"]
     yield from render(linear, family.count)
 
 
-def _names(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
+def _names(form: Canonical) -> Iterator[bytes]:
     problem, names = form.problem, form.names
     yield _line(str(problem.n_columns), "names of variables")
     for block in problem.blocks.values():
         place = Decimals(np.arange(block.offset + 1, block.offset + block.count + 1))
-        yield from render([place, b" ", Counted(counts, "columns", names.of(block)), b"\n"], block.count)
+        yield from render([place, b" ", names.of(block), b"\n"], block.count)
     yield _line(str(problem.n_rows), "names of rows")
     first = 1
     for family in problem.rows:
         place = Decimals(np.arange(first, first + family.count))
-        yield from render([place, b" ", Counted(counts, "rows", names.row(family)), b"\n"], family.count)
+        yield from render([place, b" ", names.row(family), b"\n"], family.count)
         first += family.count

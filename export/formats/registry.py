@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ...models.arguments import checked_arguments
-from ...models.errors import ConsistencyError, InputError, UnsupportedByFormatError
+from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.families import ANY_DEGREE
 from ...models.formulations.problem import Problem, lifted
@@ -187,8 +187,7 @@ def write(
 ) -> Written:
     """Write a problem to a file. Equal problems give equal bytes.
 
-    Each writer counts its records and compares them with the problem; no file appears if they differ. A .nl
-    comes with a .row and a .col file, and a .mod with its .dat.
+    A .nl comes with a .row and a .col file, and a .mod with its .dat; the files appear together.
 
     Parameters
     ----------
@@ -213,8 +212,6 @@ def write(
         If the format cannot carry the problem, or has no place for the start.
     InputError
         For an unknown suffix or dialect.
-    ConsistencyError
-        If the written records differ from the problem.
     OutputError
         If a file cannot be written.
 
@@ -241,10 +238,7 @@ def write(
     files = [(path, entry.generate(form, lines, point, chosen)), *_companions(path, entry.name, form, lines)]
     with ExitStack() as stack:  # the files get their names together, at its end
         for each, content in files:
-            try:
-                written.files[each.name] = stack.enter_context(saving(each, content))
-            except ConsistencyError as error:
-                raise ConsistencyError(str(error), file=each) from error
+            written.files[each.name] = stack.enter_context(saving(each, content))
     return written
 
 

@@ -6,7 +6,6 @@ continuous and integer, the last into continuous, binary and integer.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,9 +19,8 @@ from numpy.typing import NDArray
 from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Ints
-from .counting import Expected, check
 from .names import OBJECTIVE, Names
-from .records import Counted, render
+from .records import render
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,24 +106,18 @@ class Layout:
         return places if inside is None else places[inside]
 
     def column_file(self) -> Iterator[bytes]:
-        """The bytes of the .col file: names of columns in file order, one per line. They are counted."""
-        names, counts = Names(self.problem), Counter[str]()
+        """The bytes of the .col file: names of columns in file order, one per line."""
+        names = Names(self.problem)
         for block, run in self.stretches:
             inside = self.order[run] - block.offset
-            name = Counted(counts, "columns", names.of(block).at(inside))
-            yield from render([name, b"\n"], len(inside))
-        check(counts, {"columns": Expected(self.problem).columns})
+            yield from render([names.of(block).at(inside), b"\n"], len(inside))
 
     def row_file(self) -> Iterator[bytes]:
-        """The bytes of the .row file: names of rows in file order, then of the objective, one per line.
-
-        Rows are counted.
-        """
-        names, counts = Names(self.problem), Counter[str]()
+        """The bytes of the .row file: names of rows in file order, then of the objective, one per line."""
+        names = Names(self.problem)
         for family in self.rows:
-            yield from render([Counted(counts, "rows", names.row(family)), b"\n"], family.count)
+            yield from render([names.row(family), b"\n"], family.count)
         yield OBJECTIVE + b"\n"
-        check(counts, {"rows": Expected(self.problem).rows})
 
 
 def runs(values: NDArray[Any]) -> list[slice]:

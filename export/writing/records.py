@@ -9,7 +9,6 @@ blocks have none. Memory is one block for any number of records.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -49,9 +48,6 @@ class Part(Protocol):
     def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
         """The bytes of these records, one item each, and whether some are padded with NUL."""
 
-    def nonzero(self, start: int, stop: int) -> Bools | bool:
-        """Which of these records hold no zero; one value if it holds for all."""
-
 
 @dataclass(frozen=True, eq=False)
 class Words:
@@ -78,17 +74,6 @@ class Words:
         chosen = self._words[start:stop] if self.codes is None else self._words.take(self.codes[start:stop])
         return chosen, self._padded
 
-    @cached_property
-    def _nonzero(self) -> Bools | bool:
-        found: Bools = ~np.isin(of_bytes(self.table), _ZEROS)
-        return bool(found[0]) if len(found) and (found == found[0]).all() else found
-
-    def nonzero(self, start: int, stop: int) -> Bools | bool:
-        """Which of these records hold a word other than 0 in the notation of their table."""
-        if isinstance(self._nonzero, bool):
-            return self._nonzero
-        return self._nonzero[start:stop] if self.codes is None else self._nonzero.take(self.codes[start:stop])
-
     def at(self, codes: NDArray[Any]) -> Words:
         """Return this table with other codes."""
         return Words(self.table, codes if self.codes is None else self.codes[codes])
@@ -114,11 +99,6 @@ class Decimals:
             out[values < 10 ** (width - 1 - place), place] = 0
         return as_cells(out), least < width
 
-    def nonzero(self, start: int, stop: int) -> Bools | bool:
-        """Which of these records hold an integer other than 0."""
-        found: Bools = self.values[start:stop] != 0
-        return found
-
 
 @dataclass(frozen=True, eq=False)
 class Raw:
@@ -134,11 +114,6 @@ class Raw:
     def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
         """These values."""
         return self.values[start:stop], False
-
-    def nonzero(self, start: int, stop: int) -> Bools | bool:
-        """Which of these records hold a value other than 0."""
-        found: Bools = self.values[start:stop] != 0
-        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,47 +133,7 @@ class Tagged:
         return Tagged(self.tag, self.words.at(codes))
 
 
-_ZEROS: Final = (b"0", b"+ 0")
-"""Texts of zero, unsigned and signed."""
-
-
-@dataclass(frozen=True, eq=False)
-class Counted:
-    """A piece whose nonzero records are counted in `counts[what]` when their bytes are made.
-
-    Without bytes of its own it counts all records.
-    """
-
-    counts: Counter[str]
-    what: str
-    piece: bytes | Part | Tagged = b""
-
-    @property
-    def width(self) -> int:
-        """Bytes of the longest one."""
-        return len(self.piece) if isinstance(self.piece, bytes) else self.piece.width
-
-    def count(self, start: int, stop: int, present: Bools | None) -> None:
-        """Count the records start..stop. present: which records have the piece; None: all."""
-        nonzero = _is_nonzero(self.piece, start, stop)
-        if isinstance(nonzero, bool):
-            every = stop - start if present is None else int(np.count_nonzero(present[start:stop]))
-            self.counts[self.what] += every * nonzero
-        else:
-            chosen = nonzero if present is None else present[start:stop] & nonzero
-            self.counts[self.what] += int(np.count_nonzero(chosen))
-
-
-def _is_nonzero(piece: bytes | Part | Tagged, start: int, stop: int) -> Bools | bool:
-    """Whether a piece holds no zero, as text or as the eight bytes of a double; names hold none."""
-    if isinstance(piece, Tagged):
-        return True
-    if isinstance(piece, bytes):
-        return piece not in _ZEROS and piece != bytes(8)
-    return piece.nonzero(start, stop)
-
-
-Piece = bytes | Part | Tagged | Counted
+Piece = bytes | Part | Tagged
 Pieces = Sequence[Piece]
 
 
@@ -239,22 +174,17 @@ class _Template:
     def __init__(self, parts: Sequence[Piece | OnlyWhere]) -> None:
         self._pieces: list[bytes | Part] = []
         self._optional: list[tuple[slice, Bools]] = []
-        self._counted: list[tuple[Counted, Bools | None]] = []
         for part in parts:
             first = len(self._pieces)
             for piece in part.pieces if isinstance(part, OnlyWhere) else (part,):
-                if isinstance(piece, Counted):
-                    self._counted.append((piece, part.present if isinstance(part, OnlyWhere) else None))
-                self._pieces += _plain(piece)
+                self._pieces += [piece.tag, piece.words] if isinstance(piece, Tagged) else [piece]
             if isinstance(part, OnlyWhere):
                 self._optional.append((slice(first, len(self._pieces)), part.present))
         self._parts = {id(piece): piece for piece in self._pieces if not isinstance(piece, bytes)}
         self._widths: list[int] = []
 
     def line(self, start: int, stop: int) -> tuple[Bytes, bool]:
-        """The bytes of these records in a row, and whether there are NUL bytes to drop. Counts them."""
-        for counted, where in self._counted:
-            counted.count(start, stop, where)
+        """The bytes of these records in a row, and whether there are NUL bytes to drop."""
         cells, padded = {}, False
         for key, part in self._parts.items():
             cells[key], gaps = part.cells(start, stop)
@@ -325,13 +255,6 @@ class _Template:
                 cuts += [self._ends[place.start], self._ends[place.stop]]
         cuts.append(self._ends[-1])
         return [(first, last) for first, last in zip(cuts[::2], cuts[1::2], strict=True) if first < last]
-
-
-def _plain(piece: Piece) -> tuple[bytes | Part, ...]:
-    """A piece as literals and holes."""
-    if isinstance(piece, Counted):
-        return _plain(piece.piece)
-    return (piece.tag, piece.words) if isinstance(piece, Tagged) else (piece,)
 
 
 def as_cells(matrix: Bytes) -> Cells:

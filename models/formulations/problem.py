@@ -141,11 +141,6 @@ class Problem:
         return self.formulation.name
 
     @cached_property
-    def twin(self) -> Problem:
-        """An equal problem that computes its own arrays: files are checked against it."""
-        return Problem(self.instance, self.formulation, self.jumps, self.pinned, self.windows)
-
-    @cached_property
     def data(self) -> dict[str, Any]:
         """Arrays that symbols may denote, besides columns."""
         data: dict[str, Any] = {
