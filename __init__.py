@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from .export.shading.colours import Light as Light
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
-    from .export.solving.evaluate import Evaluation as Evaluation
-    from .export.solving.evaluate import evaluate as evaluate
     from .export.solving.local import solve as solve
     from .export.solving.run import Report as Report
     from .export.solving.run import run as run
@@ -92,7 +90,6 @@ _HOME: Final = {
     "Certificate": ".models.proof.certificate",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
-    "Evaluation": ".export.solving.evaluate",
     "FormulationError": ".models.errors",
     "Hint": ".models.surface.hints",
     "InputError": ".models.errors",
@@ -121,7 +118,6 @@ _HOME: Final = {
     "draw": ".export.pictures.draw",
     "entries": ".export.library.building.named",
     "entry": ".export.library.building.named",
-    "evaluate": ".export.solving.evaluate",
     "fit_angles": ".export.solving.two_stage",
     "formulate": ".models.formulations.problem",
     "greedy_field": ".models.search.greedy",

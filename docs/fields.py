@@ -20,6 +20,7 @@ import csv
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -27,12 +28,15 @@ from typing import Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.solving.methods import METHODS, Request
-from crossfield.models.errors import InputError
+from crossfield.models.errors import CrossfieldError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import STROKE_WEIGHT, Instance
 from crossfield.models.sketch.samples import SAMPLES
 from drawings import SUFFIXES
+from studying.fields import MOST_CURVES
+from studying.hidden import hidden_curves
 from studying.rows import DATA
+from studying.tracing import curves_of
 
 KEPT: Final = DATA / "fields.csv"
 COLUMNS: Final = ("measure", "name", "size", "noise", "weight", "method", "curve", "value")
@@ -88,24 +92,28 @@ def hidden(task: Task) -> Found:
     for weight in WEIGHTS:
         names = [name for name in task.tried(weight) if name not in FOR_ENERGY or task.size == MIDDLE]
         instance = task.instance.with_weights(stroke_weight=weight)
-        try:
-            found = cf.evaluate(instance, sketch=task.source, methods=names, limits=limits) if names else None
-        except InputError:
-            return
-        for curve, each in enumerate(found.curves if found else ()):
-            yield from ((weight, name, str(curve), value) for name, value in each.degrees.items())
+        longest = hidden_curves(instance, curves_of(instance, task.source), MOST_CURVES) if names else []
+        for number, curve in enumerate(longest):
+            for name in names:
+                with suppress(CrossfieldError):  # the method has no field without this curve
+                    field = answer(name, curve.rest, limits)
+                    yield weight, name, str(number), float(np.degrees(curve.deviation(field)))
+
+
+def answer(method: str, instance: Instance, limits: cf.Limits) -> CrossField:
+    """The last field of a method."""
+    with tempfile.TemporaryDirectory() as folder:
+        *_, last = METHODS[method].find(Request(instance, Path(folder), limits))
+    return last.field
 
 
 def fields(task: Task, instance: Instance) -> Iterator[tuple[float, str, CrossField]]:
     """Fields of the methods without a time limit, with weight and method."""
     for weight in WEIGHTS:
         weighted = instance.with_weights(stroke_weight=weight)
-        with tempfile.TemporaryDirectory() as folder:
-            request = Request(weighted, Path(folder), cf.Limits(600.0, threads=1))
-            for name in task.tried(weight):
-                if not METHODS[name].timed:
-                    *_, answer = METHODS[name].find(request)
-                    yield weight, name, answer.field
+        for name in task.tried(weight):
+            if not METHODS[name].timed:
+                yield weight, name, answer(name, weighted, cf.Limits(600.0, threads=1))
 
 
 def missed(task: Task) -> Found:

@@ -19,7 +19,7 @@ GROUND: Final = "models"
 ORDER: Final = (
     "models", "models/processes", "models/instance", "models/sketch", "models/field",
     "models/smooth", "models/surface", "models/formulations",
-    "models/search", "models/proof", "models/evaluation", "templates",
+    "models/search", "models/proof", "templates",
     "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions/logs",
     "export/solutions",
     "export/bundle", "export/shading", "export/pictures", "export/surfaces", "export/programs",

@@ -9,10 +9,10 @@ from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
-from crossfield.models.evaluation.hidden import Summary, summary
 from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 from scipy.stats import spearmanr
 
+from .hidden import Summary, summary
 from .rows import Row
 
 CLOSE: Final = 1e-3

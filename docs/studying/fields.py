@@ -14,13 +14,13 @@ import numpy as np
 from crossfield.export.formats.registry import generator
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.errors import CrossfieldError
-from crossfield.models.evaluation.hidden import HiddenCurve
 from crossfield.models.field.field import CrossField, relabelled
 from crossfield.models.instance.instance import Instance
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.smooth.polyvector import HOLDS
 
+from .hidden import HiddenCurve
 from .instances import curves, drawing, noisy
 from .rows import FAILED, Run
 

@@ -8,11 +8,11 @@ from functools import cache
 from typing import Any, Final
 
 import numpy as np
-from crossfield.models.evaluation.hidden import summary
 from crossfield.models.instance.instance import STROKE_WEIGHT
 from crossfield.models.sketch.samples import SAMPLES
 
 from .errors import Change, change
+from .hidden import summary
 from .rows import DATA, Row, Table
 
 OWN: Final = "of crossfield"

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import crossfield as cf
 import numpy as np
-from crossfield.models.evaluation.hidden import HiddenCurve, hidden_curves
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
-from crossfield.models.sketch.tracing import curves_of
+
+from .hidden import HiddenCurve, hidden_curves
+from .tracing import curves_of
 
 
 def drawings(folder: Path | None) -> list[str]:

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from crossfield.models.evaluation.hidden import Summary
 
 from . import errors, plots
+from .hidden import Summary
 from .rows import FAILED, Row, Table
 from .wording import percent, series
 

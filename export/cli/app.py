@@ -18,7 +18,6 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from ...models.storage import remove_unfinished
 from . import options
-from .evaluate_command import evaluate_command
 from .help_texts import Group
 from .inputs import (
     SAVED,
@@ -203,7 +202,6 @@ def export_command(
 
 command("solve")(solve_command)
 command("prove")(prove_command)
-command("evaluate")(evaluate_command)
 
 
 @command("read")

@@ -26,7 +26,6 @@ NAMES: Final = {
     "default formats": _of("..formats.registry", "DEFAULTS"),
     "methods": _of("..solving.methods", "METHODS"),
     "kept method": _of("..solving.run", "KEPT", lambda name: [name]),
-    "default methods": _of("..solving.evaluate", "DEFAULT_METHODS"),
     "bundled solvers": _of("..solvers_table", "BUNDLED"),
     "all solvers": _of("..solvers_table", "SOLVERS"),
     "logs": _of(
@@ -66,7 +65,7 @@ FACTS: Final = "Facts about the run"
 PANELS: Final = {
     "Sketch": "size mask silhouette curvature view gauge stroke-weight skew-weight",
     "Formulation": "formulation facet stroke-norm beta-norm relax norm tightened",
-    "Method and solver": "method solver start program solve curves search",
+    "Method and solver": "method solver start program solve search",
     "Entries": "rung where",
     "Files": "format nl-form gzip manifest solution check on underlay",
     "Picture and surface": "kind title scale light flip hint port no-browser",
@@ -81,7 +80,6 @@ EXAMPLES: Final = {
     "export": "crossfield export skew --size 4 -f milp-mccormick -F mps -F lp -o files",
     "solve": "crossfield solve mouse --size 48 --method bend -o field",
     "prove": "crossfield prove skew --size 5 -o proof",
-    "evaluate": "crossfield evaluate mouse --curves 2 --method bend --method polyvector",
     "read": "crossfield read skew.sol --manifest files/skew.milp-mccormick.manifest.json -o skew.npz",
     "draw": "crossfield draw field/mouse.bend.field.npz --kind overview -o field.png",
     "shade": "crossfield shade field/mouse.bend.field.npz --underlay mouse -o surface",

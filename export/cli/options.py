@@ -61,7 +61,6 @@ SolutionFile = Annotated[
 Exported = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield export` wrote.")]
 Folder = Annotated[Path, _folder(help="Folder for the files; created if it does not exist.")]
 ProofFolder = Annotated[Path | None, _folder(help="Folder for field, certificate and report.")]
-ReportFolder = Annotated[Path | None, _folder(help="Folder for NAME.evaluation.json; none by default.")]
 Output = Annotated[
     Path, typer.Option("-o", "--output", metavar="FILE", help="File to write; its suffix selects the format.")
 ]
@@ -195,9 +194,6 @@ MethodName = Annotated[
 ShadedMethod = Annotated[
     str | None, _method(help="Method that computes the field: {methods}; {kept method} by default.")
 ]
-MethodNames = Annotated[
-    list[str] | None, _method(help="{methods}; {default methods} by default, may be repeated.")
-]
 SolverName = Annotated[
     str | None,
     typer.Option(
@@ -229,9 +225,6 @@ SecondsPerMethod = Annotated[
     _time_limit(
         help="Seconds for each method that searches; the total is printed before the first one begins."
     ),
-]
-SecondsPerField = Annotated[
-    float, _time_limit(help="Seconds for each field of a method that searches: one field per hidden curve.")
 ]
 SecondsOfProof = Annotated[
     float,
@@ -277,9 +270,6 @@ Pick = Annotated[
         help="Number of the solution in a file with several; by default the one with the least objective, or"
         " the first.",
     ),
-]
-Curves = Annotated[
-    int, typer.Option("--curves", min=1, metavar="N", help="Number of hidden curves, the longest first.")
 ]
 Solve = Annotated[bool, typer.Option("--solve", help="Solve every problem too, and compare the optima.")]
 Jobs = Annotated[int, _jobs(help="Number of solver files that are written in parallel.")]

@@ -113,8 +113,6 @@ cf.draw(field, folder / "a.png", title=3)                | title is 3; give text
 cf.preview(None)                                         | what is None; give a CrossField
 cf.entry(3)                                              | name is 3; give text
 cf.entries(where=3)                                      | where is 3; give text or None
-cf.evaluate(instance, methods="greedy")                  | methods is 'greedy'; give a list of texts
-cf.evaluate(instance, curves=1.5)                        | curves is 1.5; give a whole number
 cf.fit_angles(instance)                                  | field is an Instance
 cf.solve(instance)                                       | problem is an Instance; give a Problem
 cf.solve(problem, folder=3)                              | folder is 3; give text or a path or None

@@ -30,7 +30,6 @@ NAMED = {
     "export": [SAMPLES, FORMULATIONS, short_names(), FORMATS],
     "solve": [SAMPLES, FORMULATIONS, short_names(), METHODS, SOLVERS],
     "prove": [SAMPLES],
-    "evaluate": [SAMPLES, METHODS],
     "read": [],
     "draw": [KINDS],
     "shade": [SAMPLES, METHODS],
@@ -131,7 +130,7 @@ def test_choices_are_those_of_the_models_and_of_the_formats(text):
 
 def test_every_command_that_reads_a_sketch_has_the_same_options_for_it(text):
     names = [f"--{field.name.replace('_', '-')}" for field in fields(SketchOptions)]
-    for command in ("run", "instance", "export", "solve", "prove", "evaluate", "shade"):
+    for command in ("run", "instance", "export", "solve", "prove", "shade"):
         panel = text(command).split("─ Sketch ─")[1].split("╰")[0]
         assert re.findall(r"^│ +(--[a-z-]+)", panel, re.MULTILINE) == names, command
 

@@ -163,10 +163,3 @@ def test_an_event_ends_a_run_with_the_fields_so_far(tmp_path):
     }
     assert (tmp_path / "field.npz").exists()
     assert not (tmp_path / "overview.png").exists()
-
-
-def test_an_event_ends_a_measure_with_the_curves_so_far():
-    asked = threading.Event()
-    asked.set()
-    found = cf.evaluate(cf.sample("mouse", 12), methods=["greedy"], stop=asked)
-    assert (found.interrupted, found.curves) == (True, ())

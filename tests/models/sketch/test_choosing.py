@@ -1,7 +1,6 @@
 """Curvature lines of a drawing: strokes chosen by label, and silhouettes that are excluded."""
 
 import io
-import json
 
 import crossfield as cf
 import numpy as np
@@ -12,7 +11,6 @@ from crossfield.models.instance.angles import line_difference
 from crossfield.models.sketch.choice import Choice, label_of
 from crossfield.models.sketch.read import instance_of
 from crossfield.models.sketch.samples import sample_svg
-from crossfield.models.sketch.tracing import curves_of
 from loops import for_each
 from PIL import Image, ImageDraw
 
@@ -131,13 +129,12 @@ def scap(clusters):
     return ("#100\t100\n@1\n" + "".join(strokes)).encode()
 
 
-def test_clusters_of_scap_are_chosen_and_are_the_curves_that_are_hidden(tmp_path):
+def test_clusters_of_scap_are_chosen(tmp_path):
     file = tmp_path / "a.scap"
     file.write_bytes(scap(["3", "4", "4"]))
     whole = cf.read_sketch(file, size=40)
     chosen = cf.read_sketch(file, size=40, curvature=["cluster=3", "cluster=4"])
     assert radius(whole).max() > 36 > radius(chosen).max()
-    assert len(np.unique(curves_of(chosen, file, Choice(curvature=("cluster=3", "cluster=4"))))) == 2
     one = cf.read_sketch(file, size=40, curvature=["cluster=4"])
     assert len(one.theta) < len(chosen.theta)
     with pytest.raises(InputError, match=r"no stroke of cluster=5; it has cluster=0, cluster=3, cluster=4"):
@@ -263,10 +260,6 @@ def test_commands_read_what_python_reads(tmp_path, capsys):
     assert invoke(["instance", file, *options, "--size", "20", "-o", instance, "-q"]) == 0
     expected = cf.read_sketch(file, size=20, curvature=["class=flow"], silhouette="outer")
     assert cf.read_instance(instance).sha256 == expected.sha256
-    assert invoke(["evaluate", file, *options, "--size", "20", "-m", "polyvector", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["curves_of"] == "sketch"
-    assert [curve["curve"] for curve in found["curves"]] == [1, 2]
     for wrong in (options, ["--view", "top"]):
         for what, reason in ((instance, "has its own curvature lines"), ("ring", "leave --curvature and")):
             assert invoke(["instance", what, *wrong, "-o", str(tmp_path / "b.json")]) == 1

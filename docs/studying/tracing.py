@@ -12,18 +12,17 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from crossfield.models.errors import InputError, naming
+from crossfield.models.instance.angles import arctangent, line_difference
+from crossfield.models.instance.grid import Ints
+from crossfield.models.instance.instance import Instance
+from crossfield.models.sketch.choice import AS_DRAWN, Choice
+from crossfield.models.sketch.cover import Frame, Indices, covering_curves
+from crossfield.models.sketch.curves import Curves
+from crossfield.models.sketch.read import LEAST_WEIGHT, bytes_of, curves_in, segments_of
+from crossfield.models.sketch.samples import SAMPLES, sample_svg
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
-
-from ..errors import InputError, naming
-from ..instance.angles import arctangent, line_difference
-from ..instance.grid import Ints
-from ..instance.instance import Instance
-from .choice import AS_DRAWN, Choice
-from .cover import Frame, Indices, covering_curves
-from .curves import Curves
-from .read import LEAST_WEIGHT, bytes_of, curves_in, segments_of
-from .samples import SAMPLES, sample_svg
 
 REACH: Final = 2  # rows and columns from a pixel of a chain to the next, across crossings without a direction
 ASIDE: Final = np.radians(27.0)  # greatest angle to the next pixel of a chain; atan(1/2) is less
@@ -58,11 +57,6 @@ def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choi
             file=sketch,
         )
     return only
-
-
-def has_curves(sketch: str | Path | None, choice: Choice = AS_DRAWN) -> bool:
-    """Whether a sketch records its curves; otherwise chains are taken as curves."""
-    return sketch is not None and _drawn(sketch, choice) is not None
 
 
 def _only(owner: Indices, stroke: Indices, count: int) -> Ints:

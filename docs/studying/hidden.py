@@ -7,11 +7,10 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-
-from ..errors import InstanceError
-from ..field.field import CrossField
-from ..instance.grid import Floats, Ints
-from ..instance.instance import Instance
+from crossfield.models.errors import InstanceError
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.grid import Floats, Ints
+from crossfield.models.instance.instance import Instance
 
 SHORTEST: Final = 3  # fewest stroke pixels of a curve that is hidden
 MOST: Final = 0.5  # greatest share of the stroke pixels that a hidden curve may have

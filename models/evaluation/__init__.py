@@ -1,1 +1,0 @@
-"""Errors of fields on curves that were hidden from them."""

@@ -1,0 +1,156 @@
+"""Hidden curves of the study: the curve of each stroke pixel, what is removed, the angle to a field."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import SimpleNamespace
+
+import crossfield as cf
+import numpy as np
+import places
+import pytest
+from crossfield.models.errors import InputError, InstanceError
+from crossfield.models.field.field import CrossField
+
+SVG = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100"><g fill="none" stroke="black">{}</g></svg>'
+)
+
+
+@pytest.fixture(scope="module")
+def study():
+    """The modules of the study that hide curves."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(places.ROOT / "docs")
+        yield SimpleNamespace(
+            hidden=import_module("studying.hidden"), tracing=import_module("studying.tracing")
+        )
+
+
+def drawn(study, tmp_path, content):
+    """The instance of an SVG, and the curve of each of its stroke pixels."""
+    path = tmp_path / "drawing.svg"
+    path.write_text(SVG.format(content))
+    instance = cf.read_sketch(path, size=25)
+    return instance, study.tracing.curves_of(instance, path)
+
+
+def traced(study, name, size=24):
+    instance = cf.sample(name, size)
+    return instance, study.tracing.curves_of(instance, name)
+
+
+def counts(curve):
+    """The numbers of pixels of the curves, the most first."""
+    return sorted(np.unique(curve[curve >= 0], return_counts=True)[1].tolist(), reverse=True)
+
+
+def test_each_run_of_a_path_is_a_curve_and_crossings_belong_to_none(study, tmp_path):
+    paths = '<path d="M10 30 H90 M10 70 H90"/><line x1="50" y1="10" x2="50" y2="90"/>'
+    instance, curve = drawn(study, tmp_path, paths)
+    several = study.tracing.SEVERAL
+    assert set(curve) <= {several, 0, 1, 2}
+    level = np.minimum(instance.theta, np.pi - instance.theta) < 0.1
+    assert set(curve[level]) - {several} == {0, 1}
+    assert set(curve[~level]) - {several} == {2}
+    assert (curve == several).sum() <= 8
+
+
+def test_a_stroke_that_redraws_another_is_hidden_with_it(study, tmp_path):
+    line = '<path d="M10 {0} H90"/>'
+    twice = line.format(31) + '<path d="M15 31.2 H60"/>' + line.format(71) + line.format(53)
+    _, curve = drawn(study, tmp_path, twice)
+    assert sorted(set(curve)) == [0, 2, 3]
+    assert len(set(counts(curve))) == 1
+
+
+def test_chains_do_not_depend_on_how_the_drawing_is_turned(study):
+    for name in ("mouse", "singular", "torus_patch"):
+        instance = cf.sample(name, 24)
+        chains = [study.tracing.chains(each) for each in (instance, instance.turned(), instance.mirrored())]
+        assert counts(chains[0]) == counts(chains[1]) == counts(chains[2])
+
+
+def test_only_drawings_with_lines_record_curves(study):
+    torus = cf.sample("torus_patch", 16)
+    assert np.array_equal(study.tracing.curves_of(torus, "torus_patch"), study.tracing.chains(torus))
+    assert len(counts(traced(study, "saddle", 16)[1])) == 10
+    with pytest.raises(InputError, match=r"mouse: draws nothing at \d+ stroke pixels of saddle"):
+        study.tracing.curves_of(cf.sample("saddle", 16), "mouse")
+
+
+def strokes_of(instance):
+    """Direction and reliability by pixel."""
+    pixels = map(tuple, instance.stroke_pixels.tolist())
+    return dict(zip(pixels, zip(instance.theta, instance.w, strict=True), strict=True))
+
+
+def at_random(instance, rng):
+    """Crosses in any direction, with lines at right angles."""
+    grid = instance.grid
+    return CrossField(instance, rng.uniform(0, np.pi, grid.size), np.zeros(grid.size), 0 * grid.first)
+
+
+def test_crosses_at_random_are_22_and_a_half_degrees_off(study):
+    rng = np.random.default_rng(5)
+    angles = []
+    for name in ("mouse", "singular", "bottle"):
+        for hidden in study.hidden.hidden_curves(*traced(study, name), 4):
+            angles += [hidden.deviation(at_random(hidden.rest, rng)) for _ in range(40)]
+    found = study.hidden.summary(np.degrees(angles))
+    assert found.count == len(angles) > 400
+    assert abs(found.mean - 22.5) < 4 * found.error < 1.5
+
+
+def test_the_nearer_line_counts_whichever_it_is(study):
+    instance, curve = traced(study, "skew")
+    for hidden in study.hidden.hidden_curves(instance, curve, 3):
+        grid, off = instance.grid, 0.2
+        on_curve = np.zeros(grid.size)
+        on_curve[instance.stroke_index[hidden.stroke]] = instance.theta[hidden.stroke]
+        for label, sign in ((0.0, 1), (np.pi / 2, -1)):  # line u, then line v
+            beta = np.full(grid.size, 0.1)
+            field = CrossField(instance, on_curve + off - label - sign * beta, beta, 0 * grid.first)
+            assert hidden.deviation(field) == pytest.approx(off, abs=1e-9)
+
+
+def test_hiding_changes_neither_the_mask_nor_the_other_strokes(study):
+    for name in ("mouse", "ring", "saddle"):
+        instance, curve = traced(study, name)
+        strokes = strokes_of(instance)
+        found = study.hidden.hidden_curves(instance, curve, 100)
+        assert len(found) > 3
+        assert [len(each.stroke) for each in found] == sorted((len(h.stroke) for h in found), reverse=True)
+        for hidden in found:
+            rest = hidden.rest
+            gone = {tuple(pixel) for pixel in instance.stroke_pixels[hidden.stroke].tolist()}
+            assert np.array_equal(rest.mask, instance.mask)
+            assert strokes_of(rest) == {at: value for at, value in strokes.items() if at not in gone}
+            assert study.hidden.SHORTEST <= len(gone) <= study.hidden.MOST * len(strokes)
+            assert (curve[hidden.stroke] == hidden.number).all()
+        assert {each.number for each in study.hidden.hidden_curves(instance, curve, 2)} == {
+            h.number for h in found[:2]
+        }
+
+
+def test_a_part_of_the_mask_keeps_a_stroke(study):
+    mask = np.ones((5, 9), dtype=bool)
+    mask[:, 4] = False  # two parts: one curve on the left, two on the right
+    pixels = np.array([[row, column] for row in range(5) for column in (1, 5, 7)])
+    instance = cf.Instance("two", mask, pixels, np.full(15, np.pi / 2), np.ones(15))
+    curve = np.tile(np.array([0, 1, 2], dtype=np.int32), 5)
+    assert [hidden.number for hidden in study.hidden.hidden_curves(instance, curve, 9)] == [1, 2]
+
+
+def test_a_field_on_other_pixels_is_refused(study):
+    (hidden,) = study.hidden.hidden_curves(*traced(study, "mouse"), 1)
+    with pytest.raises(InstanceError, match="not on the pixels of mouse"):
+        hidden.deviation(cf.greedy_field(cf.sample("bottle", 12)))
+
+
+def test_the_summary_of_some_angles(study):
+    found = study.hidden.summary(np.array([1.0, 2.0, 6.0]))
+    assert (found.count, found.mean, found.median) == (3, 3.0, 2.0)
+    assert found.error == pytest.approx(np.sqrt(7 / 3))
+    assert study.hidden.summary(np.array([4.0])).error is None
+    assert study.hidden.summary(np.array([])) is None
