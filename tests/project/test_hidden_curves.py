@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from types import SimpleNamespace
 
 import crossfield as cf
 import numpy as np
-import places
 import pytest
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
@@ -18,13 +16,9 @@ SVG = (
 
 
 @pytest.fixture(scope="module")
-def study():
+def study(docs_module):
     """The modules of the study that hide curves."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(places.ROOT / "docs")
-        yield SimpleNamespace(
-            hidden=import_module("studying.hidden"), tracing=import_module("studying.tracing")
-        )
+    return SimpleNamespace(**{name: docs_module(f"studying.{name}") for name in ("hidden", "tracing")})
 
 
 def drawn(study, tmp_path, content):
