@@ -15,11 +15,7 @@ import pytest
 from cases import make_instance, make_problem
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.writing.canonical import Canonical
-from crossfield.models.formulations.families import PlacedFamily
 from crossfield.models.formulations.problem import Problem
-from crossfield.models.instance.grid import Grid
-from crossfield.models.instance.instance import Instance
-from loops import for_each
 
 THREADS = 4
 
@@ -62,39 +58,4 @@ def test_no_cost_is_lost_when_threads_share_a_problem(frequent_switches):
     assert spoiled(150) == 0
 
 
-def anew(self: cached_property, owner: object, kind: type | None = None):
-    """A `cached_property` that computes the arrays that threads share again at every access."""
-    if isinstance(owner, Problem | PlacedFamily | Instance | Grid):
-        return self.func(owner)
-    return kept(self, owner, kind)
-
-
 kept = cached_property.__get__
-
-
-def unchanged(name: str, suffix: str, dialect: str, monkeypatch) -> None:
-    """The worst that threads can do to cached values: every reader gets its own array."""
-    shape = "pixel" if name == "milp-mccormick" else "row"
-    usual = bytes_of(make_problem(name, make_instance(shape)), suffix, dialect)
-    with monkeypatch.context() as patch:
-        patch.setattr(cached_property, "__get__", anew)
-        assert bytes_of(make_problem(name, make_instance(shape)), suffix, dialect) == usual
-
-
-def test_values_that_are_computed_anew_every_time_change_no_byte(monkeypatch):
-    unchanged("milp-mccormick", "lp", "", monkeypatch)
-
-
-@pytest.mark.slow
-@for_each("suffix, dialect", [(name, dialect) for name in FORMATS for dialect in FORMATS[name].dialects])
-@for_each("name", ["milp-mccormick", "qp-fixed"])
-def test_no_format_depends_on_who_computed_a_value(name, suffix, dialect, monkeypatch):
-    unchanged(name, suffix, dialect, monkeypatch)
-
-
-def test_a_complete_problem_has_computed_all_that_it_keeps():
-    problem = make_problem("milp-mccormick", make_instance())
-    problem.complete()
-    kept = {name for name, value in vars(Problem).items() if isinstance(value, cached_property)}
-    assert kept <= vars(problem).keys()
-    assert all("terms" in vars(family) for family in (*problem.objective, *problem.rows))

@@ -5,7 +5,6 @@ GAMS and BARON need licences that end; these tests need none.
 
 from __future__ import annotations
 
-import re
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ import baron_reader
 import gams_reader
 import numpy as np
 import pytest
-from algebraic import WrongTextError, difference
+from algebraic import difference
 from cases import CASES, make_field, make_instance, make_problem, names_of, problem_of
 from crossfield.export.formats.gams import MODEL_TYPES
 from crossfield.export.formats.registry import write
@@ -169,156 +168,3 @@ def test_results_of_gams_are_columns_in_order(tmp_path: Path):
         f"objective,<objvar.l:0{digits}>",
         *(f"{name},<{name}.l:0{digits}>" for name in names_of(column_names(problem))),
     ]
-
-
-# What the tests above would notice.
-
-TOKEN = re.compile(
-    r"(?P<number>(?<!\w)\d+\.?\d*(?:e[+-]?\d+)?)|(?P<relation>=[gle]=|[<>=]=)|(?P<operator>[-+*^])"
-    r"|(?P<attribute>\.(?:lo|up|fx|l)\b)|(?P<name>[a-z]\w*)"
-)
-OTHER = {
-    "=g=": "=l=", "=l=": "=g=", "=e=": "=g=", ">=": "<=", "<=": ">=", "==": ">=",
-    "+": "-", "-": "+", "*": "+", "^": "*",
-    ".lo": ".up", ".up": ".lo", ".fx": ".lo", ".l": ".lo",
-}  # fmt: skip
-
-
-PARTS = {"gms": ("Variables", "Model"), "bar": ("BINARY_", "}\n")}
-
-
-def variants(text: str, columns: list[str]) -> dict[str, str]:
-    """Texts with one number, relation, operator, attribute or column replaced, by a description."""
-    replaced = {}
-    for token in TOKEN.finditer(text):
-        word = token.group()
-        match token.lastgroup:
-            case "number":
-                other = repr(float(word) + 1)
-            case "name":
-                other = columns[columns.index(word) - 1] if word in columns else word
-            case _:
-                other = OTHER[word]
-        if other != word:
-            label = f"{other} for {word} in {text[token.start() - 30 : token.end() + 30]!r}"
-            replaced[label] = f"{text[: token.start()]}{other}{text[token.end() :]}"
-    return replaced
-
-
-def is_noticed(problem: Problem, suffix: str, text: str, start: CrossField) -> bool:
-    try:
-        model = READERS[suffix](text)
-    except WrongTextError:
-        return True
-    point = problem.point(start)
-    if suffix == "gms" and (model.unstated or model.start != problem.objective_value(point)):
-        return True
-    return difference(model, problem, point, one=one_of(problem, suffix)) != ""
-
-
-@for_each("suffix", READERS)
-@for_each("name", ["miqcp-bilinear", "miqp-exact"])
-def test_every_other_text_is_noticed(name: str, suffix: str, tmp_path: Path):
-    problem, start = make_problem(name, PAIR), make_field(PAIR)
-    path = tmp_path / f"model.{suffix}"
-    write(problem, path, start=start)
-    text = path.read_text("ascii")
-    assert not is_noticed(problem, suffix, text, start)
-    begin, end = text.index(PARTS[suffix][0]), text.rindex(PARTS[suffix][1])
-    others = variants(text[begin:end], [*names_of(column_names(problem)), one_of(problem, suffix)])
-    unseen = [
-        label
-        for label, part in others.items()
-        if not is_noticed(problem, suffix, text[:begin] + part + text[end:], start)
-    ]
-    assert len(others) > 100
-    assert unseen == []
-
-
-GAMS = """
-Variables y; Positive Variables x; Integer Variables n; Equations e, f;
-e.. y =e= {objective}; f.. x + n =g= 1;
-Model m / all /; solve m using {type} minimizing y;
-"""
-
-
-@for_each(
-    "objective, kind, message",
-    [
-        ("x**3", "mip", "not of the type"),
-        ("x*n", "mip", "not of the type"),
-        ("sqr(x)*n", "miqcp", "not of the type"),
-        ("sqr(x)", "nlp", "not of the type"),
-        ("x", "rmip", "not of the type"),
-        ("2 x", "minlp", "line 3"),
-        ("2*-x", "minlp", "line 3"),
-        ("x + - n", "minlp", "line 3"),
-        ("power(x, n)", "minlp", "n where a number belongs"),
-        ("abs(x)", "minlp", "the function abs"),
-        ("z", "minlp", "z is not declared"),
-        ("y + x", "minlp", "does not define"),
-        ("x; e.. y =e= n", "minlp", "defined twice"),
-        ("x; Variables X", "minlp", "declared twice"),
-        ("x; Variables put", "minlp", "cannot be a name"),
-        ("x; y.up = 5", "minlp", "is not free"),
-        ("x; Equations g", "minlp", "g is not defined"),
-        ("x; x.scale = 2", "minlp", "the attribute scale"),
-        ("x;\n$include other.gms\n", "minlp", "line 4"),
-        ("x; display x.l", "minlp", "line 3"),
-    ],
-)
-def test_gams_that_is_wrong_is_refused(objective: str, kind: str, message: str):
-    with pytest.raises(WrongTextError, match=message):
-        gams_reader.read(GAMS.format(objective=objective, type=kind))
-
-
-@for_each(
-    "objective, value",
-    [
-        ("-x**2", -4.0),
-        ("2**x**2", 16.0),
-        ("-x*3 + 1", -5.0),
-        ("(-x)**2", np.nan),
-        ("power(-x, 3)", -8.0),
-        ("X/2/2", 0.5),
-        ("1 -\n* a comment\n x", -1.0),
-        ("x\n* n\n - 1", 1.0),
-    ],
-)
-def test_gams_says_what_its_manual_says(objective: str, value: float):
-    model = gams_reader.read(GAMS.format(objective=objective, type="minlp"))
-    np.testing.assert_equal(float(model.objective.value({"x": np.float64(2), "n": 3.0})), value)
-    assert [vars(column) for column in model.columns.values()] == [
-        {"kind": "continuous", "lower": 0.0, "upper": np.inf, "level": None},
-        {"kind": "integer", "lower": 0.0, "upper": pytest.approx(np.nan, nan_ok=True), "level": None},
-    ]
-
-
-BAR = """
-POSITIVE_VARIABLES x; VARIABLES y;
-UPPER_BOUNDS{{ x: 3; }}
-EQUATIONS e;
-e: {row};
-OBJ: minimize {objective};
-"""
-
-
-@for_each(
-    "row, objective, message",
-    [
-        ("x >= 1", "-x^2", "line 6"),
-        ("x >= 1", "x^2^3", "line 6"),
-        ("x >= 1", "x^y", "line 6"),
-        ("x >= 1", "cos(x)", "line 6"),
-        ("x >= 1", "2*-x", "line 6"),
-        ("x >= 1", "x + z", "z is not declared"),
-        ("x + 1 >= 2", "x", "a constant on the left side"),
-        ("x >= y", "x", "line 5"),
-        ("x >= 1; f: y >= 1", "x", "not those declared"),
-        ("x >= 1; LOWER_BOUNDS{ x: 1; }", "x", "line 5"),
-    ],
-)
-def test_bar_that_is_wrong_is_refused(row: str, objective: str, message: str):
-    assert baron_reader.read(BAR.format(row="x - y >= 1", objective="3*x^2 - y")).rows.keys() == {"e"}
-    with pytest.raises(WrongTextError, match=message):
-        baron_reader.read(BAR.format(row=row, objective=objective))

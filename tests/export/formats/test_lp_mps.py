@@ -130,21 +130,6 @@ def test_names_on_the_largest_grid_are_15_long_at_most(name: str):
     assert max(map(len, names + names_of(row_names(problem)))) == 15
 
 
-def test_names_carry_row_column_and_side():
-    problem = make_problem("milp-mccormick", make_instance("parts"))
-    names = names_of(column_names(problem))
-    assert names[:6] == [
-        "alpha_00_00",
-        "alpha_00_01",
-        "alpha_00_03",
-        "alpha_01_00",
-        "alpha_01_03",
-        "alpha_02_02",
-    ]
-    assert [name for name in names if name.startswith("p1")] == ["p1_00_00_r", "p1_01_00_u", "p1_01_03_u"]
-    assert names_of(column_names(make_problem("qp-fixed", make_instance("far"))))[0] == "alpha_000_098"
-
-
 # text
 
 
@@ -243,15 +228,6 @@ def test_mps_keeps_to_the_common_subset(label: str):
         assert all(
             entries[second, first] == value for (first, second), value in entries.items()
         )  # both triangles
-
-
-def test_header_says_what_the_file_holds():
-    quartic = text_of(held("minlp-quartic gauge=box"), "lp")
-    assert re.search(r"^\\ lifted: z = p1 beta_i", quartic, re.MULTILINE)
-    assert re.search(r"^\\ .*minlp-quartic \(section 2, \(8\)\), MIQP", quartic, re.MULTILINE)
-    assert re.search(r"^\\ instance tiny, gauge box, sha256 [0-9a-f]{64}$", quartic, re.MULTILINE)
-    assert "lifted" not in text_of(held("milp-mccormick gauge=box"), "mps")
-    assert "miqp-exact (ours), MIQP" in text_of(held("miqp-exact gauge=box"), "mps")
 
 
 # golden files

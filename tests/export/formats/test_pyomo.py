@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pyomo.environ as pyo
@@ -84,28 +82,8 @@ def test_start_is_the_point_of_the_field(label: str):
         to_pyomo(problem, start=make_field(make_instance("row")))
 
 
-def test_components_read_like_the_paper():
-    model = to_pyomo(make_problem("miqcp-bilinear", make_instance("row", "box")))
-    assert str(model.c14[0, 0, "r"].expr) == (
-        "alpha[0,0] - alpha[0,1] + 1.5707963267948966*(p1[0,0,r] + 2*p2[0,0,r])  <=  s[0,0,r]"
-    )
-    assert sorted(model.component_map(pyo.Constraint)) == ["c14", "c15", "c16", "c17", "jlo"]
-    assert model.name == "tiny miqcp-bilinear"
-
-
 @for_each("name", FORMULATIONS)
 def test_one_pixel_has_empty_components(name: str):
     problem = make_problem(name, make_instance("pixel"))
     model = to_pyomo(problem)
     assert len(columns_of(model, problem)) == problem.n_columns
-
-
-def test_pyomo_is_imported_for_this_alone():
-    """The rest of the package starts fast, and works without Pyomo."""
-    wanted = (
-        "writing.names formats.registry formats.nl formats.lp formats.mps formats.gams "
-        "bundle.manifest solving.local"
-    )
-    imports = ", ".join(f"crossfield.export.{name}" for name in wanted.split())
-    script = f"import sys; sys.modules['pyomo'] = None; import {imports}"
-    subprocess.run([sys.executable, "-c", script], check=True)

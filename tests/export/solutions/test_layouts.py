@@ -5,7 +5,6 @@ import re
 from dataclasses import replace
 
 import crossfield as cf
-import numpy as np
 import pytest
 from answers import GOOD, TINY, problem, problem_of
 from crossfield.export.cli.app import invoke
@@ -245,13 +244,6 @@ def test_the_pool_of_gurobi():
     data = re.sub(rb'"PoolNX": \[ \S+ 0\]', b'"PoolNX": [ 1]', path.read_bytes(), count=1)
     with pytest.raises(SolutionError, match="not every column has 2 values"):
         parse_raw(data)
-
-
-def test_the_pool_of_xpress():
-    path = TINY / "xpress-by-layout_milp_two_solutions.slx"
-    first, second = read_raw(path, 1), read_raw(path, 2)
-    assert (first.names == second.names).all()
-    assert np.abs(first.values - second.values).max() > 0.1
 
 
 def test_read_takes_the_number_of_a_solution(tmp_path, capsys):

@@ -1,14 +1,12 @@
 """A solution belongs to one problem: files, solvers and manifests mean the same one."""
 
 import shutil
-import subprocess
 from pathlib import Path
 
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
-from crossfield.models.errors import SolutionError
 from crossfield.models.search.starts import first_field
 
 
@@ -80,59 +78,6 @@ def test_a_solution_for_other_jumps_is_refused(solved, ring, tmp_path, capsys):
     assert read(only(solved / "solved", "*.ipopt.sol"), other.path, tmp_path / "field.npz") == 1
     assert "is of another problem" in capsys.readouterr().err
     assert not (tmp_path / "field.npz").exists()
-
-
-def by_gurobi(model: Path, solution: Path) -> None:
-    import gurobipy
-
-    with (
-        gurobipy.Env(params={"OutputFlag": 0}) as environment,
-        gurobipy.read(str(model), environment) as read,
-    ):
-        read.optimize()
-        read.write(str(solution))
-
-
-def by_xpress(model: Path, solution: Path) -> None:
-    import xpress
-
-    problem = xpress.problem()
-    problem.controls.outputlog = 0
-    problem.readProb(str(model))
-    problem.optimize()
-    problem.writeSlxSol(str(solution))
-
-
-def by_glpk(model: Path, solution: Path) -> None:
-    kind = "--freemps" if model.suffix == ".mps" else "--lp"
-    command = ["glpsol", kind, str(model), "-w", str(solution)]
-    subprocess.run(command, capture_output=True, check=True)
-
-
-@pytest.mark.parametrize(
-    "solver, formats, suffix",
-    [
-        pytest.param(by_gurobi, ["mps", "lp"], ".sol", marks=pytest.mark.needs("gurobi")),
-        pytest.param(by_xpress, ["mps"], ".slx", marks=pytest.mark.needs("xpress")),
-        pytest.param(by_glpk, ["mps", "lp"], ".sol", marks=pytest.mark.needs("glpk")),
-    ],
-)
-@pytest.mark.filterwarnings("ignore")
-def test_solvers_repeat_the_stamp(solver, formats, suffix, tmp_path):
-    """If a solver has a place for a problem's name, its solution states its problem."""
-    mask = [[True, True]]
-    one, other = (
-        cf.formulate(cf.Instance("two", mask, [[0, 0]], [theta], [1.0]), "milp-mccormick")
-        for theta in (0.5, 0.6)
-    )
-    for name in formats:
-        model, solution = tmp_path / f"a.{name}", tmp_path / f"a{name}{suffix}"
-        cf.write(one, model)
-        solver(model, solution)
-        assert read_raw(solution).stamps == {one.stamp.removeprefix("sha256_")}
-        assert cf.read_solution(solution, one).identified
-        with pytest.raises(SolutionError, match="of another problem"):
-            cf.read_solution(solution, other)
 
 
 def test_the_answers_of_gams_carry_the_stamp(ring, tmp_path):

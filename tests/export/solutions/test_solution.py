@@ -140,23 +140,6 @@ def test_with_the_printed_facet_p_is_believed_and_z_is_not(tmp_path):
     assert solution.objective < solution.field.energy(1).total - 0.1
 
 
-def test_the_order_of_another_formulation_is_not_taken(tmp_path, field):
-    path = by_position(
-        tmp_path / "x.sol", problem_of(field, "qp-fixed"), problem_of(field, "qp-fixed").point(field)
-    )
-    with pytest.raises(SolutionError, match=r"x\.sol: the file is of"):
-        read_solution(path, problem_of(field, "milp-mccormick"))
-
-
-@pytest.mark.parametrize("value", [np.inf, -np.inf])
-def test_infinite_values_are_an_error(tmp_path, field, value):
-    problem = problem_of(field, "milp-mccormick")
-    point = problem.point(field)
-    point[0] = value
-    with pytest.raises(SolutionError, match=r"x\.sol: .* not finite"):
-        read_solution(by_name(tmp_path / "x.sol", names_of(problem), point), problem)
-
-
 def test_a_file_without_a_point_has_no_field(tmp_path, field):
     problem = problem_of(field, "milp-mccormick")
     path = tmp_path / "x.sol"

@@ -20,7 +20,6 @@ from crossfield.export.formats.registry import write
 from crossfield.export.library.documents import check_point
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
-from crossfield.export.solutions.readers.text import added_columns
 from crossfield.export.solutions.solution import AGREEMENT, LARGEST, TOLERANCE, Solution, read_solution
 from crossfield.export.statuses import Status
 from crossfield.models.errors import InstanceError, SolutionError
@@ -195,18 +194,6 @@ def test_a_point_that_breaks_rows_a_little_has_the_objective_of_its_field_beside
     assert answer.objective_of_field is None
 
 
-def test_a_bound_of_gurobi_above_the_objective_contradicts_it(tmp_path):
-    document = json.loads((TINY / "gurobi-13.0.3_milp_optimal.json").read_text())
-    path = tmp_path / "x.json"
-    path.write_text(json.dumps(document))
-    assert read_solution(path, problem("milp"), identified=True).status == "optimal-global"
-    document["SolutionInfo"]["ObjBound"] = 0.9
-    path.write_text(json.dumps(document))
-    found = read_solution(path, problem("milp"), identified=True)
-    assert (found.status, found.claimed, found.claimed_bound) == ("unknown", "optimal-global", 0.9)
-    assert found.bound is None
-
-
 @pytest.mark.parametrize(
     "code, status", [(200, "infeasible"), (300, "unbounded"), (470, "limit-without-point"), (500, "error")]
 )
@@ -321,28 +308,6 @@ def attempt(path, data, of):
         return None
 
 
-def test_a_cut_file_keeps_no_claim_that_its_point_does_not_bear_out(answers, tmp_path):
-    for name, (data, of) in answers.items():
-        whole = attempt(tmp_path / "x", data, of)
-        assert whole.status.promises_point
-        ends = [found.end() for found in re.finditer(rb"\n", data)]
-        for end in sorted({*ends[:-1:2], *range(0, len(data) - 1, 199)}):
-            found = attempt(tmp_path / "x", data[:end], of)
-            assert found is None or bears_out(found), (name, end)
-            if found is not None and found.point is not None and found.status != "unknown":
-                assert found.objective == pytest.approx(whole.objective, abs=1e-6)
-
-
-def test_a_file_cut_down_to_its_head_says_nothing(answers, tmp_path):
-    for name in ("cbc without zeros", "scip", "miplib"):
-        data, of = answers[name]
-        lines = data.splitlines(keepends=True)
-        for kept in (3, 10, len(lines) // 2):
-            found = attempt(tmp_path / "x", b"".join(lines[:kept]), of)
-            assert found.status == "unknown"
-            assert found.contradictions
-
-
 def damages(data):
     """Kinds of damage to a file: lines repeated, moved or longer, values replaced, marks."""
     lines = data.splitlines(keepends=True)
@@ -397,25 +362,6 @@ def test_a_byte_order_mark_changes_nothing(skew, tmp_path):
         (tmp_path / name).write_bytes(codecs.BOM_UTF8 + (skew / name).read_bytes())
     again = cf.read_manifest(tmp_path / f"skew.{MILP}.manifest.json").problem()
     assert again.sha256 == cf.read_manifest(skew / f"skew.{MILP}.manifest.json").problem().sha256
-
-
-def test_columns_that_programs_add_stand_in_one_table():
-    """The standalone checker has the same patterns, once each."""
-    ours = {part for patterns in added_columns().values() for part in patterns.split("|")}
-    assert set(check_point.ADDED.pattern.split("|")) - ours == set()
-    names = (
-        "ONE",
-        "ONE_1a2b3c4d5e6",
-        "objconstvar",
-        "nlobjvar",
-        "~r_0",
-        "Rgc1",
-        "MPS_Rgc1",
-        "Constant",
-        "objvar",
-    )
-    assert all(check_point.ADDED.fullmatch(name) for name in names)
-    assert not any(check_point.ADDED.fullmatch(name) for name in ("alpha_00_00", "x", "Constant1"))
 
 
 # the standalone checker

@@ -19,11 +19,9 @@ from crossfield.export.writing.records import (
     Raw,
     Tagged,
     Words,
-    bounds,
     check_coefficients,
     digits,
     number,
-    numbers,
     render,
     signed,
     table,
@@ -87,21 +85,7 @@ def test_words_are_the_numbers_of_an_array(values):
     assert words(values[0]) == number(values[0]).encode()
 
 
-def test_words_of_nothing():
-    assert text([words(np.zeros(0)), b"\n"], 0) == b""
-    assert words(-0.0, signed) == b"+ 0"
-
-
 # parts by hand
-
-
-def test_words_are_taken_by_code():
-    names = Words(table([b"a", b"long", b"mid"]), None)
-    assert names.width == 4
-    assert text([names, b";"], 3) == b"a;long;mid;"
-    picked = names.at(np.array([2, 0, 2, 1]))
-    assert text([b"<", picked, b">"], 4) == b"<mid><a><mid><long>"
-    assert text([picked.at(np.array([3, 1])), b" "], 2) == b"long a "
 
 
 def test_decimals_have_no_leading_zeros():
@@ -125,21 +109,6 @@ def test_raw_values_keep_their_zero_bytes():
     assert text(parts, 3, padded=False) == expected
 
 
-def test_no_records_and_no_parts():
-    assert text([b"x"], 0) == b""
-    assert text([], 3) == b""
-
-
-def test_any_numbers_at_once_are_the_numbers_one_by_one():
-    values = np.array([*NASTY, math.inf])
-    assert [found.decode() for found in numbers(values)] == [number(value) for value in values]
-    assert [found.decode() for found in bounds(np.array([-math.inf, -1.5, math.inf]))] == [
-        "-inf",
-        "-1.5",
-        "+inf",
-    ]
-
-
 @given(
     st.lists(st.integers(-60, 60), min_size=1, max_size=20), st.sampled_from([0.0, 1e14, 1e16, 2.0**60, 0.25])
 )
@@ -158,17 +127,6 @@ def test_a_tag_stands_before_every_word():
         == b"alpha_1=p_3;alpha_2=p_1;alpha_3=p_2;"
     )
     assert text([name.at(np.array([2])), b"!"], 1) == b"alpha_3!"
-
-
-@pytest.mark.parametrize("block", [1, 2, 3, 7, 100])
-def test_pieces_that_some_records_have(block, monkeypatch):
-    """Also in the block after one without them: blanked pieces return."""
-    monkeypatch.setattr(records, "BLOCK", block)
-    present = np.array([True, False, False, True, True, False, True])
-    key = Words(table([b"%d" % value for value in range(7)]), None)
-    parts = [b"<", key, OnlyWhere(present, [b" and ", key, b"!"]), b">", OnlyWhere(~present, [b"?"])]
-    expected = [f"<{at} and {at}!>" if there else f"<{at}>?" for at, there in enumerate(present)]
-    assert text(parts, 7).decode() == "".join(expected)
 
 
 @given(st.lists(st.tuples(*[st.booleans()] * 4), min_size=1, max_size=40), st.booleans())
@@ -208,17 +166,6 @@ def test_numbers_grow_a_digit_within_a_block_and_between_blocks(first, monkeypat
 
 
 # blocks
-
-
-@for_each("count", [0, 1, 3, 4, 5, 7, 8, 9])
-def test_a_block_leaves_no_seam(count, monkeypatch):
-    monkeypatch.setattr(records, "BLOCK", 4)
-    values = np.arange(count) ** 5
-    chunks = list(render([b"n", Decimals(values), b"\n"], count))
-    assert len(chunks) == -(-count // 4)
-    assert b"".join(chunks) == b"".join(b"n%d\n" % value for value in values)
-    raw = list(render([Raw(values.astype("<i8"))], count, padded=False))
-    assert b"".join(raw) == values.astype("<i8").tobytes()
 
 
 LAYOUTS = [(name, dialect) for name, entry in FORMATS.items() for dialect in entry.dialects]
@@ -268,11 +215,6 @@ def test_extreme_coefficients_are_refused(value):
         check_coefficients(np.array([1.0, value]), "row family c14")
     with pytest.raises(UnsupportedByFormatError, match=r"coefficient (\d|inf|nan)"):
         check_coefficients(np.float64(value), "the objective")
-
-
-def test_ordinary_coefficients_pass():
-    check_coefficients(np.array([0.0, -0.0, 1e-9, -1e-9, 9.99e14, math.pi]), "the objective")
-    check_coefficients(np.zeros(0), "the objective")
 
 
 @for_each("suffix, dialect", LAYOUTS)

@@ -46,22 +46,6 @@ def begun():
     return lambda: len(set(threading.enumerate()) - before)
 
 
-def test_a_small_file_begins_no_thread_and_a_large_one_does(tmp_path, begun):
-    def running(size: int) -> int:
-        def chunks():
-            yield bytes(size)
-            yield b"end"
-            found.append(begun())
-
-        found: list[int] = []
-        save(tmp_path / "a.lp", chunks())
-        return found[0]
-
-    assert running(sink.SHARE - 10) == 0
-    assert running(sink.SHARE) == 2
-    assert begun() == 0
-
-
 FULL = """
 import resource, sys, threading
 from pathlib import Path
