@@ -68,12 +68,12 @@ if TYPE_CHECKING:
     from .models.proof.certificate import Certificate as Certificate
     from .models.proof.certificate import read_certificate as read_certificate
     from .models.proof.certificate import write_certificate as write_certificate
-    from .models.proof.dual_start import search as search
     from .models.proof.prove import prove as prove
     from .models.proof.record import Proof as Proof
     from .models.search.greedy import greedy_field as greedy_field
     from .models.search.improvement import improved_field as improved_field
     from .models.search.search import Search as Search
+    from .models.search.search import search as search
     from .models.sketch.random_strokes import random_instance as random_instance
     from .models.sketch.read import read_sketch as read_sketch
     from .models.sketch.samples import sample as sample
@@ -136,7 +136,7 @@ _HOME: Final = {
     "run": ".export.solving.run",
     "sample": ".models.sketch.samples",
     "samples": ".models.sketch.samples",
-    "search": ".models.proof.dual_start",
+    "search": ".models.search.search",
     "solve": ".export.solving.local",
     "surface": ".models.surface.lift",
     "to_pyomo": ".export.formats.pyomo_model",

@@ -8,8 +8,7 @@ With --measure, parts are measured first, and their rows in docs/proofs.json rep
 (size 128), `sketches` (drawings of a folder, size 24), `collections` (a folder of collections of drawings,
 as docs/public_drawings.py makes it, size 24), `optima` (small instances, compared with other solvers),
 `solvers` (MIP solvers, cold and tightened) and `pictures`. --names selects from a part, --seconds replaces
-its time limit. With --work, fields and certificates stay in that folder, but not those of collections. The
-part `limits` measures how well time limits hold, also next to busy processes.
+its time limit. With --work, fields and certificates stay in that folder, but not those of collections.
 """
 
 from __future__ import annotations
@@ -25,7 +24,6 @@ import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
@@ -63,14 +61,10 @@ SECONDS: Final = {
     "samples": 60.0, "paper": 60.0, "sketches": 60.0, "collections": 60.0, "middle": 180.0, "fine": 300.0,
     "large": 1800.0, "optima": 60.0, "solvers": 60.0, "pictures": 120.0,
 }  # fmt: skip
-LIMITS: Final = {24: 10.0, 32: 30.0, 48: 60.0}
-"""Time limits, by size, that end proofs of a sample before its optimum."""
 OF_COLLECTIONS: Final = (
     "energy", "bound", "gap", "status", "pixels", "pairs", "labels", "levels", "seconds", "check", "limit"
 )  # fmt: skip
 """Facts of a proof that are kept for drawings of collections."""
-BESIDE: Final = (0, 2)
-"""Numbers of busy processes."""
 Facts = dict[str, Any]
 Kept = dict[str, dict[str, Facts]]
 Measurement = Callable[["Request"], Iterator[tuple[str, Facts]]]
@@ -181,30 +175,6 @@ def pictures(request: Request) -> Iterator[tuple[str, Facts]]:
     yield PICTURED, {"levels": len(proof.levels), "status": proof.status, "pixels": pixels}
 
 
-def limits(request: Request) -> Iterator[tuple[str, Facts]]:
-    """Wall time of commands that a time limit ends, with busy processes beside."""
-    for size, seconds in LIMITS.items():
-        for count in BESIDE:
-            folder = request.work / f"{PICTURED}_{size}_{count}_limit"
-            command = ["prove", PICTURED, "--size", str(size), "--time-limit", str(seconds), "--json"]
-            with busy(count):
-                facts = answered([*command, "-o", str(folder)], folder, PICTURED)
-            found = {"size": size, "beside": count, "limit": seconds}
-            yield f"{size} {count}", found | {name: facts[name] for name in ("whole", "gap")}
-
-
-@contextmanager
-def busy(count: int) -> Iterator[None]:
-    """Processes that each keep a core busy."""
-    others = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
-    try:
-        yield
-    finally:
-        for each in others:
-            each.kill()
-            each.wait()
-
-
 PARTS: Final[dict[str, Measurement]] = {
     "samples": samples_at(SIZE),
     "paper": paper,
@@ -216,7 +186,6 @@ PARTS: Final[dict[str, Measurement]] = {
     "optima": optima,
     "solvers": solvers,
     "pictures": pictures,
-    "limits": limits,
 }
 
 
@@ -355,23 +324,6 @@ def optima_table(rows: dict[str, Facts]) -> str:
     return markdown(columns, sorted(cells, key=lambda row: (row[0].startswith("random"), row[0])))
 
 
-def limits_table(rows: dict[str, Facts]) -> str:
-    """Time limits, and how long the commands took."""
-    cells = [
-        [
-            str(row["size"]),
-            str(row["beside"]),
-            f"{row['limit']:g}",
-            f"{1.1 * row['limit'] + 1:g}",
-            f"{row['whole']:.1f}",
-            percent(row["gap"]),
-        ]
-        for row in sorted(rows.values(), key=lambda row: (row["size"], row["beside"]))
-    ]
-    columns = ("pixels", "busy processes beside", "limit, s", "limit + 10 % + 1 s", "taken, s", "gap")
-    return markdown(columns, cells)
-
-
 def titled(solver: str) -> str:
     """The title of a solver."""
     return SOLVERS[solver].title
@@ -464,14 +416,13 @@ def counted(cores: int) -> str:
 def page(kept: Kept) -> str:
     """The text of docs/proofs.md."""
     tables = ("samples", "paper", "middle", "sketches", "fine", "large")
-    parts = {part: kept[part] for part in (*tables, "collections", "solvers", "limits")}
+    parts = {part: kept[part] for part in (*tables, "collections", "solvers")}
     texts = {
         "generated": generated("python docs/proofs.py"),
         "short": in_short(kept),
         "most": f"{MOST_LABELS:,}",
         "optima": optima_table(kept["optima"]),
         "solvers": solvers_table(kept["solvers"]),
-        "limits": limits_table(kept["limits"]),
         **{
             f"{part}_limit": f"{max(row['limit'] for row in kept[part].values()):g}"
             for part in (*tables, "collections")
@@ -498,7 +449,7 @@ def main() -> None:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         for part in given.measure:
-            seconds = given.seconds or SECONDS.get(part, 0.0)  # `limits` has its own
+            seconds = given.seconds or SECONDS[part]
             measure(part, Request(tuple(given.names), seconds, given.sketches, given.work or Path(name)))
     (DOCS / "proofs.md").write_text(page(read()))
 

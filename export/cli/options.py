@@ -98,14 +98,6 @@ Check = Annotated[
     Path | None,
     typer.Option("--check", metavar="FILE", help="Only check this certificate and print what it proves."),
 ]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Divide the grid among the workers of a dask scheduler: for grids beyond one machine's memory.",
-    ),
-]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 

@@ -35,14 +35,14 @@ def prove_command(
     start: options.Start = None,
     time_limit: options.SecondsOfProof = 60.0,
     gap: options.ProofGap = 0.0,
-    scheduler: options.Scheduler = None,
     check: options.Check = None,
     printing: options.PrintOptions,
 ) -> None:
     """Compute a field and prove how far its energy can be from the minimum.
 
     The certificate in the folder can be checked with --check, or by a separate program without crossfield.
-    Ctrl-C ends the search or the check, and keeps all that is proven so far.
+    The check of the certificate comes after the time limit. Ctrl-C ends the search, and keeps all that is
+    proven so far.
     """
     if check is not None:
         if source is not None or output is not None:
@@ -62,7 +62,6 @@ def prove_command(
             norm=NORMS[norm],
             start=read_start(start, instance),
             limits=Limits(time_limit, gap),
-            scheduler=scheduler,
             progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
         )
         document, failure = _write(proof, output)
@@ -71,8 +70,6 @@ def prove_command(
         print_notice("the proof is of the gauge strokes; its bound also holds in the gauge box")
     if proof.ended == "interrupted":
         print_notice("interrupted; the best field and bound so far were kept")
-    if proof.ended == "workers":
-        print_notice("a worker of the scheduler was lost; the best field and bound so far were kept")
     checked = len(document["levels"])
     if 0 < checked < len(proof.levels):
         print_notice(

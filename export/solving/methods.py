@@ -15,10 +15,9 @@ from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock, Deadline, Over, Progress, never, silent
 from ...models.processes.limits import Limits
 from ...models.processes.side_by_side import cores
-from ...models.proof.dual_start import search
 from ...models.search.box_qp import fitted
 from ...models.search.greedy import greedy_field
-from ...models.search.search import Search
+from ...models.search.search import Search, search
 from ...models.search.starts import best_start, first_field, polyvector_start
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field

@@ -17,7 +17,6 @@ _ENDED: Final = {
     "time": "the time limit ended before a bound was proven; increase it",
     "interrupted": "the proof was interrupted before a bound was proven",
     "work": "the limit of work ended before a bound was proven; increase it",
-    "workers": "a worker of the scheduler was lost before a bound was proven",
     "gap": "the requested gap allows the bound 0; request a smaller one",
     "labels": "the next level would have too many labels",
 }
@@ -61,12 +60,6 @@ def certified(proof: Proof, path: Path) -> Certificate:
     from ...models.proof.certificate import write_certificate
 
     if not proof.levels or (proof.verdict is not None and proof.bound <= 0 < proof.energy):
-        raise SolverError(f"nothing was proven, and there is no certificate: {_reason(proof)}")
+        reason = _ENDED.get(proof.ended, "its levels prove no bound above 0")
+        raise SolverError(f"nothing was proven, and there is no certificate: {reason}")
     return write_certificate(proof, path)
-
-
-def _reason(proof: Proof) -> str:
-    """The reason why a proof has no bound."""
-    if not proof.levels and proof.ended in {"optimal", "gap", "labels"}:
-        return "the time limit or Ctrl-C ended the check before the coarsest level was checked"
-    return _ENDED.get(proof.ended, "its levels prove no bound above 0")

@@ -71,7 +71,7 @@ def compile_all() -> None:
         if all_compiled():
             return
         instance = sample("mouse", 4).with_gauge("strokes")
-        limits = WorkLimits(Deadline(), never, gap=0.0, certified=False, work=math.inf, measured=lambda: 0.0)
+        limits = WorkLimits(Deadline(), never, gap=0.0, work=math.inf)
         with crew(1) as hands:
             work = Work(instance, Work.first(instance, None, never), limits, hands, (0, 1), silent)
             ended = work.run()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from contextlib import nullcontext
 from dataclasses import replace
 from typing import Final
 
@@ -12,25 +11,20 @@ from ..arguments import check_count, checked_arguments
 from ..field.field import CrossField, Norm, check_norm, relabelled
 from ..instance.instance import Instance
 from ..processes.compiled import crew
-from ..processes.deadline import Deadline, Over, Progress, Stop, silent, stop_function
+from ..processes.deadline import Deadline, Progress, Stop, never, silent, stop_function
 from ..processes.groups import interruptible
 from ..processes.limits import Limits
 from ..processes.side_by_side import checked
 from ..smooth.systems import one_thread
-from .certificate import REFUSALS, checked_proof, checking_pace
-from .check_certificate import StoppedError
+from .certificate import REFUSALS, checked_proof
 from .compiling import compile_proofs
 from .prove_absolute import WorkIn1Norm, WorkInMixedNorm
 from .record import Proof
 from .stroked import extended, restricted, stroked_parts
 from .work import Work, WorkLimits
-from .workers import strips_on
 
 KINDS: Final[dict[Norm, type[Work]]] = {1: WorkIn1Norm, 2: Work, "mixed": WorkInMixedNorm}
 """The work of a proof, by norm."""
-
-_LATE: Final = 0.5  # seconds by which a check may exceed the time limit, rather than drop levels
-_LATE_SHARE: Final = 0.05  # of the proof's time, by which it may exceed it as well
 
 
 @checked_arguments
@@ -44,7 +38,6 @@ def prove(
     work: int | None = None,
     seed: int = 0,
     jobs: int = 2,
-    scheduler: str | None = None,
     progress: Progress = silent,
     stop: Stop | None = None,
 ) -> Proof:
@@ -53,11 +46,11 @@ def prove(
     The proof of an instance in the gauge `box`, with its field, is that of the same sketch in the gauge
     `strokes`. The bound holds for both gauges, because every field in `box` has a field in `strokes` of at
     most its energy. Without a time limit the same arguments give the same proof, for any number of threads.
-    Ctrl-C ends the proof with its best field and bound, and a second one ends the check. The first proof on a
-    machine compiles its functions before the time limit begins, in up to a minute.
+    Ctrl-C ends the proof with its best field and bound. The first proof on a machine compiles its functions
+    before the time limit begins, in up to a minute.
 
-    The checker of certificates checks the levels at the end. Bound, status and forced jumps are those that it
-    confirms, and `write_certificate` writes them.
+    The checker of certificates checks the levels at the end, after the time limit. Bound, status and forced
+    jumps are those that it confirms, and `write_certificate` writes them.
 
     Parameters
     ----------
@@ -69,18 +62,15 @@ def prove(
     start
         A field to begin with where, improved, it is lower than the first field.
     limits
-        Time limit, relative gap at which to end (0 asks for optimality), and threads (0: as many as `jobs`).
-        Levels that could not be recorded and checked in time are not begun. If no level was checked, the
-        bound is 0 and `levels` is empty. None: no time limit, and a gap of 0.
+        Time limit of the proof without its check, relative gap at which to end (0 asks for optimality), and
+        threads (0: as many as `jobs`). If the limit ends the first level, the bound is 0 and `levels` is
+        empty. None: no time limit, and a gap of 0.
     work
         Number of labels, counted at each rounding, after which to end: a limit that no clock decides.
     seed
         Seed of the search that follows where the lattices leave a gap.
     jobs
         Number of processes of that search.
-    scheduler
-        Address of a dask scheduler, whose workers then hold a strip of the grid each: for grids that one
-        machine cannot hold. Passes take one strip after the other, and are not faster.
     progress
         Receives a line of text every few passes.
     stop
@@ -94,7 +84,7 @@ def prove(
     Raises
     ------
     InputError
-        For another norm, for too few or too many jobs or threads, and without dask or a scheduler there.
+        For another norm, and for too few or too many jobs or threads.
     InstanceError
         For a start on another instance.
     SolverError
@@ -113,8 +103,7 @@ def prove(
     start = None if start is None else restricted(start, part)
     checked(jobs)
     given, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
-    divided = nullcontext() if scheduler is None else strips_on(scheduler)
-    with interruptible() as interrupted, crew(given.threads or jobs) as hands, divided as divide:
+    with interruptible() as interrupted, crew(given.threads or jobs) as hands:
 
         def over() -> bool:
             return interrupted() or asked()
@@ -123,16 +112,9 @@ def prove(
         seconds = end.left()
         compile_proofs(progress, over)
         began = time.monotonic()
-        own = WorkLimits(
-            Deadline.after(seconds, end.clock),
-            over,
-            given.gap,
-            True,  # noqa: FBT003 - whether to keep time for the certificate
-            work or math.inf,
-            measured=checking_pace,
-        )
+        ends = WorkLimits(Deadline.after(seconds, end.clock), over, given.gap, work or math.inf)
         kind = KINDS[norm]
-        proving = kind(part, kind.first(part, start, own.over), own, hands, (seed, jobs), progress, divide)
+        proving = kind(part, kind.first(part, start, ends.over), ends, hands, (seed, jobs), progress)
         proof = proving.proof(0.0, proving.run())
     field = extended(proof.field, instance)
     energy = field.energy(norm).total
@@ -140,21 +122,7 @@ def prove(
     if not proof.levels:
         return proof
     progress("checking the levels")
-    return _checked(proof, own.whole, asked)
-
-
-def _checked(proof: Proof, deadline: Deadline, asked: Over) -> Proof:
-    """The proof as the checker confirms it; without levels if none was checked in time.
-
-    The check may end after the deadline, by half a second and 5 % of the time of the proof. A request to stop
-    that ended the proof does not end the check. A proof that the checker refuses, or has no memory
-    for, has no bound, and `write_certificate` names the reason.
-    """
-    last, before = deadline.later(_LATE + _LATE_SHARE * proof.seconds), asked()
-    with interruptible() as interrupted:
-        try:
-            return checked_proof(proof, lambda: last.passed() or interrupted() or (not before and asked()))
-        except StoppedError:
-            return replace(proof, bound=0.0, forced=0, levels=(), branches=())
-        except (*REFUSALS, MemoryError):
-            return replace(proof, bound=0.0, forced=0)
+    try:
+        return checked_proof(proof, never)
+    except (*REFUSALS, MemoryError):  # `write_certificate` names the reason
+        return replace(proof, bound=0.0, forced=0)

@@ -98,13 +98,12 @@ class Proof(Claim):
         Number of pairs with the same jump in every field that could be better.
     levels
         The last chain of lattices, coarsest first, on the parts of the mask that have a stroke. Each follows
-        from the one before, or, if there are branches, from that which they name. The check may have ended
-        before the last ones; see `verdict`.
+        from the one before, or, if there are branches, from that which they name.
     seconds
-        Duration of the whole work.
+        Duration of the work without the check.
     ended
-        `optimal`, `gap` (the requested one), `time`, `work`, `interrupted`, `labels` if the next level would
-        be too large, or `workers` if one of them was lost.
+        `optimal`, `gap` (the requested one), `time`, `work`, `interrupted`, or `labels` if the next level
+        would be too large.
     norm
         1, 2 or `mixed`.
     multipliers

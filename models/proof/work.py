@@ -22,9 +22,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from statistics import median
 from typing import ClassVar, Final
 
 import numpy as np
@@ -34,15 +32,14 @@ from ..field.jumps import free_jumps
 from ..instance.grid import Floats
 from ..instance.instance import QUARTER, Instance
 from ..processes.compiled import Crew
-from ..processes.control import WorkerError
 from ..processes.deadline import Deadline, Over, Progress, never
+from ..processes.limits import Limits
 from ..search.improvement import improved_field
-from ..search.search import search_patches
+from ..search.search import search
 from ..search.starts import best_start, polyvector_start
-from .certificate import certificate_effort
 from .check_certificate import MOST_COUNT, MOST_LEVELS
 from .clusters import table_sizes
-from .dual import Divide, Dual
+from .dual import Dual
 from .forced import Forced, forced
 from .lattice import Lattice, labels_at
 from .parts import Cut, across_seam, best_cut, island_of
@@ -66,7 +63,7 @@ _MORE_CLUSTERS: Final = (12, 0.04)  # later
 _QUADS: Final = 0.15  # share of all quads that may become clusters at once
 _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above which there are more
 _MOST_WORK: Final = 2e11  # additions of a pass, some 20 s
-MOST_LABELS: Final = 50_000_000  # of a strip; each takes some 100 bytes
+MOST_LABELS: Final = 50_000_000  # each takes some 100 bytes
 _TABLES: Final = 4  # numbers of tables that take as much as a label
 _RECORDING: Final = 9  # passes: the bound of a record and the pruning, with combs, take as long
 _PAIR: Final = 2  # passes that may follow when there is time to begin them
@@ -78,8 +75,6 @@ _MANY: Final = 4  # levels after which the field may cause the rest of the gap, 
 _NEAR: Final = 0.75  # of the greatest distance from the centre that an alpha can have
 _ROUGH: Final = 1e-5  # gap relative to 1 + energy; a first smaller one is rounded like it: few digits may do
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
-_MEASURED: Final = 3  # paces of the checker, of which the middle one counts: one alone may be far too slow
-_PACED: Final = 2.0  # seconds until the pace is measured again
 _SEARCH: Final = 0.03  # greatest share of the time for that search, no longer than the proof so far
 _LATE: Final = 0.05  # share of the time for the search before a level that takes long
 _LONGER: Final = 2  # duration of a search, relative to the one before, below which it is left out
@@ -96,38 +91,14 @@ _CLOSED: Final = 0.5  # share of the gap that a lattice with not many labels lea
 class WorkLimits:
     """When to end: a deadline, a request to stop, a sufficient gap, enough work.
 
-    whole: the deadline of proof and certificate. work: greatest number of labels; labels: those so far.
-    measured: measures the seconds per unit of the certificate's effort; pace: the last of them; paced: the
-    seconds that were left then. certified: whether to keep time for a certificate; kept: the seconds that it
-    is expected to take.
+    work: greatest number of labels; labels: those so far.
     """
 
-    whole: Deadline
+    deadline: Deadline
     stop: Over
     gap: float
-    certified: bool
     work: float
     labels: int = 0
-    pace: float = 0.0
-    paced: float = math.inf
-    kept: float = 0.0
-    measured: Callable[[], float] = field(kw_only=True)
-
-    @property
-    def deadline(self) -> Deadline:
-        """The end of the proof itself."""
-        return self.whole.later(-self.kept)
-
-    def keep(self, effort: float) -> None:
-        """Keep time for a certificate of that effort, unless it is too little even for the first level."""
-        if not self.certified or self.whole.at == np.inf:
-            return
-        if self.paced - self.whole.left() > _PACED:
-            self.pace = median(self.measured() for _ in range(_MEASURED))
-            self.paced = self.whole.left()
-        seconds = effort * self.pace
-        self.certified = self.kept > 0 or self.whole.left() > seconds
-        self.kept = seconds if self.certified else 0.0
 
     def met(self) -> str:
         """The limit that is met; empty when none is."""
@@ -165,14 +136,13 @@ class _Waiting:
 
 @dataclass
 class _Chain:
-    """The levels round one centre, the effort of a certificate of each, and what they prove together.
+    """The levels round one centre, and what they prove together.
 
     branches: what each level covers; next: what the next one covers. last: bounds of the convex problems of
     levels that are followed by none. waiting: parts without a level.
     """
 
     levels: list[LevelRecord] = field(default_factory=list)
-    efforts: list[float] = field(default_factory=list)
     branches: list[Branch] = field(default_factory=list)
     next: Branch = field(default_factory=lambda: Branch(-1))
     last: dict[int, float] = field(default_factory=dict)
@@ -194,10 +164,9 @@ class _Chain:
             best = max(best, min(map(self.bound_of, parts)))
         return best
 
-    def add(self, level: LevelRecord, effort: float) -> None:
+    def add(self, level: LevelRecord) -> None:
         """Add a level, which covers `next`; the one that follows covers all that it leaves."""
         self.levels.append(level)
-        self.efforts.append(effort)
         self.branches.append(self.next)
         self.next = Branch(len(self.levels) - 1)
 
@@ -220,7 +189,7 @@ class _Chain:
 class Work:
     """State of a proof of the 2-norm.
 
-    divide: None for a lattice in one strip. searched: seconds of the last search between levels.
+    searched: seconds of the last search between levels.
     """
 
     norm: ClassVar[Norm] = 2
@@ -234,7 +203,6 @@ class Work:
     hands: Crew
     seed_and_jobs: tuple[int, int]
     progress: Progress
-    divide: Divide | None = None
     chain: _Chain = field(default_factory=_Chain)
     proven: _Chain = field(default_factory=_Chain)
     searches: int = 0
@@ -263,13 +231,9 @@ class Work:
 
     def run(self) -> str:
         """Go through chains of levels until a limit is met or nothing helps; return the reason."""
-        try:
+        ended = self._descend()
+        while not ended or (ended == "labels" and self._found_more()):
             ended = self._descend()
-            while not ended or (ended == "labels" and self._found_more()):
-                ended = self._descend()
-        except WorkerError as error:
-            self.progress(str(error))
-            return "workers"
         return self.limits.met() or ended
 
     def _found_more(self) -> bool:
@@ -289,8 +253,7 @@ class Work:
         if met := self.limits.met():
             return met
         self.chain, before, self.began = _Chain(), self.best, time.monotonic()
-        dual = Dual(self.level(_centre(before)), self.hands, self.divide)
-        self.limits.keep(self._effort_with(dual, dual.lattice))
+        dual = Dual(self.level(_centre(before)), self.hands)
         patient = False
         while True:
             self._add_clusters(dual)
@@ -313,7 +276,6 @@ class Work:
                     return self.limits.met() or "time"
                 lattice = narrowed(left)
             patient = lattice.h == dual.lattice.h and (patient or not rising)
-            self.limits.keep(self._effort_with(dual, lattice))
             dual.move(lattice)
 
     def _cut(self, rest: _Rest) -> Cut | None:
@@ -354,7 +316,6 @@ class Work:
                 return "labels"
             if not self._in_time(dual, lattice, 2 * _PASSES):
                 return self.limits.met() or "time"
-            self.limits.keep(self._effort_with(dual, lattice))
             dual.move(lattice)
             rising = self._ascend(dual, patient=False, reached=self.chain.bound_of(self.chain.next.above))
             rest = self._record(dual)
@@ -407,15 +368,8 @@ class Work:
             self.searched = time.monotonic() - began
 
     def _in_time(self, dual: Dual, lattice: Lattice, passes: int = _WORTH) -> bool:
-        """Whether there is time for some passes over the lattice that follows, and for its certificate."""
-        work = _seconds_of(passes, dual, lattice)
-        certificate = self._effort_with(dual, lattice) * self.limits.pace if self.limits.certified else 0.0
-        return not self.limits.over(work + max(0.0, certificate - self.limits.kept))
-
-    def _effort_with(self, dual: Dual, lattice: Lattice) -> float:
-        """The effort of a certificate with one more level, which has the clusters of the dual."""
-        more = certificate_effort(lattice, dual.quads)
-        return max(sum(self.proven.efforts), sum(self.chain.efforts) + more)
+        """Whether there is time for some passes over the lattice that follows."""
+        return not self.limits.over(_seconds_of(passes, dual, lattice))
 
     def _closing(self, dual: Dual) -> Over:
         """A function that returns whether only the time to record the level is left."""
@@ -459,9 +413,9 @@ class Work:
         seed, jobs = self.seed_and_jobs
         timed = np.isfinite(self.limits.deadline.left())
         self._offer(
-            search_patches(
+            search(
                 self.instance,
-                deadline=self.limits.deadline.share(share) if timed else None,
+                limits=Limits().until(self.limits.deadline.share(share)) if timed else None,
                 rounds=None if timed else _ROUNDS,
                 seed=seed + self.searches,
                 jobs=jobs,
@@ -522,7 +476,7 @@ class Work:
         rough = _ROUGH * (1 + energy)
         level, rest = LevelRecord.of(dual, energy, rough if energy - chain.bound > rough else 0.0), None
         if level.bound > chain.bound or not self.limits.over():
-            chain.add(level, certificate_effort(dual.lattice, dual.quads))
+            chain.add(level)
         if not self.limits.over() and not (chain.branched and self._exact(level.bound)):
             left = dual.remaining_cells(level.bound, energy)
             if left.nothing:
@@ -565,7 +519,7 @@ def _seconds_of(passes: int, dual: Dual, lattice: Lattice) -> float:
 def _too_large(dual: Dual, lattice: Lattice) -> bool:
     """Whether the next level of a dual is beyond what memory, time, checker or digits of an angle allow."""
     tables = int(table_sizes(lattice, dual.quads).sum())
-    many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS * len(dual.places)
+    many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
     many = many or max(lattice.alpha_count.max(), lattice.beta_count.max()) > MOST_COUNT
     return lattice.h < np.pi / 2 / _FINEST or many or lattice.pass_work > _MOST_WORK
 

@@ -7,18 +7,20 @@ processor the field at the end of a round depends only on instance and seed, unl
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from ..arguments import check_count
+from ..arguments import check_count, checked_arguments
 from ..field.field import CrossField
 from ..instance.grid import Bools
 from ..instance.instance import Instance
-from ..processes.deadline import Deadline, Over, Progress, never, silent
+from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
 from ..processes.groups import interruptible
+from ..processes.limits import Limits
 from ..processes.side_by_side import checked, side_by_side
 from ..smooth.polyvector import power_field
 from ..smooth.systems import one_thread
@@ -30,9 +32,6 @@ from .landscape import Point
 from .nearest_stroke import nearest_strokes
 from .starts import different, polyvector_start, rounded_energy, starts
 from .walk import LOWER, Explored, Task, explore
-
-Suggest = Callable[[CrossField, Callable[[], float], Over], list[CrossField]]
-"""Returns more starts, given the best one, a function for the seconds left, and when to end."""
 
 Explorers = Callable[[list[Task]], list[Explored]]
 """Explores patches in parallel and returns the results in the order of the tasks."""
@@ -75,23 +74,62 @@ class Search:
     ended: str
 
 
+@checked_arguments
 @one_thread()
-def search_patches(
+def search(
     instance: Instance,
     *,
-    deadline: Deadline | None = None,
+    limits: Limits | None = None,
     rounds: int | None = None,
     seed: int = 0,
     jobs: int = 2,
     start: CrossField | None = None,
     progress: Progress = silent,
-    stop: Over = never,
-    suggest: Suggest = lambda *_: [],
+    stop: Stop | None = None,
 ) -> Search:
-    """Search patch by patch, from several starts, with those that `suggest` returns for the best one.
+    """Search for a field of low 2-norm energy, from the greedy field and other starts.
 
-    `crossfield.search` documents the other parameters, and the errors.
+    The result has at most the energy of `start` and, if time allows, of the first field. On up to 400 pixels,
+    the first three rounds explore from all starts, and the later ones from the best field.
+
+    Without a time limit the same instance, seed and rounds give the same field on the same kind of processor,
+    for any number of jobs. Ctrl-C ends the search with the best field so far.
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    limits
+        Time limit. All work keeps to it, the start too. One step of it may exceed the limit (on a grid of
+        100 x 100 one second), and the last solve by 5 % and half a second. None: no time limit.
+    rounds
+        Number of rounds after which to end. With neither rounds nor a time limit the search ends after 200
+        kicks per pixel without success.
+    seed
+        Seed of all random choices.
+    jobs
+        Number of processes.
+    start
+        A field to begin with where, improved, it is lower than the other starts.
+    progress
+        Receives a line of text after every round.
+    stop
+        A function that returns whether to stop, or an event. The best field so far is then returned.
+
+    Returns
+    -------
+    Search
+        The field, the number of rounds, the improvements, and why the search ended.
+
+    Raises
+    ------
+    InputError
+        For a negative number of rounds, and for too few or too many jobs.
+    InstanceError
+        For a start on another instance.
+
     """
+    asked = stop_function(stop)
     if rounds is not None:
         check_count("rounds", rounds)
     check_count("seed", seed)
@@ -99,14 +137,14 @@ def search_patches(
     if start is not None:
         start.check_instance(instance)
     with interruptible() as pressed:
-        deadline = deadline or Deadline()
-        limits = _Limits(deadline, rounds, lambda: pressed() or stop(), suggest)
+        deadline = (limits or Limits(math.inf)).deadline()
+        ends = _Ends(deadline, rounds, lambda: pressed() or asked())
         closing = _closing(deadline)
-        hunt = _Hunt(instance, seed, _starts(instance, start, limits))
-        alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
+        hunt = _Hunt(instance, seed, _starts(instance, start, ends))
+        alone = instance.grid.size <= _ALONE or deadline.left() < _HURRY
         try:
             with side_by_side(explore, 1 if alone else jobs) as explorers:
-                ended = hunt.run(explorers, limits, progress)
+                ended = hunt.run(explorers, ends, progress)
         except KeyboardInterrupt:
             ended = "interrupted"
         return Search(hunt.best(closing()), hunt.round, tuple(hunt.energies), ended)
@@ -120,13 +158,12 @@ def _closing(deadline: Deadline) -> Callable[[], Over]:
 
 
 @dataclass(frozen=True)
-class _Limits:
-    """When to end: a deadline, rounds, and whether user or caller ask for it; and what suggests starts."""
+class _Ends:
+    """When to end: a deadline, rounds, and whether user or caller ask for it."""
 
     deadline: Deadline
     rounds: int | None
     interrupted: Callable[[], bool]
-    suggest: Suggest
 
     def met(self, rounds: int) -> str:
         """The limit that is met after that many rounds; empty when none is."""
@@ -140,34 +177,29 @@ class _Limits:
         """Whether work has to end now, even in the middle of a round."""
         return self.interrupted() or self.deadline.passed()
 
-    def coarse(self) -> _Limits:
+    def coarse(self) -> _Ends:
         """The limits of the search on the grid of half the resolution."""
         many = _COARSE if self.rounds is None else min(self.rounds, _COARSE)
         return replace(self, deadline=self.deadline.share(1 - _FINE), rounds=many)
 
 
-def _from_coarse(
-    instance: Instance, seed: int, limits: _Limits, explorers: Explorers
-) -> Iterator[CrossField]:
+def _from_coarse(instance: Instance, seed: int, ends: _Ends, explorers: Explorers) -> Iterator[CrossField]:
     """Fields found on the grid of half the resolution, prolonged to this one, the best there first."""
     coarse = halved(instance)
     if coarse is None:
         return
-    sooner = limits.coarse()
+    sooner = ends.coarse()
     hunt = _Hunt(coarse, seed, _starts(coarse, None, sooner))
     hunt.run(explorers, sooner, silent)
-    for field in hunt.latest(limits.over):
-        if limits.over():
+    for field in hunt.latest(ends.over):
+        if ends.over():
             return
-        yield prolonged(field, instance, limits.over)
+        yield prolonged(field, instance, ends.over)
 
 
-def _starts(instance: Instance, given: CrossField | None, limits: _Limits) -> list[CrossField]:
+def _starts(instance: Instance, given: CrossField | None, ends: _Ends) -> list[CrossField]:
     """All starts, the lowest first."""
-    found = starts(instance, given, limits.over, polyvector_start, lambda each, _: power_field(each))
-    if not limits.over():
-        found += limits.suggest(found[0], limits.deadline.left, limits.over)
-    return different(found)
+    return different(starts(instance, given, ends.over, polyvector_start, lambda each, _: power_field(each)))
 
 
 class _Hunt:
@@ -216,18 +248,18 @@ class _Hunt:
             self._start, self._state, self._unsettled = field, FreeField.of(field), False
             self.energies.append((self.round, field.energy().total))
 
-    def run(self, explorers: Explorers, limits: _Limits, progress: Progress) -> str:
+    def run(self, explorers: Explorers, ends: _Ends, progress: Progress) -> str:
         """Adopt fields from coarser grids, then explore until a limit is met; return which one."""
         if self.large:
-            for field in _from_coarse(self._instance, self._seed, limits, explorers):
+            for field in _from_coarse(self._instance, self._seed, ends, explorers):
                 self.offer(field)
-        while not (ended := limits.met(self.round)):
+        while not (ended := ends.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
-            tasks = self.tasks(limits.deadline)
+            tasks = self.tasks(ends.deadline)
             found = explorers(tasks)
-            self._take(tasks, [each.better for each in found], limits.over)
-            if all(each.whole for each in found) and not limits.over():
+            self._take(tasks, [each.better for each in found], ends.over)
+            if all(each.whole for each in found) and not ends.over():
                 self.round += 1
             progress(f"energy {self.energies[-1][1]:.5g} after {self.round} rounds")
         return ended

@@ -80,7 +80,6 @@ cf.prove(instance, norm=True)                            | norm is True
 cf.prove(instance, norm=[2])                             | norm is [2]
 cf.prove(instance, seed=-1)                              | seed is -1
 cf.prove(instance, work=0)                               | work is 0; give a whole number of at least 1
-cf.prove(instance, scheduler=3)                          | scheduler is 3; give text or None
 cf.prove(field)                                          | instance is a CrossField
 cf.greedy_field(field)                                   | instance is a CrossField
 cf.improved_field(instance)                              | field is an Instance

@@ -21,8 +21,8 @@ from ....models.formulations.problem import Problem, formulate, with_integers_fi
 from ....models.instance.grid import Floats
 from ....models.instance.instance import QUARTER, Instance
 from ....models.proof.certificate import Certificate, read_certificate, write_certificate
-from ....models.proof.dual_start import search
 from ....models.search.pinned import pinned
+from ....models.search.search import search
 from ...bundle.starts import write_start
 from ...formats.registry import generator, write
 from ...solutions.solution import read_solution

@@ -1,7 +1,6 @@
 """Every method ends at its time limit, by a clock of the test, and returns a valid field."""
 
 import json
-import math
 
 import crossfield as cf
 import numpy as np
@@ -15,7 +14,6 @@ from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.processes.limits import Limits
 from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.proof.work import WorkLimits
 from crossfield.models.search.greedy import greedy_field
 
 
@@ -86,15 +84,6 @@ def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_check_may_be_late_by_a_little():
-    instance, lines = cf.sample("mouse", 6), list[str]()
-    for late, some in ((0.4, True), (1e6, False)):
-        lines.clear()
-        deadline = Deadline(1e6, lambda late=late: 1e6 + late if "checking the levels" in lines else 0.0)
-        proof = cf.prove(instance, limits=cf.Limits().until(deadline), progress=lines.append)
-        assert (len(proof.levels) > 0, proof.status == "optimal") == (some, some)
-
-
 @pytest.mark.parametrize("norm", ["1", "2"])
 def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsys):
     stale = tmp_path / "mouse.proof.certificate.npz"
@@ -116,34 +105,3 @@ def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
     assert invoke(given) == 0
     assert UNPROVEN in " ".join(capsys.readouterr().err.split())
     assert [path.name for path in tmp_path.iterdir()] == ["mouse.prove.field.npz"]
-
-
-def limits(seconds, *paces, now=(0.0,)):
-    """Limits of a certified proof on a machine that checks at these paces. now: the time of its clock."""
-    whole = Deadline.after(seconds, lambda: now[0])
-    measured = iter(paces).__next__
-    return WorkLimits(whole, lambda: False, 0.0, certified=True, work=math.inf, measured=measured)
-
-
-def test_a_proof_keeps_time_for_its_certificate():
-    """The pace is the middle one of three, measured again when more than two seconds have passed."""
-    now = [0.0]
-    kept = limits(1e9, 0.5, 90.0, 0.25, 0.25, 0.125, 0.25, now=now)
-    kept.keep(1000.0)
-    assert (kept.kept, kept.deadline.at) == (500.0, kept.whole.at - 500.0)
-    now[0] = 1.0
-    kept.keep(2000.0)
-    assert kept.kept == 1000.0
-    now[0] = 3.0
-    kept.keep(2000.0)
-    assert kept.kept == 500.0
-    assert kept.certified
-
-
-def test_without_time_for_a_certificate_the_proof_uses_the_whole_time():
-    short = limits(1e-6, 0.5, 0.5, 0.5)
-    short.keep(1000.0)
-    assert (short.certified, short.kept, short.deadline) == (False, 0.0, short.whole)
-    endless = limits(math.inf)
-    endless.keep(1000.0)
-    assert endless.deadline.at == math.inf

@@ -57,8 +57,7 @@ def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
         ("time", "the time limit ended before a bound was proven"),
         ("interrupted", "the proof was interrupted"),
         ("work", "the limit of work ended"),
-        ("workers", "a worker of the scheduler was lost"),
-        ("gap", "ended the check before the coarsest level was checked"),
+        ("gap", "the requested gap allows the bound 0"),
     ],
 )
 def test_the_reason_of_a_missing_certificate_is_the_true_one(tmp_path, ended, words):

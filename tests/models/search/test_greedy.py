@@ -10,7 +10,7 @@ from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.nearest_stroke import nearest_strokes
-from crossfield.models.search.search import search_patches
+from crossfield.models.search.search import search
 from crossfield.models.search.starts import first_field
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import power_field
@@ -253,6 +253,6 @@ def test_cells_do_not_leap_over_a_corner():
 def test_the_greatest_weights_are_solved(skew_coefficient):
     for instance in (sample("mouse", 8), Instance("one", [[True]], [[0, 0]], [2.0], [1.0])):
         heavy = replace(instance, stroke_coefficient=1e6, skew_coefficient=skew_coefficient)
-        for field in (greedy_field(heavy), power_field(heavy), search_patches(heavy, rounds=1).field):
+        for field in (greedy_field(heavy), power_field(heavy), search(heavy, rounds=1).field):
             assert np.isfinite(field.energy().total)
         assert np.abs(greedy_field(heavy).residual_r).max() < 1e-3

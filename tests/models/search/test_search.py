@@ -16,7 +16,6 @@ from crossfield.models.search.coarse import halved, prolonged
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.improvement import improved_field, pixel_curves
 from crossfield.models.search.landscape import STEPS, Landscape, Patch
-from crossfield.models.search.search import search_patches
 from crossfield.models.search.starts import first_field
 from crossfield.models.search.walk import Perturbations, Task, explore
 from exhaustive import assert_feasible, exact, least_energy, random_instance, sketch
@@ -177,7 +176,7 @@ def test_search_gets_below_the_greedy_field():
 
 def test_a_small_grid_is_searched_from_several_starts():
     """From the lowest start alone, three rounds lead to an energy of 6.914."""
-    found = search_patches(cf.random_instance(9, size=12), rounds=3, jobs=1).field
+    found = cf.search(cf.random_instance(9, size=12), rounds=3, jobs=1).field
     assert found.energy().total < 6.82
 
 

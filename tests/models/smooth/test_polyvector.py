@@ -5,7 +5,7 @@ import pytest
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.instance import Instance
 from crossfield.models.search.improvement import improved_field
-from crossfield.models.search.search import search_patches
+from crossfield.models.search.search import search
 from crossfield.models.search.starts import polyvector_start
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field, power_field
@@ -78,7 +78,7 @@ def test_the_search_begins_where_the_polyvector_field_leads():
     instance = sample("saddle", 24)
     reached = improved_field(polyvector_start(instance)).energy().total
     assert reached < 0.95 * improved_field(power_field(instance)).energy().total
-    assert search_patches(instance, rounds=0).field.energy().total <= reached + 1e-9
+    assert search(instance, rounds=0).field.energy().total <= reached + 1e-9
 
 
 def test_one_pixel_under_the_heaviest_strokes_is_solved():
