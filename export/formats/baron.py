@@ -31,7 +31,7 @@ from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical, Kind, coefficient
 from ..writing.expressions import Language, wrapped
 from ..writing.names import Names
-from ..writing.records import Piece, Tagged, render, scalar_when_constant, signed, words
+from ..writing.records import Piece, Tagged, render, signed, words
 from .gams import Scalar, declared
 
 WIDTH = 160
@@ -83,14 +83,14 @@ def _bounds(block: Block, names: Names, *, low: bool) -> Iterator[bytes]:
 
 def _assigned(name: Tagged, values: Floats) -> Iterator[bytes]:
     if len(values):
-        yield from render([name, b": ", words(scalar_when_constant(values)), b";\n"], len(values))
+        yield from render([name, b": ", words(values), b";\n"], len(values))
 
 
 def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     terms = [_monomial(term, names) for term in (*family.of_degree(1), *family.of_degree(2))]
     sense = f" {family.family.sense} ".encode()
     parts = [names.row(family), b":", *(piece for term in terms for piece in term), sense]
-    yield from render([*parts, words(scalar_when_constant(family.limit)), b";\n"], family.count)
+    yield from render([*parts, words(family.limit), b";\n"], family.count)
 
 
 def _monomial(term: Monomial, names: Names) -> list[Piece]:

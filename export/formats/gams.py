@@ -25,13 +25,12 @@ G-numbers: docs/format-rules.md.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
-from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.families import PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...templates import stream
@@ -48,7 +47,6 @@ from ..writing.records import (
     number,
     numbers,
     render,
-    scalar_when_constant,
     table,
     words,
 )
@@ -80,7 +78,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         "equations": _equations(problem, names),
         "objective": _objective(problem, names),
         "rows": _rows(problem, names),
-        "bounds": _bounds(problem, names),
+        "bounds": _bounds(form),
         "start": () if start is None else _start(problem, names, start),
         "results": _results(problem, names),
     }
@@ -132,8 +130,7 @@ class Scalar(Language):
 
 
 def _number_words(values: Floats | float, *, signed: bool) -> Piece:
-    given = values if isinstance(values, float) else scalar_when_constant(values)
-    return words(given, with_sign if signed else bracketed)
+    return words(values, with_sign if signed else bracketed)
 
 
 def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]:
@@ -180,22 +177,13 @@ def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
         yield from render(parts, family.count)
 
 
-def _bounds(problem: Problem, names: Names) -> Iterator[bytes]:
-    for block in problem.blocks.values():
-        fixed = block.lower == block.upper
-        for chosen, suffixes in ((fixed, ("fx",)), (~fixed, ("lo", "up"))):
-            at = np.nonzero(chosen)[0]
-            yield from render(_bound_parts(block, names, at, suffixes), len(at))
-
-
-def _bound_parts(block: Block, names: Names, at: NDArray[Any], suffixes: tuple[str, ...]) -> list[Piece]:
-    name = names.of(block) if len(at) == block.count else names.of(block).at(at)
-    parts: list[Piece] = []
-    for suffix in suffixes:
-        values = (block.upper if suffix == "up" else block.lower)[at]
-        text = words(scalar_when_constant(values), bounds) if len(at) else b""
-        parts += [name, f".{suffix} = ".encode(), text, b"; " if suffix == "lo" else b";\n"]
-    return parts
+def _bounds(form: Canonical) -> Iterator[bytes]:
+    for group in (group for block in form.problem.blocks.values() for group in form.bounds(block)):
+        name, lower, upper = group.names, words(group.lower, bounds), words(group.upper, bounds)
+        parts: list[Piece] = [name, b".lo = ", lower, b"; ", name, b".up = ", upper, b";\n"]
+        if group.kind == "fixed":
+            parts = [name, b".fx = ", lower, b";\n"]
+        yield from render(parts, len(group.lower))
 
 
 def _start(problem: Problem, names: Names, start: Floats) -> Iterator[bytes]:

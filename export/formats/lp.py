@@ -27,7 +27,7 @@ from collections.abc import Iterator
 from ...models.formulations.families import Block, PlacedFamily
 from ..writing.canonical import Canonical, coefficient
 from ..writing.names import Names
-from ..writing.records import Piece, Pieces, bounds, render, scalar_when_constant, signed, words
+from ..writing.records import Piece, Pieces, bounds, render, signed, words
 
 
 def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
@@ -61,7 +61,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
 def _objective(form: Canonical) -> Iterator[bytes]:
     names = form.names
     for block in form.problem.blocks.values():
-        cost = words(scalar_when_constant(form.costs[block.slice]), signed)
+        cost = words(form.costs[block.slice], signed)
         yield from render([b" ", cost, b" ", names.of(block), b"\n"], block.count)
     index, factor = form.products()
     if not len(factor):
@@ -94,10 +94,10 @@ def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
             ]
         parts.append(b" ]")
     sense = b" = " if family.family.sense == "==" else f" {family.family.sense} ".encode()
-    parts += [sense, words(scalar_when_constant(family.limit)), b"\n"]
+    parts += [sense, words(family.limit), b"\n"]
     yield from render(parts, family.count)
 
 
 def _bounds(block: Block, names: Names) -> Iterator[bytes]:
-    lower, upper = (words(scalar_when_constant(end), bounds) for end in (block.lower, block.upper))
+    lower, upper = (words(end, bounds) for end in (block.lower, block.upper))
     yield from render([b" ", lower, b" <= ", names.of(block), b" <= ", upper, b"\n"], block.count)

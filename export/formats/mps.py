@@ -18,14 +18,15 @@ M-numbers: docs/format-rules.md.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
 import numpy as np
 
 from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SLOTS
-from ...models.instance.grid import Bools, Grid, Ints
-from ..writing.canonical import Canonical, coefficient
+from ...models.instance.grid import Grid, Ints
+from ..writing.canonical import Bounds, Canonical, coefficient
 from ..writing.names import Names, problem_name
 from ..writing.records import (
     OnlyWhere,
@@ -33,7 +34,6 @@ from ..writing.records import (
     Tagged,
     number,
     render,
-    scalar_when_constant,
     words,
 )
 
@@ -57,7 +57,8 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     yield from _right_sides(problem, names)
     yield b"BOUNDS\n"
     for block in problem.blocks.values():
-        yield from _bounds(block, names)
+        for bounds in form.bounds(block):
+            yield from _bounds(bounds)
     yield b" FX BND1 %b 1\n" % form.one
     yield from _objective_matrix(form)
     for family in problem.rows:
@@ -74,7 +75,7 @@ def _columns(form: Canonical) -> Iterator[bytes]:
         if integer:
             yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
         for block in blocks:
-            name, cost = names.of(block), words(scalar_when_constant(form.costs[block.slice]))
+            name, cost = names.of(block), words(form.costs[block.slice])
             entries = [
                 entry
                 for family in problem.rows
@@ -150,32 +151,28 @@ def _right_sides(problem: Problem, names: Names) -> Iterator[bytes]:
         yield b" RHS1 c_ONE 1\n"
     for family in problem.rows:
         at = np.nonzero(family.limit)[0]
-        value = words(scalar_when_constant(family.limit[at]))
+        value = words(family.limit[at])
         yield from render([b" RHS1 ", names.row(family).at(at), b" ", value, b"\n"], len(at))
 
 
-def _bounds(block: Block, names: Names) -> Iterator[bytes]:
-    """Bounds kind by kind; within a kind one record per column, two lines where both ends are named."""
-    low, high = np.isfinite(block.lower), np.isfinite(block.upper)
-    fixed = block.lower == block.upper
-    kinds: list[tuple[Bools, bytes, bytes]] = [
-        (fixed, b"FX", b""),
-        (low & high & ~fixed, b"LO", b"UP"),
-        (low & ~high, b"LO", b"PL"),
-        (~low & high, b"MI", b"UP"),
-        (~low & ~high, b"FR", b""),
-    ]
-    for chosen, first, second in kinds:
-        at = np.nonzero(chosen)[0]
-        name = names.of(block) if len(at) == block.count else names.of(block).at(at)
-        parts: list[Piece] = []
-        for kind in filter(None, (first, second)):
-            value = {b"FX": block.lower, b"LO": block.lower, b"UP": block.upper}.get(kind)
-            parts += [b" " + kind + b" BND1 ", name]
-            if value is not None and len(at):
-                parts += [b" ", words(scalar_when_constant(value[at]))]
-            parts.append(b"\n")
-        yield from render(parts, len(at))
+_ENDS: Final = {
+    "fixed": (b"FX",),
+    "boxed": (b"LO", b"UP"),
+    "lower": (b"LO", b"PL"),
+    "upper": (b"MI", b"UP"),
+    "free": (b"FR",),
+}
+"""Keywords of the lines of a column, by the kind of its bounds."""
+
+
+def _bounds(bounds: Bounds) -> Iterator[bytes]:
+    """One record per column, with two lines where both ends are named."""
+    numbers = {b"FX": bounds.lower, b"LO": bounds.lower, b"UP": bounds.upper}
+    parts: list[Piece] = []
+    for keyword in _ENDS[bounds.kind]:
+        value = [b" ", words(numbers[keyword])] if keyword in numbers else []
+        parts += [b" " + keyword + b" BND1 ", bounds.names, *value, b"\n"]
+    yield from render(parts, len(bounds.lower))
 
 
 def _objective_matrix(form: Canonical) -> Iterator[bytes]:

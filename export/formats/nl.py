@@ -28,11 +28,11 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.families import Monomial, PlacedFamily
+from ...models.formulations.families import PlacedFamily
 from ...models.formulations.names import name_length
 from ...models.instance.grid import Floats, Ints
-from ..writing.canonical import Canonical, coefficient
-from ..writing.expressions import is_data, split
+from ..writing.canonical import BOUND_KINDS, Canonical, coefficient
+from ..writing.expressions import Operator, Prefix
 from ..writing.names import OBJECTIVE
 from ..writing.nl_layout import Layout, nonlinear_terms, runs
 from ..writing.records import (
@@ -43,7 +43,6 @@ from ..writing.records import (
     Raw,
     check_coefficients,
     render,
-    scalar_when_constant,
     words,
 )
 from ..writing.stamps import stamp_option
@@ -51,7 +50,6 @@ from ..writing.stamps import stamp_option
 __all__ = ["Layout", "generate"]
 
 ADD, MULTIPLY, POWER, NEGATE, COSINE, SUM = 0, 2, 5, 16, 46, 54
-_FUNCTIONS: Final = {sp.cos: COSINE}
 
 
 Numbers = NDArray[Any] | int | float
@@ -121,11 +119,8 @@ def generate(
     yield _counts(layout, code)
     first = 0
     for family in layout.rows:
-        body = _sum(
-            code, [_monomial(layout, code, term) for term in nonlinear_terms(family)]
-        ) or code.constant(0.0)
         head = code.token(b"C", np.arange(first, first + family.count, dtype=np.int32))
-        yield from code.records([*head, *body], family.count)
+        yield from code.records([*head, *_Tree(family, layout, code).monomials()], family.count)
         first += family.count
     yield from _objective(layout, code)
     if start is not None:
@@ -133,7 +128,7 @@ def generate(
         parts = code.token(b"", np.arange(problem.n_columns, dtype=np.int32), start[layout.order])
         yield from code.records(parts, problem.n_columns)
     yield from _limits(layout, code)
-    yield from _bounds(layout, code)
+    yield from _bounds(form, code)
     yield from _jacobian(layout, code)
 
 
@@ -168,55 +163,46 @@ def _objective(layout: Layout, code: Text) -> Iterator[bytes]:
     elif summands > 1:
         yield from code.records(code.sum(summands))
     for family in families:
-        yield from code.records(_tree(layout, code, family, family.family.body), family.count)
+        yield from code.records(_Tree(family, layout, code).expression(family.family.body), family.count)
 
 
-def _tree(layout: Layout, code: Text, family: PlacedFamily, expression: sp.Expr) -> Pieces:
-    """The expression in prefix notation; parts free of columns become one number."""
-    if is_data(family, expression):
-        return code.constant(family.data(expression))
-    if expression.is_Symbol:
-        return code.token(b"v", layout.places(family, expression))
-    if expression.is_Add or expression.is_Mul:
-        return _chain(layout, code, family, expression)
-    if expression.is_Pow:
-        return [
-            *code.token(b"o", POWER),
-            *_tree(layout, code, family, expression.base),
-            *code.constant(float(expression.exp)),
+class _Tree(Prefix):
+    """Expressions of a family in a form of the file."""
+
+    def __init__(self, family: PlacedFamily, layout: Layout, code: Text) -> None:
+        super().__init__(family)
+        self._layout = layout
+        self._code = code
+
+    def number(self, values: Floats | float) -> Pieces:
+        """A number."""
+        return self._code.constant(values)
+
+    def column(self, symbol: sp.Symbol) -> Pieces:
+        """A column, by its place in the file."""
+        return self._code.token(b"v", self._layout.places(self.family, symbol))
+
+    def node(self, operator: Operator, parts: list[Pieces]) -> Pieces:
+        """An operator with its operands; a product is one of pairs, and a sum of two has its own operator."""
+        inside, code = [piece for part in parts for piece in part], self._code
+        if operator == "sum":
+            return [*code.sum(len(parts)), *inside]
+        if operator == "product":
+            return [
+                *(piece for part in parts[:-1] for piece in (*code.token(b"o", MULTIPLY), *part)),
+                *parts[-1],
+            ]
+        if operator == "square":
+            return [*code.token(b"o", POWER), *inside, *code.constant(2.0)]
+        return [*code.token(b"o", NEGATE if operator == "negative" else COSINE), *inside]
+
+    def monomials(self) -> Pieces:
+        """The nonlinear terms of a row; 0 without any."""
+        terms = [
+            self.node("product", [self.number(coefficient(term)), *map(self.column, term.symbols)])
+            for term in nonlinear_terms(self.family)
         ]
-    return [*code.token(b"o", _FUNCTIONS[expression.func]), *_tree(layout, code, family, expression.args[0])]
-
-
-def _chain(layout: Layout, code: Text, family: PlacedFamily, expression: sp.Expr) -> Pieces:
-    """A sum or a product, its parts free of columns joined into one number in front."""
-    data, others = split(family, expression)
-    rest = [_tree(layout, code, family, part) for part in others]
-    if expression.is_Add:
-        return _sum(code, ([] if data is None else [code.constant(family.data(data))]) + rest)
-    parts = list(rest[-1])
-    for factor in reversed(rest[:-1]):
-        parts = [*code.token(b"o", MULTIPLY), *factor, *parts]
-    if data is None:
-        return parts
-    if data == -1:
-        return [*code.token(b"o", NEGATE), *parts]
-    return [*code.token(b"o", MULTIPLY), *code.constant(family.data(data)), *parts]
-
-
-def _sum(code: Text, summands: list[Pieces]) -> Pieces:
-    flat = [part for summand in summands for part in summand]
-    if len(summands) < 2:
-        return flat
-    return [*code.sum(len(summands)), *flat]
-
-
-def _monomial(layout: Layout, code: Text, term: Monomial) -> Pieces:
-    parts: list[Any] = [*code.token(b"o", MULTIPLY), *code.constant(coefficient(term))]
-    *others, last = (layout.places(term.family, symbol) for symbol in term.symbols)
-    for factor in others:
-        parts += [*code.token(b"o", MULTIPLY), *code.token(b"v", factor)]
-    return [*parts, *code.token(b"v", last)]
+        return self.joined("sum", terms) if terms else self.number(0.0)
 
 
 def _limits(layout: Layout, code: Text) -> Iterator[bytes]:
@@ -225,22 +211,25 @@ def _limits(layout: Layout, code: Text) -> Iterator[bytes]:
     yield from code.records(code.token(b"r"))
     for family in layout.rows:
         kind = {">=": b"2", "<=": b"1", "==": b"4"}[family.family.sense]
-        yield from code.records(code.token(kind, scalar_when_constant(family.limit)), family.count)
+        yield from code.records(code.token(kind, family.limit), family.count)
 
 
-def _bounds(layout: Layout, code: Text) -> Iterator[bytes]:
-    """Bounds in file order, one stretch of one block and of equal kind after the other."""
+_BOUND: Final = np.array([{"lower": 2, "upper": 1, "free": 3}.get(kind, 0) for kind in BOUND_KINDS])
+"""The digit before the bounds of a column, by their kind."""
+
+
+def _bounds(form: Canonical, code: Text) -> Iterator[bytes]:
+    """Bounds in file order, one stretch of one block and of equal digits after the other."""
+    problem, layout = form.problem, form.layout
     yield from code.records(code.token(b"b"))
-    for block, run in layout.stretches:
-        inside = layout.order[run] - block.offset
-        lower, upper = block.lower[inside], block.upper[inside]
-        kind = np.select(
-            [np.isfinite(lower) & np.isfinite(upper), np.isfinite(upper), np.isfinite(lower)], [0, 1, 2], 3
-        )
-        for part in runs(kind):
-            low, high = scalar_when_constant(lower[part]), scalar_when_constant(upper[part])
-            values = {0: (low, high), 1: (high,), 2: (low,), 3: ()}[int(kind[part.start])]
-            yield from code.records(code.token(b"%d" % kind[part.start], *values), part.stop - part.start)
+    for _, run in layout.stretches:
+        columns = layout.order[run]
+        digits = _BOUND[form.bound_kinds[columns]]
+        for part in runs(digits):
+            lower, upper = problem.lower[columns[part]], problem.upper[columns[part]]
+            digit = int(digits[part.start])
+            ends = {0: (lower, upper), 1: (upper,), 2: (lower,), 3: ()}[digit]
+            yield from code.records(code.token(b"%d" % digit, *ends), len(lower))
 
 
 def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:

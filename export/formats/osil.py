@@ -32,7 +32,7 @@ from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
-from ..writing.expressions import is_data, split
+from ..writing.expressions import Operator, Prefix
 from ..writing.names import OBJECTIVE, Names
 from ..writing.records import (
     Decimals,
@@ -43,7 +43,6 @@ from ..writing.records import (
     number,
     numbers,
     render,
-    scalar_when_constant,
     words,
 )
 from ..writing.terms import terms
@@ -88,7 +87,7 @@ _LETTER: Final = {"continuous": "C", "binary": "B", "integer": "I"}
 
 
 def _variables(block: Block, names: Names, kind: str) -> Iterator[bytes]:
-    lower, upper = (words(scalar_when_constant(end), ends) for end in (block.lower, block.upper))
+    lower, upper = (words(end, ends) for end in (block.lower, block.upper))
     kind_lower = f'" type="{kind}" lb="'.encode()
     parts: Pieces = [b'<var name="', names.of(block), kind_lower, lower, b'" ub="', upper, b'"/>\n']
     yield from render(parts, block.count)
@@ -125,7 +124,7 @@ def _objective(problem: Problem) -> Iterator[bytes]:
 
 
 def _constraints(family: PlacedFamily, names: Names) -> Iterator[bytes]:
-    limit = words(scalar_when_constant(family.limit))
+    limit = words(family.limit)
     lower: Piece = b"-INF" if family.family.sense == "<=" else limit
     upper: Piece = b"INF" if family.family.sense == ">=" else limit
     parts: Pieces = [b'<con name="', names.row(family), b'" lb="', lower, b'" ub="', upper, b'"/>\n']
@@ -189,35 +188,24 @@ def _nonlinear(problem: Problem) -> Iterator[bytes]:
         return
     yield b'<nonlinearExpressions numberOfNonlinearExpressions="1">\n<nl idx="-1">\n<sum>\n'
     for family in families:
-        yield from render([*_tree(family, family.family.body), b"\n"], family.count)
+        yield from render([*_Tree(family).expression(family.family.body), b"\n"], family.count)
     yield b"</sum>\n</nl>\n</nonlinearExpressions>\n"
 
 
-def _tree(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
-    """An expression as nodes; parts free of columns become one number."""
-    if is_data(family, expression):
-        return _constant(family, expression)
-    if expression.is_Symbol:
-        return [b'<variable idx="', Decimals(family.column_of(expression)), b'"/>']
-    if expression.is_Add or expression.is_Mul:
-        return _chain(family, expression)
-    if expression.is_Pow and expression.exp == 2:
-        return _node(b"square", _tree(family, expression.base))
-    assert isinstance(expression, sp.cos)  # no declaration holds anything else
-    return _node(b"cos", _tree(family, expression.args[0]))
+class _Tree(Prefix):
+    """Expressions of a family as nodes."""
 
+    def number(self, values: Floats | float) -> Pieces:
+        """A number."""
+        return [b'<number value="', words(values), b'"/>']
 
-def _chain(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
-    """A sum or a product, its parts free of columns joined into one number in front."""
-    data, others = split(family, expression)
-    constant = [] if data is None else _constant(family, data)
-    inside = constant + [piece for part in others for piece in _tree(family, part)]
-    return _node(b"sum" if expression.is_Add else b"product", inside)
+    def column(self, symbol: sp.Symbol) -> Pieces:
+        """A column, by its place."""
+        return [b'<variable idx="', Decimals(self.family.column_of(symbol)), b'"/>']
 
-
-def _constant(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
-    return [b'<number value="', words(family.data(expression)), b'"/>']
-
-
-def _node(name: bytes, inside: list[Piece]) -> list[Piece]:
-    return [b"<" + name + b">", *inside, b"</" + name + b">"]
+    def node(self, operator: Operator, parts: list[Pieces]) -> Pieces:
+        """An element with its operands inside."""
+        if operator == "negative":
+            return self.node("product", [self.number(-1.0), *parts])
+        inside = [piece for part in parts for piece in part]
+        return [f"<{operator}>".encode(), *inside, f"</{operator}>".encode()]

@@ -7,11 +7,13 @@ bridges and linopy's `matrices`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...models.formulations.arrays import row_sides
 from ...models.formulations.families import Block, Coefficient, Monomial
@@ -19,7 +21,7 @@ from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
 from .names import Names
 from .nl_layout import Layout
-from .records import Texts, check_coefficients, of_bytes
+from .records import Tagged, Texts, check_coefficients, of_bytes
 from .stamps import one_column
 
 Kind = Literal["continuous", "binary", "integer"]
@@ -27,6 +29,19 @@ Kind = Literal["continuous", "binary", "integer"]
 Order = Literal["nl", "lp", "mps", "mod"]
 """Kinds of files by the order of their columns: .nl has one of its own, LP and MPS put the column fixed to 1
 first and last, and of a .mod GLPK numbers the columns as it meets them."""
+
+
+BOUND_KINDS: Final = ("fixed", "boxed", "lower", "upper", "free")
+"""Kinds of bounds: both ends equal, both finite, one finite, none."""
+
+
+class Bounds(NamedTuple):
+    """Columns of a block whose bounds are of one kind, and their ends."""
+
+    kind: str
+    names: Tagged
+    lower: Floats
+    upper: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +111,22 @@ class Canonical:
     def blocks(self, kind: Kind) -> list[Block]:
         """The nonempty blocks of a kind, in order."""
         return [block for block in self.problem.blocks.values() if block.count and self.kind(block) == kind]
+
+    @cached_property
+    def bound_kinds(self) -> NDArray[np.int8]:
+        """The kind of the bounds of every column, a place in BOUND_KINDS, shape (columns,)."""
+        lower, upper = self.problem.lower, self.problem.upper
+        low, high = np.isfinite(lower), np.isfinite(upper)
+        return np.select([lower == upper, low & high, low, high], [0, 1, 2, 3], 4).astype(np.int8)
+
+    def bounds(self, block: Block) -> Iterator[Bounds]:
+        """The bounds of a block, kind by kind."""
+        names, kinds = self.names.of(block), self.bound_kinds[block.slice]
+        for number, kind in enumerate(BOUND_KINDS):
+            at = np.flatnonzero(kinds == number)
+            if len(at):
+                chosen = names if len(at) == block.count else names.at(at)
+                yield Bounds(kind, chosen, block.lower[at], block.upper[at])
 
     @cached_property
     def row_lower(self) -> Floats:

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Literal
 
 import sympy as sp
 
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.symbols import SCALARS, VARIABLES
+from ...models.instance.grid import Floats
 from .records import Piece, Pieces
 
 
@@ -108,11 +110,52 @@ def is_data(family: PlacedFamily, expression: sp.Expr) -> bool:
     return not expression.free_symbols & set(family.variables)
 
 
-def split(family: PlacedFamily, chain: sp.Expr) -> tuple[sp.Expr | None, list[sp.Expr]]:
-    """The two parts of a sum or a product: its data as one expression (or None), and the rest in order."""
-    data = [part for part in chain.args if is_data(family, part)]
-    others = [part for part in chain.args if part not in data]
-    return (chain.func(*data) if data else None), others
+Operator = Literal["sum", "product", "negative", "square", "cos"]
+
+
+class Prefix(ABC):
+    """Expressions of a family with operators before operands: one walk for every language of this kind.
+
+    Data are evaluated: what holds no column becomes one number, in front of the rest of its sum or product.
+    """
+
+    def __init__(self, family: PlacedFamily) -> None:
+        self.family = family
+
+    @abstractmethod
+    def number(self, values: Floats | float) -> Pieces:
+        """A number, one per element or one for all."""
+
+    @abstractmethod
+    def column(self, symbol: sp.Symbol) -> Pieces:
+        """The column of a symbol."""
+
+    @abstractmethod
+    def node(self, operator: Operator, parts: list[Pieces]) -> Pieces:
+        """An operator with its operands: two or more of a sum or a product, one of the others."""
+
+    def expression(self, expression: sp.Expr) -> Pieces:
+        """An expression."""
+        if is_data(self.family, expression):
+            return self.number(self.family.data(expression))
+        if expression.is_Symbol:
+            return self.column(expression)
+        if expression.is_Add or expression.is_Mul:
+            return self._chain(expression)
+        assert isinstance(expression, sp.cos) or expression.exp == 2  # no declaration holds anything else
+        return self.node("square" if expression.is_Pow else "cos", [self.expression(expression.args[0])])
+
+    def _chain(self, expression: sp.Expr) -> Pieces:
+        data = [part for part in expression.args if is_data(self.family, part)]
+        parts = [self.expression(part) for part in expression.args if part not in data]
+        if expression.is_Mul and data == [-1]:
+            return self.node("negative", [self.joined("product", parts)])
+        constant = [self.expression(expression.func(*data))] if data else []
+        return self.joined("sum" if expression.is_Add else "product", constant + parts)
+
+    def joined(self, operator: Operator, parts: list[Pieces]) -> Pieces:
+        """The sum or the product of one part or more."""
+        return self.node(operator, parts) if len(parts) > 1 else parts[0]
 
 
 def wrapped(summands: Sequence[Pieces], width: int, indent: bytes) -> list[Piece]:

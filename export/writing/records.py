@@ -309,16 +309,13 @@ def bounds(values: Floats) -> Texts:
 
 
 def words(values: Floats | float, text: Callable[[Floats], Texts] = numbers) -> bytes | Words:
-    """Numbers as words: literal bytes for one number, a table of the distinct ones for an array."""
-    if np.ndim(values) == 0:
-        return bytes(text(np.array([values], dtype=np.float64))[0])
-    distinct, codes = _distinct(np.asarray(values, dtype=np.float64) + 0.0)
+    """Numbers as words: literal bytes for one number or equal ones, else a table of the distinct ones."""
+    given = np.asarray(values, dtype=np.float64) + 0.0
+    first = given.ravel()[:1]
+    if len(first) and (given == first).all():
+        return bytes(text(first)[0])
+    distinct, codes = _distinct(given)
     return Words(of_texts(text(distinct)), codes)
-
-
-def scalar_when_constant(values: Floats) -> Floats | float:
-    """The one number that all values equal, or the values."""
-    return float(values[0]) + 0.0 if len(values) and (values == values[0]).all() else values
 
 
 def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
