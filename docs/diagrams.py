@@ -14,7 +14,8 @@ import numpy as np
 from crossfield.export.pictures.draw import own_settings
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.instance import Instance
 from matplotlib.figure import Figure
 
 U, V, GREY, FILL = "#c0392b", "#2563a8", "#7a7a7a", "#dfe9f5"

@@ -8,8 +8,8 @@ from typing import Any, Final
 import matplotlib as mpl
 import numpy as np
 from crossfield.export.pictures.draw import own_settings
+from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.grid import Bools, Floats, Grid
-from crossfield.models.instance.instance import HALF
 from crossfield.models.proof.lattice import offsets, starts
 from crossfield.models.proof.record import LevelRecord, Proof
 from diagrams import STYLE, U, V

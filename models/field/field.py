@@ -10,11 +10,12 @@ import numpy as np
 
 from ..arguments import check_fields, numbers
 from ..errors import InputError, InstanceError
-from ..instance.angles import MOST_ANGLE, line_difference
+from ..instance.angles import HALF, MOST_ANGLE, QUARTER, line_difference
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import HALF, QUARTER, Instance, whole_numbers
+from ..instance.instance import Instance, whole_numbers
+from ..instance.terms import parity_sign
 from ..previews import Pictured
-from .jumps import best_jumps, label_of, parity_sign, stepped
+from .jumps import best_jumps, label_of, stepped
 
 AbsoluteNorm = Literal[1, "mixed"]
 """Norms in which pairs count with absolute values."""
@@ -201,20 +202,17 @@ class CrossField(Pictured):
     @property
     def residual_a(self) -> Floats:
         """A = alpha_i - alpha_j + pi/2 p of each pair, shape (m,)."""
-        grid = self.instance.grid
-        return self.alpha[grid.first] - self.alpha[grid.second] + HALF * self.p
+        return self.instance.pair_terms.residual_a(self.alpha, self.p)
 
     @property
     def residual_b(self) -> Floats:
         """B = (-1)^p beta_i - beta_j of each pair, shape (m,)."""
-        grid = self.instance.grid
-        return parity_sign(self.p) * self.beta[grid.first] - self.beta[grid.second]
+        return self.instance.pair_terms.residual_b(self.beta, self.p)
 
     @property
     def residual_r(self) -> Floats:
         """R = alpha + beta - theta of each stroke pixel, shape (s,)."""
-        at = self.instance.stroke_index
-        return self.alpha[at] + self.beta[at] - self.instance.target
+        return self.instance.stroke_terms.residuals(self.alpha, self.beta)
 
     def energy(self, norm: Norm = 2) -> Energy:
         """The energy in a norm, as three sums and their total.

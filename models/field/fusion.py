@@ -7,6 +7,7 @@ same field cost more than a mixed pair; then the mixed pair counts as much.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -14,9 +15,9 @@ from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import HALF
+from ..instance.terms import PairTerms
 from .field import CrossField
-from .jumps import free_jumps, parity_sign
+from .jumps import free_jumps
 
 _APART: Final = 0.02  # radians of cross error up to which two crosses count as equal
 _UNITS: Final = 1e6  # parts of 1 + energy: flows are whole numbers, whose sums do not depend on the order
@@ -35,8 +36,9 @@ def fused(one: CrossField, other: CrossField) -> CrossField:
         return one
     fields = (one, other)
     pairs = np.nonzero(far[grid.first] | far[grid.second])[0].astype(np.int32)
+    terms = one.instance.pair_terms.chosen(pairs)
     same, mixed, mixed_too, exchanged = (
-        _least_of_pairs(pairs, first, second) for first in fields for second in fields
+        _least_of_pairs(terms, first, second) for first in fields for second in fields
     )
     inside = far[grid.first[pairs]] & far[grid.second[pairs]]
     price = _of_pixels(other) - _of_pixels(one)
@@ -47,7 +49,7 @@ def fused(one: CrossField, other: CrossField) -> CrossField:
     unit = (1 + energy) / _UNITS
     taken = _least_cut(far, np.rint(price / unit), links, np.rint(np.maximum(excess, 0) / unit))
     alpha, beta = np.where(taken, other.alpha, one.alpha), np.where(taken, other.beta, one.beta)
-    found = CrossField(one.instance, alpha, beta, free_jumps(grid, alpha, beta)[0])
+    found = CrossField(one.instance, alpha, beta, free_jumps(one.instance, alpha, beta)[0])
     return found if found.energy().total < energy - unit else one
 
 
@@ -60,17 +62,11 @@ def _of_pixels(field: CrossField) -> Floats:
     return strokes + skew
 
 
-def _least_of_pairs(pairs: Ints, first: CrossField, second: CrossField) -> Floats:
+def _least_of_pairs(pairs: PairTerms, first: CrossField, second: CrossField) -> Floats:
     """Energies of pairs with their best jumps; first pixels from one field, second from another."""
-    i, j = first.instance.grid.first[pairs], first.instance.grid.second[pairs]
-    turn = first.alpha[i] - second.alpha[j]
-    near = np.floor(-turn / HALF).astype(np.int32)
-    # The best even and the best odd jump are the two next to -2 turn / pi.
-    ways = (
-        2 * ((turn + HALF * p) ** 2 + (parity_sign(p) * first.beta[i] - second.beta[j]) ** 2)
-        for p in (near, near + 1)
-    )
-    return np.minimum(*ways)
+    between = replace(pairs, second=pairs.second + np.int32(len(first.alpha)))
+    alpha = np.concatenate([first.alpha, second.alpha])
+    return between.least_costs(alpha, np.concatenate([first.beta, second.beta]))
 
 
 def _least_cut(free: Bools, price: Floats, links: Ints, excess: Floats) -> Bools:

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..instance.angles import wrap
+from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.grid import Floats, Grid, Ints
-from ..instance.instance import HALF, QUARTER, Instance
-
-
-def parity_sign(p: Ints) -> Floats:
-    """The sign (-1)^p of each jump."""
-    return 1.0 - 2.0 * (p & 1).astype(np.float64)
+from ..instance.instance import Instance
+from ..instance.terms import PairTerms, parity_sign
 
 
 def label_of(u: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -30,30 +26,28 @@ def best_jumps(instance: Instance, alpha: Floats, beta: Floats, *, absolute: boo
     absolute: whether pairs count with absolute values instead of squares.
     """
     size = np.abs if absolute else np.square
-    return _best(instance.grid, alpha, beta, (instance.p_min, instance.p_max), size)[0]
+    return _best(instance.pair_terms, alpha, beta, (instance.p_min, instance.p_max), size)[0]
 
 
-def free_jumps(grid: Grid, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
+def free_jumps(instance: Instance, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
     """The best jump of each pair without a range, and its energy; ties go to the smaller jump; (m,)."""
-    return _best(grid, alpha, beta)
+    return _best(instance.pair_terms, alpha, beta)
 
 
 def _best(
-    grid: Grid,
+    pairs: PairTerms,
     alpha: Floats,
     beta: Floats,
     within: tuple[Ints, Ints] | None = None,
     size: np.ufunc = np.square,
 ) -> tuple[Ints, Floats]:
-    difference = alpha[grid.first] - alpha[grid.second]
-    near = np.floor(-difference / HALF).astype(np.int32)
+    near = pairs.jump_below(alpha)
     around = np.arange(-1, 3, dtype=np.int32)[:, None]
-    # The best even and the best odd jump are the two next to -2d/pi, unless that is a whole number.
+    # The best even and the best odd jump are near and near + 1, unless -2A/pi is a whole number.
     candidates = near + around if within is None else np.clip(np.clip(near, *within) + around, *within)
-    a = difference + HALF * candidates
-    b = parity_sign(candidates) * beta[grid.first] - beta[grid.second]
-    cost = np.round(2 * (size(a) + size(b)), 12)  # rounding must not decide between equal costs
-    at = (np.argmin(cost, axis=0), np.arange(len(difference)))
+    # Rounding must not decide between equal costs.
+    cost = np.round(pairs.costs(alpha, beta, candidates, size), 12)
+    at = (np.argmin(cost, axis=0), np.arange(len(near)))
     return candidates[at], cost[at]
 
 

@@ -19,8 +19,9 @@ import sympy as sp
 from ..arguments import check_kind, checked_arguments, numbers
 from ..errors import FormulationError, InputError
 from ..field.field import CrossField
+from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import QUARTER, Instance, whole_numbers
+from ..instance.instance import Instance, whole_numbers
 from ..previews import table_of
 from .arrays import ProblemArrays, arrays_of, check_highs, highs_of
 from .catalogue import declare, lift_products, norm_of

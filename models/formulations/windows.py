@@ -9,8 +9,9 @@ import numpy as np
 
 from ..errors import InstanceError
 from ..field.field import Norm
+from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import QUARTER, Instance, whole_numbers
+from ..instance.instance import Instance, whole_numbers
 
 _SLACK = 1e-9
 _ARRAYS = ("alpha_lower", "alpha_upper", "beta_lower", "beta_upper", "p_min", "p_max")

@@ -13,6 +13,8 @@ import numpy as np
 
 from .grid import Floats
 
+QUARTER: Final = np.pi / 4
+HALF: Final = np.pi / 2
 MOST_ANGLE: Final = 1e6  # largest absolute angle in radians that keeps enough digits modulo pi
 _TERMS: Final = 9  # of the series of sine and cosine: beyond, less than 1e-17 on [-pi/4, pi/4]
 _SINE: Final = [(-1) ** k / factorial(2 * k + 1) for k in range(_TERMS)]

@@ -13,14 +13,13 @@ import numpy as np
 from ..arguments import check_fields, check_kind, numbers
 from ..errors import CrossfieldError, InstanceError, NoStrokeError
 from ..previews import Pictured
-from .angles import MOST_ANGLE, wrap
+from .angles import HALF, MOST_ANGLE, QUARTER, wrap
 from .grid import Bools, Floats, Grid, Ints
+from .terms import PairTerms, StrokeTerms
 
 Gauge = Literal["strokes", "box"]
 GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
 
-QUARTER: Final = np.pi / 4
-HALF: Final = np.pi / 2
 _FLAT = 1e-8  # directions closer to the horizontal than this are horizontal
 _DECIMALS = 12  # of theta and w
 _FINE = 1e-3  # reliabilities up to here would lose digits that count
@@ -49,30 +48,6 @@ class Reading:
     page: tuple[float, float, float, float] | None
     warnings: tuple[str, ...] = ()
     openings: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class StrokeTerms:
-    """One residual R = alpha + beta - goal for each stroke pixel, shapes (s,).
-
-    goal: direction in the gauge's range. weight: reliability times the instance's `stroke_coefficient`.
-    """
-
-    pixel: Ints
-    goal: Floats
-    weight: Floats
-
-    def residuals(self, alpha: Floats, beta: Floats) -> Floats:
-        """R of each term in radians, shape (s,), of the angles (n,) of all pixels."""
-        return alpha[self.pixel] + beta[self.pixel] - self.goal
-
-    def at_pixels(self, values: Floats, size: int) -> Floats:
-        """Sums of the terms' values at each of `size` pixels, shape (size,)."""
-        return np.bincount(self.pixel, values, size).astype(np.float64, copy=False)
-
-    def chosen(self, terms: Ints, number: Ints) -> StrokeTerms:
-        """Some of the terms, by their numbers, at pixels renumbered by `number` (n,)."""
-        return StrokeTerms(number[self.pixel[terms]], self.goal[terms], self.weight[terms])
 
 
 def whole_numbers(values: Any, name: str, error: type[CrossfieldError] = InstanceError) -> Ints:
@@ -268,6 +243,11 @@ class Instance(Pictured):
         return np.where(beyond, np.maximum(self.theta - np.pi, -QUARTER), self.theta)
 
     @cached_property
+    def pair_terms(self) -> PairTerms:
+        """The residuals of all pairs of neighbours."""
+        return PairTerms(self.grid.first, self.grid.second)
+
+    @cached_property
     def stroke_terms(self) -> StrokeTerms:
         """The residuals of all strokes."""
         return StrokeTerms(self.stroke_index, self.target, self.stroke_coefficient * self.w)
@@ -289,16 +269,18 @@ class Instance(Pictured):
         return upper
 
     @cached_property
-    def p_min(self) -> Ints:
-        """Smallest useful jump of each pair, shape (m,): floor(-2 d_hi / pi)."""
-        d_hi = self.alpha_upper[self.grid.first] - self.alpha_lower[self.grid.second]
-        return np.floor(-2 * d_hi / np.pi + _SLACK).astype(np.int32)
+    def _jump_range(self) -> tuple[Ints, Ints]:
+        return self.pair_terms.jump_range(self.alpha_lower, self.alpha_upper)
 
-    @cached_property
+    @property
+    def p_min(self) -> Ints:
+        """Smallest useful jump of each pair, shape (m,)."""
+        return self._jump_range[0]
+
+    @property
     def p_max(self) -> Ints:
-        """Greatest useful jump of each pair, shape (m,): ceil(-2 d_lo / pi)."""
-        d_lo = self.alpha_lower[self.grid.first] - self.alpha_upper[self.grid.second]
-        return np.ceil(-2 * d_lo / np.pi - _SLACK).astype(np.int32)
+        """Greatest useful jump of each pair, shape (m,)."""
+        return self._jump_range[1]
 
     def with_gauge(self, gauge: Gauge) -> Instance:
         """Return the same instance under another gauge. Raises InstanceError for an unknown one."""

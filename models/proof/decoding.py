@@ -12,11 +12,10 @@ import numpy as np
 
 from ..instance.grid import Bools, Floats
 from ..processes.compiled import compiled
-from .products import add, share_of, sized
+from .products import add, least_a, share_of, sized
 from .state import Indices, State
 
 _HALF: Final = float(np.pi / 2)
-_PI: Final = float(np.pi)
 
 
 class Crosses(NamedTuple):
@@ -65,9 +64,7 @@ def _add_distance(i: int, state: State, alpha: float, beta: float, cost: Floats)
     columns = state.beta_count[i]
     for row in range(state.alpha_count[i]):
         even = state.alpha[i] + state.h * row - alpha
-        odd = even + _HALF
-        even -= _PI * np.round(even / _PI)
-        odd -= _PI * np.round(odd / _PI)
+        even, odd = least_a(even), least_a(even + _HALF)
         for column in range(columns):
             mine = state.beta[i] + state.h * column
             same = sized(even, state.power) + sized(mine - beta, state.power)

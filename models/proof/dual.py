@@ -32,8 +32,8 @@ import numpy as np
 
 from ..array_archive import Arrays
 from ..field.field import CrossField
+from ..instance.angles import QUARTER
 from ..instance.grid import Floats
-from ..instance.instance import QUARTER
 from ..processes.compiled import Crew
 from ..processes.deadline import Over, never
 from ..smooth.systems import stroke_weight

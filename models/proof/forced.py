@@ -18,9 +18,9 @@ import numpy as np
 from scipy import sparse
 
 from ..field.field import CrossField
-from ..field.jumps import parity_sign
+from ..instance.angles import HALF, QUARTER
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import HALF, QUARTER
+from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
 from ..search.box_qp import field_at, least_in_box
 from ..search.energy import Quadratic, energy_at
@@ -228,9 +228,7 @@ def forced(left: RemainingCells, target: Floats | None = None) -> Forced:
 
 def at_pairs(left: RemainingCells) -> tuple[Floats, Floats]:
     """Greatest |A| on the boxes of each pair, (m,), and (-1)^p beta_i beta_j at their corners, (4, m)."""
-    lattice, (i, j) = left.lattice, (left.lattice.instance.grid.first, left.lattice.instance.grid.second)
-    turn, sign, betas = HALF * lattice.p, parity_sign(lattice.p), (left.beta_low, left.beta_high)
-    lowest = left.alpha_low[i] - left.alpha_high[j] + turn
-    highest = left.alpha_high[i] - left.alpha_low[j] + turn
-    products = np.array([sign * x[i] * y[j] for x in betas for y in betas])
+    terms, p, betas = left.lattice.instance.pair_terms, left.lattice.p, (left.beta_low, left.beta_high)
+    lowest, highest = terms.range_a(left.alpha_low, left.alpha_high, p)
+    products = np.array([parity_sign(p) * x[terms.first] * y[terms.second] for x in betas for y in betas])
     return np.maximum(np.abs(lowest), np.abs(highest)), products

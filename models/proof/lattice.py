@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from ..field.field import AbsoluteNorm, CrossField, Norm
 from ..field.jumps import stepped
-from ..instance.angles import wrap
+from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.grid import Bools, Floats, Grid, Ints
-from ..instance.instance import HALF, QUARTER, Instance
+from ..instance.instance import Instance
 from ..smooth.systems import stroke_weight
 
 Starts = NDArray[np.int64]  # places in flat arrays, as of the starts of blocks and the end of the last one

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.jumps import free_jumps
+from ..instance.angles import HALF, QUARTER
 from ..instance.grid import Bools, Floats
-from ..instance.instance import HALF, QUARTER
 from ..processes.compiled import compiled_if_needed
 from .lattice import Starts, starts
 from .pruning import Rectangles, RemainingCells, boxed, boxed_between, first_steps, rectangles
@@ -115,7 +115,7 @@ def across_seam(left: RemainingCells) -> tuple[RemainingCells, Floats]:
     )
     alpha, beta = (found.alpha_low + found.alpha_high) / 2, (found.beta_low + found.beta_high) / 2
     instance = lattice.instance
-    jumps, _ = free_jumps(instance.grid, alpha, beta)
+    jumps, _ = free_jumps(instance, alpha, beta)
     target = instance.target + np.pi * np.round((alpha[instance.stroke_index] - instance.target) / np.pi)
     return replace(found, lattice=replace(lattice, alpha=alpha, beta=beta, p=jumps)), target
 

@@ -251,6 +251,12 @@ def sized(residual: float, power: int) -> float:
 
 
 @compiled
+def least_a(a: float) -> float:
+    """The A of least size over all jumps of one parity, from the A of one of them."""
+    return float(a - _PI * np.round(a / _PI))
+
+
+@compiled
 def step_costs(pair: int, i: int, state: State, odd: bool, of_steps: Floats) -> float:
     """Fill in 2 A^2 or 2 |A| for labels x of end i and y of the other end; return the least.
 
@@ -261,9 +267,7 @@ def step_costs(pair: int, i: int, state: State, odd: bool, of_steps: Floats) -> 
     if odd:
         a += _HALF
     for place in range(of_steps.size):
-        away = a + state.h * (last - place)
-        away -= _PI * np.round(away / _PI)
-        of_steps[place] = 2 * sized(away, state.power)
+        of_steps[place] = 2 * sized(least_a(a + state.h * (last - place)), state.power)
     return least_of(of_steps)
 
 

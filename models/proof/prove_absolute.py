@@ -13,9 +13,11 @@ from typing import ClassVar, cast
 import numpy as np
 
 from ..field.field import AbsoluteNorm, CrossField
-from ..field.jumps import best_jumps, parity_sign
+from ..field.jumps import best_jumps
+from ..instance.angles import HALF, QUARTER
 from ..instance.grid import Floats
-from ..instance.instance import HALF, QUARTER, Instance
+from ..instance.instance import Instance
+from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
 from ..search.absolute_fit import absolute_fit, fitted_absolute, settled_absolute
 from ..search.box_qp import field_at

@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import QUARTER
 from ..processes.compiled import compiled
 from .lattice import Lattice, Starts, ranges, starts, strip
 from .state import State

@@ -42,7 +42,7 @@ class Rounding:
     def _rounded(self, best: CrossField, over: Over, *, forwards: bool) -> CrossField:
         instance = best.instance
         alpha, beta = self._dual.decoded(forwards=forwards)
-        found = relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])
+        found = relabelled(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
         known = found.p.tobytes()
         if known in self._tried:
             return best

@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 
 from ..instance.grid import Floats, Ints
-from ..instance.instance import HALF
 from ..processes.compiled import compiled
 from .lattice import Lattice
 from .products import all_taken
@@ -81,14 +80,8 @@ def _fill_taken(first: int, end: int, state: State, theta: Floats) -> None:
 def _pairs(lattice: Lattice, state: State, corner: _Corner, pairs: Indices) -> Floats:
     """The costs of some pairs with their tables, less their shares, at a corner of both ends."""
     i, j = state.first[pairs], state.second[pairs]
-    apart = corner.alpha[i] - corner.alpha[j]
-    cost = np.full(len(i), np.inf)
-    for parity in (0, 1):
-        a = apart + HALF * parity
-        a -= np.pi * np.round(a / np.pi)
-        b = (1 - 2 * parity) * corner.beta[i] - corner.beta[j]
-        size = a * a + b * b if lattice.norm == 2 else np.abs(a) + np.abs(b)
-        cost = np.minimum(cost, 2 * size)
+    size = np.square if lattice.norm == 2 else np.abs
+    cost = lattice.instance.pair_terms.chosen(pairs).least_costs(corner.alpha, corner.beta, size)
     cost -= lattice.h**2 if lattice.norm == 2 else 0.0
     cost -= state.shares_first[state.start_first[pairs] + corner.label[i]]
     cost -= state.shares_second[state.start_second[pairs] + corner.label[j]]

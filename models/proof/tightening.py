@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..field.jumps import parity_sign
 from ..formulations.windows import Windows
+from ..instance.angles import HALF, QUARTER
 from ..instance.grid import Bools
-from ..instance.instance import HALF, QUARTER
+from ..instance.terms import parity_sign
 from .certificate import Certificate
 
 _MARGIN = 1e-9  # radians by which windows are wider than the boxes, to allow for rounding in solvers
-_SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds
 
 
 def windows_left(certificate: Certificate) -> Windows:
@@ -37,8 +36,7 @@ def windows_left(certificate: Certificate) -> Windows:
     alpha_upper = np.where(inside, box[:, 1], instance.alpha_upper)
     beta_lower = np.maximum(np.where(inside, box[:, 2], -reach), -QUARTER)
     beta_upper = np.minimum(np.where(inside, box[:, 3], reach), QUARTER)
-    least = np.floor(-2 * (alpha_upper[grid.first] - alpha_lower[grid.second]) / np.pi + _SLACK)
-    most = np.ceil(-2 * (alpha_lower[grid.first] - alpha_upper[grid.second]) / np.pi - _SLACK)
+    least, most = instance.pair_terms.jump_range(alpha_lower, alpha_upper)
     fixed = verdict.forced_pairs & inside[grid.first] & inside[grid.second]
     return Windows(
         alpha_lower,

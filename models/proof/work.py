@@ -29,8 +29,9 @@ import numpy as np
 
 from ..field.field import CrossField, Norm, relabelled
 from ..field.jumps import free_jumps
+from ..instance.angles import QUARTER
 from ..instance.grid import Floats
-from ..instance.instance import QUARTER, Instance
+from ..instance.instance import Instance
 from ..processes.compiled import Crew
 from ..processes.deadline import Deadline, Over, Progress, never
 from ..processes.limits import Limits
@@ -533,4 +534,4 @@ def _centre(field: CrossField) -> CrossField:
     """The crosses of a field in the gauge `strokes`, each pair with its best jump."""
     instance = field.instance.with_gauge("strokes")
     alpha, beta = (np.round(angle, _DECIMALS) for angle in (field.alpha, field.beta))
-    return relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])
+    return relabelled(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])

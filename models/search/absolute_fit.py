@@ -22,9 +22,11 @@ from scipy import sparse
 
 from ..errors import CrossfieldError
 from ..field.field import AbsoluteNorm, CrossField
-from ..field.jumps import best_jumps, parity_sign
+from ..field.jumps import best_jumps
+from ..instance.angles import HALF
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import HALF, Instance
+from ..instance.instance import Instance
+from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
 from ..smooth.systems import one_thread
 from .box_qp import bounds, field_at
@@ -56,18 +58,19 @@ class Residuals:
         lines (s,): 0 where line u carries the stroke, None for zeros; -1 and 1 where v does, below and above
         the window of u.
         """
-        n, first, second = instance.grid.size, instance.grid.first, instance.grid.second
-        unit, m, strokes = sparse.eye_array(n, format="csr"), len(first), instance.stroke_terms
+        n, pairs, strokes = instance.grid.size, instance.pair_terms, instance.stroke_terms
+        unit, m = sparse.eye_array(n, format="csr"), len(p)
         lines = np.zeros(len(strokes.goal), np.int32) if lines is None else lines
         nothing, at = sparse.csr_array((m, n)), unit[strokes.pixel]
-        a = sparse.hstack([unit[first] - unit[second], nothing])
-        b = sparse.hstack([nothing, sparse.diags_array(parity_sign(p)) @ unit[first] - unit[second]])
+        a = sparse.hstack([unit[pairs.first] - unit[pairs.second], nothing])
+        signed = sparse.diags_array(parity_sign(p)) @ unit[pairs.first]
+        b = sparse.hstack([nothing, signed - unit[pairs.second]])
         r = sparse.hstack([at, sparse.diags_array(np.where(lines == 0, 1.0, -1.0)) @ at])
         skew = sparse.hstack([sparse.csr_array((n, n)), unit])
         weight = np.concatenate([np.full(2 * m, 2.0), strokes.weight, np.full(n, instance.skew_coefficient)])
         return cls(
             sparse.vstack([a, b, r, skew], format="csr"),
-            np.concatenate([HALF * p, np.zeros(m), -strokes.goal - HALF * lines, np.zeros(n)]),
+            np.concatenate([pairs.offset(p), np.zeros(m), -strokes.goal - HALF * lines, np.zeros(n)]),
             weight,
             (np.arange(len(weight)) >= 2 * m) & (norm == "mixed"),
         )

@@ -14,8 +14,9 @@ from typing import Final
 import numpy as np
 
 from ..field.field import CrossField, relabelled
+from ..instance.angles import QUARTER
 from ..instance.grid import Floats, Ints
-from ..instance.instance import QUARTER, Instance
+from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.systems import PULL, one_thread
 from .energy import LinearSolver, Quadratic, energy_at

@@ -13,9 +13,11 @@ from typing import Final
 import numpy as np
 
 from ..field.field import CrossField
-from ..field.jumps import parity_sign, stepped
+from ..field.jumps import stepped
+from ..instance.angles import HALF
 from ..instance.grid import Floats, Ints
-from ..instance.instance import HALF, MOST_WEIGHT, Instance
+from ..instance.instance import MOST_WEIGHT, Instance
+from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
 from .box_qp import FreeField
 from .energy import LinearSolver

@@ -16,6 +16,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
+from ..instance.terms import parity_sign
 from ..smooth.systems import PULL, Solve, factored, stroke_weight, symmetric
 
 CLOSE: Final = 1e-2  # relative residual of a step that ranks jumps as the exact one does
@@ -42,12 +43,14 @@ class Quadratic:
 
 def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadratic:
     """The 2-norm energy as a function of the angles, over the pairs of known jump (None: all)."""
-    grid, n, at, strokes = instance.grid, instance.grid.size, instance.stroke_index, instance.stroke_terms
-    pairs = slice(None) if known is None else known
-    i, j, p = grid.first[pairs], grid.second[pairs], p[pairs]
-    degree = 2.0 * (np.bincount(i, minlength=n) + np.bincount(j, minlength=n))
-    weight, turn = stroke_weight(instance), np.pi * p
-    couplings = np.concatenate([np.full(len(p), -2.0), 4.0 * (p & 1) - 2.0, weight[at]])
+    n, at, strokes = instance.grid.size, instance.stroke_index, instance.stroke_terms
+    pairs = instance.pair_terms
+    if known is not None:
+        pairs, p = pairs.chosen(known), p[known]
+    i, j = pairs.first, pairs.second
+    degree = 2.0 * pairs.degree(n)
+    weight, turn = stroke_weight(instance), 2 * pairs.offset(p)
+    couplings = np.concatenate([np.full(len(p), -2.0), -2.0 * parity_sign(p), weight[at]])
     diagonal = np.concatenate([degree + weight, degree + weight + instance.skew_coefficient])
     row, column = np.concatenate([i, i + n, at]), np.concatenate([j, j + n, at + n])
     matrix = symmetric(row, column, couplings, diagonal)

@@ -94,7 +94,7 @@ def _stitch(state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: 
     added = 0.0
     while not known.all():
         open_ = np.nonzero(~known)[0]
-        jumps, cost = free_jumps(grid, state.alpha, state.beta)
+        jumps, cost = free_jumps(state.instance, state.alpha, state.beta)
         # Rounding must not decide the order of equal costs: it would differ between machines.
         order = np.argsort(np.round(cost[open_], 9), kind="stable")
         sums = np.cumsum(cost[open_][order])

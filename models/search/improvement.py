@@ -15,10 +15,11 @@ from scipy.sparse.csgraph import connected_components
 
 from ..arguments import checked_arguments
 from ..field.field import CrossField
-from ..field.jumps import free_jumps, parity_sign, stepped
-from ..instance.angles import line_difference
+from ..field.jumps import free_jumps, stepped
+from ..instance.angles import HALF, QUARTER, line_difference
 from ..instance.grid import Ints
-from ..instance.instance import HALF, QUARTER, Instance
+from ..instance.instance import Instance
+from ..instance.terms import parity_sign
 from ..processes.deadline import Over, Stop, never, stop_function
 from ..smooth.systems import one_thread
 from .box_qp import FreeField, free_bounds, least_in_box
@@ -81,7 +82,7 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough
         if fall < enough:
             break
         _swap_lines(state)
-        state.p = free_jumps(state.instance.grid, state.alpha, state.beta)[0]
+        state.p = free_jumps(state.instance, state.alpha, state.beta)[0]
     state.x, state.p = kept
 
 

@@ -33,9 +33,10 @@ import numpy as np
 from scipy.linalg.blas import dgemm
 
 from ..field.field import CrossField
-from ..field.jumps import parity_sign
+from ..instance.angles import HALF
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import HALF, Instance
+from ..instance.instance import Instance
+from ..instance.terms import PairTerms, parity_sign
 from ..smooth.systems import PULL
 from .box_qp import free_bounds
 from .energy import energy_at
@@ -69,15 +70,14 @@ class _State(NamedTuple):
 class Patch:
     """Pixels whose angles are free and the pairs inside, by local numbers.
 
-    pixels: (k,) numbers of pixels; pairs: (e,) numbers of the pairs with both ends inside; first, second:
-    (e,) local numbers of these ends.
+    pixels: (k,) numbers of pixels; pairs: (e,) numbers of the pairs with both ends inside; terms: their
+    residuals, by local numbers of pixels.
     """
 
     instance: Instance
     pixels: Ints
     pairs: Ints
-    first: Ints
-    second: Ints
+    terms: PairTerms
 
     @classmethod
     def of(cls, instance: Instance, free: Bools) -> Patch:
@@ -87,7 +87,7 @@ class Patch:
         number = np.full(grid.size, -1, dtype=np.int32)
         number[pixels] = np.arange(len(pixels), dtype=np.int32)
         pairs = np.nonzero(free[grid.first] & free[grid.second])[0].astype(np.int32)
-        return cls(instance, pixels, pairs, number[grid.first[pairs]], number[grid.second[pairs]])
+        return cls(instance, pixels, pairs, instance.pair_terms.chosen(pairs, number))
 
     @property
     def unknowns(self) -> Ints:
@@ -100,8 +100,8 @@ class Patch:
         grid, at = self.instance.grid, self.instance.stroke_index
         number = np.full(grid.size, -1)
         number[self.pixels] = np.arange(len(self.pixels))
-        pairs = np.bincount(np.concatenate([grid.first, grid.second]), minlength=grid.size)[at]
-        inside = np.bincount(np.concatenate([self.first, self.second]), minlength=len(self.pixels))
+        pairs = self.instance.pair_terms.degree(grid.size)[at]
+        inside = self.terms.degree(len(self.pixels))
         return np.nonzero((number[at] >= 0) & (inside[number[at]] == pairs))[0].astype(np.int32)
 
     @cached_property
@@ -111,7 +111,7 @@ class Patch:
 
     def turned(self, own: Ints) -> tuple[Ints, Ints]:
         """The pairs, and the steps of their jumps, that turn the labels of pixels by own (k,) quarters."""
-        steps = own[self.first] - own[self.second]
+        steps = own[self.terms.first] - own[self.terms.second]
         pairs = np.nonzero(steps)[0].astype(np.int32)
         return pairs, steps[pairs]
 
@@ -130,7 +130,7 @@ class PatchEnergy:
         outside = np.setdiff1d(ends, pixels)
         number = np.zeros(grid.size, dtype=np.int32)
         number[np.concatenate([pixels, outside])] = np.arange(len(pixels) + len(outside))
-        self._first, self._second = np.split(number[ends], 2)
+        self._terms = instance.pair_terms.chosen(self._pairs, number)
         alpha, beta = np.split(x, 2)
         self._alpha, self._beta = alpha[outside], beta[outside]
         strokes = np.nonzero(free[instance.stroke_terms.pixel])[0].astype(np.int32)
@@ -147,8 +147,7 @@ class PatchEnergy:
         inside = np.split(x, 2)
         alpha, beta = np.concatenate([inside[0], self._alpha]), np.concatenate([inside[1], self._beta])
         jumps = p[self._pairs]
-        a = alpha[self._first] - alpha[self._second] + HALF * jumps
-        b = parity_sign(jumps) * beta[self._first] - beta[self._second]
+        a, b = self._terms.residual_a(alpha, jumps), self._terms.residual_b(beta, jumps)
         r = self._strokes.residuals(alpha, beta)
         skew = self._instance.skew_coefficient * float(inside[1] @ inside[1])
         return self._rest + 2 * float(a @ a + b @ b) + float(self._strokes.weight @ (r * r)) + skew
@@ -211,10 +210,10 @@ class Landscape:
 
     def _gains(self) -> Floats:
         """The gains by the present inverse, infinite where they are impossible."""
-        g, x, i, j = self._inverse, self._x, self.patch.first, self.patch.second
-        k = len(self.patch.pixels)
+        g, x, terms = self._inverse, self._x, self.patch.terms
+        i, j, k = terms.first, terms.second, len(self.patch.pixels)
         p = self.p[self.patch.pairs]
-        a = x[i] - x[j] + HALF * p
+        a = terms.residual_a(x, p)
         give = g[i, i] + g[j, j] - 2 * g[i, j]
         at_i, at_j = i + k, j + k
         to_i, to_j = g[at_i, i] - g[at_i, j], g[at_j, i] - g[at_j, j]
@@ -327,19 +326,19 @@ class Landscape:
 
     def _pushed(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
         """The change of b, shape (2k,), and the change of c - 2 x'b."""
-        i, j = self.patch.first[pairs], self.patch.second[pairs]
-        q = HALF * steps
-        a = self._x[i] - self._x[j] + HALF * self.p[self.patch.pairs[pairs]]
+        terms, q = self.patch.terms.chosen(pairs), HALF * steps
+        a = terms.residual_a(self._x, self.p[self.patch.pairs[pairs]])
         push = np.zeros(len(self._x))
-        np.subtract.at(push, i, 2 * q)
-        np.add.at(push, j, 2 * q)
+        np.subtract.at(push, terms.first, 2 * q)
+        np.add.at(push, terms.second, 2 * q)
         # c changes by the sum of 2 q^2 + 4 q (pi/2 p).
         return push, float(np.sum(2 * q * q + 4 * q * a))
 
     def _couplings(self, pairs: Ints, steps: Ints) -> tuple[Ints, Floats]:
         """The unknowns beta whose couplings turn, shape (c,), and the additions to H there, shape (c, c)."""
         odd = pairs[(steps & 1) == 1]
-        ends = np.concatenate([self.patch.first[odd], self.patch.second[odd]])
+        turned = self.patch.terms.chosen(odd)
+        ends = np.concatenate([turned.first, turned.second])
         places, where = np.unique(ends, return_inverse=True)
         first, second = where[: len(odd)], where[len(odd) :]
         added = np.zeros((len(places), len(places)))

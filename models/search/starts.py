@@ -138,7 +138,7 @@ def _settle_roughly(state: FreeField) -> None:
     for _ in range(_HASTE):
         energy = energy_at(state.instance, state.p)
         state.x = np.clip(state.x + locally(energy.matrix, -energy.slope(state.x), _HASTY), *bounds)
-        state.p = free_jumps(state.instance.grid, state.alpha, state.beta)[0]
+        state.p = free_jumps(state.instance, state.alpha, state.beta)[0]
 
 
 def _together(states: list[FreeField], over: Over) -> FreeField:

@@ -18,9 +18,8 @@ from scipy import sparse
 
 from ..arguments import check_positive, checked_arguments
 from ..field.field import CrossField
-from ..instance.angles import wrap
+from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.grid import Floats, Ints
-from ..instance.instance import HALF, QUARTER
 from ..processes.deadline import Over, Stop, stop_function
 from .systems import SimilarSystems, dissected, one_thread
 
@@ -232,7 +231,8 @@ def _differences(field: CrossField) -> tuple[Any, Floats]:
     values, row = np.ones(2 * pairs), np.arange(2 * pairs)
     places = (np.concatenate([row, row]), np.concatenate([second, first]))
     matrix = sparse.csr_array((np.concatenate([values, -values]), places), shape=(2 * pairs, 2 * size))
-    return matrix, HALF * np.concatenate([field.p + odd, field.p - odd])
+    terms = field.instance.pair_terms
+    return matrix, np.concatenate([terms.offset(field.p + odd), terms.offset(field.p - odd)])
 
 
 def _quadrants(field: CrossField) -> tuple[_Places, _Places, _Places]:

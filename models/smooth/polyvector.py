@@ -16,8 +16,9 @@ from scipy import sparse
 from ..arguments import check_positive, checked_arguments
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps, label_of
+from ..instance.angles import HALF
 from ..instance.grid import Floats
-from ..instance.instance import HALF, Instance
+from ..instance.instance import Instance
 from .systems import factored, locally, one_thread, smoothness, stroke_weight
 
 _Complex = NDArray[np.complex128]
@@ -70,7 +71,7 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float 
     found = _polynomials(instance, hold, tolerance)
     u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*found))
     alpha, beta = label_of(u, v)
-    start = relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])
+    start = relabelled(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
     return start.with_best_jumps()
 
 
@@ -135,5 +136,5 @@ def power_field(instance: Instance) -> CrossField:
     )
     z = factored(smoothness(instance) + sparse.diags_array(stroke_weight(instance)))(goal)
     alpha, beta = np.arctan2(z[:, 1], z[:, 0]) / 4, np.zeros(grid.size)
-    start = relabelled(instance, alpha, beta, free_jumps(grid, alpha, beta)[0])
+    start = relabelled(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
     return start.with_best_jumps()

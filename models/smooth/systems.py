@@ -36,7 +36,7 @@ def stroke_weight(instance: Instance) -> Floats:
 def smoothness(instance: Instance) -> Any:
     """The sparse matrix (n, n) of 2 |z_i - z_j|^2 over the pairs: twice the Laplacian of the grid."""
     grid = instance.grid
-    degree = np.bincount(grid.first, minlength=grid.size) + np.bincount(grid.second, minlength=grid.size)
+    degree = instance.pair_terms.degree(grid.size)
     beside = np.full(len(grid.first), -2.0)
     return symmetric(grid.first, grid.second, beside, 2 * degree.astype(np.float64))
 

@@ -11,8 +11,9 @@ from scipy import sparse
 
 from ..arguments import check_fields
 from ..errors import InputError
+from ..instance.angles import HALF
 from ..instance.grid import Floats
-from ..instance.instance import HALF, Instance
+from ..instance.instance import Instance
 from .equations import Rows
 from .stencils import Level
 

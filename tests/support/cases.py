@@ -9,8 +9,9 @@ import numpy as np
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import Problem, formulate, with_integers_fixed
+from crossfield.models.instance.angles import QUARTER
 from crossfield.models.instance.grid import Floats
-from crossfield.models.instance.instance import QUARTER, Instance
+from crossfield.models.instance.instance import Instance
 
 MASKS = {
     "hole": ["###", "#.#", "###"],

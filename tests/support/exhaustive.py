@@ -4,7 +4,8 @@ a second opinion on greedy fields and searches.
 
 import numpy as np
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.instance import Instance
 from crossfield.models.search.box_qp import fitted
 
 

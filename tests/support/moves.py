@@ -1,7 +1,7 @@
 """Effects of turning, mirroring and transposing a sketch on pictures and on lines."""
 
 import numpy as np
-from crossfield.models.instance.instance import HALF
+from crossfield.models.instance.angles import HALF
 
 MOVES = {
     "turned": (np.rot90, lambda angle: angle + HALF),

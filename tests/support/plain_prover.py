@@ -3,7 +3,7 @@
 import itertools
 
 import numpy as np
-from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.proof.clusters import clusters_on
 from crossfield.models.proof.encoding import messages_of, tables_of
 from crossfield.models.proof.lattice import Lattice

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....models.field.field import CrossField
-from ....models.instance.instance import HALF, Instance
+from ....models.instance.angles import HALF
+from ....models.instance.instance import Instance
 from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
 from ....models.search.pinned import pinned

@@ -18,8 +18,9 @@ import numpy as np
 from ....models.errors import SolutionError
 from ....models.field.field import CrossField, Norm
 from ....models.formulations.problem import Problem, formulate, with_integers_fixed
+from ....models.instance.angles import QUARTER
 from ....models.instance.grid import Floats
-from ....models.instance.instance import QUARTER, Instance
+from ....models.instance.instance import Instance
 from ....models.proof.certificate import Certificate, read_certificate, write_certificate
 from ....models.search.pinned import pinned
 from ....models.search.search import search

@@ -23,7 +23,8 @@ from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem, tightened, with_integers_fixed
 from crossfield.models.formulations.windows import Windows
-from crossfield.models.instance.instance import QUARTER, Instance
+from crossfield.models.instance.angles import QUARTER
+from crossfield.models.instance.instance import Instance
 from loops import for_each
 
 READERS = {"gms": gams_reader.read, "bar": baron_reader.read}

@@ -5,7 +5,8 @@ import pytest
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import DEGENERATE, CrossField, relabelled
 from crossfield.models.field.jumps import best_jumps
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.instance import Instance
 from exhaustive import random_instance
 from hypothesis import given
 from hypothesis import strategies as st

@@ -12,8 +12,9 @@ from crossfield.models.errors import CrossfieldError, InputError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.file import read_field, write_field
 from crossfield.models.field.jumps import best_jumps
+from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.file import read_instance, write_instance
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import power_field
 from damage import change, full_instance, refused, same_instance, without

@@ -8,7 +8,8 @@ import pytest
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.fusion import fused
 from crossfield.models.field.jumps import free_jumps
-from crossfield.models.instance.instance import HALF, MOST_WEIGHT
+from crossfield.models.instance.angles import HALF
+from crossfield.models.instance.instance import MOST_WEIGHT
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.sketch.samples import sample
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.numeric
 
 def mixed(one, other, taken):
     alpha, beta = np.where(taken, other.alpha, one.alpha), np.where(taken, other.beta, one.beta)
-    return CrossField(one.instance, alpha, beta, free_jumps(one.instance.grid, alpha, beta)[0])
+    return CrossField(one.instance, alpha, beta, free_jumps(one.instance, alpha, beta)[0])
 
 
 def test_it_takes_the_better_half_of_each():

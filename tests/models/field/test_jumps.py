@@ -34,7 +34,7 @@ def test_steps_of_the_label_leave_crosses_and_the_sizes_of_all_residuals():
 def test_best_jumps_are_the_free_ones_where_those_are_in_range():
     for seed in range(20):
         field, _ = some_field(seed)
-        free, cost = free_jumps(field.instance.grid, field.alpha, field.beta)
+        free, cost = free_jumps(field.instance, field.alpha, field.beta)
         bound = best_jumps(field.instance, field.alpha, field.beta)
         inside = (free >= field.instance.p_min) & (free <= field.instance.p_max)
         assert inside.any()

@@ -5,8 +5,8 @@ import pytest
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
-from crossfield.models.instance.angles import line_difference
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.angles import HALF, QUARTER, line_difference
+from crossfield.models.instance.instance import Instance
 from exhaustive import random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -6,7 +6,7 @@ from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.file import read_field, write_field
 from crossfield.models.field.jumps import best_jumps
-from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.instance.angles import HALF, QUARTER
 from exhaustive import random_instance
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

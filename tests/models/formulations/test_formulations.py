@@ -17,7 +17,8 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.formulations import symbols as n
 from crossfield.models.formulations.catalogue import CUBIC, FORMULATIONS, PARITY, QUARTIC, declare
 from crossfield.models.formulations.problem import formulate, with_integers_fixed
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.limits import Limits
 from loops import for_each
 

@@ -14,7 +14,8 @@ from crossfield.models.errors import FormulationError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate, lifted, with_integers_fixed
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.instance import Instance
 from loops import for_each
 
 POLYNOMIAL = [label for label in CASES if not label.startswith("minlp-parity")]

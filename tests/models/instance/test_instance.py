@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from cases import make_instance
 from crossfield.models.errors import InstanceError
-from crossfield.models.instance.instance import GAUGES, HALF, Instance
+from crossfield.models.instance.angles import HALF
+from crossfield.models.instance.instance import GAUGES, Instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each

@@ -7,7 +7,8 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.field.field import relabelled
-from crossfield.models.instance.instance import HALF, Instance
+from crossfield.models.instance.angles import HALF
+from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.compiled import crew
 from crossfield.models.processes.deadline import never
 from crossfield.models.proof.dual import Dual

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.proof.forced import forced
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.pruning import RemainingCells

@@ -10,8 +10,8 @@ import math
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.field.jumps import parity_sign
-from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.terms import parity_sign
 from crossfield.models.proof import check_certificate
 from exhaustive import every_jump, least_energy
 from odd_instances import NORMS, odd_instance

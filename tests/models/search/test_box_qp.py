@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from crossfield.export.solving.two_stage import fit_angles
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.instance import Instance
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.search.pinned import pinned
 from crossfield.models.sketch.samples import sample, samples

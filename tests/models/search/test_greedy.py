@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.instance import Instance
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.nearest_stroke import nearest_strokes

@@ -10,7 +10,7 @@ import pytest
 from children import interrupted
 from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.coarse import halved, prolonged
 from crossfield.models.search.greedy import greedy_field

@@ -6,8 +6,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.solving.methods import METHODS, Request
-from crossfield.models.instance.angles import line_difference
-from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.instance.angles import HALF, QUARTER, line_difference
 from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, bend_field, tremble
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
 from exhaustive import random_instance, sketch

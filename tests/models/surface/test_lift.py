@@ -7,7 +7,8 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError
-from crossfield.models.instance.instance import HALF, Instance
+from crossfield.models.instance.angles import HALF
+from crossfield.models.instance.instance import Instance
 from crossfield.models.smooth.polyvector import HOLDS
 from loops import for_each
 from moves import MOVES, lines

@@ -1,0 +1,111 @@
+"""The residuals of pairs and of strokes: what an energy and a field's jumps are made of.
+
+Everything that depends on the jump between two neighbours goes through `PairTerms`
+(docs/mathematics.md, 3 and 5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .angles import HALF
+from .grid import Floats, Ints
+
+_SLACK = 1e-9  # quarter turns by which rounding may move the end of a range of jumps
+
+
+def parity_sign(p: Ints) -> Floats:
+    """The sign (-1)^p of each jump."""
+    return 1.0 - 2.0 * (p & 1).astype(np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class PairTerms:
+    """Two residuals for each pair (i, j) of neighbours with the jump p.
+
+    A = alpha_i - alpha_j + offset(p) and B = (-1)^p beta_i - beta_j, shapes (m,). Jumps may have more axes
+    in front: p (c, m) are c candidates for each pair.
+
+    first, second: the pixels i and j of each pair, shapes (m,).
+    """
+
+    first: Ints
+    second: Ints
+
+    def offset(self, p: Ints | int) -> Floats:
+        """The turn pi/2 p that a jump adds to A."""
+        return np.asarray(HALF * p)
+
+    def residual_a(self, alpha: Floats, p: Ints | int) -> Floats:
+        """A of each pair, in radians, of the angles alpha (n,) of all pixels."""
+        return np.asarray(alpha[self.first] - alpha[self.second] + self.offset(p))
+
+    def residual_b(self, beta: Floats, p: Ints) -> Floats:
+        """B of each pair, in radians, of the angles beta (n,) of all pixels."""
+        return np.asarray(parity_sign(p) * beta[self.first] - beta[self.second])
+
+    def jump_below(self, alpha: Floats) -> Ints:
+        """The greatest jump p of each pair with A <= 0: the best even and odd ones are p and p + 1."""
+        return np.floor(-self.residual_a(alpha, 0) / HALF).astype(np.int32)
+
+    def costs(self, alpha: Floats, beta: Floats, p: Ints, size: np.ufunc = np.square) -> Floats:
+        """Smooth energy 2 (phi(A) + phi(B)) of each pair. size: phi, the square or the absolute value."""
+        return np.asarray(2 * (size(self.residual_a(alpha, p)) + size(self.residual_b(beta, p))))
+
+    def least_costs(self, alpha: Floats, beta: Floats, size: np.ufunc = np.square) -> Floats:
+        """Least smooth energy of each pair over all jumps, shape (m,)."""
+        jumps = self.jump_below(alpha) + np.array([[0], [1]], dtype=np.int32)
+        costs: Floats = self.costs(alpha, beta, jumps, size).min(axis=0)
+        return costs
+
+    def degree(self, pixels: int) -> Ints:
+        """Number of pairs of each pixel, shape (pixels,)."""
+        ends = np.concatenate([self.first, self.second])
+        return np.bincount(ends, minlength=pixels).astype(np.int32)
+
+    def range_a(self, lower: Floats, upper: Floats, p: Ints | int) -> tuple[Floats, Floats]:
+        """Least and greatest A of each pair where lower <= alpha <= upper, shapes (n,)."""
+        least = lower[self.first] - upper[self.second] + self.offset(p)
+        return least, upper[self.first] - lower[self.second] + self.offset(p)
+
+    def jump_range(self, lower: Floats, upper: Floats) -> tuple[Ints, Ints]:
+        """Smallest and greatest useful jump of each pair where lower <= alpha <= upper.
+
+        For every A at jump 0 in its range, the best even and the best odd jump lie between the two.
+        """
+        least, greatest = self.range_a(lower, upper, 0)
+        p_min = np.floor(-2 * greatest / np.pi + _SLACK).astype(np.int32)
+        return p_min, np.ceil(-2 * least / np.pi - _SLACK).astype(np.int32)
+
+    def chosen(self, pairs: NDArray[Any], number: Ints | None = None) -> PairTerms:
+        """Some of the pairs, by their numbers or a mask, at pixels renumbered by `number` (n,)."""
+        first, second = self.first[pairs], self.second[pairs]
+        return PairTerms(first, second) if number is None else PairTerms(number[first], number[second])
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeTerms:
+    """One residual R = alpha + beta - goal for each stroke pixel, shapes (s,).
+
+    goal: direction in the gauge's range. weight: reliability times the instance's `stroke_coefficient`.
+    """
+
+    pixel: Ints
+    goal: Floats
+    weight: Floats
+
+    def residuals(self, alpha: Floats, beta: Floats) -> Floats:
+        """R of each term in radians, shape (s,), of the angles (n,) of all pixels."""
+        return alpha[self.pixel] + beta[self.pixel] - self.goal
+
+    def at_pixels(self, values: Floats, size: int) -> Floats:
+        """Sums of the terms' values at each of `size` pixels, shape (size,)."""
+        return np.bincount(self.pixel, values, size).astype(np.float64, copy=False)
+
+    def chosen(self, terms: Ints, number: Ints) -> StrokeTerms:
+        """Some of the terms, by their numbers, at pixels renumbered by `number` (n,)."""
+        return StrokeTerms(number[self.pixel[terms]], self.goal[terms], self.weight[terms])
