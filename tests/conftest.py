@@ -103,8 +103,11 @@ def _absent(item):
 
 
 def pytest_collection_finish(session):
-    """Compiles the functions of proofs, or waits for the process that does: tests have limits of time."""
-    if session.items and not session.config.option.collectonly:
+    """Compiles the functions of proofs, or waits for the process that does: tests have limits of time.
+    Smoke tests need none of them.
+    """
+    option = session.config.option
+    if session.items and not option.collectonly and not option.markexpr.startswith("smoke"):
         from crossfield.models.proof.compiling import compile_all
 
         compile_all()

@@ -21,6 +21,8 @@ from crossfield.export.solvers_table import BUNDLED, PROGRAMS, SOLVERS, Refusal,
 from crossfield.models.errors import MissingSolverError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 
+pytestmark = pytest.mark.smoke
+
 ROOT = Path(cf.__file__).parent
 TOY = Solver(
     "toy", "Toy", ("lp",), "cbc", {"quadratic rows": Refusal("read", "Toy reads no products, at no price")}

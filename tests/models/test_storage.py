@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from crossfield.models.storage import remove_unfinished, write_bytes
 
+pytestmark = pytest.mark.smoke
+
 NOBODY = 65534
 AS_NOBODY = f"""
 import os, sys

@@ -59,6 +59,7 @@ def child(*arguments, **options):
 # The commands, one after the other
 
 
+@pytest.mark.smoke
 def test_a_tour_of_the_commands(tmp_path, crossfield):
     """instance, export, solve, read, draw: each reads files of the previous command."""
     out = crossfield("instance skew --size 6 -o skew.json")

@@ -9,6 +9,8 @@ import pytest
 from crossfield.export.cli.app import invoke
 from studios import changed, studio
 
+pytestmark = pytest.mark.smoke
+
 
 @pytest.fixture(scope="module")
 def page():

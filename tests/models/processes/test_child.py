@@ -15,6 +15,8 @@ from crossfield.models.processes.child import Child, KilledError
 from crossfield.models.processes.control import WorkerError
 from crossfield.models.processes.deadline import Deadline
 
+pytestmark = pytest.mark.smoke
+
 
 class Clock:
     """A clock that stands still until the work has begun, and then runs faster than others by a factor."""
