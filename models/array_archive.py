@@ -1,17 +1,8 @@
-"""Archives of arrays (.npz): equal arrays give equal bytes, and one strict reader unpacks them within limits.
+"""Archives of arrays (.npz): equal arrays give equal bytes, and a reader unpacks them within limits.
 
-The reader accepts only what `pack_arrays`, `numpy.savez` and `numpy.savez_compressed` write, so that no other
-program can find other arrays in the same file:
-
-- The file consists of the members, the central directory and its end record, in this order, without other
-  bytes before, between or after them. There are no comments, and no 64-bit end record.
-- Each member is stored or deflated, and is not encrypted. Its header repeats the directory exactly; the
-  64-bit sizes that NumPy adds are the only extra field.
-- Names are ASCII, end in `.npy` and differ in more than case. Each array is one that its caller expects.
-- An array has the format version 1.0, a header of 128 bytes as NumPy writes it, at least one dimension,
-  little-endian numbers in the order of rows (C), and exactly the bytes that its header promises.
-
-Sizes, kinds and shapes are checked before the data is unpacked. There are no pickles.
+The reader accepts what `pack_arrays`, `numpy.savez` and `numpy.savez_compressed` write: each name once,
+and arrays with the header that NumPy writes, of numbers that their caller expects. Sizes, kinds and shapes
+are checked before the data is unpacked. There are no pickles.
 """
 
 from __future__ import annotations
@@ -19,10 +10,10 @@ from __future__ import annotations
 import io
 import math
 import re
-import struct
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -32,22 +23,17 @@ from .input_limits import MAX_ARCHIVE
 
 Arrays = dict[str, np.ndarray[Any, Any]]
 
-_END: Final = struct.Struct("<4s4H2LH")
-_ENTRY: Final = struct.Struct("<4s6H3L5H2L")
-_LOCAL: Final = struct.Struct("<4s5H3L2H")
-_WIDE: Final = struct.Struct("<2H2Q")
-_UNKNOWN: Final = 0xFFFFFFFF  # stands for a size that the extra field of 64-bit sizes holds
+_METHODS: Final = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _LONG: Final = 1 << 20  # bytes of a member from which it is packed fast: five times as fast, and 5 % larger
 _HEADER: Final = 128  # bytes of an array's header, for every array
 _ARRAY: Final = re.compile(
     rb"\x93NUMPY\x01\x00\x76\x00\{'descr': '([ -&(-~]{1,20})', 'fortran_order': (False|True), "
     rb"'shape': \(((?:[0-9]{1,10}(?:,|(?:, [0-9]{1,10})+))?)\), \} *\n"
 )
+_ERRORS: Final = (
+    zipfile.BadZipFile, zlib.error, RuntimeError, ValueError, OSError, EOFError, MemoryError,
+)  # fmt: skip
 _NUMBERS: Final = re.compile(r"\|(?:b1|[iu]1)|<(?:[iu][248]|f[248])")
-
-
-class _DamagedError(Exception):
-    """A defect in the bytes of an archive."""
 
 
 class Expected(NamedTuple):
@@ -56,15 +42,6 @@ class Expected(NamedTuple):
     dimensions: int
     most: int
     kinds: str = "biuf"
-
-
-class _Member(NamedTuple):
-    """Packing of a member, the number of its bytes once unpacked, and their checksum."""
-
-    deflated: bool
-    packed: memoryview
-    length: int
-    checksum: int
 
 
 class Packing:
@@ -105,17 +82,22 @@ class ArrayArchive:
     """The members of an .npz in memory; each is unpacked on request. Raises InstanceError for other bytes."""
 
     def __init__(self, data: bytes) -> None:
-        try:
-            self._members = dict(_members(memoryview(data)))
-        except (_DamagedError, struct.error) as error:
-            raise _damaged(error) from error
-        if sum(member.length for member in self._members.values()) > MAX_ARCHIVE:
+        with _damage():
+            self._archive = zipfile.ZipFile(io.BytesIO(data))
+            members = self._archive.infolist()
+            self._members = {member.filename.removesuffix(".npy"): member for member in members}
+            if len(self._members) < len(members):
+                raise zipfile.BadZipFile("it holds two arrays of one name")
+            # Other methods unpack a few bytes to gigabytes at once.
+            if any(member.compress_type not in _METHODS for member in members):
+                raise zipfile.BadZipFile("it is packed in another way than NumPy packs")
+        if sum(member.file_size for member in members) > MAX_ARCHIVE:
             raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")
         self._unread = set(self._members)
 
     def arrays(self, expected: Mapping[str, Expected], prefix: str = "") -> Arrays:
         """The expected arrays by name, without the prefix. Raises InstanceError for any other array."""
-        return {name: self._array(prefix, name, kind) for name, kind in expected.items()}
+        return {name: self._array(prefix + name, name, limits) for name, limits in expected.items()}
 
     def finish(self) -> None:
         """Raise InstanceError if the archive holds an array that was never requested."""
@@ -124,103 +106,46 @@ class ArrayArchive:
                 f"holds an array {shortened(min(self._unread))!r} that does not belong in it; write it again"
             )
 
-    def _array(self, prefix: str, name: str, expected: Expected) -> np.ndarray[Any, Any]:
-        member = self._members.get(prefix + name)
-        if member is None:
+    def _array(self, key: str, name: str, expected: Expected) -> np.ndarray[Any, Any]:
+        if key not in self._members:
             raise InstanceError(f"holds no array {name!r}; expected a file written by crossfield")
-        self._unread.discard(prefix + name)
-        try:
-            return _array(member, name, expected)
-        except (_DamagedError, zlib.error, MemoryError) as error:
-            raise _damaged(error) from error
+        self._unread.discard(key)
+        with _damage(), self._archive.open(self._members[key]) as stream:
+            kind, shape = _described(stream.read(_HEADER), name, expected)
+            length = math.prod(shape) * kind.itemsize
+            if length + _HEADER != self._members[key].file_size:
+                raise zipfile.BadZipFile(f"array {name!r} has another length than its header states")
+            content = stream.read(length + 1)  # one byte more, so that the end and the checksum are looked at
+            array = np.frombuffer(content, dtype=kind).reshape(shape)
+        # NumPy takes the bytes of bits unchanged, and counts and inverts values other than 0 and 1 wrongly.
+        if kind.kind == "b" and (array.view(np.uint8) > 1).any():
+            raise _damaged(f"array {name!r} has bits beyond 1")
+        return array
 
 
-def _damaged(error: Exception) -> InstanceError:
-    return InstanceError(f"is a damaged or unsafe .npz: {shortened(error)}; write it again")
+@contextmanager
+def _damage() -> Iterator[None]:
+    """Raise InstanceError for everything that zipfile and NumPy raise for bytes of another kind."""
+    try:
+        yield
+    except InstanceError:
+        raise
+    except _ERRORS as error:
+        raise _damaged(error) from error
 
 
-def _need(holds: object, otherwise: str) -> None:
-    """Raise _DamagedError unless the condition holds."""
-    if not holds:
-        raise _DamagedError(otherwise)
-
-
-def _members(data: memoryview) -> Iterator[tuple[str, _Member]]:
-    """The members in their order, by name without suffix."""
-    end = len(data) - _END.size
-    _need(end >= 0, "it is cut off")
-    mark, *disks, here, count, size, begin, comment = _END.unpack(data[end:])
-    _need(mark == b"PK\5\6" and not comment and not any(disks) and here == count, "its end is missing")
-    _need(begin + size == end, "its directory does not end where the archive does")
-    at, place, names = begin, 0, set[str]()
-    for _ in range(count):
-        entry = _ENTRY.unpack_from(data, at)
-        name_length, extra, remark = entry[10:13]
-        raw = bytes(data[at + _ENTRY.size : at + _ENTRY.size + name_length])
-        name = raw.decode("ascii", "replace")
-        _need(raw.isascii() and name.isprintable() and name.endswith(".npy"), f"it holds {name!r}, no .npy")
-        _need(name.lower() not in names, f"it holds {name!r} twice")
-        _need(entry[0] == b"PK\1\2" and not extra and not remark, f"the directory entry of {name!r} is wrong")
-        names.add(name.lower())
-        member, place = _member(data, place, entry, name)
-        at += _ENTRY.size + name_length
-        yield name.removesuffix(".npy"), member
-    _need((at, place) == (end, begin), "its members do not fill it")
-
-
-def _member(data: memoryview, place: int, entry: tuple[Any, ...], name: str) -> tuple[_Member, int]:
-    """The member at a position, whose header must repeat its directory entry, and the next position."""
-    version, flags, method, time, date, checksum, packed, length = entry[2:10]
-    mark, *repeated, name_length, extra = _LOCAL.unpack_from(data, place)
-    begin = place + _LOCAL.size + len(name)
-    after = begin + extra
-    if extra == _WIDE.size and repeated[-2:] in ([packed, length], [_UNKNOWN, _UNKNOWN]):
-        _need(_WIDE.unpack(data[begin:after]) == (1, 16, length, packed), f"the sizes of {name!r} differ")
-        repeated[-2:], extra = [packed, length], 0
-    same = [version, flags, method, time, date, checksum, packed, length] == repeated
-    _need(
-        mark == b"PK\3\4" and same and not extra and entry[-1] == place and entry[13] == 0
-        and name_length == len(name) and data[begin - len(name) : begin] == name.encode(),
-        f"the header of {name!r} differs from its directory entry",
-    )  # fmt: skip
-    _need(
-        not flags and method in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED),
-        f"{name!r} is packed in another way than NumPy packs",
-    )
-    _need(method != zipfile.ZIP_STORED or packed == length, f"the sizes of {name!r} differ")
-    content = data[after : after + packed]
-    _need(len(content) == packed, "it is cut off")
-    return _Member(method != zipfile.ZIP_STORED, content, length, checksum), after + packed
-
-
-def _array(member: _Member, name: str, expected: Expected) -> np.ndarray[Any, Any]:
-    """The array of a member, whose header is checked before the rest is unpacked."""
-    unpacker = zlib.decompressobj(-zlib.MAX_WBITS)
-    packed = member.packed
-    head = unpacker.decompress(packed, _HEADER) if member.deflated else bytes(packed[:_HEADER])
-    kind, shape = _described(head, name, expected)
-    length = math.prod(shape) * kind.itemsize
-    _need(length == member.length - _HEADER, f"array {name!r} has another length than its header states")
-    if member.deflated:
-        rest: bytes | memoryview = unpacker.decompress(unpacker.unconsumed_tail, length + 1)
-        _need(unpacker.eof and not unpacker.unused_data, f"array {name!r} has more than its header states")
-    else:
-        rest = packed[_HEADER:]
-    _need(len(rest) == length, f"array {name!r} has another length than its header states")
-    _need(zlib.crc32(rest, zlib.crc32(head)) == member.checksum, f"array {name!r} has another checksum")
-    found = np.frombuffer(rest, dtype=kind).reshape(shape)
-    # NumPy takes the bytes of bits unchanged, and counts and inverts values other than 0 and 1 wrongly.
-    _need(kind.kind != "b" or not (found.view(np.uint8) > 1).any(), f"array {name!r} has bits beyond 1")
-    return found
+def _damaged(reason: object) -> InstanceError:
+    return InstanceError(f"is a damaged or unsafe .npz: {shortened(reason)}; write it again")
 
 
 def _described(head: bytes, name: str, expected: Expected) -> tuple[np.dtype[Any], tuple[int, ...]]:
     """The kind and shape in the header of an array. Raises InstanceError unless they are expected."""
     found = _ARRAY.fullmatch(head)
     if found is None:
-        raise _DamagedError(f"array {name!r} has no header as NumPy writes it")
+        raise _damaged(f"array {name!r} has no header as NumPy writes it")
     kind, by_columns, sides = found[1].decode(), found[2] == b"True", found[3].decode()
-    _need("O" not in kind, f"array {name!r} is pickled")
+    if "O" in kind:
+        raise _damaged(f"array {name!r} is pickled")
     if not _NUMBERS.fullmatch(kind) or np.dtype(kind).kind not in expected.kinds:
         raise InstanceError(
             f"array {name!r} holds {kind}, not numbers of the kind that belongs there; write it again"
