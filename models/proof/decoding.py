@@ -6,7 +6,7 @@ shares of the neighbours that have none (Kolmogorov 2006, 5).
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -18,29 +18,16 @@ from .state import Indices, State
 _HALF: Final = float(np.pi / 2)
 
 
-class Crosses(NamedTuple):
-    """Alpha and beta of pixels, and whether a pixel has them already; shapes (n,)."""
-
-    alpha: Floats
-    beta: Floats
-    fixed: Bools
-
-    @classmethod
-    def none(cls, size: int) -> Crosses:
-        """No crosses yet."""
-        return cls(np.zeros(size), np.zeros(size), np.zeros(size, dtype=bool))
-
-
-def decode(order: Indices, state: State, crosses: Crosses) -> Crosses:
-    """The crosses with those of some more pixels, one after the other."""
-    found = Crosses(crosses.alpha.copy(), crosses.beta.copy(), crosses.fixed.copy())
-    _decode(order, state, *found)
-    return found
+def decode(order: Indices, state: State) -> tuple[Floats, Floats]:
+    """Alpha and beta of the crosses, found pixel by pixel in that order."""
+    alpha, beta = np.zeros((2, len(order)))
+    _decode(order, state, alpha, beta, np.zeros(len(order), dtype=bool))
+    return alpha, beta
 
 
 @compiled
 def _decode(order: Indices, state: State, alpha: Floats, beta: Floats, fixed: Bools) -> None:
-    """Fill in the angles, pixel by pixel in that order."""
+    """Fill in the angles, pixel by pixel in that order. fixed: the pixels that have theirs."""
     for i in order:
         cost = state.unary[state.start[i] : state.start[i + 1]].copy()
         for column in range(4):

@@ -1,8 +1,9 @@
-"""The dual of the local polytope, by TRW-S.
+"""The dual of the local polytope (Schlesinger's linear relaxation), raised by TRW-S.
 
-Kolmogorov, Convergent tree-reweighted message passing for energy minimization, IEEE TPAMI 28 (2006), written
-in shares: the amounts that a pair gives to the labels of its ends. In a forward pass every pixel i, in the
-grid's order, takes from each pair to an earlier pixel j the largest possible share,
+Kolmogorov, Convergent tree-reweighted message passing for energy minimization, IEEE TPAMI 28 (2006). Its
+reparametrisation is written in *shares*, which are the dual variables: the amounts that a pair gives to the
+labels of its ends. In a forward pass every pixel i, in the grid's order, takes from each pair to an earlier
+pixel j the largest possible share,
 
     share_i(x) = min over y of c(x, y) - share_j(y),        theta_i = D_i + sum of the shares at i,
 
@@ -15,10 +16,7 @@ last change, by a factor that grows as in Nesterov's method (Soviet Math. Dokl. 
 where the bound falls (O'Donoghue and Candes, Found. Comput. Math. 15, 2015). This halves the number of
 passes, and any shares prove a bound.
 
-The work is divided into strips of rows: one, or those on the workers of a cluster (models/proof/workers.py).
-A pass takes one strip after the other, so the numbers are the same for any strips. Only clusters differ: a
-quad of two strips gets none. The code for a strip is models/proof/strip.py, that for one pixel and one pair
-models/proof/products.py.
+The compiled code for one pixel and one pair is models/proof/products.py.
 """
 
 from __future__ import annotations
@@ -26,113 +24,99 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import Any, Final, Protocol
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..array_archive import Arrays
 from ..field.field import CrossField
 from ..instance.angles import QUARTER
-from ..instance.grid import Floats
-from ..processes.compiled import Crew
+from ..instance.grid import Bools, Floats, Grid
+from ..processes.compiled import Crew, compiled
 from ..processes.deadline import Over, never
 from ..smooth.systems import stroke_weight
 from . import check_certificate
-from .clusters import table_work
-from .decoding import Crosses
+from .clusters import (
+    cluster_fronts,
+    clusters_on,
+    extended,
+    least_of_clusters,
+    prolonged_clusters,
+    table_work,
+    update_clusters,
+)
+from .combs import comb_excesses
+from .decoding import decode
+from .encoding import messages_of, tables_of
 from .lattice import Lattice, labels_at
-from .pruning import RemainingCells, boxed
-from .strip import Passed, Strip, part_of
+from .products import all_taken, ends_of, pair_minimum, pixel_pass, share_of
+from .pruning import RemainingCells, boxed, cells_left, prolonged_shares
+from .slack import quad_slacks
+from .state import Clusters, Ends, Indices, State, state_of
+
+Singles = NDArray[np.float32]
 
 _TOLERANCE: Final = 1e-7  # excess over the energy with which labels still survive, relative to 1 + it
 _LOST: Final = 0.1  # share of the gap that rounding may cost at most; a fifth of it is usual
 _TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
 _LEVELS: Final = 64  # more than usual; the checker allows for the sides of domains at each
-
-_KEPT: Final = ("places", "_saved")  # attributes that stay the same when a dual returns to a former state
-
-Answer = Callable[[], Any]
-"""Waits for the result of a call, and returns it."""
-
-
-class Place(Protocol):
-    """A strip, here or elsewhere."""
-
-    pixels: slice
-    """The strip's pixels."""
-
-    def ask(self, name: str, *arguments: Any, **named: Any) -> Answer:
-        """Call a method of the strip."""
-
-    def sweep(self, earlier: int, over: Over) -> Passed | None:
-        """Do a pass, as `Strip.sweep`."""
-
-
-Divide = Callable[[Lattice], list[Place]]
-"""Divides a lattice into strips that begin with zero shares, from the top to the bottom."""
-
-
-class Here:
-    """A strip in this process."""
-
-    def __init__(self, strip: Strip) -> None:
-        self.strip, self.pixels = strip, strip.own
-
-    def ask(self, name: str, *arguments: Any, **named: Any) -> Answer:
-        """Call a method of the strip."""
-        found = getattr(self.strip, name)(*arguments, **named)
-        return lambda: found
-
-    def sweep(self, earlier: int, over: Over) -> Passed | None:
-        """Do a pass."""
-        return self.strip.sweep(earlier, over)
+_ALONE: Final = 30_000  # labels up to which sharing a pass among threads takes longer than it saves
 
 
 class Dual:
-    """A dual solution on a lattice: the shares of all pairs, and the bound of the last pass."""
+    """A dual solution on a lattice: the shares of all pairs, and the bound of the last pass.
 
-    def __init__(self, lattice: Lattice, crew: Crew, divide: Divide | None = None) -> None:
-        """Start from zero shares and without clusters. divide: None for one strip with the crew's threads."""
-        self.lattice = lattice
-        self._saved: dict[int, dict[str, Any]] = {}
-        whole = slice(0, len(lattice.count))
-        self.places = divide(lattice) if divide else [Here(Strip(part_of(lattice, whole), crew))]
-        self.quads = np.zeros((0, 4), np.int64)  # those with clusters, as in `Grid.quads`
+    A shallow copy stays as it is when the dual moves to another lattice, because a move makes new arrays.
+    """
+
+    lattice: Lattice
+    state: State
+    _before: list[Singles]  # the direction of a change needs no more digits
+
+    def __init__(self, lattice: Lattice, crew: Crew) -> None:
+        """Start from zero shares and without clusters."""
+        self._crew = crew
+        grid = lattice.instance.grid
+        self._fronts = fronts(grid)
         self._pass_seconds = self._table_seconds = 0.0  # of the last pass that was not cut off
-        self._least_of_clusters = np.zeros(0)
-        self._times, self._reached = 0, -math.inf
         self._left_by_combs = 1.0
+        first, second = (np.zeros(int(lattice.share_starts(ends)[-1])) for ends in (grid.first, grid.second))
+        self._begin(lattice, (first, second), clusters_on(lattice, np.zeros(0, np.int64)))
 
-    def save(self, name: int) -> None:
-        """Keep what the dual is now under a name, until `restore` asks for it the last time."""
-        self._all("save", name)
-        self._saved[name] = {key: value for key, value in vars(self).items() if key not in _KEPT}
+    def _begin(self, lattice: Lattice, shares: tuple[Floats, Floats], clusters: Clusters) -> None:
+        self.lattice, self.state = lattice, state_of(lattice, shares, clusters)
+        self._parts = [self._crew.parts(lattice.count[front]) for front in self._fronts]
+        self._take_clusters(clusters)
+        self._times, self._reached = 0, -math.inf
 
-    def restore(self, name: int, *, last: bool) -> None:
-        """Return to what was kept under a name."""
-        self._all("restore", name, last=last)
-        vars(self).update(self._saved.pop(name) if last else self._saved[name])
+    def _take_clusters(self, clusters: Clusters) -> None:
+        self.state = self.state._replace(clusters=clusters)
+        self._cluster_fronts = cluster_fronts(self.lattice.instance.grid, clusters)
+        self._before = []
+        self._least_of_clusters = self._find_least_of_clusters()
 
-    def _all(self, name: str, *arguments: Any, **named: Any) -> list[Any]:
-        """The results of all strips."""
-        return [answer() for answer in [place.ask(name, *arguments, **named) for place in self.places]]
+    @property
+    def quads(self) -> Indices:
+        """The quads with clusters, as in `Grid.quads`."""
+        return self.state.clusters.quads
 
     def move(self, lattice: Lattice) -> None:
         """Go on, with interpolated shares and tables, on a finer or smaller lattice with the same centres."""
         self._pass_seconds, self._table_seconds = self.seconds_on(lattice)
-        self.lattice = lattice
-        asked = [place.ask("move", part_of(lattice, place.pixels).lattice) for place in self.places]
-        for answer in asked:
-            answer()
-        self._least_of_clusters = np.concatenate(self._all("least_of_clusters"))
-        self._times, self._reached = 0, -math.inf
+        self._before = []  # first of all, for memory
+        old, state = self.lattice, self.state
+        shares = prolonged_shares(old, (state.shares_first, state.shares_second), lattice)
+        clusters = prolonged_clusters(old, state.clusters, lattice)
+        del self.state, state  # the new arrays need its memory
+        self._begin(lattice, shares, clusters)
 
     def forward(self, over: Over = never) -> float:
-        """The bound after a forward pass."""
+        """The bound after a forward pass; -inf if time cut it off."""
         return self._pass(0, over)
 
     def backward(self, over: Over = never) -> float:
-        """The bound after a backward pass."""
+        """The bound after a backward pass; -inf if time cut it off."""
         return self._pass(2, over)
 
     def ascend(self, times: int, over: Over = never, closing: Over = never) -> float:
@@ -156,10 +140,43 @@ class Dual:
                 break
         return bound
 
+    def _pass(self, earlier: int, over: Over) -> float:
+        """The bound after a pass; earlier: 0 forwards, 2 backwards."""
+        began, way = time.monotonic(), 1 if earlier == 0 else -1
+
+        def visit(pixels: Indices) -> None:
+            _pass_pixels(pixels, earlier, self.state)
+
+        if self.lattice.start[-1] < _ALONE:
+            visit(np.concatenate(self._fronts[::way]))
+        else:
+            for front, parts in zip(self._fronts[::way], self._parts[::way], strict=True):
+                if over():
+                    return -math.inf
+                self._crew.run(visit, [front[part] for part in parts])
+        self._pass_seconds = time.monotonic() - began
+        return math.fsum([*self.state.least, *self._least_of_clusters])
+
     def _extrapolate(self) -> None:
         """Move shares and tables along their last change, further the longer the bound has not fallen."""
-        self._all("extrapolate", self._times / (self._times + 3))
+        part = self._times / (self._times + 3)
         self._times += 1
+        if not self._before:
+            self._before = [values.astype(np.float32) for values in self._values]
+            return
+        first, second, old_tables = self._before
+        state, tables = self.state, self.state.clusters.tables
+        self._crew.run(
+            lambda pairs: _carry_shares(pairs, state, (first, second), part),
+            [(at.start, at.stop) for at in self._crew.equal_parts(len(state.first))],
+        )
+        self._crew.run(
+            lambda at: _carry_on(tables[at], old_tables[at], part), self._crew.equal_parts(len(tables))
+        )
+
+    @property
+    def _values(self) -> tuple[Floats, Floats, Floats]:
+        return (self.state.shares_first, self.state.shares_second, self.state.clusters.tables)
 
     def add_clusters(self, count: int, field: CrossField) -> None:
         """Add clusters, with zero tables, on the quads that hold most of the gap to the energy of the field.
@@ -168,41 +185,36 @@ class Dual:
         """
         alpha, beta, _ = labels_at(field, self.lattice)
         quads = self.lattice.instance.grid.quads
-        slack = np.sum(self._all("slacks", alpha, beta), axis=0)
+        slack = quad_slacks(self.lattice, self.state, (alpha, beta))
         slack[np.isin(quads[:, 0], self.quads[:, 0])] = np.inf
         numbers = np.sort(np.argsort(-slack, kind="stable")[: len(self.quads) + count])
-        asked = [(place, place.ask("inside")) for place in self.places]
-        of_strips = [(place, numbers[answer()[numbers]]) for place, answer in asked]
-        answers = [place.ask("add_clusters", some) for place, some in of_strips]
-        self._least_of_clusters = np.concatenate([answer() for answer in answers])
-        self.quads = quads[np.concatenate([some for _, some in of_strips])].astype(np.int64)
+        self._take_clusters(extended(self.state.clusters, clusters_on(self.lattice, numbers)))
 
     def update_clusters(self, way: int = 1) -> None:
         """Update all clusters; way: -1 for the reverse order."""
         if not len(self.quads):
             return
         began = time.monotonic()
-        self._least_of_clusters[:] = 0.0
-        self._all("update_clusters", way)
+        for front in self._cluster_fronts[::way]:
+            self._crew.run(
+                lambda numbers: update_clusters(numbers, self.state),
+                [front[k : k + 1] for k in range(len(front))],
+            )
+        self._least_of_clusters = np.zeros(len(self.quads))
         self._table_seconds = time.monotonic() - began
 
-    def _pass(self, earlier: int, over: Over) -> float:
-        began, least = time.monotonic(), []
-        numbers = range(len(self.places))[:: 1 if earlier == 0 else -1]
-        for number in numbers:
-            passed = self.places[number].sweep(earlier, over)
-            if passed is None:
-                return -math.inf
-            least.append(passed.least)
-            beside = ((number - 1, passed.above, False), (number + 1, passed.below, True))
-            for answer in [
-                self.places[each].ask("take", shares, above=above)
-                for each, shares, above in beside
-                if 0 <= each < len(self.places)
-            ]:
-                answer()
-        self._pass_seconds = time.monotonic() - began
-        return math.fsum([*np.concatenate(least), *self._least_of_clusters])
+    def _find_least_of_clusters(self) -> Floats:
+        """The least of the negative tables of each cluster."""
+        least = np.zeros(len(self.quads))
+        self._in_parts(least_of_clusters, least)
+        return least
+
+    def _in_parts(self, fill: Callable[[int, int, State, Floats], None], values: Floats) -> None:
+        """Fill in values, one for each pixel, pair or cluster, by all threads."""
+        self._crew.run(
+            lambda part: fill(part.start, part.stop, self.state, values),
+            self._crew.equal_parts(len(values)),
+        )
 
     def seconds_on(self, lattice: Lattice) -> tuple[float, float]:
         """Expected seconds of a pass, and of an update of the clusters, estimated from the last ones here."""
@@ -216,26 +228,33 @@ class Dual:
         Multiples of a greater power take less space in a certificate. gap: of the level's bound, of which
         the rounding costs a small part at most.
         """
+        self._before = []  # a level is recorded next, which takes memory
         most = max(self._greatest()[0], 2.0**-16)
         least = 2.0 ** (math.ceil(math.log2(most)) - (30 if self.lattice.norm == 2 else 48))
         # Shares and tables, wrong by half a quantum, enter the minima of pixels and pairs, or of clusters.
-        wrong = np.array([2 * len(self.lattice.p), 4 * len(self._least_of_clusters)])
+        wrong = np.array([2 * len(self.lattice.p), 4 * len(self.quads)])
         lost = _LOST * gap * np.array([1 - _TABLES, _TABLES]) / np.maximum(wrong, 1)
         of_shares, of_tables = (
-            min(2.0 ** math.floor(math.log2(max(each, least))), check_certificate.MOST_SCALE) for each in lost
+            min(2.0 ** math.floor(math.log2(max(most_lost, least))), check_certificate.MOST_SCALE)
+            for most_lost in lost
         )
-        self._all("quantise", of_shares, of_tables)
+        for values, quantum in zip(self._values, (of_shares, of_shares, of_tables), strict=True):
+            np.multiply(values, 1 / quantum, out=values)
+            np.round(values, out=values)
+            np.multiply(values, quantum, out=values)
         return of_shares, of_tables
 
     def _greatest(self) -> tuple[float, float]:
-        """The greatest size of a share or a number of a table, and of a cost of a pixel."""
-        shares, costs = zip(*self._all("greatest"), strict=True)
-        return max(shares), max(costs)
+        """The greatest size of a share or a number of a table, and of a finite cost of a pixel."""
+        unary = self.state.unary
+        return max(map(_most, self._values)), _most(unary[np.isfinite(unary)])
 
     def bound(self) -> float:
         """The bound that any shares prove, as `LevelRecord` defines it."""
-        terms = np.concatenate([each for minima in self._all("minima") for each in minima])
-        return math.fsum([*terms, -self._roundings()[0]])
+        pixels, pairs = np.zeros(len(self.lattice.count)), np.zeros(len(self.lattice.p))
+        self._in_parts(_pixel_minima, pixels)
+        self._in_parts(_pair_minima, pairs)
+        return math.fsum([*pixels, *pairs, *self._find_least_of_clusters(), -self._roundings()[0]])
 
     def _roundings(self) -> tuple[float, float]:
         """Margin that the checker takes off the bound of a pass, and adds to the energy for combs.
@@ -260,29 +279,21 @@ class Dual:
         """The cells that the level leaves below an energy, by a forward pass; see models/proof/pruning.py."""
         self.forward()
         excess = self._excess(bound, energy)
-        cells = np.concatenate(self._all("cells", excess))
+        cells = self._cells_of_pass(excess)
         before = max(int(np.count_nonzero(cells)), 1)
-        self._all("begin_combs")
-        for teeth_are_columns in (True, False):
-            for first in (True, False):
-                self._all("turn_comb", first=first)
-                column = first == teeth_are_columns
-                for back in (False, True):
-                    self._follow_combs(column=column, back=back)
-            cells &= np.concatenate(self._all("cells_by_comb", excess))
-        self._all("forget_combs")
+        for excesses in comb_excesses(self.state, self._crew):
+            cells &= cells_left(self.lattice, excesses <= excess)
         self._left_by_combs = int(np.count_nonzero(cells)) / before
         return boxed(self.lattice, cells)
 
-    def _follow_combs(self, *, column: bool, back: bool) -> None:
-        edge = np.zeros(0)
-        for place in self.places[:: -1 if back else 1]:
-            edge = place.ask("follow_comb", edge, column=column, back=back)()
-
     def count_left(self, bound: float, energy: float) -> int:
         """The number of cells that the last pass leaves, times the share that combs left the last time."""
-        left = sum(map(np.count_nonzero, self._all("cells", self._excess(bound, energy))))
-        return round(self._left_by_combs * left)
+        return round(self._left_by_combs * np.count_nonzero(self._cells_of_pass(self._excess(bound, energy))))
+
+    def _cells_of_pass(self, excess: float) -> Bools:
+        """The cells where a vertex's theta exceeds the least by at most `excess`, flat."""
+        state = self.state
+        return cells_left(self.lattice, state.theta <= np.repeat(state.least + excess, self.lattice.count))
 
     def _excess(self, bound: float, energy: float) -> float:
         """The excess over a bound up to which labels survive."""
@@ -290,16 +301,74 @@ class Dual:
 
     def decoded(self, *, forwards: bool) -> tuple[Floats, Floats]:
         """Alpha and beta (n,) of the crosses that the shares suggest; forwards after a backward pass."""
-        crosses = Crosses.none(len(self.lattice.count))
-        for place in self.places[:: 1 if forwards else -1]:
-            crosses = place.ask("decoded", crosses, forwards=forwards)()
-        return crosses.alpha, np.clip(crosses.beta, -QUARTER, QUARTER)
+        order = np.arange(len(self.lattice.count))[:: 1 if forwards else -1].copy()
+        alpha, beta = decode(order, self.state)
+        return alpha, np.clip(beta, -QUARTER, QUARTER)
 
     def arrays(self, quanta: tuple[float, float]) -> tuple[Arrays, Arrays]:
         """Messages and tables as whole numbers of their scales, after `quantise`."""
-        messages, tables = zip(*self._all("arrays", *quanta), strict=True)
-        return _joined(messages), _joined(tables)
+        shares, (of_shares, of_tables) = (self.state.shares_first, self.state.shares_second), quanta
+        messages = messages_of(self.lattice, shares, of_shares, slice(0, len(self.lattice.p)))
+        return messages, tables_of(self.lattice, self.state.clusters, of_tables)
 
 
-def _joined(parts: tuple[Arrays, ...]) -> Arrays:
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def fronts(grid: Grid) -> list[Indices]:
+    """The pixels of each anti-diagonal. No two of one diagonal form a pair; earlier pixels come sooner."""
+    diagonal = grid.rows + grid.columns
+    order = np.argsort(diagonal, kind="stable")
+    _, begin = np.unique(diagonal[order], return_index=True)
+    return np.split(order, begin[1:])
+
+
+def _most(values: Floats) -> float:
+    """The greatest size, without an array of all sizes."""
+    return float(max(values.max(initial=0.0), -values.min(initial=0.0)))
+
+
+@compiled
+def _pass_pixels(pixels: Indices, earlier: int, state: State) -> None:
+    """Do a pass over some pixels, one after the other; earlier: 0 forwards, 2 backwards."""
+    for i in pixels:
+        pixel_pass(i, earlier, state)
+
+
+@compiled
+def _carry_shares(pairs: tuple[int, int], state: State, before: tuple[Singles, Singles], part: float) -> None:
+    """Extrapolate the shares of consecutive pairs. before: those at their first and their second pixels."""
+    for pair in range(pairs[0], pairs[1]):
+        i, j = state.first[pair], state.second[pair]
+        was = before[0][state.start_first[pair] : state.start_first[pair + 1]]
+        _carry_used(share_of(pair, i, state), was, ends_of(i, state), state.beta_count[i], part)
+        was = before[1][state.start_second[pair] : state.start_second[pair + 1]]
+        _carry_used(share_of(pair, j, state), was, ends_of(j, state), state.beta_count[j], part)
+
+
+@compiled
+def _carry_used(values: Floats, before: Singles, ends: Ends, columns: int, part: float) -> None:
+    """Extrapolate the used part of the shares of a pair at one pixel."""
+    for row in range(ends[0].size):
+        begin, end = row * columns + ends[0][row], row * columns + ends[1][row]
+        _carry_on(values[begin:end], before[begin:end], part)
+
+
+@compiled
+def _carry_on(values: Floats, before: Singles, part: float) -> None:
+    """Extrapolate numbers by a part of their last change, and store them as they were."""
+    for x in range(values.size):
+        now = values[x]
+        values[x] = now + part * (now - before[x])
+        before[x] = now
+
+
+@compiled
+def _pair_minima(begin: int, end: int, state: State, least: Floats) -> None:
+    """Fill in the least c - shares of some pairs."""
+    for pair in range(begin, end):
+        least[pair] = pair_minimum(pair, state)
+
+
+@compiled
+def _pixel_minima(begin: int, end: int, state: State, least: Floats) -> None:
+    """Fill in the least D + sum of the shares of some pixels."""
+    for i in range(begin, end):
+        least[i] = all_taken(i, state).min()

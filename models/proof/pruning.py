@@ -25,7 +25,6 @@ from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats, Ints
 from ..processes.compiled import compiled
 from .lattice import Lattice, Starts, ranges, starts, strip
-from .state import State
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,16 +103,15 @@ def _covering(left: RemainingCells, new: Lattice, times: int, side: Ints) -> Lat
     return new
 
 
-def prolonged_shares(old: Lattice, state: State, new: Lattice) -> list[Floats]:
+def prolonged_shares(old: Lattice, shares: tuple[Floats, Floats], new: Lattice) -> tuple[Floats, Floats]:
     """Shares at both ends of all pairs, interpolated on a finer or smaller lattice with the same centres."""
-    grid, shares = old.instance.grid, []
-    for ends, values in ((grid.first, state.shares_first), (grid.second, state.shares_second)):
-        found = np.zeros(int(new.share_starts(ends)[-1]))
+    grid = old.instance.grid
+    first, second = (np.zeros(int(new.share_starts(ends)[-1])) for ends in (grid.first, grid.second))
+    for ends, values, fine in ((grid.first, shares[0], first), (grid.second, shares[1], second)):
         was = rectangles(old), old.share_starts(ends), values
-        now = rectangles(new), new.share_starts(ends), found
+        now = rectangles(new), new.share_starts(ends), fine
         _interpolate(was, now, ends, new.h / old.h, (new.offset, new.allowed))
-        shares.append(found)
-    return shares
+    return first, second
 
 
 def rows_of(lattice: Lattice) -> tuple[Starts, Starts, Starts]:

@@ -16,27 +16,25 @@ from ..instance.grid import Floats, Ints
 from ..processes.compiled import compiled
 from .lattice import Lattice
 from .products import all_taken
-from .state import Indices, State
+from .state import State
 
 _THRESHOLDS: Final = (0.25, 0.75)  # of the rounding
 
 
-def quad_slacks(lattice: Lattice, state: State, angles: tuple[Floats, Floats], own: slice) -> Floats:
+def quad_slacks(lattice: Lattice, state: State, angles: tuple[Floats, Floats]) -> Floats:
     """The slack of the four pixels of each quad, and half of the slack of each of their pairs; shape (q,).
 
     Pairs count as after a pass, when their least value is 0. Without a label near the field, a slack is 0.
-    angles: alpha and beta of a field, as from `labels_at`. own: the pixels of the quads that are wanted.
+    angles: alpha and beta of a field, as from `labels_at`.
     """
     grid = lattice.instance.grid
     corners = _corners(lattice, *angles)
-    theta = np.empty(lattice.start[own.stop] - lattice.start[own.start])
-    _fill_taken(own.start, own.stop, state, theta)
-    begin, at_pixel = lattice.start[own] - lattice.start[own.start], np.zeros(grid.size)
+    theta = np.empty(lattice.start[-1])
+    _fill_taken(state, theta)
+    begin = lattice.start[:-1]
     least = np.minimum.reduceat(theta, begin)
-    at_pixel[own] = np.mean([theta[begin + corner.label[own]] for corner in corners], axis=0) - least
-    known = np.flatnonzero((lattice.count[grid.first] > 0) & (lattice.count[grid.second] > 0))
-    at_pair = np.zeros(len(grid.first))
-    at_pair[known] = np.mean([_pairs(lattice, state, corner, known) for corner in corners], axis=0) / 2
+    at_pixel = np.mean([theta[begin + corner.label] for corner in corners], axis=0) - least
+    at_pair = np.mean([_pairs(lattice, state, corner) for corner in corners], axis=0) / 2
     for ends in (grid.first, grid.second):
         np.add.at(at_pixel, ends, at_pair)
     bottom, _, top, _ = grid.quads.T
@@ -70,23 +68,22 @@ def _corners(lattice: Lattice, alpha: Floats, beta: Floats) -> list[_Corner]:
 
 
 @compiled
-def _fill_taken(first: int, end: int, state: State, theta: Floats) -> None:
-    """Fill in the cost of each label of some pixels plus the shares of all pairs there."""
-    begin = state.start[first]
-    for i in range(first, end):
-        theta[state.start[i] - begin : state.start[i + 1] - begin] = all_taken(i, state)
+def _fill_taken(state: State, theta: Floats) -> None:
+    """Fill in the cost of each label plus the shares of all pairs there."""
+    for i in range(state.least.size):
+        theta[state.start[i] : state.start[i + 1]] = all_taken(i, state)
 
 
-def _pairs(lattice: Lattice, state: State, corner: _Corner, pairs: Indices) -> Floats:
-    """The costs of some pairs with their tables, less their shares, at a corner of both ends."""
-    i, j = state.first[pairs], state.second[pairs]
+def _pairs(lattice: Lattice, state: State, corner: _Corner) -> Floats:
+    """The costs of pairs with their tables, less their shares, at a corner of both ends."""
+    i, j = state.first, state.second
     size = np.square if lattice.norm == 2 else np.abs
-    cost = lattice.instance.pair_terms.chosen(pairs).least_costs(corner.alpha, corner.beta, size)
+    cost = lattice.instance.pair_terms.least_costs(corner.alpha, corner.beta, size)
     cost -= lattice.h**2 if lattice.norm == 2 else 0.0
-    cost -= state.shares_first[state.start_first[pairs] + corner.label[i]]
-    cost -= state.shares_second[state.start_second[pairs] + corner.label[j]]
+    cost -= state.shares_first[state.start_first[:-1] + corner.label[i]]
+    cost -= state.shares_second[state.start_second[:-1] + corner.label[j]]
     clusters = state.clusters
-    for numbers in clusters.of_pair[pairs].T:
+    for numbers in clusters.of_pair.T:
         at = np.flatnonzero(numbers >= 0)
         wide = lattice.alpha_count[j[at]]
         place = clusters.start[numbers[at]] + corner.row[i[at]] * wide + corner.row[j[at]]

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.grid import Floats, Ints
-from .lattice import Starts
+from ..instance.grid import Floats, Grid, Ints
+from .lattice import Lattice, Starts
+from .pruning import rows_of
 
 Indices = NDArray[np.int64]
 """Numbers of pixels and pairs: all of one type, so that each function is compiled once."""
@@ -53,3 +54,41 @@ class State(NamedTuple):
     least: Floats  # of each pixel's theta
     power: int  # of the residuals of pairs: 1 or 2
     clusters: Clusters
+
+
+def state_of(lattice: Lattice, shares: tuple[Floats, Floats], clusters: Clusters) -> State:
+    """A lattice as arrays, with shares at the first and at the second pixels of all pairs, and clusters."""
+    grid = lattice.instance.grid
+    unary = lattice.unary_costs()
+    row_start, begin, end = rows_of(lattice)
+    return State(
+        lattice.h,
+        lattice.alpha + lattice.h * (lattice.alpha_first + lattice.offset),
+        lattice.beta + lattice.h * (lattice.beta_first + lattice.offset),
+        lattice.alpha_count,
+        lattice.beta_count,
+        lattice.start,
+        row_start,
+        begin,
+        end,
+        unary,
+        grid.first.astype(np.int64),
+        grid.second.astype(np.int64),
+        lattice.p & 1,
+        lattice.share_starts(grid.first),
+        lattice.share_starts(grid.second),
+        _around(grid),
+        *shares,
+        unary.copy(),
+        np.zeros(grid.size),
+        2 if lattice.norm == 2 else 1,
+        clusters,
+    )
+
+
+def _around(grid: Grid) -> Indices:
+    """The pairs of each pixel with its upper, left, lower and right neighbour, -1 for none; shape (n, 4)."""
+    upper, right = (np.pad(table, 1, constant_values=-1) for table in grid.pair_number)
+    row, column = grid.rows + 1, grid.columns + 1
+    pairs = (upper[row, column], right[row, column - 1], upper[row + 1, column], right[row, column])
+    return np.stack(pairs, axis=1).astype(np.int64)

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 import time
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Final
 
@@ -129,8 +130,9 @@ class _Rest:
 
 @dataclass
 class _Waiting:
-    """A part of what a level leaves, for levels that are still to come."""
+    """A part of what a level leaves, for levels that are still to come, and the level's dual."""
 
+    dual: Dual
     left: RemainingCells
     branch: Branch
 
@@ -304,9 +306,7 @@ class Work:
         while self.chain.waiting:
             part = self.chain.waiting.pop()
             self.chain.next = part.branch
-            above = [each.branch.above for each in self.chain.waiting]
-            dual.restore(part.branch.above, last=part.branch.above not in above)
-            if ended := self._go_through_part(dual, narrowed(part.left)):
+            if ended := self._go_through_part(part.dual, narrowed(part.left)):
                 return ended
         return "labels"
 
@@ -344,9 +344,8 @@ class Work:
     def _wait(self, dual: Dual, rest: _Rest, cut: Cut) -> None:
         """Let both parts of what is left wait; the one with fewer cells comes first."""
         number = len(self.chain.levels) - 1
-        dual.save(number)
         parts = [
-            _Waiting(part, Branch(number, cut.pixel, 2 * cut.axis + side, cut.step))
+            _Waiting(copy(dual), part, Branch(number, cut.pixel, 2 * cut.axis + side, cut.step))
             for side, part in enumerate(cut.parts(rest.left))
         ]
         self.chain.waiting += sorted(parts, key=lambda part: -np.count_nonzero(part.left.cells))

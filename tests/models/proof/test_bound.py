@@ -66,7 +66,7 @@ def test_any_shares_give_a_bound():
             instance = small(seed)
             lattice = Lattice.whole(first_field(instance), 4)
             dual, rng = Dual(lattice, hands), np.random.default_rng(seed)
-            state = dual.places[0].strip.state
+            state = dual.state
             for shares in (state.shares_first, state.shares_second):
                 shares[:] = rng.normal(0, 3, len(shares))
             assert dual.bound() <= least_labelling(*discrete(lattice))
@@ -87,7 +87,7 @@ def test_any_tables_of_clusters_give_a_bound():
             instance = random_instance(seed, ((2, 2), (2, 3), (3, 2))[seed % 3])
             lattice = Lattice.whole(first_field(instance), 4)
             dual = with_clusters(lattice, hands)
-            state = dual.places[0].strip.state
+            state = dual.state
             for values in (state.shares_first, state.shares_second, state.clusters.tables):
                 values[:] = rng.normal(0, 0.3, len(values))
             assert dual.bound() <= least_labelling(*discrete(lattice))
@@ -123,7 +123,7 @@ def test_threads_change_no_bit():
             dual = Dual(lattice, hands)
             dual.ascend(2)
             dual.add_clusters(5, first_field(instance))
-            state = dual.places[0].strip.state
+            state = dual.state
             found.append(
                 (dual.ascend(2), dual.bound(), state.shares_first.tobytes(), state.clusters.tables.tobytes())
             )

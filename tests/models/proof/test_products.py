@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from crossfield.models.processes.compiled import crew
 from crossfield.models.proof.clusters import clusters_on
+from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.min_plus import min_plus
 from crossfield.models.proof.products import pair_minimum, product, share_of
-from crossfield.models.proof.strip import Strip, part_of
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 from labellings import discrete
@@ -45,7 +45,7 @@ def test_shares_and_minima_of_pairs_are_those_over_the_allowed_labels(seed):
     lattice = with_holes(Lattice.whole(first_field(instance), steps), rng)
     allowed = np.split(lattice.allowed, lattice.start[1:-1])
     with crew(1) as hands:
-        state = Strip(part_of(lattice, slice(0, instance.grid.size)), hands).state
+        state = Dual(lattice, hands).state
     state = state._replace(clusters=clusters_on(lattice, np.arange(seed % 3 > 0)))
     for values in (state.shares_first, state.shares_second, state.clusters.tables):
         values[:] = rng.normal(0, 0.5, len(values))
