@@ -26,7 +26,7 @@ from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
-from crossfield.models.sketch.surfaces import CurvaturePatch, instance_on, turned_by
+from crossfield.models.sketch.surfaces import CurvaturePatch, analytic_instance, turned_by
 from crossfield.models.surface.trust import OFF, off_right_angles
 from drawings import SUFFIXES
 from make import markdown, replace_between
@@ -149,7 +149,7 @@ def sides(name: str, size: int) -> Rows:
             lambda s, t: (position(s, t + step) - position(s, t - step)) / (2 * step),
             s_range, t_range, seen, share=0.2,
         )  # fmt: skip
-        true = instance_on(patch, "patch", size)
+        true = analytic_instance(patch, "patch", size)
         found = cf.surface(cf.CrossField.from_lines(true.instance, true.u_angle, true.v_angle))
         error = normal_error(found, true.normals).mean()
         right = angles(found.normals, true.normals).mean() <= error + 1e-9

@@ -16,11 +16,12 @@ from crossfield.models.errors import InputError, naming
 from crossfield.models.instance.angles import arctangent, line_difference
 from crossfield.models.instance.grid import Ints
 from crossfield.models.instance.instance import Instance
-from crossfield.models.sketch.choice import AS_DRAWN, Choice
-from crossfield.models.sketch.cover import Frame, Indices, covering_curves
+from crossfield.models.sketch.cover import LEAST_WEIGHT, Frame, Indices, covering_curves
 from crossfield.models.sketch.curves import Curves
-from crossfield.models.sketch.read import LEAST_WEIGHT, bytes_of, curves_in, segments_of
+from crossfield.models.sketch.drawing_file import parse_drawing, read_file
+from crossfield.models.sketch.read import DEFAULT_SIZE
 from crossfield.models.sketch.samples import SAMPLES, sample_svg
+from crossfield.models.sketch.svg import read_svg
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
@@ -32,18 +33,18 @@ SEVERAL: Final = -1  # the number of a stroke pixel on several curves
 _NONE: Final = -2
 
 
-def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choice = AS_DRAWN) -> Ints:
+def curves_of(instance: Instance, sketch: str | Path | None = None) -> Ints:
     """The number of the only curve of each stroke pixel, int (s,), SEVERAL where more curves pass through it.
 
     sketch: the file that the instance was read from, or the name of a sample. None, pictures, computed
     samples and instance files record no curves. Raises InputError for another sketch.
     """
-    found = None if sketch is None else _drawn(sketch, choice)
-    if found is None:
+    curves = None if sketch is None else _drawn(sketch)
+    if curves is None:
         return chains(instance)
     x, y = instance.origin
     frame = Frame(x, y, instance.pixel_size, instance.grid.height, instance.grid.width)
-    segments, curve, line = segments_of(found, frame)
+    segments, curve, line = curves.segments(frame)
     owner, row, column = covering_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
     number = np.full(frame.shape, -1, dtype=np.int64)
     number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
@@ -109,13 +110,14 @@ def chains(instance: Instance) -> Ints:
     return np.asarray(connected_components(links, directed=False)[1].astype(np.int32))
 
 
-def _drawn(sketch: str | Path, choice: Choice) -> Curves | None:
+def _drawn(sketch: str | Path) -> Curves | None:
     """The curves of a vector sketch, in a file or a sample; None for other sources."""
     path = Path(sketch)
     if not path.is_file() and str(sketch) in SAMPLES:
         analytic = SAMPLES[str(sketch)].kind == "analytic"
-        return None if analytic else curves_in(sample_svg(str(sketch)).encode(), ".svg", choice)
+        return None if analytic else read_svg(sample_svg(str(sketch)).encode())
     if path.suffix.lower() in {".json", ".npz"}:
         return None
     with naming(path):
-        return curves_in(bytes_of(path), path.suffix.lower(), choice)
+        drawing = parse_drawing(read_file(path), path.suffix, DEFAULT_SIZE)
+    return drawing if isinstance(drawing, Curves) else None

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ...models.errors import InputError
-from ...models.sketch.choice import AS_DRAWN, Choice, Silhouette
 from .output import print_warnings
 
 if TYPE_CHECKING:
@@ -32,7 +31,7 @@ class SketchOptions:
         ),
     ] = None
     silhouette: Annotated[
-        Silhouette,
+        Literal["none", "outer"],
         typer.Option(
             "--silhouette",
             help="Strokes along the outline of the drawing carry no direction (outer), or are curvature lines"
@@ -86,15 +85,15 @@ class SketchOptions:
     ] = None
 
     @property
-    def choice(self) -> Choice:
-        """Strokes that are curvature lines. Raises InputError for a label that does not exist."""
-        return Choice(self.silhouette, tuple(self.curvature or ()), self.view)
-
-    @property
     def given(self) -> bool:
         """Whether any of the options is given."""
         values = (self.size, self.mask, self.gauge, self.stroke_weight, self.skew_weight)
-        return self.choice != AS_DRAWN or any(value is not None for value in values)
+        return self._chooses_strokes or any(value is not None for value in values)
+
+    @property
+    def _chooses_strokes(self) -> bool:
+        """Whether an option decides which strokes of a drawing are curvature lines."""
+        return self.silhouette != "none" or bool(self.curvature) or self.view is not None
 
     def instance(self, what: str, *, quiet: bool) -> Instance:
         """Instance of a sketch file, a built-in sample or an instance file, small enough for the memory.
@@ -133,7 +132,7 @@ class SketchOptions:
             mask=self.mask,
             gauge=self.gauge or "strokes",
             silhouette=self.silhouette,
-            curvature=self.choice.curvature,
+            curvature=self.curvature or (),
             view=self.view,
         )
 
@@ -143,7 +142,7 @@ class SketchOptions:
 
         if self.mask is not None:
             raise InputError(f"the sample {name} has its own mask; leave --mask out")
-        if self.choice.curvature or self.view:
+        if self.curvature or self.view:
             raise InputError(
                 f"the sample {name} has its own curvature lines; leave --curvature and --view out"
             )
@@ -157,7 +156,7 @@ class SketchOptions:
             raise InputError(
                 "is an instance, which has its own grid and mask; leave --size and --mask out", file=path
             )
-        if self.choice != AS_DRAWN:
+        if self._chooses_strokes:
             raise InputError(
                 "is an instance, which has its own curvature lines; "
                 "leave --silhouette, --curvature and --view out",

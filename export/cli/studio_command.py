@@ -59,7 +59,7 @@ def studio_command(
 def _opened(drawing: str) -> dict[str, Any]:
     """Strokes of a file or a sample. Raises InputError."""
     from ...models.errors import naming
-    from ...models.sketch.read import bytes_of
+    from ...models.sketch.drawing_file import read_file
     from ...models.sketch.samples import SAMPLES, sample_svg
     from ..studio.document import Document
     from ..studio.opening import opened
@@ -67,7 +67,7 @@ def _opened(drawing: str) -> dict[str, Any]:
     path = Path(drawing)
     if not path.is_file() and drawing in SAMPLES:
         return opened(sample_svg(drawing).encode(), f"{drawing}.svg")
-    data = bytes_of(path)
+    data = read_file(path)
     with naming(path):
         if data.lstrip().startswith(b"{"):
             Document.of_bytes(data)

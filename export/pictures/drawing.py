@@ -20,14 +20,12 @@ from scipy import ndimage
 from ...models.errors import InputError, naming
 from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
-from ...models.sketch.bitmap import Picture, read_picture
-from ...models.sketch.choice import Choice, view_in
-from ...models.sketch.cover import Frame, covering_curves
-from ...models.sketch.curves import Curves, are_straight, bounding_box, runs
-from ...models.sketch.read import DEFAULT_SIZE, bytes_of, curves_in, segments_of
+from ...models.sketch.bitmap import Bitmap
+from ...models.sketch.cover import Box, Frame, covering_curves
+from ...models.sketch.curves import Curves, are_straight, runs
+from ...models.sketch.drawing_file import parse_drawing, read_file
+from ...models.sketch.read import DEFAULT_SIZE
 from ...models.sketch.samples import SAMPLES, sample_svg
-
-Box = tuple[float, float, float, float]
 
 INK: Final = {"black": "#4a4a4a", "red": "#c23b33"}
 """Colours of the strokes below a field; red are those that are drawn in red."""
@@ -62,15 +60,14 @@ def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
     """
     path = Path(what)
     sampled = not path.is_file() and str(what) in SAMPLES
-    data = sample_svg(str(what)).encode() if sampled else bytes_of(path)
+    data = sample_svg(str(what)).encode() if sampled else read_file(path)
     with naming(path):
-        curves = curves_in(data, ".svg" if sampled else path.suffix.lower(), Choice(view=view_in(on.source)))
+        content = parse_drawing(data, path.suffix, DEFAULT_SIZE, view=on.view)
         frame = Frame(*on.origin, on.pixel_size, *on.mask.shape)
-        if curves is None:
-            picture = read_picture(data, DEFAULT_SIZE)
-            drawing, drawn = _of_ink(picture), _inked(picture, frame)
+        if isinstance(content, Bitmap):
+            drawing, drawn = _of_ink(content), _inked(content, frame)
         else:
-            drawing, drawn = _of_curves(curves, data), _covered(curves, frame)
+            drawing, drawn = _of_curves(content, data), _covered(content, frame)
         near = ndimage.binary_dilation(drawn, np.ones((3, 3), dtype=bool))
         share = near[tuple(on.stroke_pixels.T)].mean()
         if share < _SAME:
@@ -83,14 +80,14 @@ def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
 
 def _covered(curves: Curves, frame: Frame) -> Bools:
     """The pixels of a grid that a curve touches, shape (h, w)."""
-    segments, curve, _ = segments_of(curves, frame)
+    segments, curve, _ = curves.segments(frame)
     _, row, column = covering_curves(segments, curve, frame, 0.0)
     drawn = np.zeros(frame.shape, dtype=bool)
     drawn[row, column] = True
     return drawn
 
 
-def _inked(picture: Picture, frame: Frame) -> Bools:
+def _inked(picture: Bitmap, frame: Frame) -> Bools:
     """The pixels of a grid with ink, shape (h, w)."""
     at = (np.argwhere(picture.ink > _INK)[:, ::-1] + 0.5) * picture.reduced
     column, row = np.floor((at - (frame.x, frame.y)) / frame.pixel).astype(int).T
@@ -101,15 +98,15 @@ def _inked(picture: Picture, frame: Frame) -> Bools:
 
 
 def _of_curves(curves: Curves, data: bytes) -> Drawing:
-    left, top, right, bottom = bounding_box(curves.points)
-    x, y, width, height = curves.canvas or (0.0, 0.0, 0.0, 0.0)
+    left, top, right, bottom = curves.box
+    x, y, width, height = curves.page or (0.0, 0.0, 0.0, 0.0)
     left, top = min(left, x), min(top, y)
     page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
     starts = np.flatnonzero(np.diff(runs(curves.points, curves.curve), prepend=-1))
     found: dict[str, list[Floats]] = {name: [] for name in INK}
     for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):
         found["red" if red else "black"].append(run[:, [0, 3]] if are_straight(run) else run)
-    return Drawing(page, found, _size(data, curves.canvas, page))
+    return Drawing(page, found, _size(data, curves.page, page))
 
 
 def size_in_units(page: Box) -> tuple[str, str]:
@@ -117,7 +114,7 @@ def size_in_units(page: Box) -> tuple[str, str]:
     return f"{page[2]:.12g}", f"{page[3]:.12g}"
 
 
-def _size(data: bytes, canvas: Box | None, page: Box) -> tuple[str, str]:
+def _size(data: bytes, declared: Box | None, page: Box) -> tuple[str, str]:
     """Width and height of the page of a sketch, at the millimetres per unit that an SVG declares."""
     from defusedxml.ElementTree import iterparse
 
@@ -126,15 +123,15 @@ def _size(data: bytes, canvas: Box | None, page: Box) -> tuple[str, str]:
     except ParseError:  # pen strokes
         return size_in_units(page)
     width, height = (_LENGTH.fullmatch(root.get(side, "").strip()) for side in ("width", "height"))
-    if not (canvas and width and height and float(width[1]) and float(height[1])):
+    if not (declared and width and height and float(width[1]) and float(height[1])):
         return size_in_units(page)
     return (
-        f"{float(width[1]) * page[2] / canvas[2]:.12g}{width[2] or ''}",
-        f"{float(height[1]) * page[3] / canvas[3]:.12g}{height[2] or ''}",
+        f"{float(width[1]) * page[2] / declared[2]:.12g}{width[2] or ''}",
+        f"{float(height[1]) * page[3] / declared[3]:.12g}{height[2] or ''}",
     )
 
 
-def _of_ink(picture: Picture) -> Drawing:
+def _of_ink(picture: Bitmap) -> Drawing:
     level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
     ink = (level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)).astype(np.uint8)
     page = (0.0, 0.0, float(picture.width), float(picture.height))

@@ -14,9 +14,10 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
+from ...models.sketch.cover import Box
 from ...models.sketch.curves import lines_as_cubics
 from ..shading.raster import drawn_border
-from .drawing import INK, Box, Drawing
+from .drawing import INK, Drawing
 from .marks import FAMILIES, Frame, Layer, Lines, Sheet, runs
 from .streamlines import streamlines
 

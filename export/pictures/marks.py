@@ -12,7 +12,8 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
-from .drawing import Box, Drawing
+from ...models.sketch.cover import Box
+from .drawing import Drawing
 from .streamlines import Streamline, combed, streamlines
 
 FAMILIES: Final = ("#00798c", "#e1812c")

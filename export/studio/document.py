@@ -18,9 +18,8 @@ from ...models.input_limits import MAX_ELEMENTS, MAX_SEGMENTS
 from ...models.instance.file import parse_json
 from ...models.instance.grid import Bools, Floats, Ints
 from ...models.instance.instance import STROKE_WEIGHT
-from ...models.sketch.choice import Silhouette
 from ...models.sketch.curves import Curves, lines_as_cubics
-from ...models.sketch.read import name_from
+from ...models.sketch.read import Silhouette, name_from
 
 Mark = Literal["line", "cut", "ignored"]
 EditKind = Literal["paint", "erase", "toggle", "gap"]

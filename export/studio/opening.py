@@ -10,12 +10,12 @@ from scipy import ndimage
 
 from ...models.errors import InputError
 from ...models.instance.grid import Bools, Floats
-from ...models.sketch.bitmap import Picture, read_picture
-from ...models.sketch.bridges import thinned
-from ...models.sketch.choice import Choice
-from ...models.sketch.cover import block_means
-from ...models.sketch.curves import bounding_box, flatten, runs
-from ...models.sketch.read import curves_in, kind_of, name_from
+from ...models.sketch.bitmap import Bitmap
+from ...models.sketch.cover import Box, block_means
+from ...models.sketch.curves import Curves, flatten, runs
+from ...models.sketch.drawing_file import kind_of, parse_drawing
+from ...models.sketch.read import name_from
+from ...models.sketch.thinning import thinned
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
 _THINNED: Final = 700  # pixels on the longer side of a picture while it is traced
@@ -39,19 +39,8 @@ def opened(data: bytes, file_name: str, view: str | None = None) -> dict[str, An
     stem, dot, suffix = file_name.rpartition(".")
     suffix = f".{suffix.lower()}" if dot else ""
     spatial = kind_of(data, suffix) == "curves"
-    curves = curves_in(data, suffix, Choice(view=view if spatial else None))
-    if curves is None:
-        page, strokes = _of_picture(read_picture(data, _THINNED // 4))
-    else:
-        left, top, right, bottom = bounding_box(curves.points)
-        page = curves.canvas or (left, top, max(right - left, 1e-6), max(bottom - top, 1e-6))
-        segments, owner = flatten(curves.points, _FINE * max(right - left, bottom - top, 1e-6))
-        run = runs(curves.points, curves.curve)[owner]
-        starts = np.flatnonzero(np.diff(run, prepend=-1))
-        strokes = [
-            _stroke(np.concatenate([part[:, 0], part[-1:, 1]]), line=bool(line))
-            for part, line in zip(np.split(segments, starts[1:]), curves.line[owner[starts]], strict=True)
-        ]
+    drawing = parse_drawing(data, suffix, _THINNED // 4, view=view if spatial else None)
+    page, strokes = _of_picture(drawing) if isinstance(drawing, Bitmap) else _of_curves(drawing)
     return {"name": name_from(stem or file_name), "page": list(page), "strokes": strokes, "spatial": spatial}
 
 
@@ -60,7 +49,21 @@ def _stroke(points: Floats, *, line: bool) -> dict[str, Any]:
     return {"points": rounded, "mark": "line" if line else "cut", "weight": 1}
 
 
-def _of_picture(picture: Picture) -> tuple[tuple[float, float, float, float], list[dict[str, Any]]]:
+def _of_curves(curves: Curves) -> tuple[Box, list[dict[str, Any]]]:
+    """Page and strokes of curves: their unbroken runs as polylines."""
+    left, top, right, bottom = curves.box
+    page = curves.page or (left, top, max(right - left, 1e-6), max(bottom - top, 1e-6))
+    segments, owner = flatten(curves.points, _FINE * max(right - left, bottom - top, 1e-6))
+    run = runs(curves.points, curves.curve)[owner]
+    starts = np.flatnonzero(np.diff(run, prepend=-1))
+    strokes = [
+        _stroke(np.concatenate([part[:, 0], part[-1:, 1]]), line=bool(line))
+        for part, line in zip(np.split(segments, starts[1:]), curves.line[owner[starts]], strict=True)
+    ]
+    return page, strokes
+
+
+def _of_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
     """Page and strokes of a picture: the middle lines of its ink, from one end or junction to the next."""
     reduced = max(1.0, max(picture.ink.shape) / _THINNED)
     rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in picture.ink.shape)

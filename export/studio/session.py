@@ -16,12 +16,11 @@ from scipy import ndimage
 from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats, Ints
-from ...models.instance.instance import Instance, Reading
+from ...models.instance.instance import SKEW_WEIGHT, Instance, Reading
 from ...models.processes.control import stopped
-from ...models.sketch.choice import Choice
-from ...models.sketch.cover import Cover, Frame, covering_curves
+from ...models.sketch.cover import LEAST_WEIGHT, Frame, covering_curves
 from ...models.sketch.outline import enclosed
-from ...models.sketch.read import CUT, LEAST_WEIGHT, instance_of, segments_of
+from ...models.sketch.read import build_instance, find_mask, frame_box, without_silhouette
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.surface.hints import Hint
@@ -57,34 +56,25 @@ class Drawn:
 def drawn(document: Document, size: int | None = None) -> Drawn:
     """The instance of a document. size: instead of that of the document. Raises InputError."""
     curves = document.curves()
-    seen: dict[str, Any] = {}
-
-    def edit(solve: Bools, lines: Cover, others: Cover, found: Reading, frame: Frame) -> Bools:
-        walls = (lines.amount >= LEAST_WEIGHT) | (others.amount >= CUT)
-        edited, gaps = _edited(document.mask, solve, walls, found, frame)
-        kinds = np.where(edited, IN, np.where(_enclosed(~edited & ~walls), LEFT_OUT, OUT))
-        seen["kinds"] = np.where(others.amount >= CUT, STROKE, kinds)
-        seen["gaps"] = gaps
-        return edited
-
-    instance = instance_of(
-        curves,
-        size=size or document.size,
-        name=document.name,
-        source=f"{document.name}.svg",
-        choice=Choice(document.silhouette),
-        edit=edit,
-    ).with_weights(stroke_weight=document.stroke_weight)
-    x, y = instance.origin
-    frame = Frame(x, y, instance.pixel_size, *instance.mask.shape)
-    segments, curve, line = segments_of(curves, frame)
+    frame = frame_box(curves.box, size or document.size, margin=True)
+    covers = curves.covers(frame)
+    mask, reading = find_mask(curves, covers, frame)
+    edited, gaps = _edited(document.mask, mask, covers.walls, reading, frame)
+    left_out = edited | _enclosed(~edited & ~covers.walls)
+    mask = edited & ~covers.cuts
+    if document.silhouette == "outer":
+        covers, mask = without_silhouette(covers, mask)
+    instance = build_instance(
+        frame, covers.lines, mask, reading, name=document.name, source=f"{document.name}.svg"
+    ).with_weights(stroke_weight=document.stroke_weight, skew_weight=SKEW_WEIGHT)
+    segments, curve, line = curves.segments(frame)
     owner, row, column = covering_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
     number = np.full(frame.shape, -1)
     number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
     pairs = np.stack([owner, number[row, column]], axis=1)
     pairs = pairs[pairs[:, 1] >= 0].astype(np.int32)
-    kinds = np.where((seen["kinds"] == IN) & ~instance.mask, LEFT_OUT, seen["kinds"]).astype(np.int32)
-    return Drawn(_weighted(instance, document.weights, pairs), kinds, seen["gaps"], pairs)
+    kinds = np.select([covers.cuts, mask, left_out], [STROKE, IN, LEFT_OUT], OUT).astype(np.int32)
+    return Drawn(_weighted(instance, document.weights, pairs), kinds, gaps, pairs)
 
 
 def _weighted(instance: Instance, weights: Floats, pairs: Ints) -> Instance:

@@ -27,6 +27,7 @@ _SCALARS = {
     "name": "name",
     "gauge": "gauge",
     "source": "source",
+    "view": "view",
     "w_strokes": "stroke_coefficient",
     "w_beta": "skew_coefficient",
     "pixel_size": "pixel_size",
@@ -116,8 +117,10 @@ def to_json(instance: Instance) -> str:
 
 
 def _head(instance: Instance) -> dict[str, Any]:
-    """Format, version and scalars."""
+    """Format, version and scalars; a view only if there is one."""
     scalars = {key: getattr(instance, name) for key, name in _SCALARS.items()}
+    if instance.view is None:
+        del scalars["view"]
     return {"format": FORMAT, "version": VERSION} | scalars
 
 
@@ -305,10 +308,10 @@ def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
     check_version(head, FORMAT, VERSION)
     check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
     try:
-        scalars = {name: head[key] for key, name in _SCALARS.items()}
+        scalars = {name: head[key] for key, name in _SCALARS.items() if key != "view"}
         x, y = arrays["origin"].astype(np.float64).tolist()
         entries: dict[str, Any] = scalars | {key: arrays[key] for key in _ARRAYS}
-        return Instance(origin=(x, y), **entries)
+        return Instance(origin=(x, y), view=head.get("view"), **entries)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error
 

@@ -123,6 +123,8 @@ class Instance(Pictured):
         Side of a pixel in units of the sketch, 1e-100 to 1e100, rounded to 12 digits.
     origin
         Sketch coordinates (x, y) of the top left corner of pixel [0, 0], y downwards, rounded to 12 digits.
+    view
+        Viewpoint from which a drawing in space was seen, as in `read_sketch`; None without a choice.
     reading
         Messages from the reader of its drawing, such as warnings; None for other origins.
 
@@ -146,6 +148,7 @@ class Instance(Pictured):
     source: str = ""
     pixel_size: float = 1.0
     origin: tuple[float, float] = field(default=(0.0, 0.0))
+    view: str | None = None
     reading: Reading | None = None
 
     def __post_init__(self) -> None:
@@ -194,8 +197,9 @@ class Instance(Pictured):
             raise InstanceError(
                 f"origin is {self.origin}; it must be two numbers between {-_FARTHEST:g} and {_FARTHEST:g}"
             )
-        if _NOT_TEXT.search(self.source):
-            raise InstanceError("source holds a line break or a control character; give one line")
+        for name, text in (("source", self.source), ("view", self.view or "")):
+            if _NOT_TEXT.search(text):
+                raise InstanceError(f"{name} holds a line break or a control character; give one line")
 
     def _check_strokes(self) -> None:
         if self.mask.ndim != 2 or not self.mask.any():
@@ -408,8 +412,9 @@ class Instance(Pictured):
     def sha256(self) -> str:
         """64 hexadecimal digits of the whole content; equal only for equal instances."""
         digest = hashlib.sha256(b"crossfield-instance 1\n")
-        for text in (self.name, self.gauge, self.source):
-            digest.update(text.encode() + b"\0")
+        for text in (self.name, self.gauge, self.source, self.view):
+            if text is not None:
+                digest.update(text.encode() + b"\0")
         scalars = np.array(
             [*self.mask.shape, self.stroke_coefficient, self.skew_coefficient, self.pixel_size, *self.origin],
             dtype="<f8",

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from ..errors import InputError, shortened
 from ..input_limits import MAX_PIXELS, MAX_SIDE
 from ..instance.grid import Bools, Floats
-from .bridges import ink_ends
 from .colour import REDDISH, ink_of, redness
-from .cover import Cover, Frame, block_means
+from .cover import Box, Cover, Covers, Frame, block_means
+from .thinning import thinned
 from .tiff import unpacked
 
 Ink = NDArray[np.float32]
@@ -42,11 +42,14 @@ _NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and c
 _BAND: Final = 1 << 20  # pixels of a picture that are processed together
 _BLUR: Final = 1.0  # pixels, of the gradient
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
+_INK: Final = 0.3  # least ink of a pixel that belongs to a stroke
+_THINNED: Final = 512  # pixels on the longer side of a bitmap while its ends are sought
+_TAIL: Final = 11  # pixels round the end of a thinned line that determine its continuation
 _COLOUR_SHARE: Final = 0.03  # of all ink, for red and for other strokes, before the two are separated
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class Bitmap:
     """A bitmap sketch, ready for any frame.
 
     ink: [h, w], 0 for paper to 1 for ink as dark as the strokes. red: [h, w] in [0, 1], the part of the ink
@@ -60,10 +63,15 @@ class Picture:
     width: int
     height: int
 
+    @property
+    def page(self) -> Box:
+        """x, y, width and height of the picture."""
+        return 0.0, 0.0, self.width, self.height
+
     @cached_property
-    def box(self) -> tuple[float, float, float, float]:
+    def box(self) -> Box:
         """Left, top, right, bottom of the ink in pixels of the file."""
-        rows, columns = (np.nonzero((self.ink > 0.3).any(axis=axis))[0] for axis in (1, 0))
+        rows, columns = (np.nonzero((self.ink > _INK).any(axis=axis))[0] for axis in (1, 0))
         edges = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1], dtype=float)
         left, top, right, bottom = (self.reduced * edges).tolist()
         return left, top, right, bottom
@@ -76,18 +84,38 @@ class Picture:
         edges = float(np.sqrt((down[:, :-1] + down[:, 1:] + right[:-1] + right[1:]) / 2).sum())
         return max(1.0, 2 * float(self.ink.sum()) / edges) if edges > 0 else 1.0
 
-    def covers(self, frame: Frame) -> tuple[Cover, Cover]:
-        """The cover by curvature lines and by other strokes, separated where red and others occur."""
-        share = float((self.ink * self.red).sum() / self.ink.sum())
-        if not _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
-            return self._cover(self.ink, frame), Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
-        return self._cover(self.ink * self.red, frame), self._cover(self.ink * (1 - self.red), frame)
+    def covers(self, frame: Frame) -> Covers:
+        """The covers by curvature lines and by other strokes, separated where red and others occur."""
+        width = self.stroke_width * self.reduced / frame.pixel
+        red = self.ink * self.red
+        share = float(red.sum() / self.ink.sum())
+        if _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
+            black = self.ink * (1 - self.red)
+            return Covers(self._cover(red, frame, width), self._cover(black, frame, width), width)
+        nothing = Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
+        return Covers(self._cover(self.ink, frame, width), nothing, width)
 
     def ends(self) -> Floats:
-        """Ends of thin strokes, in pixels of the file: points and ways out (n, 2, 2), as (x, y)."""
-        return self.reduced * ink_ends(self.ink, self.stroke_width)
+        """Ends of strokes, in pixels of the file: points and directions of continuation (n, 2, 2)."""
+        # A stroke extends half its width beyond its thinned line, which is far below the gaps that count.
+        from scipy import ndimage
 
-    def _cover(self, ink: Ink, frame: Frame) -> Cover:
+        reduced = max(1.0, max(self.ink.shape) / _THINNED)
+        rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in self.ink.shape)
+        small = block_means(self.ink, rows, columns)
+        line = thinned(small * max(1.0, reduced / self.stroke_width) > _INK)
+        neighbours = ndimage.convolve(line.astype(np.uint8), np.ones((3, 3), dtype=np.uint8), mode="constant")
+        row, column = np.nonzero(line & (neighbours == 2))
+        # From the middle of the line near its end to the end.
+        mean = [
+            ndimage.uniform_filter(part * line, _TAIL, mode="constant")[row, column]
+            for part in (np.ones(line.shape), *np.indices(line.shape, dtype=np.float64)[::-1])
+        ]
+        middle = np.stack(mean[1:], axis=1) / mean[0][:, None]
+        ends = np.stack([column, row], axis=1)
+        return self.reduced * np.stack([(ends + 0.5) * reduced, (ends - middle) * reduced], axis=1)
+
+    def _cover(self, ink: Ink, frame: Frame, width: float) -> Cover:
         rows, columns = (edges / self.reduced for edges in frame.edges)
         tangent = stroke_directions(ink, self.stroke_width)
         dark = block_means(ink, rows, columns)
@@ -95,7 +123,7 @@ class Picture:
             block_means(ink[..., None] * tangent, rows, columns) / np.where(dark > 0, dark, 1)[..., None]
         )
         # A stroke straight across a grid pixel darkens a part width / pixel of it.
-        return Cover(dark / min(1.0, self.stroke_width * self.reduced / frame.pixel), direction)
+        return Cover(dark / min(1.0, width), direction)
 
 
 def stroke_directions(ink: Ink, width: float) -> Ink:
@@ -116,7 +144,7 @@ def stroke_directions(ink: Ink, width: float) -> Ink:
     return np.asarray(np.stack([cosine, sine], axis=-1) / np.maximum(energy, 1e-8)[..., None])
 
 
-def read_picture(data: bytes, size: int) -> Picture:
+def read_bitmap(data: bytes, size: int) -> Bitmap:
     """The ink of a bitmap, fine enough for a grid of `size` pixels. Raises InputError for other content."""
     image = _opened(data)
     width, height = image.size
@@ -131,7 +159,7 @@ def read_picture(data: bytes, size: int) -> Picture:
     level = float(np.median(raw[raw > strongest / 2]))
     ink = np.clip((raw / level - _NOISE) / (_FULL - _NOISE), 0, 1).astype(np.float32)
     ink[_specks(ink)] = 0
-    if not (ink > 0.3).any():
+    if not (ink > _INK).any():
         raise InputError("shows no stroke but a few specks; expected dark strokes on lighter paper")
     covered = float((ink > 0.5).mean())
     if covered >= _MOST_INK:
@@ -139,11 +167,11 @@ def read_picture(data: bytes, size: int) -> Picture:
             f"shows ink on {covered:.0%} of the paper, and strokes would leave most of it bare; "
             "crop it to the drawing, take the picture in brighter light, or thin the strokes"
         )
-    return Picture(ink, _red_part(rgb, raw), reduced, width, height)
+    return Bitmap(ink, _red_part(rgb, raw), reduced, width, height)
 
 
 def read_white(data: bytes) -> Bools:
-    """The white part of a mask picture, bool [h, w]. Raises InputError like read_picture."""
+    """The white part of a mask picture, bool [h, w]. Raises InputError like read_bitmap."""
     image = _opened(data)
     bands = [pixels.mean(axis=-1, dtype=np.float32) >= 127.5 for pixels in _bands(image, 1)]
     return np.concatenate(bands)

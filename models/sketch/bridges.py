@@ -1,4 +1,4 @@
-"""Gaps in an outline: ends of strokes, and the short bridges that close gaps.
+"""Gaps in an outline, and the short bridges between ends of strokes that close them.
 
 A drawing's outline is seldom drawn without a break. A bridge is a straight line between two ends of strokes,
 or from an end to the next stroke; it is kept only if it closes off room that would be open without it
@@ -10,84 +10,19 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..instance.angles import length as vector_length
 from ..instance.grid import Bools, Floats
-from .cover import Frame, block_means, covering_curves
-from .outline import enclosed, place
-
-Indices = NDArray[np.intp]
+from .cover import Frame, Indices, covering_curves
+from .outline import enclosed
 
 LONGEST: Final = 0.08  # longest bridge, as a share of the grid's longer side; wider gaps are meant
 WIDER: Final = 0.7  # least width of the room behind a bridge per pixel of the bridge
 AHEAD: Final = 0.5
 ASIDE: Final = -0.1  # least cosines of the turns from the two strokes into the bridge
-_TAIL: Final = 11  # pixels round the end of a thinned line that determine its continuation
 _NEAREST: Final = 8  # most other ends that an end may be bridged to: the work stays linear
-_THINNED: Final = 512  # pixels on the longer side of a bitmap while its ends are sought
-_SAME: Final = 1e-6  # of the longer side: ends that lie closer together are one point
-_INK: Final = 0.3
 _MOST_BRIDGES: Final = 10_000  # only the shortest: the work has a bound
 _MOST_TRIED: Final = 32  # bridges that are tested for being unnecessary
-_MOST_PLACES: Final = 5  # in one warning
-
-
-def curve_ends(points: Floats) -> Floats:
-    """Ends that no other cubic (k, 4, 2) shares: point and direction of continuation, (n, 2, 2)."""
-    ends = np.concatenate([points[:, 0], points[:, 3]])
-    inside = np.concatenate([points[:, 1:], points[:, 2::-1]])
-    grain = max(_SAME * float(np.ptp(ends, axis=0).max()), np.finfo(float).tiny)
-    apart = (np.abs(inside - ends[:, None]) > grain).any(axis=-1)
-    nearest = inside[np.arange(len(ends)), np.argmax(apart, axis=1)]
-    _, first, times = np.unique(np.round(ends / grain), axis=0, return_index=True, return_counts=True)
-    free = np.sort(first[times == 1])
-    return np.stack([ends[free], ends[free] - nearest[free]], axis=1)
-
-
-def ink_ends(ink: NDArray[np.float32], width: float) -> Floats:
-    """Ends of strokes of some width: point in pixels of `ink` [h, w] and way out, (n, 2, 2), as (x, y)."""
-    # A stroke extends half its width beyond its thinned line, which is far below the gaps that count.
-    from scipy import ndimage
-
-    reduced = max(1.0, max(ink.shape) / _THINNED)
-    rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in ink.shape)
-    small = block_means(ink, rows, columns)
-    line = thinned(small * max(1.0, reduced / width) > _INK)
-    neighbours = ndimage.convolve(line.astype(np.uint8), np.ones((3, 3), dtype=np.uint8), mode="constant")
-    row, column = np.nonzero(line & (neighbours == 2))
-    # From the middle of the line near its end to the end.
-    mean = [
-        ndimage.uniform_filter(part * line, _TAIL, mode="constant")[row, column]
-        for part in (np.ones(line.shape), *np.indices(line.shape, dtype=np.float64)[::-1])
-    ]
-    middle = np.stack(mean[1:], axis=1) / mean[0][:, None]
-    ends = np.stack([column, row], axis=1)
-    return np.stack([(ends + 0.5) * reduced, (ends - middle) * reduced], axis=1)
-
-
-def thinned(shape: Bools) -> Bools:
-    """The shape [h, w] thinned to lines one pixel wide, after Zhang and Suen (Commun. ACM 27, 1984)."""
-    line = np.pad(shape, 1)
-    while True:
-        before = int(line.sum())
-        for first in (True, False):
-            line[1:-1, 1:-1] &= ~_removable(line, first=first)
-        if int(line.sum()) == before:
-            return line[1:-1, 1:-1]
-
-
-def _removable(line: Bools, *, first: bool) -> Bools:
-    """The pixels of a padded shape that one of the two passes of the thinning removes."""
-    # Neighbours from the upper one on, clockwise.
-    steps = ((0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0), (0, 0))
-    height, width = line.shape
-    around = np.stack([line[down : height - 2 + down, right : width - 2 + right] for down, right in steps])
-    up, right, down, left = around[::2]
-    count = around.sum(axis=0, dtype=np.uint8)
-    turns = (~around & np.roll(around, -1, axis=0)).sum(axis=0, dtype=np.uint8)
-    sides = (up & right & down) | (right & down & left) if first else (up & right & left) | (up & down & left)
-    return np.asarray((count >= 2) & (count <= 6) & (turns == 1) & ~sides)
 
 
 def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
@@ -108,21 +43,6 @@ def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
     pixels = (number, row, column)
     kept = _needed(walls, rooms, mouths, pixels)
     return _with(walls, pixels, kept), bridges[kept]
-
-
-def opened(openings: Floats) -> tuple[str, ...]:
-    """A warning about the gaps (m, 2, 2) in the outline that were bridged, or none."""
-    if not len(openings):
-        return ()
-    wide = vector_length(*(openings[:, 1] - openings[:, 0]).T)
-    order = np.argsort(-wide, kind="stable")
-    places = [f"{place(openings[k].mean(axis=0))} over {wide[k]:.4g}" for k in order[:_MOST_PLACES]]
-    more = f" and {len(order) - _MOST_PLACES} more" if len(order) > _MOST_PLACES else ""
-    warning = (
-        f"outline open here: {', '.join(places)}{more}; it is taken as closed by a straight line, "
-        "draw it on or give a mask if that is wrong"
-    )
-    return (warning,)
 
 
 def _extents(walls: Bools, row: Indices, column: Indices) -> Floats:

@@ -14,11 +14,14 @@ from ..input_limits import MAX_PIECES
 from ..instance.angles import length as vector_length
 from ..instance.grid import Bools, Floats, Ints
 
+Box = tuple[float, float, float, float]
 Indices = NDArray[np.intp]
 Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
 
 MARGIN: Final = 0.04  # empty border round a drawing, as a share of its longer side; at least one pixel
 LEAST_R: Final = 0.5  # least R of a pixel with a direction: |cos d| at an angle d, 0.64 for a bend by 90
+LEAST_WEIGHT: Final = 0.1  # stroke pixels with a smaller w have no direction: grazed corners, crossings
+CUT: Final = 0.5 - 1e-9  # least length at which another stroke cuts a pixel out; more would leave gaps
 _NUDGE: Final = 1e-9  # of a pixel: a line exactly along a pixel edge is shared by both sides
 
 
@@ -69,7 +72,34 @@ class Cover:
         return Cover(amount, sum(parts) / np.where(amount > 0, amount, 1)[..., None])
 
 
-def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
+@dataclass(frozen=True, eq=False)
+class Covers:
+    """Covers by curvature lines and by the other strokes, which cut the field.
+
+    stroke_width: typical width of the strokes in pixels, 0 for curves.
+    """
+
+    lines: Cover
+    others: Cover
+    stroke_width: float = 0.0
+
+    @property
+    def cuts(self) -> Bools:
+        """The pixels [height, width] that strokes cut out of the field."""
+        return self.others.amount >= CUT
+
+    @property
+    def walls(self) -> Bools:
+        """The pixels [height, width] of all strokes, which may bound the field."""
+        return (self.lines.amount >= LEAST_WEIGHT) | self.cuts
+
+    @property
+    def filled(self) -> Bools:
+        """The pixels [height, width] that are covered over half of their side or more."""
+        return self.lines.amount + self.others.amount >= CUT
+
+
+def fit_frame(box: Box, size: int, *, margin: bool) -> Frame:
     """The frame of `size` pixels on its longer side centred on a box (left, top, right, bottom)."""
     left, top, right, bottom = box
     longer = max(right - left, bottom - top)

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..input_limits import MAX_SEGMENTS
 from ..instance.grid import Bools, Floats, Ints
+from .cover import Box, Covers, Frame, cover_by_segments
 
+_FLATNESS: Final = 0.02  # of a pixel
+_SAME: Final = 1e-6  # of the longer side: ends that lie closer together are one point
 _BOX_TOLERANCE: Final = 1e-4  # of the longer side: far below a pixel of any grid that can be solved
 
 
@@ -22,14 +25,14 @@ class Curves:
     points: float (k, 4, 2), control points of cubic Beziers; straight lines have theirs at the thirds.
     curve: int (k,), number of the curve that contains each of them, from 0 in the order of the file.
     red: bool (k,), True where a stroke is drawn in red.
-    canvas: x, y, width and height of the page, or None if the file does not state it.
+    page: x, y, width and height of the page, or None if the file does not state it.
     chosen: bool (k,), True where a stroke was chosen as a curvature line, or None without a choice.
     """
 
     points: Floats
     curve: Ints
     red: Bools
-    canvas: tuple[float, float, float, float] | None
+    page: Box | None
     chosen: Bools | None = None
 
     @property
@@ -39,6 +42,32 @@ class Curves:
             return self.chosen
         mixed = self.red.any() and not self.red.all()
         return self.red if mixed else np.ones(len(self.red), dtype=bool)
+
+    @property
+    def box(self) -> Box:
+        """Left, top, right, bottom of the curves."""
+        return bounding_box(self.points)
+
+    def ends(self) -> Floats:
+        """Ends that no other curve shares: points and directions of continuation (n, 2, 2)."""
+        ends = np.concatenate([self.points[:, 0], self.points[:, 3]])
+        inside = np.concatenate([self.points[:, 1:], self.points[:, 2::-1]])
+        grain = max(_SAME * float(np.ptp(ends, axis=0).max()), np.finfo(float).tiny)
+        apart = (np.abs(inside - ends[:, None]) > grain).any(axis=-1)
+        nearest = inside[np.arange(len(ends)), np.argmax(apart, axis=1)]
+        _, first, times = np.unique(np.round(ends / grain), axis=0, return_index=True, return_counts=True)
+        free = np.sort(first[times == 1])
+        return np.stack([ends[free], ends[free] - nearest[free]], axis=1)
+
+    def segments(self, frame: Frame) -> tuple[Floats, Ints, Bools]:
+        """Segments (m, 2, 2), the number (m,) of each segment's curve, and which (m,) are curvature lines."""
+        segments, owner = flatten(self.points, _FLATNESS * frame.pixel)
+        return segments, self.curve[owner], self.line[owner]
+
+    def covers(self, frame: Frame) -> Covers:
+        """The covers by curvature lines and by other strokes."""
+        segments, _, line = self.segments(frame)
+        return Covers(cover_by_segments(segments[line], frame), cover_by_segments(segments[~line], frame))
 
 
 def lines_as_cubics(start: Floats, end: Floats) -> Floats:
@@ -74,7 +103,7 @@ def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]
     return np.stack(ends, axis=1), owner
 
 
-def bounding_box(points: Floats) -> tuple[float, float, float, float]:
+def bounding_box(points: Floats) -> Box:
     """Least x, least y, greatest x, greatest y of the curves, not of their control points."""
     span = float(np.ptp(points.reshape(-1, 2), axis=0).max())
     corners = flatten(points, _BOX_TOLERANCE * span)[0].reshape(-1, 2) if span > 0 else points.reshape(-1, 2)

@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.angles import cosine, line_difference, line_of, sine
+from ..instance.angles import cosine, line_of, sine
 from ..instance.grid import Bools, Floats
-from .cover import Cover, Frame
+from .cover import LEAST_WEIGHT
 
 GAPS: Final = (0.03, 0.06, 0.12)  # shares of the longer side: gaps that count as closed, tried in turn
 ENCLOSED: Final = 0.25  # least share of the strokes' convex hull that a closed drawing fills
@@ -16,16 +16,7 @@ CRUMB: Final = 0.01  # least share of a region for a separate part; a grazing st
 HELD: Final = 2.0  # least stroke length, in pixel sides, in a separate part: a stroke's loose end has less
 STEP: Final = 3.0  # pixels over which a stroke is compared with the outline
 THICKER: Final = 1.25  # width of the thickest strokes of a picture relative to typical ones
-BLOCK: Final = 4  # side in pixels of a block filled by strokes; no sample has one from 16 pixels on
-CROWDED: Final = 0.1  # least share of the solved pixels in blocks filled by strokes that causes a warning
-LOOSE: Final = 0.08  # least share of stroke pixels that bound nothing, which causes a warning
-BOX: Final = 0.93  # least share of a box's border along three directions, and of its area in its convex hull
-_THICK: Final = 2  # pixels of a stroke between two areas
-_BINS: Final = 36
-_WIDE: Final = 3  # bins of directions, 15 degrees, that count as one
-_BESIDE: Final = 0.45  # least share of the box in the strokes beside an area between the box and the body
-_TOUCHES: Final = 4  # most strokes that end at a box round a body; lines across a sheet end at its border
-OFF: Final = 0.01  # least share of the solved pixels more than a pixel off the page that causes a warning
+THICK: Final = 2  # pixels of a stroke between two areas
 _NUDGE: Final = 1e-9  # of a pixel: the limit of exactly 30 degrees is decided equally on every processor
 
 
@@ -35,22 +26,22 @@ def inside_outline(strokes: Bools) -> Bools:
     The narrowest of GAPS for which the drawing encloses something decides. An open drawing, which encloses
     almost nothing at any of them, gets the full rectangle.
     """
-    hull = _convex_area(strokes)
+    hull = convex_area(strokes)
     for gap in GAPS:
         region = enclosed(strokes, gap)
-        if _as_wide(region, 3).sum() >= ENCLOSED * hull:
+        if without_narrow_parts(region, 3).sum() >= ENCLOSED * hull:
             return region
     return np.ones_like(strokes)
 
 
-def _as_wide(region: Bools, least: int) -> Bools:
+def without_narrow_parts(region: Bools, least: int) -> Bools:
     """The region without parts that are narrower than so many pixels, such as ends of strokes."""
     from scipy import ndimage
 
     return np.asarray(ndimage.binary_opening(region, np.ones((least, least))))
 
 
-def _convex_area(pixels: Bools) -> float:
+def convex_area(pixels: Bools) -> float:
     """The area of the convex hull of some pixels."""
     from scipy.spatial import ConvexHull
 
@@ -62,13 +53,14 @@ def _convex_area(pixels: Bools) -> float:
 def parts_with(region: Bools, weight: Floats) -> Bools:
     """The 4-connected parts of a region that contain curvature lines; other parts have no data.
 
-    weight: [height, width], w of the stroke pixels, else 0. The part with most strokes is always kept.
+    weight: [height, width], w of the strokes. The part with most strokes is always kept.
     """
     from scipy import ndimage
 
     label, count = ndimage.label(region)
     size = np.bincount(label.ravel(), minlength=count + 1)
-    held = np.bincount(label.ravel(), np.where(region, weight, 0.0).ravel(), minlength=count + 1)
+    directed = region & (weight >= LEAST_WEIGHT)
+    held = np.bincount(label.ravel(), np.where(directed, weight, 0.0).ravel(), minlength=count + 1)
     kept = (held >= HELD) & (size >= max(4, CRUMB * region.sum()))
     kept[np.argmax(held)] = held.max() > 0
     kept[0] = False
@@ -103,118 +95,6 @@ def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
     return along
 
 
-def boundless(region: Bools) -> tuple[str, ...]:
-    """A warning if the region is the whole rectangle because the drawing encloses nothing, or none."""
-    if not region.all():
-        return ()
-    return (
-        "the strokes enclose nothing, so the whole rectangle is solved; close the outline or give a mask",
-    )
-
-
-def unbounded(walls: Bools, region: Bools, frame: Frame) -> tuple[str, ...]:
-    """A warning if many stroke pixels bound nothing although others do, or none."""
-    from scipy import ndimage
-
-    eight = np.ones((3, 3), dtype=bool)
-    bounding = ndimage.binary_dilation(region & ~walls, eight, iterations=_THICK)
-    label, count = ndimage.label(walls & ~bounding & ~ndimage.binary_opening(walls, eight), eight)
-    size = np.bincount(label.ravel(), minlength=count + 1)
-    size[0] = 0
-    if region.all() or size.sum() < LOOSE * walls.sum():
-        return ()
-    warning = (
-        f"{size.sum()} of {walls.sum()} stroke pixels bound no area, most of them round "
-        f"{_middle(label == np.argmax(size), frame)}: what they should enclose is left out; "
-        "close the outline there or give a mask"
-    )
-    return (warning,)
-
-
-def boxed(walls: Bools, region: Bools, strokes: Cover) -> tuple[str, ...]:
-    """A warning if the outermost outline is a box of straight lines round another outline, or none."""
-    from scipy import ndimage
-
-    shape, theta = _as_wide(region, 5), line_of(strokes.direction)
-    border = walls & shape & ndimage.binary_dilation(~shape, border_value=1)
-    if region.all() or not border.any() or _straight(theta[border]) < BOX:
-        return ()
-    if shape.sum() < BOX * _convex_area(shape):
-        return ()
-    away, near = ndimage.distance_transform_edt(~border, return_indices=True)
-    across = walls & (away > 1) & (away <= 3) & (line_difference(theta, theta[tuple(near)]) > np.pi / 4)
-    label, count = ndimage.label(shape & ~walls)
-    # Strokes of pictures are some pixels thick, so a pixel of the border belongs to the nearest area.
-    nearest = ndimage.distance_transform_edt(label == 0, return_distances=False, return_indices=True)
-    beside = np.where(walls, ndimage.maximum_filter(label, size=3), 0)
-    of_box, of_all, size = (
-        np.bincount(some.ravel(), minlength=count + 1)[1:]
-        for some in (label[tuple(nearest)][border], beside, label)
-    )
-    between, (_, touching) = of_box > _BESIDE * of_all, ndimage.label(across, np.ones((3, 3)))
-    room, along = size[between].sum(), of_box[between].sum()
-    if touching > _TOUCHES or min(room, 2 * along) < border.sum() or size[~between].sum() < room / 4:
-        return ()
-    warning = (
-        f"a box of straight lines encloses another outline, and the {room} pixels between them are solved "
-        "for; if it is a construction line, remove it or give a mask"
-    )
-    return (warning,)
-
-
-def _straight(theta: Floats) -> float:
-    """The share of lines close to the three most frequent directions, each found without the earlier ones."""
-    rest = np.bincount((theta / np.pi * _BINS).astype(np.intp) % _BINS, minlength=_BINS)
-    for _ in range(3):
-        near = np.arange(_WIDE) + np.argmax(sum(np.roll(rest, -step) for step in range(_WIDE)))
-        rest[near % _BINS] = 0
-    return 1 - float(rest.sum()) / max(len(theta), 1)
-
-
-def crowded(filled: Bools, solve: Bools, frame: Frame) -> tuple[str, ...]:
-    """A warning about the largest place filled by strokes, which leave no room between them, or none."""
-    from scipy import ndimage
-
-    label, count = ndimage.label(ndimage.binary_opening(filled & solve, np.ones((BLOCK, BLOCK))))
-    size = np.bincount(label.ravel(), minlength=count + 1)
-    size[0] = 0
-    if size.max() < max(CROWDED * solve.sum(), 1):
-        return ()
-    warning = (
-        f"strokes leave no room between them round {_middle(label == np.argmax(size), frame)}, all in all on "
-        f"{size.sum() / solve.sum():.0%} of the pixels to solve for, where they give no direction; choose a "
-        "larger size, or draw fewer lines and no solid ink there"
-    )
-    return (warning,)
-
-
-def off_page(solve: Bools, frame: Frame, page: tuple[float, float, float, float] | None) -> tuple[str, ...]:
-    """A warning if pixels to solve for lie off the page (x, y, width, height) of the drawing, or none."""
-    if page is None:
-        return ()
-    inside = []
-    for edges, start, side in zip(frame.edges, page[1::-1], page[:1:-1], strict=True):
-        middle = (edges[:-1] + edges[1:]) / 2
-        inside.append((middle >= start - frame.pixel) & (middle <= start + side + frame.pixel))
-    off = 1 - solve[np.ix_(*inside)].sum() / solve.sum()
-    if off < OFF:
-        return ()
-    return (
-        f"{off:.0%} of the pixels to solve for lie off the page, where no mask reaches; enlarge the page",
-    )
-
-
-def _middle(pixels: Bools, frame: Frame) -> str:
-    """The middle of some pixels as text."""
-    row, column = np.nonzero(pixels)
-    return place(np.array([frame.x, frame.y]) + frame.pixel * (np.array([column.mean(), row.mean()]) + 0.5))
-
-
-def place(point: Floats) -> str:
-    """A point (x, y) as text."""
-    return f"({point[0]:.4g}, {point[1]:.4g})"
-
-
 def enclosed(strokes: Bools, gap: float = GAPS[0]) -> Bools:
     """The region that a disc, of a share `gap` of the longer side, cannot reach without touching a stroke."""
     from scipy import ndimage
@@ -245,7 +125,7 @@ def _slits(inside: Bools, free: Bools, walls: Bools) -> Bools:
     slit[label[free]] = False
     slit[0] = False
     beside = np.where(ndimage.binary_dilation(walls, eight), label, 0)
-    beyond = ndimage.binary_dilation(inside & ~slit[label], eight, iterations=_THICK + 1)
+    beyond = ndimage.binary_dilation(inside & ~slit[label], eight, iterations=THICK + 1)
     bounding, every = (np.bincount(some.ravel(), minlength=count + 1) for some in (beside[beyond], beside))
     slit &= 2 * bounding > every
     return np.asarray(slit[label])

@@ -20,8 +20,9 @@ from ..errors import InputError, shortened
 from ..input_limits import LEAST_LENGTH, MAX_LINES
 from ..instance.angles import cosine, sine, turned
 from ..instance.grid import Bools, Floats, Ints
-from .choice import Chooser
+from .cover import Box
 from .curves import Curves, lines_as_cubics
+from .labels import LabelMatcher
 
 _GREATEST: Final = 1e9
 SPATIAL: Final = re.compile(rb"v[ \t]+\d+[ \t]*[\r\n]")
@@ -32,13 +33,13 @@ VIEWS: Final = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 90.0)}
 """Directions of views: azimuth, from z towards x, and elevation, in degrees."""
 
 
-def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
+def read_scap(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     """Read the strokes of a .scap file. Raises InputError with the number of the line at fault.
 
-    chooser: matches the clusters of curvature lines, cluster=NAME; None: all strokes are.
+    matcher: matches the clusters of curvature lines, cluster=NAME; None: all strokes are.
     """
     lines = _lines(data)
-    canvas = _canvas(lines[0] if lines else "")
+    page = _page(lines[0] if lines else "")
     strokes: list[list[tuple[float, float]]] = []
     clusters: list[str] = []
     samples: list[tuple[float, float]] = []
@@ -67,7 +68,7 @@ def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
             samples.append((x, y))
     if opened:
         raise InputError(f"line {opened}: this stroke does not end; the file is cut off")
-    return _curves(strokes, clusters, canvas, chooser)
+    return _curves(strokes, clusters, page, matcher)
 
 
 def read_curves(data: bytes, view: str | None = None) -> Curves:
@@ -169,21 +170,19 @@ def _numbers_in(line: str, number: int, layout: str, count: int) -> list[float]:
     return found
 
 
-def _polylines(
-    strokes: list[Floats], curve: Ints, canvas: tuple[float, float, float, float], taken: Bools | None = None
-) -> Curves:
+def _polylines(strokes: list[Floats], curve: Ints, page: Box, taken: Bools | None = None) -> Curves:
     """The curves of pen strokes of two or more samples (n, 2), by the numbers (s,) of their curves."""
     count = [len(stroke) - 1 for stroke in strokes]
     points = np.concatenate([lines_as_cubics(stroke[:-1], stroke[1:]) for stroke in strokes])
     chosen = None if taken is None else np.repeat(taken, count)
-    return Curves(points, np.repeat(curve, count), np.zeros(len(points), dtype=bool), canvas, chosen)
+    return Curves(points, np.repeat(curve, count), np.zeros(len(points), dtype=bool), page, chosen)
 
 
 def _curves(
     strokes: list[list[tuple[float, float]]],
     clusters: list[str],
-    canvas: tuple[float, float, float, float],
-    chooser: Chooser | None,
+    page: Box,
+    matcher: LabelMatcher | None,
 ) -> Curves:
     drawn = [number for number, stroke in enumerate(strokes) if len(stroke) > 1]
     if not drawn:
@@ -192,14 +191,14 @@ def _curves(
     numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
     curve = [numbers[name] for name in names] if len(numbers) > 1 else range(len(names))
     taken = None
-    if chooser is not None:
-        taken = np.array([chooser.takes([f"cluster={name}"] if " " not in name else []) for name in names])
-        chooser.check(taken=bool(taken.any()))
+    if matcher is not None:
+        taken = np.array([matcher.matches([f"cluster={name}"] if " " not in name else []) for name in names])
+        matcher.check(any_stroke=bool(taken.any()))
     samples = [np.array(strokes[number]) for number in drawn]
-    return _polylines(samples, np.array(curve, dtype=np.int32), canvas, taken)
+    return _polylines(samples, np.array(curve, dtype=np.int32), page, taken)
 
 
-def _canvas(line: str) -> tuple[float, float, float, float]:
+def _page(line: str) -> Box:
     fields = line.strip().removeprefix("#").split(maxsplit=3)
     try:
         width, height = (float(field) for field in fields)

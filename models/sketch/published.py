@@ -10,8 +10,8 @@ import numpy as np
 from ..errors import InputError
 from ..input_limits import MAX_DATA
 from ..instance.grid import Floats
-from .curves import Curves, are_straight, bounding_box
-from .read import kind_of, suffix_of_picture
+from .curves import Curves, are_straight
+from .drawing_file import kind_of, suffix_of_picture
 from .svg import read_svg
 
 _LINE: Final = 400  # widths of a line on the longer side of the drawing
@@ -32,9 +32,9 @@ def published(data: bytes, suffix: str) -> tuple[bytes, str]:
 
 def redrawn(curves: Curves) -> bytes:
     """SVG of only these curves; reading it gives the same numbers, except controls of straight lines."""
-    left, top, right, bottom = bounding_box(curves.points)
-    box = curves.canvas or (left, top, right - left, bottom - top)
-    page = f' viewBox="{_numbers(np.array(box))}"' if curves.canvas else ""
+    left, top, right, bottom = curves.box
+    box = curves.page or (left, top, right - left, bottom - top)
+    page = f' viewBox="{_numbers(np.array(box))}"' if curves.page else ""
     root = (
         f'<svg xmlns="http://www.w3.org/2000/svg"{page} fill="none" stroke="#000" '
         f'stroke-width="{max(box[2:]) / _LINE:.3g}" stroke-linecap="round" stroke-linejoin="round">'

@@ -16,10 +16,10 @@ from ..instance.angles import line_of
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from ..memory import available_memory
-from .cover import Cover, Frame, cover_by_segments
+from .cover import LEAST_WEIGHT, Cover, Frame
 from .curves import Curves, lines_as_cubics
 from .outline import largest_part
-from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_memory, check_size, segments_of
+from .read import DEFAULT_SIZE, check_memory, check_size
 
 Strokes = Literal["pixels", "straight", "curved"]
 STROKES: Final[tuple[Strokes, ...]] = get_args(Strokes)
@@ -189,4 +189,4 @@ def _curve(rng: np.random.Generator, size: int, bend: float) -> Floats:
 def _cover(cubic: Floats, frame: Frame) -> Cover:
     """The cover of the pixels by one cubic."""
     curves = Curves(cubic[None], np.zeros(1, dtype=np.int32), np.zeros(1, dtype=bool), None)
-    return cover_by_segments(segments_of(curves, frame)[0], frame)
+    return curves.covers(frame).lines

@@ -1,74 +1,46 @@
-"""From a sketch to an instance: SVG, bitmap, .scap or .curves, with or without a mask.
+"""From a drawing to an instance: drawing, frame, covers, mask, instance, each from those before it.
 
 Strokes drawn in red are curvature lines when a sketch has red strokes and others; the others then cut the
 field, so their pixels leave the mask. In a sketch of one colour all strokes are curvature lines
-(docs/mathematics.md, 1). A Choice overrides this.
+(docs/mathematics.md, 1). Labels can choose others.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal, get_args
 
 import numpy as np
 
 from ..arguments import checked_arguments
-from ..errors import InputError, NoStrokeError, naming
-from ..input_limits import MAX_BYTES
+from ..errors import InputError, NoStrokeError, naming, printable, shortened
 from ..instance.angles import line_of
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.grid import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading
 from ..memory import available_memory
-from ..storage import read_bytes
-from .bitmap import Picture, read_picture, read_white
-from .bridges import closing, curve_ends, opened
-from .choice import AS_DRAWN, Choice, Kind, Silhouette
-from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
-from .curves import Curves, bounding_box, flatten
-from .outline import along_outline, boundless, boxed, crowded, inside_outline, off_page, parts_with, unbounded
-from .pen_strokes import SPATIAL, read_curves, read_scap
-from .svg import read_svg
+from .bitmap import read_white
+from .bridges import closing
+from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
+from .doubts import (
+    describe_box,
+    describe_crowding,
+    describe_gaps,
+    describe_loose_strokes,
+    describe_off_page,
+    describe_open_drawing,
+)
+from .drawing_file import Drawing, parse_drawing, read_file
+from .labels import label_of
+from .outline import along_outline, inside_outline, parts_with
 
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
 BYTES_PER_PIXEL: Final = 5000  # while its problem is written
-LEAST_WEIGHT: Final = 0.1  # stroke pixels with a smaller w have no direction: grazed corners, crossings
-CUT: Final = 0.5 - 1e-9  # least length at which another stroke cuts a pixel out; more would leave gaps
-_PICTURES: Final = {
-    ".png": rb"\x89PNG",
-    ".jpg": rb"\xff\xd8\xff",
-    ".webp": rb"RIFF",
-    ".tif": rb"II\*\0|MM\0\*",
-    ".bmp": rb"BM",
-    ".gif": rb"GIF8",
-    ".pnm": rb"P[1-6]\s",
-}
-"""First bytes of pictures, by the suffix of their files."""
-_PICTURE: Final = re.compile(b"|".join(_PICTURES.values()), re.DOTALL)
 
-_FLATNESS: Final = 0.02  # of a pixel
-
-Edit = Callable[[Bools, Cover, Cover, Reading, Frame], Bools]
-"""A change of a mask, given the covers by curvature lines and by other strokes, the reading and the frame."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Sketch:
-    """Attributes of every kind of sketch, in its own units with y down.
-
-    box: left, top, right, bottom of the strokes; page: x, y, width, height. covers: by curvature lines and by
-    other strokes. ends: points and ways out (n, 2, 2). stroke_width: as drawn in a picture, 0 for curves.
-    """
-
-    box: tuple[float, float, float, float]
-    page: tuple[float, float, float, float] | None
-    covers: Callable[[Frame], tuple[Cover, Cover]]
-    ends: Callable[[], Floats]
-    stroke_width: float = 0.0
+Silhouette = Literal["none", "outer"]
 
 
 @checked_arguments
@@ -133,67 +105,176 @@ def read_sketch(
     """
     path = Path(path)
     check_size(size)
-    choice = Choice(silhouette, tuple(curvature), view)
-    with_mask = None if mask is None else Path(mask)
-    data = bytes_of(path)
+    check_silhouette(silhouette)
+    labels = tuple(map(label_of, curvature))
+    data = read_file(path)
     try:
         with naming(path):
-            name = name or name_from(path.stem)
-            read = instance_of(
-                data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name, choice=choice
+            drawing = parse_drawing(data, path.suffix, size, labels=labels, view=view)
+            white = None
+            if mask is not None:
+                with naming(mask):
+                    white = read_mask(read_file(Path(mask)), drawing.page)
+            instance = instance_of(
+                drawing,
+                size,
+                white=white,
+                name=name or name_from(path.stem),
+                source=path.name,
+                gauge=gauge,
+                silhouette=silhouette,
+                view=view,
             )
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
-    return read.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
+    return instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
 
 
 def instance_of(
-    data: bytes | Curves,
-    *,
+    drawing: Drawing,
     size: int,
+    *,
     name: str,
     source: str,
-    mask: Path | None = None,
+    white: Bools | None = None,
     gauge: Gauge = "strokes",
-    choice: Choice = AS_DRAWN,
-    edit: Edit | None = None,
+    silhouette: Silhouette = "none",
+    view: str | None = None,
 ) -> Instance:
-    """Read the instance of curves, or of a file's bytes, with the default weights.
+    """The instance of a drawing with the coefficients of the paper. Raises InputError.
 
-    edit: changes the mask that was found. Raises InputError.
+    white: the picture from `read_mask`; without it the mask is the inside of the drawing.
     """
-    sketch = _sketch_of(data, size, Path(source).suffix.lower(), choice)
-    if mask is None:
-        frame, given = _framed(sketch.box, size, margin=True), None
+    if white is None:
+        frame = frame_box(drawing.box, size, margin=True)
+        covers = drawing.covers(frame)
+        mask, reading = find_mask(drawing, covers, frame)
+        if silhouette == "outer":
+            covers, mask = without_silhouette(covers, mask)
     else:
-        with naming(mask):
-            frame, given = _mask_on_grid(read_white(bytes_of(mask)), sketch.page, size)
-    lines, others = sketch.covers(frame)
-    solve, found = _solve_mask(lines, others, given, sketch, frame)
-    if edit is not None:
-        solve = edit(solve, lines, others, found, frame) & (others.amount < CUT)
-    weight = np.where(solve, lines.weight, 0.0)
-    if choice.silhouette == "outer":
-        region = solve | (others.amount >= CUT) if given is None else given
-        weight[along_outline(region, lines.direction, sketch.stroke_width / frame.pixel)] = 0.0
-        if not (held := _held(weight)).any() and given is None:
-            raise InputError("every stroke runs along the outline; choose the silhouette none")
-        solve = parts_with(solve, held) if given is None else solve
-    stroke = solve & (weight >= LEAST_WEIGHT)
+        assert drawing.page is not None  # as `read_mask` checked
+        frame, region = frame_white(white, drawing.page, size)
+        covers = drawing.covers(frame)
+        mask = region & ~covers.cuts
+        reading = Reading(drawing.page, _present(describe_crowding(covers.filled, mask, frame)))
+        if silhouette == "outer":
+            covers = drop_outline(covers, region)
+    return build_instance(
+        frame, covers.lines, mask, reading, name=name, source=source, gauge=gauge, view=view
+    )
+
+
+def frame_box(box: Box, size: int, *, margin: bool) -> Frame:
+    """The grid of `size` pixels on its longer side round a box. Raises InputError for a point."""
+    if max(box[2] - box[0], box[3] - box[1]) <= 0:
+        raise InputError("draws no stroke: everything is one point")
+    frame = fit_frame(box, size, margin=margin)
+    check_memory(frame.height * frame.width, available_memory())
+    return frame
+
+
+def frame_white(white: Bools, page: Box, size: int) -> tuple[Frame, Bools]:
+    """The grid round the white part of a page, and which pixels are white over half of their area or more."""
+    x, y, width, height = page
+    across, down = width / white.shape[1], height / white.shape[0]
+    high, wide = (np.nonzero(white.any(axis=axis))[0] for axis in (1, 0))
+    left, right = x + across * wide[0], x + across * (wide[-1] + 1)
+    top, bottom = y + down * high[0], y + down * (high[-1] + 1)
+    frame = frame_box((left, top, right, bottom), size, margin=False)
+    rows, columns = frame.edges
+    share = block_means(white.astype(np.float32), (rows - y) / down, (columns - x) / across)
+    return frame, share >= 0.5 - 1e-6
+
+
+def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Reading]:
+    """The inside of the outline, its gaps bridged, without the strokes that cut; and doubts about it."""
+    walls = covers.walls
+    if not walls.any():
+        raise NoStrokeError("no stroke is left on so coarse a grid; choose a larger size")
+    closed, bridges = closing(walls, drawing.ends(), frame)
+    region = inside_outline(closed)
+    mask = parts_with(region & ~covers.cuts, covers.lines.weight)
+    if not mask.any():
+        raise NoStrokeError(
+            "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
+        )
+    warnings = _present(
+        describe_gaps(bridges),
+        describe_open_drawing(region),
+        describe_loose_strokes(closed, region, frame),
+        describe_box(closed, region, covers.lines.joined(covers.others)),
+        describe_crowding(covers.filled, mask, frame),
+        describe_off_page(mask, frame, drawing.page),
+    )
+    gaps = tuple(((a, b), (c, d)) for (a, b), (c, d) in bridges.tolist())
+    return mask, Reading(drawing.page, warnings, gaps)
+
+
+def _present(*doubts: str | None) -> tuple[str, ...]:
+    return tuple(doubt for doubt in doubts if doubt is not None)
+
+
+def without_silhouette(covers: Covers, mask: Bools) -> tuple[Covers, Bools]:
+    """The covers without directions along the outline of a mask, and its parts with other strokes."""
+    covers = drop_outline(covers, mask | covers.cuts)
+    mask = parts_with(mask, covers.lines.weight)
+    if not mask.any():
+        raise InputError("every stroke runs along the outline; choose the silhouette none")
+    return covers, mask
+
+
+def drop_outline(covers: Covers, region: Bools) -> Covers:
+    """The covers without directions of curvature lines along the border of a region."""
+    lines = covers.lines
+    along = along_outline(region, lines.direction, covers.stroke_width)
+    return replace(covers, lines=Cover(lines.amount, np.where(along[..., None], 0.0, lines.direction)))
+
+
+def build_instance(
+    frame: Frame,
+    lines: Cover,
+    mask: Bools,
+    reading: Reading,
+    *,
+    name: str,
+    source: str,
+    gauge: Gauge = "strokes",
+    view: str | None = None,
+) -> Instance:
+    """The instance of a mask whose pixels have the directions of these curvature lines."""
+    weight = lines.weight
+    stroke = mask & (weight >= LEAST_WEIGHT)
     if not stroke.any():
         raise NoStrokeError("no stroke lies inside the mask; draw a curvature line there or move the mask")
     return Instance(
         name=name,
-        mask=solve,
+        mask=mask,
         stroke_pixels=np.argwhere(stroke).astype(np.int32),
         theta=line_of(lines.direction[stroke]),
         w=np.minimum(weight[stroke], 1.0),
         gauge=gauge,
-        source=choice.source(source),
+        source=printable(source),
+        view=view,
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
-        reading=found,
-    ).with_weights(stroke_weight=STROKE_WEIGHT, skew_weight=SKEW_WEIGHT)
+        reading=reading,
+    )
+
+
+def read_mask(data: bytes, page: Box | None) -> Bools:
+    """The white part of a mask picture, which must have the size of the page. Raises InputError."""
+    white = read_white(data)
+    if page is None:
+        raise InputError("cannot be placed: the sketch has neither a viewBox nor a width and height; add one")
+    size, wanted = white.shape[::-1], (round(page[2]), round(page[3]))
+    if size != wanted:
+        raise InputError(
+            f"the mask has {size[0]} x {size[1]} pixels, but the sketch {wanted[0]} x {wanted[1]}; "
+            "make them equal"
+        )
+    if not white.any():
+        raise InputError("the mask is black all over; paint the region to solve white")
+    return white
 
 
 def name_from(text: str) -> str:
@@ -218,136 +299,8 @@ def check_size(size: int) -> None:
         raise InputError(f"size is {size}; choose 1 to {MAX_SIZE} pixels for the longer side")
 
 
-def bytes_of(path: Path) -> bytes:
-    """Read a regular file of acceptable length, at least one byte."""
-    if path.exists() and not path.is_file():
-        raise InputError("is not a file; give a sketch as SVG, picture, .scap or .curves", file=path)
-    data = read_bytes(path, MAX_BYTES, "simplify the sketch")
-    if not data:
-        raise InputError("is empty; save the sketch again", file=path)
-    return data
-
-
-def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | None:
-    """The curves of a vector sketch, None for a picture. Raises InputError."""
-    kind = kind_of(data, suffix)
-    choice.check(kind)
-    if kind == "curves":
-        return read_curves(data, choice.view)
-    return None if kind == "picture" else (read_svg if kind == "svg" else read_scap)(data, choice.chooser)
-
-
-def kind_of(data: bytes, suffix: str) -> Kind:
-    """Kind of a sketch, by its content first and the suffix of its file second. Raises InputError."""
-    start = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
-    if data[:2] == b"\x1f\x8b":
-        raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
-    drawn = _PICTURE.match(data) is None
-    if SPATIAL.match(start) or (suffix == ".curves" and drawn and not start.startswith(b"<")):
-        return "curves"
-    if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return "svg"
-    if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and drawn):
-        return "scap"
-    return "svg" if suffix == ".svg" and drawn else "picture"
-
-
-def suffix_of_picture(data: bytes) -> str:
-    """Suffix of a picture by its content; Netpbm's for unknown content."""
-    return next((suffix for suffix, start in _PICTURES.items() if re.match(start, data)), ".pnm")
-
-
-def _sketch_of(data: bytes | Curves, size: int, suffix: str, choice: Choice) -> _Sketch:
-    curves = data if isinstance(data, Curves) else curves_in(data, suffix, choice)
-    if curves is not None:
-        return _of_curves(curves)
-    assert isinstance(data, bytes)
-    return _of_picture(read_picture(data, size))
-
-
-def _of_picture(picture: Picture) -> _Sketch:
-    page = (0.0, 0.0, picture.width, picture.height)
-    width = picture.stroke_width * picture.reduced
-    return _Sketch(picture.box, page, picture.covers, picture.ends, stroke_width=width)
-
-
-def _of_curves(curves: Curves) -> _Sketch:
-    def covers(frame: Frame) -> tuple[Cover, Cover]:
-        segments, _, line = segments_of(curves, frame)
-        return cover_by_segments(segments[line], frame), cover_by_segments(segments[~line], frame)
-
-    ends = partial(curve_ends, curves.points)
-    return _Sketch(bounding_box(curves.points), curves.canvas, covers, ends)
-
-
-def segments_of(curves: Curves, frame: Frame) -> tuple[Floats, Ints, Bools]:
-    """Segments (m, 2, 2), the number (m,) of each segment's curve, and which (m,) are curvature lines."""
-    segments, owner = flatten(curves.points, _FLATNESS * frame.pixel)
-    return segments, curves.curve[owner], curves.line[owner]
-
-
-def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
-    if max(box[2] - box[0], box[3] - box[1]) <= 0:
-        raise InputError("draws no stroke: everything is one point")
-    frame = fit_frame(box, size, margin=margin)
-    check_memory(frame.height * frame.width, available_memory())
-    return frame
-
-
-def _mask_on_grid(
-    white: Bools, page: tuple[float, float, float, float] | None, size: int
-) -> tuple[Frame, Bools]:
-    """The frame round the white part of a mask picture, and the mask on it."""
-    if page is None:
-        raise InputError("cannot be placed: the sketch has neither a viewBox nor a width and height; add one")
-    x, y, width, height = page
-    wanted = (round(width), round(height))
-    if white.shape[::-1] != wanted:
-        given = f"{white.shape[1]} x {white.shape[0]} pixels"
-        raise InputError(f"the mask has {given}, but the sketch {wanted[0]} x {wanted[1]}; make them equal")
-    if not white.any():
-        raise InputError("the mask is black all over; paint the region to solve white")
-    across, down = width / wanted[0], height / wanted[1]
-    high, wide = (np.nonzero(white.any(axis=axis))[0] for axis in (1, 0))
-    left, right = x + across * wide[0], x + across * (wide[-1] + 1)
-    top, bottom = y + down * high[0], y + down * (high[-1] + 1)
-    frame = _framed((left, top, right, bottom), size, margin=False)
-    rows, columns = frame.edges
-    share = block_means(white.astype(np.float32), (rows - y) / down, (columns - x) / across)
-    return frame, share >= 0.5 - 1e-6
-
-
-def _solve_mask(
-    lines: Cover, others: Cover, given: Bools | None, sketch: _Sketch, frame: Frame
-) -> tuple[Bools, Reading]:
-    """The mask or the inside of the bridged outline, without pixels of other strokes, and warnings."""
-    cut = others.amount >= CUT
-    filled = lines.amount + others.amount >= CUT
-    if given is not None:
-        solve = given & ~cut
-        return solve, Reading(sketch.page, crowded(filled, solve, frame))
-    walls = (lines.amount >= LEAST_WEIGHT) | cut
-    if not walls.any():
-        raise NoStrokeError("no stroke is left on so coarse a grid; choose a larger size")
-    closed, openings = closing(walls, sketch.ends(), frame)
-    region = inside_outline(closed)
-    solve = parts_with(region & ~cut, _held(lines.weight))
-    if not solve.any():
-        raise NoStrokeError(
-            "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
-        )
-    warnings = (
-        *opened(openings),
-        *boundless(region),
-        *unbounded(closed, region, frame),
-        *boxed(closed, region, lines.joined(others)),
-        *crowded(filled, solve, frame),
-        *off_page(solve, frame, sketch.page),
-    )
-    gaps = tuple(((a, b), (c, d)) for (a, b), (c, d) in openings.tolist())
-    return solve, Reading(sketch.page, warnings, gaps)
-
-
-def _held(weight: Floats) -> Floats:
-    """The weights of pixels with a direction, 0 elsewhere."""
-    return np.where(weight >= LEAST_WEIGHT, weight, 0.0)
+def check_silhouette(silhouette: str) -> None:
+    """Raise InputError for an unknown treatment of silhouettes."""
+    if silhouette not in get_args(Silhouette):
+        known = " or ".join(get_args(Silhouette))
+        raise InputError(f"there is no silhouette {shortened(silhouette)!r}; choose {known}")

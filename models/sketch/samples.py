@@ -9,9 +9,9 @@ from typing import Final, Literal
 from ..arguments import checked_arguments
 from ..errors import InputError
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
-from .choice import AS_DRAWN, Choice, Silhouette
-from .read import DEFAULT_SIZE, check_size, instance_of
+from .read import DEFAULT_SIZE, Silhouette, check_silhouette, check_size, instance_of
 from .surfaces import analytic
+from .svg import read_svg
 
 Kind = Literal["sketch", "analytic"]
 
@@ -93,15 +93,16 @@ def sample(
 
     """
     check_size(size)
-    choice = Choice(silhouette)
+    check_silhouette(silhouette)
     if _known(name).kind == "analytic":
-        if choice != AS_DRAWN:
+        if silhouette != "none":
             raise InputError(f"{name} is computed, not drawn; choose the silhouette none")
-        found = analytic(name, size, gauge=gauge).instance
-    else:
-        svg = sample_svg(name).encode()
-        found = instance_of(svg, size=size, name=name, source=f"{name}.svg", gauge=gauge, choice=choice)
-    return found.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
+        return analytic(
+            name, size, gauge=gauge, stroke_weight=stroke_weight, skew_weight=skew_weight
+        ).instance
+    drawing = read_svg(sample_svg(name).encode())
+    instance = instance_of(drawing, size, name=name, source=f"{name}.svg", gauge=gauge, silhouette=silhouette)
+    return instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
 
 
 def sample_svg(name: str) -> str:

@@ -7,7 +7,7 @@ along -z. x runs to the right, y up, z towards the viewer.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -17,9 +17,9 @@ from ..errors import InputError
 from ..instance.angles import arctangent, cosine, length, sine, turned, wrap
 from ..instance.grid import Bools, Floats
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
-from .cover import Frame, cover_by_segments, fit_frame
+from .cover import LEAST_WEIGHT, Frame, cover_by_segments, fit_frame
 from .outline import largest_part
-from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_size
+from .read import DEFAULT_SIZE, check_size
 
 _NEWTON: Final = 12
 _SEEDS: Final = 120  # lattice of starting points per side
@@ -235,13 +235,21 @@ def analytic(
     if name not in SURFACES:
         raise InputError(f"there is no surface {name!r}; choose one of {', '.join(SURFACES)}")
     check_size(size)
-    found = instance_on(SURFACES[name], name, size, gauge)
-    weighted = found.instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
-    return replace(found, instance=weighted)
+    return analytic_instance(
+        SURFACES[name], name, size, gauge=gauge, stroke_weight=stroke_weight, skew_weight=skew_weight
+    )
 
 
-def instance_on(surface: CurvaturePatch, name: str, size: int, gauge: Gauge = "strokes") -> AnalyticInstance:
-    """Instance of any patch, as `analytic`, with the default weights."""
+def analytic_instance(
+    surface: CurvaturePatch,
+    name: str,
+    size: int,
+    *,
+    gauge: Gauge = "strokes",
+    stroke_weight: float = STROKE_WEIGHT,
+    skew_weight: float = SKEW_WEIGHT,
+) -> AnalyticInstance:
+    """Instance of any patch, as `analytic`."""
     frame = _frame(surface, size)
     s, t, mask = _parameters(surface, frame)
     tangents = surface.tangents(s, t)
@@ -260,7 +268,7 @@ def instance_on(surface: CurvaturePatch, name: str, size: int, gauge: Gauge = "s
         origin=(frame.x, frame.y),
     )
     return AnalyticInstance(
-        instance.with_weights(stroke_weight=STROKE_WEIGHT, skew_weight=SKEW_WEIGHT),
+        instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight),
         u_angle,
         v_angle,
         normals=_towards_viewer(*tangents),

@@ -32,9 +32,10 @@ from ..input_limits import (
 )
 from ..instance.angles import turned
 from ..instance.grid import Floats
-from .choice import Chooser, colour_label
 from .colour import is_paper, is_red
+from .cover import Box
 from .curves import Curves, runs
+from .labels import LabelMatcher, colour_label
 from .path_data import SHAPES, outline, pixels, too_many_curves
 from .style_sheet import KNOWN, PAINT, StyleSheet, style_properties, style_sheet
 
@@ -57,18 +58,18 @@ class _Place:
     chosen: bool = False
 
 
-def read_svg(data: bytes, chooser: Chooser | None = None) -> Curves:
+def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     """Read the strokes of an SVG drawing in the units of its viewBox. Raises InputError.
 
-    chooser: matches the labels of curvature lines; None: colours decide.
+    matcher: matches the labels of curvature lines; None: colours decide.
     """
     root = _parsed(data)
     if _tag(root) != "svg":
         tag = root.tag.split("}")[-1][:30]
         raise InputError(f"its root element is <{tag}>, not <svg>; expected an SVG drawing")
-    canvas = _canvas(root)
+    page = _page(root)
     texts = ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
-    walk = _Walk(style_sheet(texts), canvas, chooser)
+    walk = _Walk(style_sheet(texts), page, matcher)
     shapes = list(walk.shapes(root))
     if not sum(len(points) for _, points, _ in shapes):
         raise InputError("draws no stroke: it has no visible path, line or shape; export it again")
@@ -76,10 +77,10 @@ def read_svg(data: bytes, chooser: Chooser | None = None) -> Curves:
     red, points = is_red(np.array(paints)), np.concatenate(outlines)
     shape = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(outline) for outline in outlines])
     chosen = None
-    if chooser is not None:
+    if matcher is not None:
         chosen = np.array(taken)[shape]
-        chooser.check(taken=bool(chosen.any()))
-    return Curves(points, runs(points, shape), red[shape], canvas, chosen)
+        matcher.check(any_stroke=bool(chosen.any()))
+    return Curves(points, runs(points, shape), red[shape], page, chosen)
 
 
 def _parsed(data: bytes) -> Element:
@@ -102,8 +103,8 @@ class _Walk:
     """A walk through a drawing. Results that depend only on an element are computed once for all its uses."""
 
     sheet: StyleSheet
-    canvas: tuple[float, float, float, float] | None
-    chooser: Chooser | None
+    page: Box | None
+    matcher: LabelMatcher | None
     own: dict[Element, tuple[Mapping[str, str], Any, bool]] = field(default_factory=dict)
     outlines: dict[Element, Floats] = field(default_factory=dict)
 
@@ -129,7 +130,7 @@ class _Walk:
             if tag in SHAPES:
                 paint = _paint(place.style)
                 if not (place.style["visibility"] in ("hidden", "collapse") or is_paper(np.array(paint))):
-                    painted = self.chooser is not None and self.chooser.takes([colour_label(paint)])
+                    painted = self.matcher is not None and self.matcher.matches([colour_label(paint)])
                     yield paint, self._placed(place), painted or place.chosen
             elif tag in _CONTAINERS:
                 inner = _view(place, element) if element is not root else place.matrix
@@ -148,7 +149,7 @@ class _Walk:
                     "simplify the drawing"
                 )
             style = _own_style(element, self.sheet)
-            taken = self.chooser is not None and self.chooser.takes(_labels(element))
+            taken = self.matcher is not None and self.matcher.matches(_labels(element))
             self.own[element] = style, _transform(element, style), taken
         own, transform, taken = self.own[element]
         inherited = {key: place.style[key] for key in PAINT if key in place.style}
@@ -181,9 +182,9 @@ class _Walk:
     def _placed(self, place: _Place) -> Floats:
         """Control points (k, 4, 2) of a shape in the units of the root."""
         if place.element not in self.outlines:
-            page = self.canvas[2:] if self.canvas else (100.0, 100.0)
+            size = self.page[2:] if self.page else (100.0, 100.0)
             try:
-                found = outline(_tag(place.element), place.element.attrib, page)
+                found = outline(_tag(place.element), place.element.attrib, size)
             except InputError as error:
                 raise InputError(f"{_named(place.element)}: {error}") from error
             self.outlines[place.element] = found
@@ -281,7 +282,7 @@ def _rgb(colour: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _canvas(root: Element) -> tuple[float, float, float, float] | None:
+def _page(root: Element) -> Box | None:
     """The viewBox, or else width and height from (0, 0), or None."""
     box = _view_box(root)
     if box is not None:
@@ -290,7 +291,7 @@ def _canvas(root: Element) -> tuple[float, float, float, float] | None:
     return (0.0, 0.0, width, height) if min(width, height) >= LEAST_LENGTH else None
 
 
-def _view_box(element: Element) -> tuple[float, float, float, float] | None:
+def _view_box(element: Element) -> Box | None:
     fields = re.split(r"[\s,]+", element.get("viewBox", "").strip())
     if fields == [""]:
         return None

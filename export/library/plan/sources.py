@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.instance.instance import Gauge, Instance
+from ....models.sketch.drawing_file import parse_drawing
 from ....models.sketch.random_strokes import random_instance
-from ....models.sketch.read import instance_of
+from ....models.sketch.read import instance_of, read_mask
 from ....models.sketch.samples import SAMPLES, sample
 from .recipe import InstanceRecipe
 
@@ -41,17 +41,10 @@ def _of_sample(recipe: InstanceRecipe) -> Instance:
 
 def _of_file(recipe: InstanceRecipe) -> Instance:
     sketch = recipe.sketch
-    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-        mask = Path(folder) / f"mask{sketch.mask_suffix}"
-        mask.write_bytes(sketch.mask)
-        return instance_of(
-            sketch.drawing,
-            size=recipe.size,
-            name=recipe.name,
-            source=sketch.what,
-            mask=mask if sketch.mask else None,
-            gauge=cast("Gauge", recipe.gauge),
-        )
+    drawing = parse_drawing(sketch.drawing, Path(sketch.what).suffix, recipe.size)
+    white = read_mask(sketch.mask, drawing.page) if sketch.mask else None
+    gauge = cast("Gauge", recipe.gauge)
+    return instance_of(drawing, recipe.size, white=white, name=recipe.name, source=sketch.what, gauge=gauge)
 
 
 def _of_random(recipe: InstanceRecipe) -> Instance:

@@ -21,9 +21,9 @@ from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
 from ....models.instance.instance import GAUGES
+from ....models.sketch.drawing_file import suffix_of_picture
 from ....models.sketch.published import published
 from ....models.sketch.random_strokes import RAGGED_SHARE
-from ....models.sketch.read import suffix_of_picture
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS, carried

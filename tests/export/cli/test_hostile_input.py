@@ -381,10 +381,10 @@ def test_pictures_are_the_same_for_any_number_of_rows_per_band(tmp_path, monkeyp
         "palette.gif": Image.fromarray(shades).quantize(16),
     }.items():
         image.save(tmp_path / name)
-        whole = bitmap.read_picture((tmp_path / name).read_bytes(), 4)
+        whole = bitmap.read_bitmap((tmp_path / name).read_bytes(), 4)
         with monkeypatch.context() as patch:
             patch.setattr(bitmap, "_BAND", 400)
-            banded = bitmap.read_picture((tmp_path / name).read_bytes(), 4)
+            banded = bitmap.read_bitmap((tmp_path / name).read_bytes(), 4)
             mask = bitmap.read_white((tmp_path / name).read_bytes())
         np.testing.assert_array_equal(whole.ink, banded.ink)
         np.testing.assert_array_equal(mask, bitmap.read_white((tmp_path / name).read_bytes()))

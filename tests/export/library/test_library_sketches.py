@@ -7,7 +7,7 @@ from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.site.site import write_site
 from crossfield.models.errors import InputError
 from crossfield.models.instance.file import read_instance
-from crossfield.models.sketch.read import instance_of
+from drawings import read
 from forging import seal
 from libraries import library_of
 
@@ -57,7 +57,7 @@ def lib(built, tmp_path):
 def test_a_published_sketch_has_its_strokes_and_nothing_else_of_its_file(built):
     assert (built / "cf_evil.sketch.svg").read_text() == SHOWN
     found = read_instance(built / "cf_evil_n008.instance.json")
-    wanted = instance_of(HOSTILE, size=8, name=found.name, source="evil.html")
+    wanted = read(HOSTILE, 8, "evil.html")
     assert (found.theta.tolist(), found.w.tolist()) == (wanted.theta.tolist(), wanted.w.tolist())
     assert verify_library(built) == []
     for path in built.iterdir():

@@ -5,7 +5,7 @@ import pytest
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.angles import line_difference
-from crossfield.models.sketch.read import LEAST_WEIGHT
+from crossfield.models.sketch.cover import LEAST_WEIGHT
 from crossfield.models.sketch.surfaces import SURFACES, _frame, _parameters, analytic
 from crossfield.models.smooth.polyvector import polyvector_field
 

@@ -1,39 +1,25 @@
 """Curvature lines of a drawing: strokes chosen by label, and silhouettes that are excluded."""
 
-import io
-
 import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InputError
 from crossfield.models.instance.angles import line_difference
-from crossfield.models.sketch.choice import Choice, label_of
-from crossfield.models.sketch.read import instance_of
+from crossfield.models.sketch.labels import label_of
 from crossfield.models.sketch.samples import sample_svg
+from drawings import png, read, svg
 from loops import for_each
 from PIL import Image, ImageDraw
 
-HEAD = (
-    '<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" '
-    'viewBox="0 0 100 100">'
-)
 LAYER = 'inkscape:groupmode="layer" inkscape:label="Flow lines"'
 LINES = '<path d="M20 50H80"/><path d="M50 20V80"/>'
 RIM = '<circle cx="50" cy="50" r="40" fill="none" stroke="black"/>'
 CIRCLE = f'<g fill="none" stroke="black"><circle cx="50" cy="50" r="40"/>{LINES}</g>'
 
 
-def svg(body):
-    return f"{HEAD}{body}</svg>".encode()
-
-
 def lines(attributes, colour="#0044cc"):
     return svg(f'{RIM}<g fill="none" stroke="{colour}" {attributes}><g>{LINES}</g></g>')
-
-
-def read(data, size=40, source="a.svg", **choice):
-    return instance_of(data, size=size, name="a", source=source, choice=Choice(**choice))
 
 
 def radius(instance, side=100):
@@ -153,9 +139,7 @@ def picture(side=400, width=4):
     draw.ellipse([10 * scale, 10 * scale, 90 * scale, 90 * scale], outline=0, width=width)
     for ends in ((20, 50, 80, 50), (50, 20, 50, 80)):
         draw.line([scale * end for end in ends], fill=0, width=width)
-    stream = io.BytesIO()
-    image.save(stream, "PNG")
-    return stream.getvalue()
+    return png(image)
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from crossfield.models import input_limits
 from crossfield.models.errors import CrossfieldError, InputError
-from crossfield.models.sketch.choice import Choice
-from crossfield.models.sketch.curves import bounding_box
 from crossfield.models.sketch.pen_strokes import axes_of, read_curves
-from crossfield.models.sketch.read import curves_in, instance_of
+from drawings import read
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -35,11 +33,11 @@ def sheet(count=21):
 
 def test_strokes_are_seen_along_the_third_principal_axis_with_up_above():
     curves = read_curves(content(sheet()))
-    left, top, right, bottom = bounding_box(curves.points)
+    left, top, right, bottom = curves.box
     assert (left, top) == pytest.approx((40, 40))
     assert right == pytest.approx(1040)
     assert bottom == pytest.approx(540, abs=5)
-    assert curves.canvas == (0, 0, 1080, np.ceil(bottom - 40) + 80)
+    assert curves.page == (0, 0, 1080, np.ceil(bottom - 40) + 80)
     assert np.unique(curves.curve).tolist() == [0, 1, 2, 3, 4, 5]
     lowest, highest = (curves.points[curves.curve == number][..., 1].mean() for number in (0, 2))
     assert lowest > highest  # y down
@@ -49,7 +47,7 @@ def test_principal_axes_do_not_depend_on_the_samples_but_on_the_strokes():
     coarse = sheet(21)
     fine = [np.repeat(stroke, 1 + 3 * (number % 2), axis=0) for number, stroke in enumerate(coarse)]
     first, second = (read_curves(content(strokes)) for strokes in (coarse, fine))
-    assert bounding_box(first.points) == pytest.approx(bounding_box(second.points), abs=1e-6)
+    assert first.box == pytest.approx(second.box, abs=1e-6)
 
 
 @settings(max_examples=25, deadline=None)
@@ -75,9 +73,9 @@ def test_named_views():
 
 def test_content_or_suffix_say_what_a_file_is(tmp_path):
     data = content(sheet())
-    first = instance_of(data, size=24, name="a", source="a.txt")
+    first = read(data, 24, "a.txt")
     windows = b"\xef\xbb\xbf" + data.replace(b"\n", b"\r\n")
-    assert instance_of(windows, size=24, name="a", source="a.txt").sha256 == first.sha256
+    assert read(windows, 24, "a.txt").sha256 == first.sha256
     (tmp_path / "a.curves").write_bytes(data)
     file = tmp_path / "a.curves"
     instance = cf.read_sketch(file, size=24, silhouette="outer")
@@ -85,12 +83,12 @@ def test_content_or_suffix_say_what_a_file_is(tmp_path):
     with pytest.raises(InputError, match="whose strokes have no labels; leave the choice of class=a out"):
         cf.read_sketch(file, curvature=["class=a"])
     with pytest.raises(CrossfieldError, match="is not a whole picture"):
-        instance_of(b"v 1.0 2.0 3.0\nv 1 2 3\nf 1 2 3\n", size=24, name="a", source="a.obj")
+        read(b"v 1.0 2.0 3.0\nv 1 2 3\nf 1 2 3\n", 24, "a.obj")
 
 
 def test_a_mask_is_as_large_as_the_page(tmp_path):
     (tmp_path / "a.curves").write_bytes(content(sheet()))
-    width, height = (round(side) for side in read_curves(content(sheet())).canvas[2:])
+    width, height = (round(side) for side in read_curves(content(sheet())).page[2:])
     Image.new("L", (width, height), 255).save(tmp_path / "mask.png")
     instance = cf.read_sketch(tmp_path / "a.curves", size=27, mask=tmp_path / "mask.png")
     assert instance.mask.all()
@@ -119,14 +117,14 @@ BROKEN = {
 @for_each("text", BROKEN)
 def test_broken_files_are_refused_with_the_line(text):
     with pytest.raises(InputError) as caught:
-        curves_in(text.encode(), ".curves")
+        read_curves(text.encode())
     assert BROKEN[text] in str(caught.value)
     assert len(str(caught.value)) < 200
 
 
 def test_more_lines_than_the_limit_are_refused_before_they_are_split():
     with pytest.raises(InputError, match=f"more than {input_limits.MAX_LINES} lines"):
-        curves_in(b"v 2\n" + b"\n" * (input_limits.MAX_LINES + 1), "")
+        read_curves(b"v 2\n" + b"\n" * (input_limits.MAX_LINES + 1))
 
 
 @for_each("view", ["back", "", "1", "1,2,3", "nan,0", "0,91", "1e9,0", "x" * 9999])
@@ -134,7 +132,7 @@ def test_views_that_are_none_are_refused(view):
     with pytest.raises(
         InputError, match=r"there is no view .*; choose front, side, top, or azimuth"
     ) as caught:
-        curves_in(content(sheet()), "", Choice(view=view))
+        read_curves(content(sheet()), view)
     assert len(str(caught.value)) < 300
 
 
@@ -148,7 +146,7 @@ def test_all_strokes_in_space_make_a_page_or_a_typed_error(strokes):
     except CrossfieldError:
         return
     assert np.isfinite(curves.points).all()
-    width, height = curves.canvas[2:]
+    width, height = curves.page[2:]
     assert max(width, height) == 1080
     assert min(width, height) >= 80
 
@@ -157,4 +155,4 @@ def test_all_strokes_in_space_make_a_page_or_a_typed_error(strokes):
 @given(st.binary(max_size=200), st.sampled_from([b"", b"v 2\n", b"v 2\n0 0 0\n1 1 1\n"]))
 def test_no_bytes_at_all_give_anything_but_a_typed_error(data, start):
     with contextlib.suppress(CrossfieldError):
-        instance_of(start + data, size=8, name="a", source="a.curves")
+        read(start + data, 8, "a.curves")

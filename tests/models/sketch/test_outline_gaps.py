@@ -1,88 +1,28 @@
 """Outlines with a gap, drawings that enclose nothing, holes, and strokes without room between them."""
 
-import io
-
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.sketch.bridges import thinned
-from crossfield.models.sketch.curves import Curves, flatten, lines_as_cubics
-from crossfield.models.sketch.published import redrawn
-from crossfield.models.sketch.read import instance_of
-from crossfield.models.sketch.samples import sample_svg, samples
-from crossfield.models.sketch.svg import read_svg
+from crossfield.models.sketch.samples import samples
+from crossfield.models.sketch.thinning import thinned
+from drawings import png, read, svg
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
 SKETCHES = [each.name for each in samples() if each.kind == "sketch"]
 
 
-def svg(paths, page="0 0 100 100"):
+def drawing(paths, page="0 0 100 100"):
     body = "".join(f'<path d="{path}" fill="none" stroke="{colour}"/>' for path, colour in paths)
-    return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{page}">{body}</svg>'.encode()
-
-
-def read(data, size=48, source="a.svg"):
-    return instance_of(data, size=size, name="a", source=source)
+    return svg(body, f'viewBox="{page}"')
 
 
 def in_black(*paths, page="0 0 100 100"):
-    return read(svg([(path, "black") for path in paths], page))
+    return read(drawing([(path, "black") for path in paths], page), 48)
 
 
 def middles(instance):
     return np.array(instance.reading.openings).mean(axis=1)
-
-
-def cut(name, centre, gap, parts=16):
-    """A sample's drawing, as short straight lines, without the strokes within half a gap of a point."""
-    curves = read_svg(sample_svg(name).encode())
-    segments, owner = flatten(curves.points, 0.05)
-    step = np.linspace(0, 1, parts + 1)[:, None]
-    points = segments[:, None, 0] + step * np.diff(segments, axis=1)
-    lines = np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 2)
-    far = np.hypot(*(lines.mean(axis=1) - centre).T) > gap / 2
-    red = np.repeat(curves.red[owner], parts)[far]
-    cubics = lines_as_cubics(*lines[far].swapaxes(0, 1))
-    return redrawn(Curves(cubics, np.arange(len(red)), red, curves.canvas))
-
-
-def on_outline(name, instance, rng, count):
-    """Points of a sample's strokes at the outer border of its mask."""
-    points = flatten(read_svg(sample_svg(name).encode()).points, 0.5)[0].mean(axis=1)
-    column, row = np.floor((points - instance.origin) / instance.pixel_size).astype(int).T
-    outside = ~ndimage.binary_fill_holes(instance.mask)
-    border = ndimage.binary_dilation(outside, np.ones((3, 3))) & instance.mask
-    return rng.permutation(points[border[row, column]])[:count]
-
-
-@pytest.mark.parametrize(
-    "names", [("mouse",), pytest.param(("mouse", "skew", "singular"), marks=pytest.mark.slow)]
-)
-def test_a_gap_in_the_outline_of_a_sample_leaves_its_mask_nearly_the_same(names):
-    assert sum(bridged_gaps(name) for name in names) >= 2
-
-
-def bridged_gaps(name):
-    """Number of gaps that had to be bridged; the mask is nearly that of the whole sample for all of them."""
-    whole = cf.sample(name, 48)
-    side = max(whole.mask.shape) * whole.pixel_size
-    rng = np.random.default_rng(2)
-    bridged = 0
-    for share in (0.05, 0.06, 0.07):
-        for centre in on_outline(name, whole, rng, 3):
-            instance = read(cut(name, centre, share * side))
-            if (
-                instance.pixel_size != pytest.approx(whole.pixel_size)
-                or instance.mask.shape != whole.mask.shape
-            ):
-                continue  # an end of the drawing is cut off
-            assert (instance.mask != whole.mask).sum() <= 0.02 * whole.mask.sum(), (share, centre)
-            if instance.reading.openings:
-                bridged += 1
-                assert "outline open here: (" in instance.reading.warnings[0]
-                assert np.hypot(*(middles(instance) - centre).T).max() < share * side
-    return bridged
 
 
 def test_a_compartment_with_a_gap_is_kept_in_svg_and_bitmap():
@@ -95,9 +35,7 @@ def test_a_compartment_with_a_gap_is_kept_in_svg_and_bitmap():
     draw = ImageDraw.Draw(image)
     draw.line((336, 120, 40, 120, 40, 280, 360, 280, 360, 120), fill=0, width=4)
     draw.line((200, 120, 200, 280), fill=0, width=4)
-    stream = io.BytesIO()
-    image.save(stream, "PNG")
-    bitmap = read(stream.getvalue(), 64, "a.png")
+    bitmap = read(png(image), 64, "a.png")
     assert np.abs(middles(bitmap) - (348, 120)).max() < 5
     assert bitmap.mask.sum() * bitmap.pixel_size**2 == pytest.approx(324 * 164, rel=0.08)
 
@@ -135,7 +73,7 @@ def test_a_hole_is_solved_in_one_colour_and_left_out_between_cuts():
     outer, inner = "M90 50A40 40 0 1 1 90 49.9Z", "M65 50A15 15 0 1 1 65 49.9Z"
     assert in_black(outer, inner).mask[23:25, 23:25].all()
     lines = [(outer, "black"), (inner, "black"), ("M10 50H30M70 50H90M50 10V30M50 70V90", "#d1242f")]
-    assert not read(svg(lines)).mask[18:30, 18:30].any()
+    assert not read(drawing(lines), 48).mask[18:30, 18:30].any()
 
 
 LARGE = "0 0 200 200"
@@ -144,7 +82,7 @@ LARGE = "0 0 200 200"
 @pytest.mark.parametrize("width", [5, 6, 30])
 def test_a_gap_between_limbs_stays_outside(width):
     trousers = f"M30 40H170V180H{100 + width / 2}V90H{100 - width / 2}V180H30Z"
-    instance = read(svg([(trousers, "black")], LARGE), 96)
+    instance = read(drawing([(trousers, "black")], LARGE), 96)
     column, first, last = (int((at - instance.origin[0]) / instance.pixel_size) for at in (100, 105, 165))
     assert not instance.mask[first:last, column].any()
     assert instance.mask[first : last + 5, : column - 5].sum() > 30 * 60 / instance.pixel_size**2
@@ -171,15 +109,13 @@ def test_a_construction_box_round_the_body_is_warned_of():
     box = "M10 20H190M10 180H190M20 10V190M180 10V190"
     for size, body in ((96, BODY), (48, "M100 50A50 50 0 1 1 99.9 50Z")):
         paths = [(path, "black") for path in (box, body, "M60 100Q100 130 140 100")]
-        (text,) = read(svg(paths, LARGE), size).reading.warnings
+        (text,) = read(drawing(paths, LARGE), size).reading.warnings
         assert "a box of straight lines encloses another outline, and the" in text
     image = Image.new("L", (400, 400), 255)
     draw = ImageDraw.Draw(image)
     draw.rectangle((40, 40, 360, 360), outline=0, width=3)
     draw.ellipse((100, 80, 300, 330), outline=0, width=3)
-    stream = io.BytesIO()
-    image.save(stream, "PNG")
-    assert "a box of straight lines" in read(stream.getvalue(), source="a.png").reading.warnings[0]
+    assert "a box of straight lines" in read(png(image), 48, "a.png").reading.warnings[0]
 
 
 def test_a_construction_box_in_perspective_is_warned_of():
@@ -206,15 +142,13 @@ def test_solid_ink_and_hatching_are_warned_of_with_their_place():
     image = Image.new("L", (200, 200), 255)
     ImageDraw.Draw(image).rectangle((20, 20, 180, 180), outline=0, width=3)
     ImageDraw.Draw(image).ellipse((100, 100, 170, 170), fill=0)
-    stream = io.BytesIO()
-    image.save(stream, "PNG")
-    (text,) = read(stream.getvalue(), source="a.png").reading.warnings
+    (text,) = read(png(image), 48, "a.png").reading.warnings
     assert "strokes leave no room between them round (13" in text
 
 
 def test_drawings_off_their_page_are_warned_of():
-    data = svg([("M10 10H90V190H10Z", "black")])
-    (text,) = read(data).reading.warnings
+    data = drawing([("M10 10H90V190H10Z", "black")])
+    (text,) = read(data, 48).reading.warnings
     assert text.startswith("48% of the pixels to solve for lie off the page")
 
 

@@ -1,15 +1,14 @@
 """Published sketches: places where a script could hide are gone, and every stroke is the same."""
 
-import io
 import re
 
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError
 from crossfield.models.sketch.published import published, redrawn
-from crossfield.models.sketch.read import instance_of
 from crossfield.models.sketch.samples import SAMPLES, sample_svg
 from crossfield.models.sketch.svg import read_svg
+from drawings import png, read
 from loops import for_each
 from PIL import Image
 
@@ -26,11 +25,11 @@ def test_a_drawing_is_the_same_when_it_is_drawn_again(name):
     first, again = read_svg(data), redrawn(read_svg(data))
     second = read_svg(again)
     assert redrawn(second) == again
-    assert (first.canvas, first.curve.tolist()) == (second.canvas, second.curve.tolist())
+    assert (first.page, first.curve.tolist()) == (second.page, second.curve.tolist())
     assert first.red.tolist() == second.red.tolist()
     assert np.array_equal(first.points[:, [0, 3]], second.points[:, [0, 3]])
     assert np.allclose(first.points, second.points, rtol=1e-9, atol=0)
-    instances = [instance_of(each, size=24, name="a", source="a.svg") for each in (data, again)]
+    instances = [read(each) for each in (data, again)]
     assert instances[0].sha256 == instances[1].sha256
     assert re.fullmatch(
         r'<svg xmlns="http://www.w3.org/2000/svg"( viewBox="[^"]+")? fill="none" stroke="#000" '
@@ -40,19 +39,16 @@ def test_a_drawing_is_the_same_when_it_is_drawn_again(name):
     )
 
 
-def picture(kind):
-    stream = io.BytesIO()
-    Image.new("L", (3, 3), 255).save(stream, kind)
-    return stream.getvalue()
+BLANK = Image.new("L", (3, 3), 255)
 
 
 @for_each(
     "data, suffix, expected",
     [
-        (picture("GIF") + b"<script>alert(1)</script>", ".html", ".gif"),
-        (picture("JPEG"), ".svg", ".jpg"),
-        (picture("PNG"), "", ".png"),
-        (picture("PPM"), ".html", ".pnm"),
+        (png(BLANK, "GIF") + b"<script>alert(1)</script>", ".html", ".gif"),
+        (png(BLANK, "JPEG"), ".svg", ".jpg"),
+        (png(BLANK, "PNG"), "", ".png"),
+        (png(BLANK, "PPM"), ".html", ".pnm"),
         (b"neither this nor that", ".html", ".pnm"),
         (b"#9 9\n{\n}\n", ".html", ".scap"),
         (b"v 2\n0 0 0\n1 0 0\n", ".svg", ".curves"),

@@ -38,8 +38,8 @@ def test_the_colours_are_those_of_the_description(name):
     mixed = "red" in SAMPLES[name].description
     assert curves.red.any() == mixed
     assert not curves.red.all()
-    assert curves.canvas is not None
-    x, y, width, height = curves.canvas
+    assert curves.page is not None
+    x, y, width, height = curves.page
     corners = curves.points.reshape(-1, 2)
     assert (corners >= (x, y)).all()
     assert (corners <= (x + width, y + height)).all()

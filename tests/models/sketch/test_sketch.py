@@ -1,7 +1,6 @@
 """From sketches to instances: SVG, bitmaps and .scap, masks, colours, and everything that must be refused."""
 
 import contextlib
-import io
 import os
 import struct
 import zlib
@@ -11,39 +10,20 @@ import pytest
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.file import read_instance, write_instance
-from crossfield.models.sketch.bitmap import read_picture
+from crossfield.models.sketch.bitmap import read_bitmap
 from crossfield.models.sketch.cover import Frame, block_means, cover_by_segments, fit_frame
 from crossfield.models.sketch.curves import bounding_box, flatten
-from crossfield.models.sketch.outline import inside_outline
 from crossfield.models.sketch.pen_strokes import read_scap
-from crossfield.models.sketch.read import check_memory, instance_of, name_from, read_sketch
+from crossfield.models.sketch.read import check_memory, name_from, read_sketch
 from crossfield.models.sketch.svg import read_svg
+from drawings import BLACK, RED, png, read, svg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
 from PIL import Image, ImageDraw, ImageOps
 from scipy import ndimage
 
-BLACK = 'fill="none" stroke="black"'
-RED = 'fill="none" stroke="#d1242f"'
 LINE = f'<path d="M10 10 L90 90" {BLACK}/>'
-
-
-def svg(body, head='viewBox="0 0 100 100"'):
-    return (
-        '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
-        f"{head}>{body}</svg>"
-    ).encode()
-
-
-def read(data, size=24, source="a.svg", **options):
-    return instance_of(data, size=size, name="a", source=source, **options)
-
-
-def png(image, kind="PNG", **options):
-    stream = io.BytesIO()
-    image.save(stream, kind, **options)
-    return stream.getvalue()
 
 
 def as_map(instance, values):
@@ -416,7 +396,7 @@ def test_dust_does_not_widen_the_frame():
 def test_a_picture_finer_than_needed_gives_the_same_directions():
     large = png(drawn(525, 4).resize((4200, 4200)), compress_level=1)
     coarse, fine = read(png(drawn(525, 4)), 24, "a.png"), read(png(drawn(1050, 8)), 24, "a.png")
-    assert read_picture(large, 24).reduced == 2
+    assert read_bitmap(large, 24).reduced == 2
     reduced = read(large, 24, "a.png")
     for other in (fine, reduced):
         assert (coarse.mask == other.mask).mean() > 0.99
@@ -544,16 +524,6 @@ def test_outlines_with_small_gaps_enclose_and_open_strokes_do_not(size):
     assert open_line.all()
     apart = read(svg(f'<path d="M10 10H90M10 50H90M10 90H90" {BLACK}/>'), size).mask
     assert apart.all()
-
-
-def test_a_silhouette_holds_every_stroke_and_what_is_closed_off():
-    walls = np.zeros((30, 30), dtype=bool)
-    walls[5, 5:25] = walls[24, 5:25] = walls[5:25, 5] = walls[5:25, 24] = True
-    walls[2, 2:6] = True
-    region = inside_outline(walls)
-    assert region[5:25, 5:25].all()
-    assert region[walls].all()
-    assert not region[28].any()
 
 
 def mask_file(tmp_path, size, box, value=255, name="mask.png"):

@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError
-from crossfield.models.sketch.bitmap import read_picture
+from crossfield.models.sketch.bitmap import read_bitmap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
@@ -28,7 +28,7 @@ def drawing(colour=(0, 0, 0)):
 def picture(pixels):
     stream = io.BytesIO()
     Image.fromarray(np.clip(pixels, 0, 255).astype(np.uint8)).save(stream, "PNG")
-    return read_picture(stream.getvalue(), 32)
+    return read_bitmap(stream.getvalue(), 32)
 
 
 DRAWING = drawing()
