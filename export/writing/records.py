@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.errors import UnsupportedByFormatError
-from ...models.formulations.families import ranked
 from ...models.formulations.names import Bytes, digits
 from ...models.instance.grid import Bools, Floats
 
@@ -324,8 +323,7 @@ def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
     few = 0 <= most - least < _FEW and max(-least, most) < MOST
     if few and (values == np.rint(values)).all():
         return np.arange(least, most + 1), (values - least).astype(np.uint8)
-    place, rank = ranked(values)
-    return values[place], rank
+    return np.unique(values, return_inverse=True)
 
 
 def check_coefficients(values: Floats | float, where: str) -> None:

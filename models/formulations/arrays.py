@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,11 @@ from scipy import sparse
 
 from ..errors import SolverError, UnsupportedBySolverError
 from ..instance.grid import Bools, Floats, Ints
-from .families import ANY_DEGREE, PlacedFamily, Placement
+from .families import ANY_DEGREE, PlacedFamily
 from .names import Bytes, column_names, row_names
+
+if TYPE_CHECKING:
+    from .problem import Problem
 
 QUADRATIC: Final = 2
 """Greatest degree of what arrays hold."""
@@ -95,30 +98,7 @@ class ProblemArrays:
         return found
 
 
-class Formulated(Placement, Protocol):
-    """A problem, as far as its arrays need it."""
-
-    @property
-    def objective(self) -> tuple[PlacedFamily, ...]:
-        """Terms of the objective."""
-
-    @property
-    def lower(self) -> Floats:
-        """Lower bounds."""
-
-    @property
-    def upper(self) -> Floats:
-        """Upper bounds."""
-
-    @property
-    def integer(self) -> Bools:
-        """Integer columns."""
-
-    def merged_objective(self, degree: int, *, up_to: int) -> tuple[Ints, Floats]:
-        """Monomials of that degree, of terms of no higher degree than `up_to`."""
-
-
-def arrays_of(problem: Formulated, *, names: bool) -> ProblemArrays:
+def arrays_of(problem: Problem, *, names: bool) -> ProblemArrays:
     """Return the arrays of a problem."""
     size, places = len(problem.lower), _places(problem.rows)
     at, cost = problem.merged_objective(1, up_to=QUADRATIC)

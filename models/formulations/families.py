@@ -5,16 +5,18 @@ from __future__ import annotations
 import builtins
 from dataclasses import dataclass
 from functools import cache, cached_property, reduce
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import Instance
 from .declaration import Family
 from .symbols import SCALARS, SLOTS, IndexSet, numeric, way
+
+if TYPE_CHECKING:
+    from .problem import Problem
 
 Coefficient = float | Floats
 Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]
@@ -48,26 +50,6 @@ class Block:
         return slice(self.offset, self.offset + self.count)
 
 
-class Placement(Protocol):
-    """A problem as its families see it: instance, blocks of columns, data that symbols may mean, rows."""
-
-    @property
-    def instance(self) -> Instance:
-        """The instance."""
-
-    @property
-    def blocks(self) -> dict[str, Block]:
-        """Blocks of columns by name."""
-
-    @property
-    def data(self) -> dict[str, Any]:
-        """Arrays by the name of their quantity."""
-
-    @property
-    def rows(self) -> tuple[PlacedFamily, ...]:
-        """Families of rows in row order."""
-
-
 @dataclass(frozen=True, eq=False)
 class Monomial:
     """A monomial of a family: symbols, each as often as its power, and coefficient (one or (count,))."""
@@ -96,7 +78,7 @@ class PlacedFamily:
     """
 
     family: Family
-    problem: Placement
+    problem: Problem
     elements: Ints
 
     @property
@@ -190,27 +172,6 @@ class PlacedFamily:
         return by_sense[self.family.sense]
 
 
-def block_costs(terms: list[Monomial], block: Block) -> tuple[Ints, Floats]:
-    """As `merged`, for single columns of a block: one number each, terms added in turn."""
-    if not terms:
-        return np.zeros((0, 1), np.int32), np.zeros(0)
-    total, scale = np.zeros(block.count), np.zeros(block.count)
-    for term in terms:
-        inside = term.family.inside(term.symbols[0])
-        add_at(total, inside, term.coefficient)
-        add_at(scale, inside, term.family.scale)
-    kept = np.nonzero(beyond_noise(total, scale))[0]
-    return (block.offset + kept).astype(np.int32)[:, None], total[kept]
-
-
-def add_at(sums: Floats, inside: Ints | None, values: Coefficient) -> None:
-    """Add values to these elements of sums; None: to all, in their order."""
-    if inside is None:
-        sums += values
-    else:
-        np.add.at(sums, inside, values)
-
-
 @cache
 def monomials(family: Family, variables: tuple[sp.Symbol, ...]) -> Monomials | None:
     """The monomials of a declaration by degree, constant included; None if it is not a polynomial.
@@ -243,7 +204,7 @@ def merged(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tup
     key = index[:, 0].astype(np.int64)
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]
-    place, rank = ranked(key)
+    _, place, rank = np.unique(key, return_index=True, return_inverse=True)
     total, largest = (_sums(values, rank, len(place)) for values in (coefficient, scale))
     kept = beyond_noise(total, largest)
     return index[place[kept]], total[kept]
@@ -256,14 +217,3 @@ def _sums(values: Floats, rank: NDArray[np.intp], count: int) -> Floats:
 def beyond_noise(total: Floats, scale: Floats) -> Bools:
     """Whether sums exceed rounding, for terms of that scale."""
     return np.abs(total) > _NOISE * scale
-
-
-def ranked(values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Positions of the distinct values in ascending order, and the rank of every value among them."""
-    order = np.argsort(values, kind="stable")
-    ascending = values[order]
-    new = np.ones(len(values), dtype=bool)
-    np.not_equal(ascending[1:], ascending[:-1], out=new[1:])
-    rank = np.empty(len(values), dtype=np.intp)
-    rank[order] = np.cumsum(new) - 1
-    return order[new], rank

@@ -9,14 +9,17 @@ model.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.instance import Instance
-from .families import PlacedFamily, Placement
 from .symbols import IndexSet, pixel_of
+
+if TYPE_CHECKING:
+    from .families import PlacedFamily
+    from .problem import Problem
 
 Bytes = NDArray[np.uint8]
 """Texts as rows of bytes, padded with NUL on the right."""
@@ -82,7 +85,7 @@ def stacked(matrices: list[Bytes]) -> Bytes:
     return out
 
 
-def column_names(problem: Placement) -> Bytes:
+def column_names(problem: Problem) -> Bytes:
     """Names of all columns in column order, shape (columns, width), padded with NUL."""
     return stacked(
         [element_names(problem.instance, block.name, block.over) for block in problem.blocks.values()]
@@ -95,6 +98,6 @@ def family_names(family: PlacedFamily) -> Bytes:
     return names if family.everywhere else names[family.elements]
 
 
-def row_names(problem: Placement) -> Bytes:
+def row_names(problem: Problem) -> Bytes:
     """Names of all rows in row order, shape (rows, width), padded with NUL."""
     return stacked([family_names(family) for family in problem.rows])

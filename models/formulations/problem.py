@@ -26,7 +26,7 @@ from ..previews import table_of
 from .arrays import ProblemArrays, arrays_of, check_highs, highs_of
 from .catalogue import declare, lift_products, norm_of
 from .declaration import Family, Formulation
-from .families import ANY_DEGREE, Block, Monomial, PlacedFamily, block_costs, merged, ordered
+from .families import ANY_DEGREE, Block, PlacedFamily, merged, ordered
 from .symbols import NARROWED, SLOTS, VARIABLES, Variable, elements, numeric, way
 from .windows import Windows
 
@@ -293,20 +293,9 @@ class Problem:
             return np.zeros((1, 0), np.int32), np.array([total])
         if not terms:
             return np.zeros((0, degree), np.int32), np.zeros(0)
-        if degree == 1:
-            return self._merged_costs([term for term, _ in terms])
         index = np.concatenate([ordered(term.factors) for term, _ in terms])
         scale = np.concatenate([family.scale for _, family in terms])
         return merged(index, np.concatenate(coefficients), scale, self.n_columns)
-
-    def _merged_costs(self, terms: list[Monomial]) -> tuple[Ints, Floats]:
-        reached = [(term.family.block(term.symbols[0]).name, term) for term in terms]
-        costs = [
-            block_costs([term for name, term in reached if name == block.name], block)
-            for block in self.blocks.values()
-        ]
-        index, cost = zip(*costs, strict=True)
-        return np.concatenate(index), np.concatenate(cost)
 
     def to_arrays(self, *, names: bool = True) -> ProblemArrays:
         """Return the problem up to degree 2 as NumPy arrays and SciPy matrices.
