@@ -35,6 +35,7 @@ GENERATED = {
 """Programs with their arguments, and the pages in which they replace tables and counts."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", GENERATED, ids=lambda command: command[0])
 def test_generated_tables_and_counts_are_up_to_date(tmp_path, command):
     copy = tmp_path / "project"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import json
 import os
@@ -13,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import make_field, make_instance, make_problem
-from crossfield.export.bundle import manifest as manifest_module
 from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
 from crossfield.export.bundle.starts import STARTS
 from crossfield.export.formats.registry import FORMATS, format_of, write
@@ -25,7 +23,7 @@ from crossfield.models.errors import (
     UnsupportedByFormatError,
 )
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.problem import Problem, formulate, lifted, with_integers_fixed
+from crossfield.models.formulations.problem import formulate, lifted, with_integers_fixed
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import Instance
 from loops import for_each
@@ -307,20 +305,6 @@ def test_unknown_formats_dialects_and_folders(tmp_path):
     assert format_of("a.b.mps.gz").name == "mps"
     with pytest.raises(InputError, match=r"MODEL\.PS\.GZ: no format has the suffix 'PS'"):
         format_of("MODEL.PS.GZ")
-
-
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_an_export_holds_one_problem_more_than_it_has_jobs(tmp_path, monkeypatch, jobs):
-    monkeypatch.setattr(manifest_module, "LARGE", 0)  # the collector runs for large instances only
-    instance, most = make_instance(), []
-
-    def progress(_name):
-        present = [each for each in gc.get_objects() if isinstance(each, Problem)]
-        most.append(len({each.name for each in present if each.instance is instance}))
-
-    write_all(instance, tmp_path, formats=["nl", "mps"], jobs=jobs, progress=progress)
-    assert len(most) == len(FORMULATIONS)
-    assert max(most) <= jobs + 1
 
 
 @pytest.mark.parametrize("name", FORMATS)
