@@ -45,8 +45,13 @@ class Curves:
 
     @property
     def box(self) -> Box:
-        """Left, top, right, bottom of the curves."""
-        return bounding_box(self.points)
+        """Left, top, right, bottom of the curves, not of their control points."""
+        corners = self.points.reshape(-1, 2)
+        span = float(np.ptp(corners, axis=0).max())
+        if span > 0:
+            corners = flatten(self.points, _BOX_TOLERANCE * span)[0].reshape(-1, 2)
+        (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        return left, top, right, bottom
 
     def ends(self) -> Floats:
         """Ends that no other curve shares: points and directions of continuation (n, 2, 2)."""
@@ -101,14 +106,6 @@ def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]
     step = np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)
     ends = [_at(points[owner], (step + side) / steps[owner]) for side in (0, 1)]
     return np.stack(ends, axis=1), owner
-
-
-def bounding_box(points: Floats) -> Box:
-    """Least x, least y, greatest x, greatest y of the curves, not of their control points."""
-    span = float(np.ptp(points.reshape(-1, 2), axis=0).max())
-    corners = flatten(points, _BOX_TOLERANCE * span)[0].reshape(-1, 2) if span > 0 else points.reshape(-1, 2)
-    (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-    return left, top, right, bottom
 
 
 def _at(points: Floats, t: Floats) -> Floats:

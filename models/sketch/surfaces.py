@@ -87,6 +87,9 @@ def _revolved(
     slopes: tuple[_Profile, _Profile],
     t_range: tuple[float, float],
     cut: float,
+    *,
+    turn: tuple[float, float] = (-30, 15),
+    share: float = 0.25,
 ) -> CurvaturePatch:
     """The front, up to `cut` radians from the sides, of a profile (radius, y) revolved about the y axis."""
     (radius, y), (widening, rise) = profile, slopes
@@ -96,8 +99,8 @@ def _revolved(
         along_t=lambda s, t: _vectors(widening(t) * cosine(s), rise(t), widening(t) * sine(s)),
         s_range=(cut, np.pi - cut),
         t_range=t_range,
-        turn=turned_by(-30, 15),
-        share=0.25,
+        turn=turned_by(*turn),
+        share=share,
     )
 
 
@@ -139,13 +142,12 @@ _TUBE: Final = 0.45  # radius of the torus's tube; its centre line has radius 1
 _WAVE: Final = 0.6  # height of the wave
 
 SURFACES: Final[dict[str, CurvaturePatch]] = {
-    "tilted_cylinder": CurvaturePatch(
-        position=lambda s, t: _vectors(cosine(s), t, sine(s)),
-        along_s=lambda s, t: _vectors(-sine(s), 0 * t, cosine(s)),
-        along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
-        s_range=(0.45, np.pi - 0.45),
-        t_range=(-1.3, 1.3),
-        turn=turned_by(35, 20),
+    "tilted_cylinder": _revolved(
+        (lambda t: 1 + 0 * t, lambda t: t),
+        (lambda t: 0 * t, lambda t: 1 + 0 * t),
+        (-1.3, 1.3),
+        0.45,
+        turn=(35, 20),
         share=1 / 3,
     ),
     "torus_patch": CurvaturePatch(

