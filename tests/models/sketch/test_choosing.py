@@ -6,8 +6,6 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InputError
 from crossfield.models.instance.angles import line_difference
-from crossfield.models.sketch.labels import label_of
-from crossfield.models.sketch.samples import sample_svg
 from drawings import png, read, svg
 from loops import for_each
 from PIL import Image, ImageDraw
@@ -205,12 +203,7 @@ def test_a_drawing_of_nothing_but_its_outline_and_unknown_silhouettes_are_refuse
         cf.read_sketch(tmp_path / "none.svg", silhouette="inner")
 
 
-def test_samples_in_one_colour_lose_their_silhouette_when_asked():
-    whole, inner = cf.sample("mouse", 24), cf.sample("mouse", 24, silhouette="outer")
-    read_alike = read(sample_svg("mouse").encode(), 24, silhouette="outer")
-    assert np.array_equal(inner.stroke_pixels, read_alike.stroke_pixels)
-    assert np.array_equal(whole.mask, inner.mask)
-    assert len(inner.theta) < len(whole.theta)
+def test_computed_samples_have_no_silhouette():
     with pytest.raises(InputError, match="torus_patch is computed, not drawn; choose the silhouette none"):
         cf.sample("torus_patch", 16, silhouette="outer")
 
@@ -226,12 +219,6 @@ def test_pictures_have_no_labels_and_flat_drawings_no_views(tmp_path):
     for name in ("a.png", "a.svg"):
         with pytest.raises(InputError, match=r"is flat: only a \.curves file can be seen from "):
             cf.read_sketch(tmp_path / name, view="top")
-
-
-def test_labels_are_compared_as_they_are_written():
-    assert label_of(" class = Flow ") == "class=Flow"
-    assert label_of("id=a=b") == "id=a=b"
-    assert label_of("color=RED") == label_of("colour=#f00") == "colour=#ff0000"
 
 
 def test_commands_read_what_python_reads(tmp_path, capsys):

@@ -11,7 +11,7 @@ from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.sketch.bitmap import read_bitmap
-from crossfield.models.sketch.cover import Frame, block_means, cover_by_segments, fit_frame
+from crossfield.models.sketch.cover import Frame, cover_by_segments
 from crossfield.models.sketch.curves import flatten
 from crossfield.models.sketch.pen_strokes import read_scap
 from crossfield.models.sketch.read import check_memory, name_from, read_sketch
@@ -79,12 +79,6 @@ def test_a_line_along_a_pixel_edge_is_shared_by_both_sides():
     np.testing.assert_allclose(cover.amount, np.array([[0, 0.5, 0.5, 0]] * 4).T)
 
 
-def test_nothing_and_lines_off_the_grid_cover_nothing():
-    frame = Frame(0, 0, 1, 3, 3)
-    for segments in (np.zeros((0, 2, 2)), np.array([[[-5.0, -1.0], [9.0, -1.0]], [[1.0, 1.0], [1.0, 1.0]]])):
-        assert cover_by_segments(segments, frame).amount.sum() == 0
-
-
 @given(st.lists(st.floats(-50, 50), min_size=8, max_size=8), st.floats(1e-3, 5))
 def test_flattening_stays_within_its_tolerance(numbers, tolerance):
     points = np.array(numbers).reshape(1, 4, 2)
@@ -98,28 +92,9 @@ def test_flattening_stays_within_its_tolerance(numbers, tolerance):
     assert np.hypot(*(true - segments.mean(axis=1)).T).max() <= tolerance * (1 + 1e-9)
 
 
-def test_the_frame_has_a_margin_and_the_drawing_in_its_middle():
-    frame = fit_frame((0, 0, 100, 20), 200, margin=True)
-    assert (frame.width, frame.pixel) == (200, pytest.approx(0.54))
-    assert (frame.x, frame.y + frame.height * frame.pixel / 2) == (pytest.approx(-4), pytest.approx(10))
-    small = fit_frame((0, 0, 100, 100), 10, margin=True)
-    assert small.pixel == pytest.approx(12.5)  # one whole pixel on either side
-    assert fit_frame((0, 0, 100, 50), 10, margin=False) == Frame(0, 0, 10, 5, 10)
-
-
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 7, 100])
 def test_the_longer_side_has_as_many_pixels_as_asked_for(size):
     assert max(read(svg(f'<path d="M5 5Q60 5 95 45" {BLACK}/>'), size).mask.shape) == size
-
-
-def test_block_means_are_exact_areas():
-    image = np.arange(12.0).reshape(3, 4)
-    means = block_means(image, np.array([-1.0, 0.5, 3.0]), np.array([0.0, 1.5, 4.0]))
-    np.testing.assert_allclose(
-        means[0], [(0 + 0.5 * 1) * 0.5 / (1.5 * 1.5), (0.5 * 1 + 2 + 3) * 0.5 / (1.5 * 2.5)]
-    )
-    total = (means * np.outer([1.5, 2.5], [1.5, 2.5])).sum()
-    assert total == pytest.approx(image.sum())
 
 
 # --- SVG ----------------------------------------------------------------------------------------------------
@@ -423,17 +398,6 @@ def test_red_lines_are_curvature_lines_and_the_others_cut():
 def test_a_sketch_in_one_colour_is_all_curvature_lines(colour):
     body = TWO_COLOURS.replace("#d1242f", "black")
     assert_same(read(svg(body.replace("black", colour))), read(svg(body)))
-
-
-def test_a_black_line_across_cuts_the_field_in_two():
-    instance = read(
-        svg(
-            f'<rect x="10" y="10" width="80" height="80" {BLACK}/><path d="M50 10V90" {BLACK}/><path '
-            f'd="M20 50H80" {RED}/>'
-        ),
-        40,
-    )
-    assert instance.grid.parts == 2
 
 
 def test_a_part_without_a_curvature_line_is_left_out():
