@@ -21,7 +21,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -31,12 +31,9 @@ from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.errors import CrossfieldError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import STROKE_WEIGHT, Instance
-from crossfield.models.sketch.samples import SAMPLES
-from drawings import SUFFIXES
 from studying.fields import MOST_CURVES
-from studying.hidden import hidden_curves
+from studying.instances import curves, drawing, drawings, noisy, surfaces
 from studying.rows import DATA
-from studying.tracing import curves_of
 
 KEPT: Final = DATA / "fields.csv"
 COLUMNS: Final = ("measure", "name", "size", "noise", "weight", "method", "curve", "value")
@@ -57,22 +54,15 @@ Found = Iterator[tuple[float, str, str, float]]
 
 @dataclass(frozen=True)
 class Task:
-    """A drawing or a surface at a size. source: a sample or a file. seconds: of methods that search."""
+    """A drawing or a surface at a size. folder: of drawings by others. seconds: of methods that search."""
 
     measure: str
     name: str
-    source: str
     size: int
     noise: float
+    folder: Path | None
     seconds: float
     methods: tuple[str, ...]
-
-    @property
-    def instance(self) -> Instance:
-        """The instance under the default weights."""
-        if self.source in SAMPLES:
-            return cf.sample(self.source, self.size)
-        return cf.read_sketch(self.source, size=self.size)
 
     def tried(self, weight: float) -> list[str]:
         """The methods under a weight of the strokes: all under the default, else the greedy one."""
@@ -91,12 +81,12 @@ def hidden(task: Task) -> Found:
     limits = cf.Limits(task.seconds, threads=1)
     for weight in WEIGHTS:
         names = [name for name in task.tried(weight) if name not in FOR_ENERGY or task.size == MIDDLE]
-        instance = task.instance.with_weights(stroke_weight=weight)
-        longest = hidden_curves(instance, curves_of(instance, task.source), MOST_CURVES) if names else []
+        longest = curves(task.name, task.size, MOST_CURVES, task.folder) if names else []
         for number, curve in enumerate(longest):
+            rest = curve.rest.with_weights(stroke_weight=weight)
             for name in names:
                 with suppress(CrossfieldError):  # the method has no field without this curve
-                    field = answer(name, curve.rest, limits)
+                    field = answer(name, rest, limits)
                     yield weight, name, str(number), float(np.degrees(curve.deviation(field)))
 
 
@@ -118,7 +108,7 @@ def fields(task: Task, instance: Instance) -> Iterator[tuple[float, str, CrossFi
 
 def missed(task: Task) -> Found:
     """The share of the stroke pixels of a drawing that fields miss."""
-    for weight, name, field in fields(task, task.instance):
+    for weight, name, field in fields(task, drawing(task.name, task.size, task.folder)):
         yield weight, name, "", float((np.degrees(field.stroke_deviation) > MISSED).mean())
 
 
@@ -127,9 +117,7 @@ def surface(task: Task) -> Found:
     truth = cf.analytic(task.name, task.size)
     errors: dict[tuple[float, str], list[float]] = {}
     for seed in range(SEEDS if task.noise else 1):
-        noise = np.random.default_rng(seed).standard_normal(len(truth.instance.theta))
-        instance = replace(truth.instance, theta=truth.instance.theta + np.radians(task.noise) * noise)
-        for weight, name, field in fields(task, instance):
+        for weight, name, field in fields(task, noisy(truth.instance, task.noise, seed)):
             error = np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean()
             errors.setdefault((weight, name), []).append(float(error))
     yield from ((weight, name, "", float(np.mean(found))) for (weight, name), found in errors.items())
@@ -145,14 +133,10 @@ MEASURES: Final[dict[str, Callable[[Task], Found]]] = {
 def tasks(measure: str, folder: Path | None, seconds: float, methods: tuple[str, ...]) -> list[Task]:
     """The tasks of a measure, in order."""
     if measure == "surface":
-        names = [name for name, entry in SAMPLES.items() if entry.kind == "analytic"]
-        cases = [(name, name, size, noise) for size in SURFACE_SIZES for noise in NOISE for name in names]
+        cases = [(name, size, noise) for size in SURFACE_SIZES for noise in NOISE for name in surfaces()]
     else:
-        own = [(name, name) for name, entry in SAMPLES.items() if entry.kind == "sketch"]
-        files = [path for path in sorted(folder.iterdir()) if path.suffix in SUFFIXES] if folder else []
-        others = [(path.name, str(path)) for path in files if not path.stem.endswith("_mask")]
-        cases = [(name, source, size, 0.0) for size in SIZES for name, source in [*own, *others]]
-    return [Task(measure, *case, seconds, methods) for case in cases]
+        cases = [(name, size, 0.0) for size in SIZES for name in drawings(folder)]
+    return [Task(measure, *case, folder, seconds, methods) for case in cases]
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ import crossfield as cf
 import numpy as np
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
+from drawings import drawings_of
 
 from .hidden import HiddenCurve, hidden_curves
 from .tracing import curves_of
@@ -20,8 +21,7 @@ def drawings(folder: Path | None) -> list[str]:
     own = [name for name, entry in SAMPLES.items() if entry.kind == "sketch"]
     if folder is None:
         return own
-    files = sorted(each for each in folder.iterdir() if each.suffix in {".svg", ".png", ".scap"})
-    return own + [each.name for each in files if not each.stem.endswith("_mask")]
+    return own + [sketch.name for sketch in drawings_of(folder)]
 
 
 def surfaces() -> list[str]:

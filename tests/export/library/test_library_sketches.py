@@ -7,9 +7,9 @@ from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.site.site import write_site
 from crossfield.models.errors import InputError
 from crossfield.models.instance.file import read_instance
-from drawings import read
 from forging import seal
 from libraries import library_of
+from small_drawings import read
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 

@@ -6,9 +6,9 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InputError
 from crossfield.models.instance.angles import line_difference
-from drawings import png, read, svg
 from loops import for_each
 from PIL import Image, ImageDraw
+from small_drawings import png, read, svg
 
 LAYER = 'inkscape:groupmode="layer" inkscape:label="Flow lines"'
 LINES = '<path d="M20 50H80"/><path d="M50 20V80"/>'

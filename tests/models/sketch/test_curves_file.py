@@ -6,11 +6,11 @@ import pytest
 from crossfield.models import input_limits
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.sketch.pen_strokes import axes_of, read_curves
-from drawings import read
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
 from PIL import Image
+from small_drawings import read
 
 
 def content(strokes):

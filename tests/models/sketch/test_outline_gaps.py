@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from crossfield.models.sketch.samples import samples
 from crossfield.models.sketch.thinning import thinned
-from drawings import png, read, svg
 from PIL import Image, ImageDraw
 from scipy import ndimage
+from small_drawings import png, read, svg
 
 SKETCHES = [each.name for each in samples() if each.kind == "sketch"]
 

@@ -8,9 +8,9 @@ from crossfield.models.errors import InputError
 from crossfield.models.sketch.published import published, redrawn
 from crossfield.models.sketch.samples import SAMPLES, sample_svg
 from crossfield.models.sketch.svg import read_svg
-from drawings import png, read
 from loops import for_each
 from PIL import Image
+from small_drawings import png, read
 
 DRAWN = [name for name, each in SAMPLES.items() if each.kind == "sketch"]
 TURNED = b"""<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm">

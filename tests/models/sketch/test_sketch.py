@@ -16,12 +16,12 @@ from crossfield.models.sketch.curves import flatten
 from crossfield.models.sketch.pen_strokes import read_scap
 from crossfield.models.sketch.read import check_memory, name_from, read_sketch
 from crossfield.models.sketch.svg import read_svg
-from drawings import BLACK, RED, png, read, svg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
 from PIL import Image, ImageDraw, ImageOps
 from scipy import ndimage
+from small_drawings import BLACK, RED, png, read, svg
 
 LINE = f'<path d="M10 10 L90 90" {BLACK}/>'
 
