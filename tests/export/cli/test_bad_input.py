@@ -201,24 +201,6 @@ def in_child(*arguments, prelude=""):
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize(
-    "package, formulation, solver",
-    [
-        ("highspy", "milp-mccormick", "HiGHS"),
-        ("casadi", "qp-fixed", "Ipopt"),
-        ("casadi", "miqp-exact", "Bonmin"),
-    ],
-)
-@pytest.mark.slow
-def test_a_missing_solver_is_named(files, tmp_path, package, formulation, solver):
-    before = listing(tmp_path)
-    arguments = f"solve tiny.json -f {formulation} --solver {solver.lower()} -o out".split()
-    done = in_child(*arguments, prelude=f"sys.modules[{package!r}] = None")
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr == f"crossfield: {solver} is not installed; pip install {package}\n"
-    assert listing(tmp_path) == before
-
-
 @pytest.mark.slow
 def test_another_solver_for_the_class_replaces_a_missing_one(files):
     arguments = ["solve", "tiny.json", "-f", "milp-mccormick", "--json", "-o", "out"]
@@ -274,19 +256,13 @@ resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"""
 DISK = {
     "instance": (["instance", "mouse"], "out.json", 1000),
     "export": (["export", "mouse", "--size", "10", "-f", "milp-mccormick"], "out", 30_000),
-    "solve": (["solve", "mouse", "--size", "10", "-f", "milp-mccormick"], "out", 30_000),
     "run": (["run", "mouse", "--size", "10"], "out", 30_000),
     "draw": (["draw", "field.npz"], "out.png", 1000),
-    "draw pdf": (["draw", "field.npz"], "out.pdf", 1000),
 }
 
 
-SLOW = ("solve", "run", "draw pdf", "draw", "export")
-
-
-@pytest.mark.parametrize(
-    "case", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in DISK]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("case", DISK)
 def test_only_complete_files_remain_on_a_full_disk(tmp_path, monkeypatch, case):
     arguments, output, limit = DISK[case]
     monkeypatch.chdir(tmp_path)

@@ -251,12 +251,6 @@ def test_help_loads_nothing_heavy():
     }  # fmt: skip
 
 
-def test_without_a_command_there_is_help(capsys):
-    assert invoke([]) in {0, 2}
-    captured = capsys.readouterr()
-    assert "Commands" in captured.out + captured.err
-
-
 def test_the_version_is_that_of_the_package(crossfield):
     from importlib.metadata import version
 
@@ -394,17 +388,6 @@ def test_progress_is_shown_on_a_terminal_only(tmp_path, instance_file):
     done = child(*arguments)
     assert "solving" not in done.stdout
     assert without_progress(done.stderr) == ""
-
-
-@pytest.mark.slow
-def test_the_plan_of_a_run_is_printed_on_a_terminal_unless_quiet(tmp_path):
-    (tmp_path / "file").touch()
-    arguments = ("run", "skew", "--size", "4", "--time-limit", "20", "-o", tmp_path / "file")
-    code, shown = in_terminal(arguments)
-    assert code == 1
-    plan = "at most 60 s: search 20, two-stage 20, prove 20; files and pictures on top"
-    assert plan in shown
-    assert plan not in in_terminal([*arguments, "--quiet"])[1]
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -7,7 +7,6 @@ import re
 import struct
 import subprocess
 import sys
-import warnings
 import zipfile
 from pathlib import Path
 
@@ -346,22 +345,6 @@ def test_damaged_headers_are_refused_without_a_warning(tmp_path, header):
         archive.writestr("u.npy", content)
     with pytest.raises(InstanceError, match="no header as NumPy writes it"):
         ArrayArchive(buffer.getvalue()).arrays({"u": Expected(1, 10)})
-
-
-def test_warnings_of_other_threads_are_no_errors_while_an_archive_is_read():
-    """All threads share the filters; this mapping records them while the archive is read."""
-
-    class Watched(dict):
-        def items(self):
-            found.append(list(warnings.filters))
-            return super().items()
-
-    found = []
-    data = pack_arrays({"u": np.zeros(3)})
-    with warnings.catch_warnings(action="default"):
-        before = list(warnings.filters)
-        assert ArrayArchive(data).arrays(Watched({"u": Expected(1, 10)}))["u"].tolist() == [0.0] * 3
-    assert found == [before]
 
 
 def test_pictures_are_the_same_for_any_number_of_rows_per_band(tmp_path, monkeypatch):
