@@ -11,7 +11,6 @@ from types import SimpleNamespace
 
 import places
 import pytest
-from clusters import cluster
 
 DOCS = places.ROOT / "docs"
 DATA = DOCS / "studying" / "data"
@@ -26,7 +25,7 @@ from studying.rows import Run
 
 HANDFUL = [Run("practice", "skew", 6 + n, way) for n in range(6) for way in ("greedy", "power")]
 work.stages = lambda plan, folder: [Stage("a handful", tuple(HANDFUL))]
-work.carry_out(None, Path({data!r}), jobs=1, scheduler={scheduler!r}, progress=lambda line: None)
+work.carry_out(None, Path({data!r}), jobs=1, progress=lambda line: None)
 """
 
 
@@ -42,7 +41,7 @@ def lines_of(path):
 
 @pytest.mark.slow
 def test_a_study_that_is_killed_goes_on_and_every_run_has_one_row(study, tmp_path):
-    program = SMALL.format(docs=str(DOCS), data=str(tmp_path), scheduler=None)
+    program = SMALL.format(docs=str(DOCS), data=str(tmp_path))
     file = tmp_path / "practice.csv"
     child = subprocess.Popen([sys.executable, "-c", program])
     while len(lines_of(file)) < 4:
@@ -60,24 +59,6 @@ def test_a_study_that_is_killed_goes_on_and_every_run_has_one_row(study, tmp_pat
     keys = [study.rows.key_of(row) for row in rows]
     assert len(keys) == len(set(keys)) == 12
     assert {row["status"] for row in rows} == {"field"}
-
-
-@pytest.mark.slow
-@pytest.mark.needs("distributed")
-def test_a_study_on_a_cluster_has_the_rows_that_it_has_here(study, tmp_path):
-    rows = {}
-    with cluster(tmp_path, PYTHONPATH=str(DOCS)) as (address, workers):
-        for name, scheduler in (("there", address), ("here", None)):
-            program = SMALL.format(docs=str(DOCS), data=str(tmp_path / name), scheduler=scheduler)
-            subprocess.run([sys.executable, "-c", program], check=True)
-            rows[name] = list(study.rows.read(tmp_path / name / "practice.csv"))
-        assert all(worker.poll() is None for worker in workers)
-    assert len(rows["here"]) == 12
-    found = {
-        name: {study.rows.key_of(row): (row["status"], row["energy_2"], row["off"]) for row in each}
-        for name, each in rows.items()
-    }
-    assert found["here"] == found["there"]
 
 
 def test_a_second_row_of_a_run_and_a_file_of_another_study_are_refused(study, tmp_path):

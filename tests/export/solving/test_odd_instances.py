@@ -3,7 +3,6 @@
 from collections import Counter
 
 import crossfield as cf
-import numpy as np
 import pytest
 from crossfield.export.solvers_table import takes_in
 from crossfield.export.solving.local import Files, Solvers
@@ -127,10 +126,9 @@ def test_some_odd_instances_are_exported_solved_and_read(solvers, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(8))
+@pytest.mark.parametrize("block", range(2))
 def test_odd_instances_are_exported_solved_and_read(block, solvers, tmp_path):
     first = len(FORMULATIONS) + 50 * block
     count = sum((assert_answers_of(seed, solvers, tmp_path) for seed in range(first, first + 50)), Counter())
     assert {name for name, *_ in count} == set(FORMULATIONS)
     assert {solver for _, solver, *_ in count} == {*BUNDLED, "at jumps"}
-    assert np.mean(list(count.values())) > 2

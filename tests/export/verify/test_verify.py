@@ -56,7 +56,6 @@ def on_grid(height: int, width: int, name: str = "small", seed: int = 4) -> Inst
 
 INSTANCES: dict[str, Callable[[], Instance]] = {
     "1 x 3": lambda: on_grid(1, 3),
-    "3 x 3 with a hole": lambda: make_instance("hole"),
     "a sample": lambda: sample("skew", 5),
 }
 RELAXED = "1 x 3, relaxed"

@@ -131,16 +131,15 @@ def assert_round_trip(seed, folder):
     return proof
 
 
-def test_forty_odd_instances_are_proven_written_checked_and_read(tmp_path):
-    few = [seed for seed in range(100) if odd_instance(seed).grid.size <= MOST_PAIRS][:40]
+def test_few_odd_instances_are_proven_written_checked_and_read(tmp_path):
+    few = [seed for seed in range(100) if odd_instance(seed).grid.size <= MOST_PAIRS][:24]
     proofs = [assert_round_trip(seed, tmp_path) for seed in few]
-    assert len(proofs) == 40
     assert {proof.norm for proof in proofs} == set(NORMS)
     assert {proof.status for proof in proofs} == {"optimal", "gap"}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(20))
+@pytest.mark.parametrize("block", range(6))
 def test_odd_instances_are_proven_written_checked_and_read(block, tmp_path):
     for seed in range(20 * block, 20 * block + 20):
         assert_round_trip(seed, tmp_path)

@@ -100,7 +100,6 @@ def test_contact_along_the_strokes_of_a_drawing():
 @pytest.mark.parametrize(
     "name, size",
     [
-        *(pytest.param(known.name, 24, marks=pytest.mark.slow) for known in samples()[3:]),
         *((known.name, 24) for known in samples()[:3]),
         pytest.param("ring", 48, marks=pytest.mark.slow),
     ],
