@@ -37,6 +37,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import IO, Any, NoReturn, Optional, TypeVar
 
+from ....models.formulations.symbols import COLUMNS
 from ...solutions.readers.grammar import HEAD, LineError, Scan, plain_numbers, plain_text, spellings
 from ...solutions.readers.listings import TEXT_LAYOUTS
 
@@ -82,8 +83,6 @@ ADDED = re.compile(
 
 STAMP = re.compile(r"(?:sha256_|\b(?:t_)?ONE_)([0-9a-f]{11})", re.IGNORECASE | re.ASCII)
 """The first digits of a problem's hash, in the name of a model, a column or an objective."""
-
-ON_PIXELS, ON_PAIRS = ("alpha", "beta", "psi", "gamma", "chi"), ("p", "p1", "p2", "s", "t", "z", "d", "u")
 
 Entry = tuple[int, Decimal]
 Product = tuple[int, int, Decimal]
@@ -698,7 +697,11 @@ class Field:
 
 def check_instance(instance: Instance, point: Point) -> Finding:
     """Check the cross field of a point on an instance."""
-    places = {pixel.place for pixel in instance.pixels}, {name for name, _, _ in instance.pairs}
+    places = {
+        "pixels": {pixel.place for pixel in instance.pixels},
+        "strokes": {pixel.place for pixel in instance.pixels if pixel.stroke is not None},
+        "pairs": {name for name, _, _ in instance.pairs},
+    }
     foreign = [name for name in point.values if not _is_of(name, places) and not ADDED.fullmatch(name)]
     _refuse_foreign(foreign, len(point.values))
     tags = {name.split("_", 1)[0] for name in point.values}
@@ -717,9 +720,10 @@ def check_instance(instance: Instance, point: Point) -> Finding:
     return Finding(energy, lines, field.violations())
 
 
-def _is_of(name: str, places: tuple[set[str], set[str]]) -> bool:
-    tag, _, place = name.partition("_")
-    return (tag in ON_PIXELS and place in places[0]) or (tag in ON_PAIRS and place in places[1])
+def _is_of(name: str, places: dict[str, set[str]]) -> bool:
+    """Whether a column of a formulation on the instance has this name."""
+    symbol, _, place = name.partition("_")
+    return symbol in COLUMNS and place in places[COLUMNS[symbol]]
 
 
 # ----------------------------------------------------------------------------------------------------- report
