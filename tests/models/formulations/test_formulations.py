@@ -85,21 +85,24 @@ def test_hull_facets_force_the_product_and_the_printed_one_does_not():
                 assert high == pytest.approx(0, abs=1e-15)
 
 
-@for_each("name", FORMULATIONS)
-def test_every_formulation_has_its_class(name):
+CLASSES = {
+    "minlp-parity": ("MINLP", False, 99, 0),
+    "minlp-quartic": ("MINLP", False, 4, 1),
+    "minlp-cubic": ("MINLP", False, 3, 1),
+    "miqcp-bilinear": ("MIQCP", False, 2, 2),
+    "miqcp-bilinear-l1": ("MIQCP", False, 1, 2),
+    "miqp-mccormick": ("MIQP", True, 2, 1),
+    "milp-mccormick": ("MILP", True, 1, 1),
+    "qp-fixed": ("QP", True, 2, 0),
+    "miqp-exact": ("MIQP", True, 2, 1),
+}
+"""Class, convexity, degree of the objective and of the rows."""
+
+
+@for_each("name, expected", CLASSES.items())
+def test_every_formulation_has_its_class(name, expected):
     field = make_field(make_instance())
     problem = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
-    expected = {
-        "minlp-parity": ("MINLP", False, 99, 0),
-        "minlp-quartic": ("MINLP", False, 4, 1),
-        "minlp-cubic": ("MINLP", False, 3, 1),
-        "miqcp-bilinear": ("MIQCP", False, 2, 2),
-        "miqcp-bilinear-l1": ("MIQCP", False, 1, 2),
-        "miqp-mccormick": ("MIQP", True, 2, 1),
-        "milp-mccormick": ("MILP", True, 1, 1),
-        "qp-fixed": ("QP", True, 2, 0),
-        "miqp-exact": ("MIQP", True, 2, 1),
-    }[name]
     assert (problem.problem_class, problem.convex, problem.objective_degree, problem.row_degree) == expected
     if name != "qp-fixed":
         relaxed = formulate(field.instance, name, relax=True)
