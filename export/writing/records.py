@@ -323,7 +323,8 @@ def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
     few = 0 <= most - least < _FEW and max(-least, most) < MOST
     if few and (values == np.rint(values)).all():
         return np.arange(least, most + 1), (values - least).astype(np.uint8)
-    return np.unique(values, return_inverse=True)
+    distinct, _, codes = np.unique(values, return_index=True, return_inverse=True)
+    return distinct, codes
 
 
 def check_coefficients(values: Floats | float, where: str) -> None:
