@@ -111,9 +111,9 @@ def by_linopy(instance: Instance, name: str, path: Path) -> None:
 
 def by_highs(instance: Instance, name: str, path: Path) -> None:
     """HiGHS: a model passed as whole arrays, with our names left out, and its writeModel."""
-    from crossfield.models.formulations.arrays import highs_of
+    from crossfield.models.formulations.arrays import build_highs
 
-    highs_of(problem_of(instance, name).to_arrays(names=False), "square").writeModel(str(path))
+    build_highs(problem_of(instance, name).to_arrays(names=False), "square").writeModel(str(path))
 
 
 WRITERS: Final[dict[str, Writer]] = {

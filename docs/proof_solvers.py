@@ -15,7 +15,7 @@ import crossfield as cf
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import Norm
-from crossfield.models.formulations.problem import Problem, tightened
+from crossfield.models.formulations.problem import Problem, with_windows
 from crossfield.models.instance.instance import Instance
 from crossfield.models.proof.certificate import Certificate, write_certificate
 from crossfield.models.proof.prove import prove
@@ -107,7 +107,7 @@ def both(name: str, size: int, seconds: float, proof_seconds: float) -> Iterator
             proofs[instance.sha256] = certificate(instance, proof_seconds)
         proof = proofs[instance.sha256]
         cold = cf.formulate(instance, formulation)
-        narrow = tightened(cold, windows_left(proof))
+        narrow = with_windows(cold, windows_left(proof))
         row = {
             "name": name, "width": instance.grid.width, "height": instance.grid.height,
             "pixels": instance.grid.size, "solver": solver, "formulation": formulation,

@@ -27,7 +27,7 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.sketch.surfaces import CurvaturePatch, analytic_instance, turned_by
-from crossfield.models.surface.trust import OFF, off_right_angles
+from crossfield.models.surface.trust import OFF, right_angle_deviation
 from drawings import SUFFIXES
 from make import markdown, replace_between
 
@@ -163,7 +163,7 @@ def trust(name: str, what: str, size: int) -> Rows:
     instance = cf.sample(what, size) if what in SAMPLES else cf.read_sketch(what, size=size)
     field = field_by("bend", instance)
     found = cf.surface(field)
-    off = off_right_angles(field, found.heights)
+    off = right_angle_deviation(field, found.heights)
     numbers = {
         "unfit": np.mean(off > OFF), "slant": np.degrees(np.arccos(found.normals[:, 2])).mean(),
         "confidence": found.confidence.mean(), "firm": found.firmness,

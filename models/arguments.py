@@ -39,7 +39,7 @@ _CLASSES: Final = frozenset(
 """Classes of the package, known by their names, because this module can import none of them."""
 
 
-def checked_arguments(function: Callable[_P, _Result]) -> Callable[_P, _Result]:
+def check_arguments(function: Callable[_P, _Result]) -> Callable[_P, _Result]:
     """The function, which raises InputError for an argument of another kind than its annotation names."""
     signature = inspect.signature(function)
 
@@ -70,7 +70,7 @@ def check_kind(name: str, value: Any, annotation: str, error: _ErrorClass = Inpu
     kinds = [_kind(part) for part in annotation.split(" | ")]
     if any(fits(value) for _, fits in kinds):
         return
-    raise error(f"{name} is {_shown(value)}; give {' or '.join(words for words, _ in kinds)}")
+    raise error(f"{name} is {_quoted_value(value)}; give {' or '.join(words for words, _ in kinds)}")
 
 
 def check_count(name: str, value: int, least: int = 0) -> None:
@@ -85,7 +85,9 @@ def check_positive(name: str, value: float) -> None:
         raise InputError(f"{name} is {value}; give a number above 0")
 
 
-def numbers(values: Any, name: str, error: _ErrorClass = InputError) -> np.ndarray[Any, np.dtype[np.float64]]:
+def float_array(
+    values: Any, name: str, error: _ErrorClass = InputError
+) -> np.ndarray[Any, np.dtype[np.float64]]:
     """The values as a new array of float64. Raises the error, which names them, unless they are real."""
     try:
         array = np.asarray(values)
@@ -101,7 +103,9 @@ def _kind(annotation: str) -> tuple[str, Callable[[Any], bool]]:
     if annotation in _KINDS:
         return _KINDS[annotation]
     if annotation in _CLASSES:
-        return _named(annotation), lambda value: annotation in {each.__name__ for each in type(value).mro()}
+        return _with_article(
+            annotation
+        ), lambda value: annotation in {each.__name__ for each in type(value).mro()}
     outer, _, inner = annotation.removesuffix("]").partition("[")
     if outer in {"dict", "Mapping"}:
         return "a dictionary", lambda value: isinstance(value, Mapping)
@@ -118,11 +122,11 @@ def _is_list(value: Any, fits: Callable[[Any], bool]) -> bool:
     return not isinstance(value, Sequence) or all(map(fits, value))
 
 
-def _shown(value: Any) -> str:
+def _quoted_value(value: Any) -> str:
     if value is None or isinstance(value, (str, Real, list, tuple, *_BOOLEAN)):
         return shortened(repr(value), 40)
-    return _named(type(value).__name__)
+    return _with_article(type(value).__name__)
 
 
-def _named(kind: str) -> str:
+def _with_article(kind: str) -> str:
     return f"{'an' if kind[0] in 'AEIOUaeiou' else 'a'} {kind}"

@@ -36,7 +36,7 @@ _ERRORS: Final = (
 _NUMBERS: Final = re.compile(r"\|(?:b1|[iu]1)|<(?:[iu][248]|f[248])")
 
 
-class Expected(NamedTuple):
+class ExpectedArray(NamedTuple):
     """Limits of a member: number of dimensions, most entries along one, kinds of its numbers."""
 
     dimensions: int
@@ -82,7 +82,7 @@ class ArrayArchive:
     """The members of an .npz in memory; each is unpacked on request. Raises InstanceError for other bytes."""
 
     def __init__(self, data: bytes) -> None:
-        with _damage():
+        with _report_damage():
             self._archive = zipfile.ZipFile(io.BytesIO(data))
             members = self._archive.infolist()
             self._members = {member.filename.removesuffix(".npy"): member for member in members}
@@ -95,7 +95,7 @@ class ArrayArchive:
             raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")
         self._unread = set(self._members)
 
-    def arrays(self, expected: Mapping[str, Expected], prefix: str = "") -> Arrays:
+    def arrays(self, expected: Mapping[str, ExpectedArray], prefix: str = "") -> Arrays:
         """The expected arrays by name, without the prefix. Raises InstanceError for any other array."""
         return {name: self._array(prefix + name, name, limits) for name, limits in expected.items()}
 
@@ -106,12 +106,12 @@ class ArrayArchive:
                 f"holds an array {shortened(min(self._unread))!r} that does not belong in it; write it again"
             )
 
-    def _array(self, key: str, name: str, expected: Expected) -> np.ndarray[Any, Any]:
+    def _array(self, key: str, name: str, expected: ExpectedArray) -> np.ndarray[Any, Any]:
         if key not in self._members:
             raise InstanceError(f"holds no array {name!r}; expected a file written by crossfield")
         self._unread.discard(key)
-        with _damage(), self._archive.open(self._members[key]) as stream:
-            kind, shape = _described(stream.read(_HEADER), name, expected)
+        with _report_damage(), self._archive.open(self._members[key]) as stream:
+            kind, shape = _parse_header(stream.read(_HEADER), name, expected)
             length = math.prod(shape) * kind.itemsize
             if length + _HEADER != self._members[key].file_size:
                 raise zipfile.BadZipFile(f"array {name!r} has another length than its header states")
@@ -119,33 +119,33 @@ class ArrayArchive:
             array = np.frombuffer(content, dtype=kind).reshape(shape)
         # NumPy takes the bytes of bits unchanged, and counts and inverts values other than 0 and 1 wrongly.
         if kind.kind == "b" and (array.view(np.uint8) > 1).any():
-            raise _damaged(f"array {name!r} has bits beyond 1")
+            raise _damage_error(f"array {name!r} has bits beyond 1")
         return array
 
 
 @contextmanager
-def _damage() -> Iterator[None]:
+def _report_damage() -> Iterator[None]:
     """Raise InstanceError for everything that zipfile and NumPy raise for bytes of another kind."""
     try:
         yield
     except InstanceError:
         raise
     except _ERRORS as error:
-        raise _damaged(error) from error
+        raise _damage_error(error) from error
 
 
-def _damaged(reason: object) -> InstanceError:
+def _damage_error(reason: object) -> InstanceError:
     return InstanceError(f"is a damaged or unsafe .npz: {shortened(reason)}; write it again")
 
 
-def _described(head: bytes, name: str, expected: Expected) -> tuple[np.dtype[Any], tuple[int, ...]]:
+def _parse_header(head: bytes, name: str, expected: ExpectedArray) -> tuple[np.dtype[Any], tuple[int, ...]]:
     """The kind and shape in the header of an array. Raises InstanceError unless they are expected."""
     found = _ARRAY.fullmatch(head)
     if found is None:
-        raise _damaged(f"array {name!r} has no header as NumPy writes it")
+        raise _damage_error(f"array {name!r} has no header as NumPy writes it")
     kind, by_columns, sides = found[1].decode(), found[2] == b"True", found[3].decode()
     if "O" in kind:
-        raise _damaged(f"array {name!r} is pickled")
+        raise _damage_error(f"array {name!r} is pickled")
     if not _NUMBERS.fullmatch(kind) or np.dtype(kind).kind not in expected.kinds:
         raise InstanceError(
             f"array {name!r} holds {kind}, not numbers of the kind that belongs there; write it again"

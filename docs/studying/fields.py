@@ -14,9 +14,9 @@ import numpy as np
 from crossfield.export.formats.registry import generator
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.errors import CrossfieldError
-from crossfield.models.field.field import CrossField, relabelled
+from crossfield.models.field.field import CrossField, field_in_windows
 from crossfield.models.instance.instance import Instance
-from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.smooth.polyvector import HOLDS
 
@@ -118,15 +118,15 @@ def perturbed(instance: Instance, share: float, seed: int) -> CrossField:
     field, rng = cf.greedy_field(instance), np.random.default_rng([3, seed])
     chosen = rng.random(instance.grid.size) < share
     alpha = np.where(chosen, rng.uniform(0, np.pi, instance.grid.size), field.alpha)
-    moved = relabelled(instance, alpha, np.where(chosen, 0.0, field.beta), field.p)
-    return fitted(moved.with_best_jumps())
+    moved = field_in_windows(instance, alpha, np.where(chosen, 0.0, field.beta), field.p)
+    return fit_in_box(moved.with_best_jumps())
 
 
 PLAIN: Final[dict[str, Callable[[Instance], CrossField]]] = {
     "greedy": cf.greedy_field,
     "improved": lambda instance: cf.improved_field(cf.greedy_field(instance)),
-    "power": lambda instance: fitted(cf.power_field(instance)),
-    "polyvector": lambda instance: fitted(cf.polyvector_field(instance)),
+    "power": lambda instance: fit_in_box(cf.power_field(instance)),
+    "polyvector": lambda instance: fit_in_box(cf.polyvector_field(instance)),
     "bend": lambda instance: cf.bend_field(cf.polyvector_field(instance, hold=max(HOLDS))),
 }
 """Ways without a time limit."""

@@ -20,7 +20,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.errors import (
     CrossfieldError,
     FormulationError,
@@ -31,13 +31,13 @@ from ...models.errors import (
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import FORMULATIONS, declaration_of, declare
 from ...models.formulations.declaration import Declaration, Formulation, Options
-from ...models.formulations.problem import Problem, formulate, lifted, tightened
+from ...models.formulations.problem import Problem, formulate, with_products_lifted, with_windows
 from ...models.formulations.windows import Windows
 from ...models.instance.file import read_document, read_instance, write_instance
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Progress, silent
-from ...models.processes.side_by_side import checked
+from ...models.processes.process_pool import check_jobs
 from ...models.storage import make_folder, write_bytes
 from ..formats.registry import DEFAULTS, FORMATS, Written, carried, generator, write
 from ..solvers_table import smallest, takers
@@ -100,7 +100,8 @@ class Manifest:
     def held(self, problem: Problem) -> dict[str, Problem]:
         """The problem in each format, as its files hold it: the same, or with its products lifted."""
         return {
-            file["format"]: lifted(problem) if file["lifted"] else problem for file in self.document["files"]
+            file["format"]: with_products_lifted(problem) if file["lifted"] else problem
+            for file in self.document["files"]
         }
 
     @property
@@ -120,7 +121,7 @@ class Manifest:
         return jumps
 
 
-@checked_arguments
+@check_arguments
 def read_manifest(path: str | Path) -> Manifest:
     """Read a manifest, with which `read_solution` reads answers back.
 
@@ -147,7 +148,7 @@ def read_manifest(path: str | Path) -> Manifest:
     return Manifest(document, Path(path))
 
 
-@checked_arguments
+@check_arguments
 def write_problem(
     problem: Problem,
     folder: str | Path,
@@ -195,7 +196,7 @@ def write_problem(
     return _write_sets([problem], folder, formats, start, dialects or {}, compress=compress, jobs=jobs)[0]
 
 
-@checked_arguments
+@check_arguments
 def write_all(
     instance: Instance,
     folder: str | Path,
@@ -316,7 +317,7 @@ def _write_sets(
     existing file is complete.
     """
     folder = Path(folder)
-    with ThreadPoolExecutor(checked(jobs)) as pool:
+    with ThreadPoolExecutor(check_jobs(jobs)) as pool:
         make_folder(folder)
 
         def begin(problem: Problem) -> dict[str, Future[Written]]:
@@ -422,7 +423,7 @@ def _write_document(document: dict[str, Any], path: Path) -> Manifest:
 
 
 def _narrowed(problem: Problem, windows: Windows | None) -> Problem:
-    return problem if windows is None else tightened(problem, windows)
+    return problem if windows is None else with_windows(problem, windows)
 
 
 def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:

@@ -306,13 +306,13 @@ _ONLY_IF_ANY: Final = (
 
 def show_surface(surface: Surface, folder: Path) -> None:
     """Print the fit of a surface, its undetermined parts, doubts about it, and the folder of its files."""
-    from ...models.surface.trust import in_words
+    from ...models.surface.trust import describe_firmness
     from ..surfaces.files import surface_facts
 
     facts = surface_facts(surface)
     sentences = ("doubts", "freedom", "firmness")
     show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in sentences})
-    print_line(_wrapped(f"firmness: {in_words(surface.firmness)}"))
+    print_line(_wrapped(f"firmness: {describe_firmness(surface.firmness)}"))
     for text in surface.freedom:
         print_line(_wrapped(f"undetermined: {text}"))
     if surface.freedom:

@@ -17,7 +17,7 @@ import numpy as np
 import pyomo.environ as pyo
 import sympy as sp
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.field.field import CrossField
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.problem import Problem
@@ -37,7 +37,7 @@ _COMPARE: Final[dict[str, Callable[[Any, Any], Any]]] = {
 _FUNCTIONS: Final = {"cos": pyo.cos, "pi": math.pi}
 
 
-@checked_arguments
+@check_arguments
 def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.ConcreteModel:
     """Build a Pyomo model of a problem: the same columns, bounds, domains, rows and objective.
 

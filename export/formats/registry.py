@@ -15,11 +15,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.families import ANY_DEGREE
-from ...models.formulations.problem import Problem, lifted
+from ...models.formulations.problem import Problem, with_products_lifted
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical
 from ..writing.sink import is_packed, saving
@@ -150,7 +150,7 @@ def carried(problem: Problem, entry: Format) -> Problem:
     if _degree(problem) <= entry.degree:
         return problem
     if _degree(problem) < ANY_DEGREE:
-        other = lifted(problem)
+        other = with_products_lifted(problem)
         if _degree(other) <= entry.degree:
             return other
     instead = problem.formulation.equivalent
@@ -181,7 +181,7 @@ def header(problem: Problem) -> list[str]:
     return lines + [f"{how}: {text}" for how, text in changes.items() if text]
 
 
-@checked_arguments
+@check_arguments
 def write(
     problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
 ) -> Written:

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
@@ -114,7 +114,7 @@ _CHARACTER: Final = 4.0  # width of a character of the caption, at most
 _NARROWEST: Final = 52.0  # room for a heading
 
 
-@checked_arguments
+@check_arguments
 def draw(
     what: CrossField | Instance | Surface,
     path: str | Path,
@@ -171,7 +171,7 @@ def draw(
         return write_bytes(path, _saved(_page(what, chosen, title), suffix))
 
 
-@checked_arguments
+@check_arguments
 def preview(what: CrossField | Instance | Surface) -> bytes:
     """Draw a small picture for notebooks.
 

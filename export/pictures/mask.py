@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.errors import InputError
 from ...models.input_limits import MAX_PIXELS, MAX_SIDE
 from ...models.instance.grid import Bools, Floats
@@ -19,7 +19,7 @@ Page = tuple[float, float, float, float]
 _TINT: Final = (170, 195, 255)  # of bridged gaps; so light that it counts as white
 
 
-@checked_arguments
+@check_arguments
 def write_mask(instance: Instance, path: str | Path) -> Path:
     """Write the mask of an instance as a PNG: white where the field is solved for, black elsewhere.
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ...models.errors import InputError
 from ...models.field.field import CrossField
-from ...models.field.jumps import stepped
+from ...models.field.jumps import step_labels
 from ...models.instance.angles import double_angle
 from ...models.instance.grid import Bools, Floats
 
@@ -101,7 +101,7 @@ def combed(field: CrossField) -> CrossField:
     lying = np.round(np.bincount(part, np.sign(vector) * nearer[:, 0]), 9)
     side = np.where(np.where(strokes != 0, strokes, lying) < 0, -1, 1)
     exchanged = (vector * side[part] < 0).astype(np.int64)
-    return CrossField(instance, *stepped(instance.grid, field.alpha, field.beta, field.p, exchanged))
+    return CrossField(instance, *step_labels(instance.grid, field.alpha, field.beta, field.p, exchanged))
 
 
 def _lowest_vector(field: CrossField, part: _Array, start: Floats) -> Floats:

@@ -20,7 +20,7 @@ with warnings.catch_warnings(action="ignore"):  # its import warns on newer Pyth
     import casadi as ca
 
 from ...models.instance.grid import Bools, Floats
-from ...models.processes.control import on_stop, stopped
+from ...models.processes.control import is_stopped, on_stop
 from ..solutions.readers.ampl import write_ampl_sol
 from .protocol import Job, Outcome, RefusedError, file_names, interrupt_self
 from .reading import Evaluation, Points
@@ -144,7 +144,7 @@ class Watch(ca.Callback):
         """Return 1 to stop, 0 to continue."""
         by_name = dict(zip(self.sizes, arguments, strict=True))
         self.see(*(np.array(by_name[name]).ravel() for name in ("x", "f", "g")))
-        return [int(stopped())]
+        return [int(is_stopped())]
 
     def see(self, point: Floats, value: Floats, rows: Floats) -> None:
         """Keep a point (n,) with its objective (1,) and rows (m,) if it is feasible and lower."""
@@ -232,7 +232,7 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
     ends = {"lbx": model.lower, "ubx": model.upper, "lbg": model.row_lower, "ubg": model.row_upper}
     size = f"{len(model.start)} columns, {len(model.row_lower)} rows"
     print(f"{solver}: {size}, at most {seconds:.3g} s", flush=True)  # noqa: T201 - the output is the log
-    hook: Callable[[], object] = stopped
+    hook: Callable[[], object] = is_stopped
     if solver == "bonmin":
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Bonmin handles it once its search has begun
         hook = interrupt_self

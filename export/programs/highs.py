@@ -9,7 +9,7 @@ import highspy
 import numpy as np
 
 from ...models.errors import OutputError
-from ...models.processes.control import stopped
+from ...models.processes.control import is_stopped
 from ..writing.terms import of_triangle, terms
 from .protocol import Job, Outcome, RefusedError, complete
 from .reading import Meaning, finite
@@ -112,9 +112,9 @@ def _run(highs: Any) -> None:
     """Solve; a request to stop ends the search and keeps the incumbent."""
     highs.HandleUserInterrupt = True
     highs.startSolve()
-    while not (stopped() or highs.wait(_TICK)[0]):
+    while not (is_stopped() or highs.wait(_TICK)[0]):
         pass
-    if stopped():
+    if is_stopped():
         highs.cancelSolve()
     while not highs.wait(_TICK)[0]:
         pass

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from ...models.errors import CrossfieldError
-from ...models.processes.control import on_stop, stopped
+from ...models.processes.control import is_stopped, on_stop
 from ...models.processes.deadline import Deadline
 from ..statuses import Status
 
@@ -96,7 +96,7 @@ def call(program: str, step: str, *arguments: Any) -> Any:
     try:
         return getattr(import_module(f"{__package__}.{program}"), step)(*arguments)
     except RefusedError:
-        if step != "solve" or not stopped():
+        if step != "solve" or not is_stopped():
             raise
         return Outcome(Status.LIMIT_WITHOUT_POINT, "interrupted")
     except CrossfieldError:

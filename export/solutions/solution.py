@@ -14,10 +14,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.errors import SolutionError, UnsupportedByFormatError, naming
 from ...models.field.field import CrossField
-from ...models.formulations.problem import Problem, Violation, lifted
+from ...models.formulations.problem import Problem, Violation, with_products_lifted
 from ...models.instance.grid import Floats
 from ...models.previews import table_of
 from ..formats.registry import FORMATS, carried
@@ -308,7 +308,7 @@ class Solution:
         return self.problem.field(self.point)
 
 
-@checked_arguments
+@check_arguments
 def read_solution(
     path: str | Path,
     problem: Problem,
@@ -372,7 +372,7 @@ def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Ca
         return Canonical(*forms.values())
     liftable = "p1" in problem.blocks and "z" not in problem.blocks
     named = liftable and np.strings.startswith(raw.names, b"z_").any()
-    return Canonical(lifted(problem) if named else problem)
+    return Canonical(with_products_lifted(problem) if named else problem)
 
 
 def _carried(problem: Problem, name: str) -> Problem:

@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.errors import (
     InputError,
     MissingSolverError,
@@ -52,7 +52,7 @@ _KILLED: Final = "did not end within its time; the answer is what it had written
 _NO_BETTER: Final = "nothing better than the start"
 
 
-@checked_arguments
+@check_arguments
 def solve(
     problem: Problem,
     solver: str | None = None,

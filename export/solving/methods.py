@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ...models.field.field import CrossField, relabelled
+from ...models.field.field import CrossField, field_in_windows
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock, Deadline, Over, Progress, never, silent
 from ...models.processes.limits import Limits
-from ...models.processes.side_by_side import cores
-from ...models.search.box_qp import fitted
+from ...models.processes.process_pool import cores
+from ...models.search.box_qp import fit_in_box
 from ...models.search.greedy import greedy_field
 from ...models.search.search import Search, search
 from ...models.search.starts import best_start, first_field, polyvector_start
@@ -201,7 +201,7 @@ def _power(request: Request) -> Iterator[Candidate]:
     over = request.over()
     power = _timed("power", lambda: power_field(request.instance))
     yield power
-    yield _timed("power + QP", lambda: fitted(power.field, over))
+    yield _timed("power + QP", lambda: fit_in_box(power.field, over))
 
 
 def _polyvector(request: Request) -> Iterator[Candidate]:
@@ -279,7 +279,7 @@ def _prove(request: Request) -> Iterator[Candidate]:
     begin = time.perf_counter()
     field = proof.field
     if request.instance.gauge == "box":
-        near = relabelled(request.instance, field.alpha, field.beta, field.p)
+        near = field_in_windows(request.instance, field.alpha, field.beta, field.p)
         field = best_start(request.instance, near, request.stop)
     counts = (("levels", len(proof.levels)), ("forced_jumps", proof.forced))
     seconds = loading + proof.seconds + time.perf_counter() - begin

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.errors import CrossfieldError, SolverError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock, Deadline, Over, Progress, Stop, never, silent, stop_function
-from ...models.processes.groups import interruptible
+from ...models.processes.groups import catch_interrupts
 from ...models.processes.limits import Limits
 from ...models.search.starts import first_field
 from ...models.storage import make_folder, remove_file, replacing_files, write_bytes
@@ -166,7 +166,7 @@ def plan(limits: Limits) -> str:
     return f"at most {len(timed) * limits.time_limit:g} s: {each}; files and pictures on top"
 
 
-@checked_arguments
+@check_arguments
 def run(
     instance: Instance,
     folder: str | Path,
@@ -272,7 +272,7 @@ def run(
     fresh |= {CERTIFICATE} if report.proven else set()
     watch.lap("certificate")
     # An exception at Ctrl-C could be raised in a callback, where Python discards it.
-    with interruptible() as pressed, replacing_files(folder) as new:
+    with catch_interrupts() as pressed, replacing_files(folder) as new:
         if not report.interrupted:
             report = _drawn(report, new, below, progress, lambda: over() or pressed())
             watch.lap("pictures")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import FORMULATIONS
 from ...models.formulations.declaration import Options
@@ -46,7 +46,7 @@ class TwoStage:
         return self.qp.field if self.qp.point is not None else self.milp.field
 
 
-@checked_arguments
+@check_arguments
 def fit_angles(
     field: CrossField,
     *,
@@ -105,7 +105,7 @@ def find_jumps(
     return solve(problem, None, folder=folder, limits=limits.until(deadline), start=start, stop=stop)
 
 
-@checked_arguments
+@check_arguments
 def two_stage(
     instance: Instance,
     *,

@@ -6,7 +6,7 @@ import re
 import sys
 from typing import Any, Final
 
-from ...models.processes.control import stopped
+from ...models.processes.control import is_stopped
 from ...models.processes.limits import Limits
 from .document import Document
 from .session import field_of
@@ -26,7 +26,7 @@ def prove_step(data: bytes) -> dict[str, Any]:
         limits=Limits(SECONDS, gap=0.0, threads=1),
         jobs=1,
         progress=_printed,
-        stop=stopped,
+        stop=is_stopped,
     )
     return {
         "stage": "proof",

@@ -17,7 +17,7 @@ from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats, Ints
 from ...models.instance.instance import SKEW_WEIGHT, Instance, Reading
-from ...models.processes.control import stopped
+from ...models.processes.control import is_stopped
 from ...models.sketch.cover import LEAST_WEIGHT, Frame, covering_curves
 from ...models.sketch.outline import enclosed
 from ...models.sketch.read import build_instance, find_mask, frame_box, without_silhouette
@@ -177,7 +177,7 @@ class _Kept(OrderedDict[object, Any]):
         """The result for a key, computed if it is new. Raises OvertakenError."""
         if key not in self:
             result = work()
-            if stopped():
+            if is_stopped():
                 raise OvertakenError("a newer edit replaced this one")
             self[key] = result
             while len(self) > _MOST_KEPT:
@@ -196,7 +196,7 @@ def field_of(document: Document, size: int | None = None) -> tuple[Drawn, CrossF
     instance = found.instance
     return found, _FIELDS.found(
         instance.sha256,
-        lambda: bend_field(polyvector_field(instance, hold=max(HOLDS)), stop=stopped),
+        lambda: bend_field(polyvector_field(instance, hold=max(HOLDS)), stop=is_stopped),
     )
 
 
@@ -217,5 +217,5 @@ def surface_of(document: Document, field: CrossField) -> Surface:
     hints, flip = tuple(hints_of(document, field.instance)), document.flip
     return _SURFACES.found(
         (field.instance.sha256, hints, flip),
-        lambda: surface(field, hints, flip=flip, stop=stopped),
+        lambda: surface(field, hints, flip=flip, stop=is_stopped),
     )

@@ -8,9 +8,9 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.field.field import FAR, CrossField
-from ...models.processes.control import stopped
+from ...models.processes.control import is_stopped
 from ...models.surface.surface import Surface
-from ...models.surface.trust import OFF, UNFIT, off_right_angles
+from ...models.surface.trust import OFF, UNFIT, right_angle_deviation
 from ..pictures.draw import counted
 from ..pictures.marks import runs
 from ..pictures.streamlines import streamlines
@@ -98,7 +98,7 @@ def lines_step(found: CrossField) -> dict[str, Any]:
         ]
         for family in (0, 1)
     ]
-    if stopped():
+    if is_stopped():
         raise OvertakenError("a newer edit replaced this one")
     return {"stage": "lines", "size": max(found.instance.mask.shape), "families": families}
 
@@ -115,7 +115,7 @@ def _surface_view(found: Drawn, lifted: Surface) -> dict[str, Any]:
     longer = max(instance.mask.shape)
     picture = raster(instance, lifted.normals, max(1, SIDE // longer))
     height, width = picture.opacity.shape
-    off = off_right_angles(field, lifted.heights)
+    off = right_angle_deviation(field, lifted.heights)
     unfit = off > OFF
     return {
         "stage": "surface",

@@ -15,13 +15,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.arguments import checked_arguments
+from ...models.arguments import check_arguments
 from ...models.field.rawfield import vertices_of
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import make_folder, write_bytes
 from ...models.surface.surface import Surface
-from ...models.surface.trust import off_right_angles
+from ...models.surface.trust import right_angle_deviation
 from ..formats.registry import generator
 from ..pictures.canvas import pixels_of
 from ..pictures.draw import own_settings
@@ -52,7 +52,7 @@ _MTL: Final = f"newmtl {_MATERIAL}\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_K
 _WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
 
-@checked_arguments
+@check_arguments
 def write_surface(
     surface: Surface,
     folder: str | Path,
@@ -177,7 +177,7 @@ def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -
 
 def surface_facts(surface: Surface) -> dict[str, Any]:
     """Doubts about a surface, its freedom, and measurements in pixels and degrees."""
-    off = np.degrees(off_right_angles(surface.field, surface.heights))
+    off = np.degrees(right_angle_deviation(surface.field, surface.heights))
     slant = np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1.0, 1.0)))
     numbers = {
         "firmness": surface.firmness,

@@ -8,14 +8,14 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from ..arguments import check_fields, numbers
+from ..arguments import check_fields, float_array
 from ..errors import InputError, InstanceError
 from ..instance.angles import HALF, MOST_ANGLE, QUARTER, line_difference
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance, whole_numbers
 from ..instance.terms import parity_sign
 from ..previews import Pictured
-from .jumps import best_jumps, label_of, stepped
+from .jumps import best_jumps, label_of, step_labels
 
 AbsoluteNorm = Literal[1, "mixed"]
 """Norms in which pairs count with absolute values."""
@@ -118,8 +118,8 @@ class CrossField(Pictured):
         check_fields(self, InstanceError)
         grid = self.instance.grid
         given: dict[str, np.ndarray[Any, Any]] = {
-            "alpha": numbers(self.alpha, "alpha", InstanceError),
-            "beta": numbers(self.beta, "beta", InstanceError),
+            "alpha": float_array(self.alpha, "alpha", InstanceError),
+            "beta": float_array(self.beta, "beta", InstanceError),
             "p": whole_numbers(self.p, "p"),
         }
         for (name, value), size in zip(given.items(), (grid.size, grid.size, len(grid.first)), strict=True):
@@ -165,8 +165,10 @@ class CrossField(Pictured):
             For another shape, such as vectors, and for values that are not finite or exceed 1e6.
 
         """
-        alpha, beta = label_of(_angles(instance, u_angle, "u_angle"), _angles(instance, v_angle, "v_angle"))
-        steps = _steps(instance, alpha, beta, inside=True)
+        alpha, beta = label_of(
+            _check_angles(instance, u_angle, "u_angle"), _check_angles(instance, v_angle, "v_angle")
+        )
+        steps = _steps_into_windows(instance, alpha, beta, inside=True)
         alpha = np.clip(alpha + HALF * steps, instance.alpha_lower, instance.alpha_upper)
         beta = np.clip(parity_sign(steps) * beta, -QUARTER, QUARTER)
         return cls(instance, alpha, beta, best_jumps(instance, alpha, beta))
@@ -305,7 +307,7 @@ class CrossField(Pictured):
         """
         size = self.instance.grid.size
         u, v = (
-            _angles(self.instance, np.full(size, line) if np.size(line) == 1 else line, name)
+            _check_angles(self.instance, np.full(size, line) if np.size(line) == 1 else line, name)
             for name, line in (("u_angle", u_angle), ("v_angle", v_angle))
         )
         straight = line_difference(self.u_angle, u) + line_difference(self.v_angle, v)
@@ -330,12 +332,14 @@ class CrossField(Pictured):
         return picture
 
 
-def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:
+def field_in_windows(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:
     """The same crosses with every alpha in its window of the gauge and |beta| <= pi/4, or clipped to that.
 
     Each pair gets its best jump; without clipping the energy does not rise.
     """
-    alpha, beta, p = stepped(instance.grid, alpha, beta, p, _steps(instance, alpha, beta, inside=False))
+    alpha, beta, p = step_labels(
+        instance.grid, alpha, beta, p, _steps_into_windows(instance, alpha, beta, inside=False)
+    )
     kept = CrossField(
         instance,
         np.clip(alpha, instance.alpha_lower, instance.alpha_upper),
@@ -346,7 +350,7 @@ def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> Cros
     return best if best.energy().total < kept.energy().total else kept
 
 
-def _steps(instance: Instance, alpha: Floats, beta: Floats, *, inside: bool) -> Ints:
+def _steps_into_windows(instance: Instance, alpha: Floats, beta: Floats, *, inside: bool) -> Ints:
     """The step of each label, (n,), into its window; on an edge, the one nearer to the stroke.
 
     If not inside, the label of a stroke may leave its window for the least clipping and misfit.
@@ -368,9 +372,9 @@ def _steps(instance: Instance, alpha: Floats, beta: Floats, *, inside: bool) -> 
     return steps
 
 
-def _angles(instance: Instance, given: Any, name: str) -> Floats:
+def _check_angles(instance: Instance, given: Any, name: str) -> Floats:
     """The angles (n,). Raises InputError."""
-    angles = numbers(given, name)
+    angles = float_array(given, name)
     size = instance.grid.size
     if angles.shape != (size,):
         raise InputError(

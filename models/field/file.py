@@ -13,44 +13,44 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from ..arguments import checked_arguments
-from ..array_archive import ArrayArchive, Expected, pack_arrays
+from ..arguments import check_arguments
+from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
 from ..errors import InputError, InstanceError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.angles import MOST_ANGLE
 from ..instance.file import (
     are_places,
-    arrays_of,
     check_schema,
     check_version,
-    decoded,
-    head_of,
+    decode_json,
+    instance_arrays,
+    instance_of_archive,
+    instance_of_document,
+    instance_to_json,
     number_table,
-    of_archive,
-    of_document,
+    parse_head,
     parse_json,
-    to_json,
 )
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import Instance
 from ..storage import read_bytes, write_bytes
 from .field import CrossField
-from .rawfield import most_bytes, of_rawfield, to_obj, to_rawfield, to_sings
+from .rawfield import most_rawfield_bytes, parse_rawfield, to_obj, to_rawfield, to_sings
 
 FORMAT: Final = "crossfield-field"
 VERSION: Final = 1
 _PREFIX = "instance_"
 _ARCHIVE: Final = {
-    "head": Expected(1, MAX_HEAD, "u"),
-    "alpha": Expected(1, MAX_GRID**2),
-    "beta": Expected(1, MAX_GRID**2),
-    "p": Expected(1, 2 * MAX_GRID**2),
+    "head": ExpectedArray(1, MAX_HEAD, "u"),
+    "alpha": ExpectedArray(1, MAX_GRID**2),
+    "beta": ExpectedArray(1, MAX_GRID**2),
+    "p": ExpectedArray(1, 2 * MAX_GRID**2),
 }
 _MOST_JUMP: Final = 1_000_000
-_Kind = TypeVar("_Kind")
+_Entry = TypeVar("_Entry")
 
 
-@checked_arguments
+@check_arguments
 def write_field(field: CrossField, path: str | Path) -> Path:
     """Write a field. Equal fields give equal bytes.
 
@@ -76,14 +76,14 @@ def write_field(field: CrossField, path: str | Path) -> Path:
 
     """
     path = Path(path)
-    write = _of_suffix(_WRITERS, path, "written")
+    write = _look_up_suffix(_WRITERS, path, "written")
     if write is to_rawfield:
         write_bytes(path.with_suffix(".obj"), to_obj(field.instance))
         write_bytes(path.with_suffix(".sings"), to_sings(field))
     return write_bytes(path, write(field))
 
 
-@checked_arguments
+@check_arguments
 def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     """Read a field with its instance.
 
@@ -113,15 +113,15 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
         if path.suffix.lower() == ".rawfield":
             if on is None:
                 raise InputError("holds no instance; give the instance: read_field(path, on=instance)")
-            return of_rawfield(read_bytes(path, most_bytes(on)), on)
-        read = _of_suffix(_READERS, path, "read", ".rawfield")
+            return parse_rawfield(read_bytes(path, most_rawfield_bytes(on)), on)
+        read = _look_up_suffix(_READERS, path, "read", ".rawfield")
         field = read(read_bytes(path, MAX_ARCHIVE))
         if on is not None:
             field.check_instance(on)
         return field
 
 
-def _of_suffix(table: dict[str, _Kind], path: Path, verb: str, *others: str) -> _Kind:
+def _look_up_suffix(table: dict[str, _Entry], path: Path, verb: str, *others: str) -> _Entry:
     found = table.get(path.suffix.lower())
     if found is None:
         raise InputError(
@@ -131,7 +131,7 @@ def _of_suffix(table: dict[str, _Kind], path: Path, verb: str, *others: str) -> 
     return found
 
 
-def _npz(field: CrossField) -> bytes:
+def _field_to_npz(field: CrossField) -> bytes:
     head = json.dumps({"format": FORMAT, "version": VERSION})
     arrays: dict[str, np.ndarray[Any, Any]] = {
         "head": np.frombuffer(head.encode(), dtype=np.uint8),
@@ -139,19 +139,21 @@ def _npz(field: CrossField) -> bytes:
         "beta": field.beta,
         "p": field.p,
     }
-    return pack_arrays(arrays | {_PREFIX + name: array for name, array in arrays_of(field.instance).items()})
+    return pack_arrays(
+        arrays | {_PREFIX + name: array for name, array in instance_arrays(field.instance).items()}
+    )
 
 
-def _of_npz(data: bytes) -> CrossField:
+def _field_of_npz(data: bytes) -> CrossField:
     archive = ArrayArchive(data)
     arrays = archive.arrays(_ARCHIVE)
-    check_version(head_of(arrays), FORMAT, VERSION)
-    instance = _embedded(lambda given: of_archive(given, _PREFIX), archive)
+    check_version(parse_head(arrays), FORMAT, VERSION)
+    instance = _read_embedded(lambda given: instance_of_archive(given, _PREFIX), archive)
     archive.finish()
-    return _field(instance, arrays["alpha"], arrays["beta"], arrays["p"])
+    return _make_field(instance, arrays["alpha"], arrays["beta"], arrays["p"])
 
 
-def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
+def _read_embedded(read: Callable[[_Entry], Instance], source: _Entry) -> Instance:
     try:
         return read(source)
     except InstanceError as error:
@@ -161,16 +163,16 @@ def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
 def field_to_json(field: CrossField) -> bytes:
     """Return the bytes of the field's JSON file, its instance included."""
     grid = field.instance.grid
-    upper, right = (_jumps(field, table) for table in grid.pair_number)
+    upper, right = (_jump_column(field, table) for table in grid.pair_number)
     columns = (grid.rows, grid.columns, field.alpha, field.beta, upper, right)
     rows = zip(*(column.tolist() for column in columns), strict=True)
     pixels = ",\n".join(f"    {json.dumps(row)}" for row in rows)
-    instance = to_json(field.instance).rstrip().replace("\n", "\n  ")
+    instance = instance_to_json(field.instance).rstrip().replace("\n", "\n  ")
     head = f'  "format": "{FORMAT}",\n  "version": {VERSION},\n  "instance": {instance},\n'
     return f'{{\n{head}  "pixels": [\n{pixels}\n  ]\n}}\n'.encode()
 
 
-def _jumps(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
+def _jump_column(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
     """Jump of each pixel's pair in the table, None without a pair; shape (n,), objects."""
     pair = table[field.instance.mask]
     jumps = np.full(len(pair), None, dtype=object)
@@ -180,17 +182,17 @@ def _jumps(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
 
 def field_of_json(data: bytes) -> CrossField:
     """Read a field from the bytes of a JSON file. Raises InstanceError with the place in the document."""
-    document = parse_json(decoded(data))
+    document = parse_json(decode_json(data))
     check_version(document, FORMAT, VERSION)
     checked = check_schema(document, "field", __package__, rows={"pixels": _are_pixels})
-    instance = _embedded(of_document, checked["instance"])
+    instance = _read_embedded(instance_of_document, checked["instance"])
     row, column, alpha, beta, upper, right = zip(*checked["pixels"], strict=True)
     _check_places(instance.grid, np.array([row, column], dtype=np.int32))
     p = np.zeros(len(instance.grid.first), dtype=np.int32)
     for name, table, jumps in zip(("upper", "right"), instance.grid.pair_number, (upper, right), strict=True):
         _fill_jumps(instance.grid, p, table, np.array(jumps, dtype=np.float64), name)
     try:
-        return _field(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
+        return _make_field(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
 
@@ -206,7 +208,7 @@ def _are_pixels(rows: list[Any]) -> bool:
     return are_places(table[:, :2]) and bool((np.abs(jumps) <= _MOST_JUMP).all() and (jumps % 1 == 0).all())
 
 
-def _field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:
+def _make_field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:
     """The field. Raises InstanceError for numbers that are not angles."""
     for name, values in (("alpha", alpha), ("beta", beta)):
         size = np.abs(np.asarray(values, dtype=np.float64))
@@ -242,8 +244,8 @@ def _fill_jumps(grid: Grid, p: Ints, table: Ints, jumps: Floats, name: str) -> N
 
 
 _WRITERS: Final[dict[str, Callable[[CrossField], bytes]]] = {
-    ".npz": _npz,
+    ".npz": _field_to_npz,
     ".json": field_to_json,
     ".rawfield": to_rawfield,
 }
-_READERS: Final[dict[str, Callable[[bytes], CrossField]]] = {".npz": _of_npz, ".json": field_of_json}
+_READERS: Final[dict[str, Callable[[bytes], CrossField]]] = {".npz": _field_of_npz, ".json": field_of_json}

@@ -24,7 +24,7 @@ _UNITS: Final = 1e6  # parts of 1 + energy: flows are whole numbers, whose sums 
 _MOST: Final = 1e9  # units of a pixel's price, far more than a choice can gain: flows have 32 bits
 
 
-def fused(one: CrossField, other: CrossField) -> CrossField:
+def fuse_fields(one: CrossField, other: CrossField) -> CrossField:
     """The field that takes each cross from `one` or `other`, at the least 2-norm energy, with best jumps.
 
     Both fields are on the same instance. Jumps are not limited to a range. Returns `one` if no cut finds a
@@ -38,22 +38,22 @@ def fused(one: CrossField, other: CrossField) -> CrossField:
     pairs = np.nonzero(far[grid.first] | far[grid.second])[0].astype(np.int32)
     terms = one.instance.pair_terms.chosen(pairs)
     same, mixed, mixed_too, exchanged = (
-        _least_of_pairs(terms, first, second) for first in fields for second in fields
+        _least_pair_costs(terms, first, second) for first in fields for second in fields
     )
     inside = far[grid.first[pairs]] & far[grid.second[pairs]]
-    price = _of_pixels(other) - _of_pixels(one)
+    price = _pixel_costs(other) - _pixel_costs(one)
     price += np.bincount(grid.first[pairs], mixed_too - same, grid.size)
     price += np.bincount(grid.second[pairs], np.where(inside, exchanged - mixed_too, mixed - same), grid.size)
     links = np.stack([grid.first[pairs[inside]], grid.second[pairs[inside]]])
     excess = (mixed + mixed_too - same - exchanged)[inside]
     unit = (1 + energy) / _UNITS
-    taken = _least_cut(far, np.rint(price / unit), links, np.rint(np.maximum(excess, 0) / unit))
+    taken = _find_least_cut(far, np.rint(price / unit), links, np.rint(np.maximum(excess, 0) / unit))
     alpha, beta = np.where(taken, other.alpha, one.alpha), np.where(taken, other.beta, one.beta)
     found = CrossField(one.instance, alpha, beta, free_jumps(one.instance, alpha, beta)[0])
     return found if found.energy().total < energy - unit else one
 
 
-def _of_pixels(field: CrossField) -> Floats:
+def _pixel_costs(field: CrossField) -> Floats:
     """Contribution of each pixel to the energy without its neighbours, shape (n,)."""
     terms, instance = field.instance.stroke_terms, field.instance
     residual = terms.residuals(field.alpha, field.beta)
@@ -62,14 +62,14 @@ def _of_pixels(field: CrossField) -> Floats:
     return strokes + skew
 
 
-def _least_of_pairs(pairs: PairTerms, first: CrossField, second: CrossField) -> Floats:
+def _least_pair_costs(pairs: PairTerms, first: CrossField, second: CrossField) -> Floats:
     """Energies of pairs with their best jumps; first pixels from one field, second from another."""
     between = replace(pairs, second=pairs.second + np.int32(len(first.alpha)))
     alpha = np.concatenate([first.alpha, second.alpha])
     return between.least_costs(alpha, np.concatenate([first.beta, second.beta]))
 
 
-def _least_cut(free: Bools, price: Floats, links: Ints, excess: Floats) -> Bools:
+def _find_least_cut(free: Bools, price: Floats, links: Ints, excess: Floats) -> Bools:
     """The free pixels that pay, at the least total of prices (n,) and excesses (k,) of links (2, k)."""
     # An excess is due for each link from a pixel that does not pay to one that does.
     count = int(free.sum())

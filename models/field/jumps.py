@@ -26,15 +26,15 @@ def best_jumps(instance: Instance, alpha: Floats, beta: Floats, *, absolute: boo
     absolute: whether pairs count with absolute values instead of squares.
     """
     size = np.abs if absolute else np.square
-    return _best(instance.pair_terms, alpha, beta, (instance.p_min, instance.p_max), size)[0]
+    return _find_best_jumps(instance.pair_terms, alpha, beta, (instance.p_min, instance.p_max), size)[0]
 
 
 def free_jumps(instance: Instance, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
     """The best jump of each pair without a range, and its energy; ties go to the smaller jump; (m,)."""
-    return _best(instance.pair_terms, alpha, beta)
+    return _find_best_jumps(instance.pair_terms, alpha, beta)
 
 
-def _best(
+def _find_best_jumps(
     pairs: PairTerms,
     alpha: Floats,
     beta: Floats,
@@ -51,7 +51,7 @@ def _best(
     return candidates[at], cost[at]
 
 
-def stepped(grid: Grid, alpha: Floats, beta: Floats, p: Ints, steps: Ints) -> tuple[Floats, Floats, Ints]:
+def step_labels(grid: Grid, alpha: Floats, beta: Floats, p: Ints, steps: Ints) -> tuple[Floats, Floats, Ints]:
     """Angles (n,) and jumps (m,) of the crosses after `steps` (n,) of labels; residuals only change sign."""
     jumps = p - steps[grid.first] + steps[grid.second]
     return alpha + HALF * steps, parity_sign(steps) * beta, jumps

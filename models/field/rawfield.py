@@ -35,7 +35,7 @@ def to_rawfield(field: CrossField) -> bytes:
     """The text of the field's .rawfield, with each pixel's row twice."""
     vectors = np.zeros((field.instance.grid.size, 4, 3))
     vectors[:, :, :2] = np.stack([field.u, field.v, -field.u, -field.v], axis=1)
-    rows = _lines(np.repeat(vectors.reshape(-1, 12), 2, axis=0) + 0.0)
+    rows = _text_of_rows(np.repeat(vectors.reshape(-1, 12), 2, axis=0) + 0.0)
     return f"4 {2 * len(vectors)}\n{rows}".encode()
 
 
@@ -44,8 +44,8 @@ def to_obj(instance: Instance) -> bytes:
     places, corners = vertices_of(instance.grid)
     x = instance.origin[0] + instance.pixel_size * places[:, 1]
     y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
-    vertices = _lines(np.stack([x, y, np.zeros(len(x))], axis=1) + 0.0, "v ")
-    faces = _lines(corners[:, [0, 2, 3, 0, 3, 1]].reshape(-1, 3) + 1, "f ")
+    vertices = _text_of_rows(np.stack([x, y, np.zeros(len(x))], axis=1) + 0.0, "v ")
+    faces = _text_of_rows(corners[:, [0, 2, 3, 0, 3, 1]].reshape(-1, 3) + 1, "f ")
     return (
         f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, "
         f"row by row; y up\n{vertices}{faces}"
@@ -60,7 +60,7 @@ def to_sings(field: CrossField) -> bytes:
     at = np.searchsorted(places[:, 0] * across + places[:, 1], (found.row + 1) * across + found.column + 1)
     index = np.round(4 * found.index).astype(np.int64)
     order = np.argsort(at, kind="stable")
-    return f"4 {len(at)}\n{_lines(np.stack([at[order], index[order]], axis=1))}".encode()
+    return f"4 {len(at)}\n{_text_of_rows(np.stack([at[order], index[order]], axis=1))}".encode()
 
 
 def vertices_of(grid: Grid) -> tuple[Ints, Ints]:
@@ -78,34 +78,34 @@ def vertices_of(grid: Grid) -> tuple[Ints, Ints]:
     return places.astype(np.int32), corners.reshape(key.shape).astype(np.int32)
 
 
-def _lines(table: np.ndarray[Any, Any], lead: str = "") -> str:
+def _text_of_rows(table: np.ndarray[Any, Any], lead: str = "") -> str:
     return "".join(f"{lead}{' '.join(map(repr, row))}\n" for row in table.tolist())
 
 
-def most_bytes(instance: Instance) -> int:
+def most_rawfield_bytes(instance: Instance) -> int:
     """Most bytes of a .rawfield that is read for the instance."""
     return (MAX_NUMBER + 1) * (2 + 2 * instance.grid.size * _ROW)
 
 
-def of_rawfield(data: bytes, instance: Instance) -> CrossField:
+def parse_rawfield(data: bytes, instance: Instance) -> CrossField:
     """Read the field of a .rawfield on the instance. Raises InstanceError that names the line."""
     lines = data.splitlines()
-    rows = _faces(lines[0] if lines else b"", instance)
+    rows = _parse_head(lines[0] if lines else b"", instance)
     body = [(number, line) for number, line in enumerate(lines[1:], 2) if line.strip()]
     if len(body) != rows:
         raise InstanceError(f"has {len(body)} rows of vectors, but its first line states {rows}")
-    vectors = _vectors(body).reshape(rows, 4, 3)
-    u, v = _two_lines(vectors, [number for number, _ in body])
+    vectors = _parse_vectors(body).reshape(rows, 4, 3)
+    u, v = _lines_of_vectors(vectors, [number for number, _ in body])
     if rows == 2 * instance.grid.size:
-        u, v = _between(u.reshape(-1, 2).T, v.reshape(-1, 2).T)
+        u, v = _lines_between(u.reshape(-1, 2).T, v.reshape(-1, 2).T)
     return CrossField.from_lines(instance, u, v)
 
 
-def _faces(head: bytes, instance: Instance) -> int:
+def _parse_head(head: bytes, instance: Instance) -> int:
     """The number of faces that the first line states."""
     words = head.split()
     if len(words) != 2 or not all(word.isdigit() and len(word) < MAX_NUMBER for word in words):
-        raise InstanceError(f"line 1: is {_shown(head)}, not the degree 4 and the number of faces as text")
+        raise InstanceError(f"line 1: is {_quoted(head)}, not the degree 4 and the number of faces as text")
     degree, faces = map(int, words)
     if degree != 4:
         raise InstanceError(f"line 1: has {degree} vectors per face; crosses have 4: u, v, -u, -v")
@@ -118,22 +118,22 @@ def _faces(head: bytes, instance: Instance) -> int:
     return faces
 
 
-def _vectors(body: list[tuple[int, bytes]]) -> Floats:
+def _parse_vectors(body: list[tuple[int, bytes]]) -> Floats:
     """The numbers of all rows, 12 per row."""
     for number, line in body:
         words = len(line.split())
         if words != _ROW:
             raise InstanceError(f"line {number}: has {words} numbers; give {_ROW}, x y z of four vectors")
         if not _NUMBERS.fullmatch(line):
-            raise InstanceError(f"line {number}: holds something other than numbers: {_shown(line)}")
+            raise InstanceError(f"line {number}: holds something other than numbers: {_quoted(line)}")
     return np.array(b" ".join(line for _, line in body).split(), dtype=np.float64)
 
 
-def _shown(line: bytes) -> str:
+def _quoted(line: bytes) -> str:
     return repr(shortened(line.decode("utf-8", "replace")))
 
 
-def _two_lines(vectors: Floats, numbers: list[int]) -> tuple[Floats, Floats]:
+def _lines_of_vectors(vectors: Floats, numbers: list[int]) -> tuple[Floats, Floats]:
     """The angles u, v (k,) in radians of the two lines given by four vectors each, (k, 4, 3)."""
     largest = np.abs(vectors).max(axis=2, keepdims=True)
     _refuse(~np.isfinite(largest).all(axis=(1, 2)), numbers, "holds a number beyond the range of doubles")
@@ -159,7 +159,7 @@ def _refuse(wrong: Bools, numbers: list[int], reason: str) -> None:
         raise InstanceError(f"line {numbers[int(np.argmax(wrong))]}: {reason} ({int(wrong.sum())} such rows)")
 
 
-def _between(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+def _lines_between(u: Floats, v: Floats) -> tuple[Floats, Floats]:
     """The lines between the lines of two crosses, shapes (2, n), with the closest lines paired."""
     straight = line_difference(u[0], u[1]) + line_difference(v[0], v[1])
     crossed = line_difference(u[0], v[1]) + line_difference(v[0], u[1])

@@ -84,7 +84,7 @@ class ProblemArrays:
     def row_q(self, row: int) -> sparse.csr_array:
         """Quadratic part of a row: the symmetric matrix P of 0.5 x'Px, shape (n, n)."""
         chosen = self.row_products[:, 0] == row
-        return symmetric(self.row_products[chosen, 1:], self.row_factors[chosen], len(self.c))
+        return quadratic_matrix(self.row_products[chosen, 1:], self.row_factors[chosen], len(self.c))
 
     def objective_value(self, point: Floats) -> float:
         """Objective at a point (n,)."""
@@ -98,9 +98,9 @@ class ProblemArrays:
         return found
 
 
-def arrays_of(problem: Problem, *, names: bool) -> ProblemArrays:
+def problem_arrays(problem: Problem, *, names: bool) -> ProblemArrays:
     """Return the arrays of a problem."""
-    size, places = len(problem.lower), _places(problem.rows)
+    size, places = len(problem.lower), _rows_by_tag(problem.rows)
     at, cost = problem.merged_objective(1, up_to=QUADRATIC)
     c = np.zeros(size)
     c[at[:, 0]] = cost
@@ -116,7 +116,7 @@ def arrays_of(problem: Problem, *, names: bool) -> ProblemArrays:
     return ProblemArrays(
         c=c,
         constant=float(problem.merged_objective(0, up_to=QUADRATIC)[1][0]),
-        q=symmetric(*problem.merged_objective(2, up_to=QUADRATIC), size),
+        q=quadratic_matrix(*problem.merged_objective(2, up_to=QUADRATIC), size),
         a=a,
         row_lower=lower,
         row_upper=upper,
@@ -125,14 +125,14 @@ def arrays_of(problem: Problem, *, names: bool) -> ProblemArrays:
         lower=problem.lower.copy(),
         upper=problem.upper.copy(),
         integer=problem.integer.copy(),
-        column_names=_texts(column_names(problem)) if names else None,
-        row_names=_texts(row_names(problem)) if names else None,
+        column_names=_decode_names(column_names(problem)) if names else None,
+        row_names=_decode_names(row_names(problem)) if names else None,
         nonlinear=tuple(family.family.tag for family in nonlinear),
         family_rows=places,
     )
 
 
-def symmetric(at: Ints, factor: Floats, size: int) -> sparse.csr_array:
+def quadratic_matrix(at: Ints, factor: Floats, size: int) -> sparse.csr_array:
     """The matrix Q of 0.5 x'Qx for products of columns `at`, shape (k, 2), with factors (k,)."""
     both = np.concatenate([at, at[:, ::-1]])
     found = sparse.csr_array((np.tile(factor, 2), tuple(both.T)), shape=(size, size))
@@ -169,7 +169,7 @@ def row_sides(families: Iterable[PlacedFamily]) -> tuple[Floats, Floats]:
     return np.concatenate(lower) + 0.0, np.concatenate(upper) + 0.0
 
 
-def _places(families: Iterable[PlacedFamily]) -> dict[str, slice]:
+def _rows_by_tag(families: Iterable[PlacedFamily]) -> dict[str, slice]:
     """Rows of each family by its tag."""
     found, start = {}, 0
     for family in families:
@@ -178,7 +178,7 @@ def _places(families: Iterable[PlacedFamily]) -> dict[str, slice]:
     return found
 
 
-def _texts(names: Bytes) -> Names:
+def _decode_names(names: Bytes) -> Names:
     return np.ascontiguousarray(names).view(f"S{names.shape[1]}").ravel().astype(np.str_)
 
 
@@ -201,7 +201,7 @@ def check_highs(problem_class: str, *, convex: bool) -> None:
     )
 
 
-def highs_of(arrays: ProblemArrays, name: str) -> Any:
+def build_highs(arrays: ProblemArrays, name: str) -> Any:
     """Return a `highspy.Highs` that holds the arrays. Raises SolverError if HiGHS refuses them."""
     import highspy
 
@@ -212,7 +212,7 @@ def highs_of(arrays: ProblemArrays, name: str) -> Any:
     lp.col_lower_, lp.col_upper_ = arrays.lower, arrays.upper
     lp.row_lower_, lp.row_upper_ = arrays.row_lower, arrays.row_upper
     lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-    _fill(lp.a_matrix_, by_column)
+    _fill_matrix(lp.a_matrix_, by_column)
     if arrays.integer.any():
         kinds = np.array([highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger])
         lp.integrality_ = kinds[arrays.integer.astype(np.intp)].tolist()
@@ -221,7 +221,7 @@ def highs_of(arrays: ProblemArrays, name: str) -> Any:
     if arrays.q.nnz:
         model.hessian_.dim_ = len(arrays.c)
         model.hessian_.format_ = highspy.HessianFormat.kTriangular
-        _fill(model.hessian_, sparse.tril(arrays.q, format="csc"))
+        _fill_matrix(model.hessian_, sparse.tril(arrays.q, format="csc"))
     solver = highspy.Highs()  # type: ignore[no-untyped-call]
     solver.setOptionValue("output_flag", False)  # noqa: FBT003 - as highspy has it
     if solver.passModel(model) == highspy.HighsStatus.kError:
@@ -229,7 +229,7 @@ def highs_of(arrays: ProblemArrays, name: str) -> Any:
     return solver
 
 
-def _fill(matrix: Any, columns: sparse.csc_array) -> None:
+def _fill_matrix(matrix: Any, columns: sparse.csc_array) -> None:
     columns.sort_indices()
     matrix.start_ = columns.indptr.astype(np.int32)
     matrix.index_ = columns.indices.astype(np.int32)

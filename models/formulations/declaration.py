@@ -23,7 +23,7 @@ from .symbols import SLOTS, VARIABLES, IndexSet
 
 Facet = Literal["hull", "printed"]
 FACETS: Final[tuple[str, ...]] = get_args(Facet)
-NORMS: Final = (1, 2)
+TERM_NORMS: Final = (1, 2)
 
 I: Final[IndexSet] = "pixels"  # noqa: E741 - the paper's letter
 S_C: Final[IndexSet] = "strokes"
@@ -177,7 +177,7 @@ class Declaration:
         if not isinstance(options.facet, str) or options.facet not in FACETS:
             raise FormulationError(f"there is no facet {options.facet!r}; choose one of {', '.join(FACETS)}")
         for name in ("stroke_norm", "beta_norm"):
-            if getattr(options, name) not in NORMS:
+            if getattr(options, name) not in TERM_NORMS:
                 raise FormulationError(f"{name} is {getattr(options, name)}; give 1 or 2")
         # NumPy's numbers are written differently, and the options are a part of the problem's hash.
         return Options(options.facet, int(options.stroke_norm), int(options.beta_norm), bool(options.relax))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..instance.grid import Bools, Floats, Ints
 from .declaration import Family
-from .symbols import SCALARS, SLOTS, IndexSet, numeric, way
+from .symbols import SCALARS, SLOTS, IndexSet, index_map, numpy_function
 
 if TYPE_CHECKING:
     from .problem import Problem
@@ -104,7 +104,7 @@ class PlacedFamily:
 
     def inside(self, symbol: sp.Symbol) -> Ints | None:
         """The symbol's place in its block at each element, (count,); None: the element's own."""
-        index = way(self.problem.instance, SLOTS[self.family.over][symbol][1])
+        index = index_map(self.problem.instance, SLOTS[self.family.over][symbol][1])
         if isinstance(index, slice):
             return None if self.everywhere else self.elements
         return index if self.everywhere else index[self.elements]
@@ -119,14 +119,14 @@ class PlacedFamily:
         symbols = sorted(expression.free_symbols, key=str)
         if not symbols:
             return float(expression)
-        value = numeric(symbols, expression)(*(self._datum(symbol) for symbol in symbols))
+        value = numpy_function(symbols, expression)(*(self._datum(symbol) for symbol in symbols))
         return value if np.ndim(value) else float(value)
 
     def _datum(self, symbol: sp.Symbol) -> Any:
         if symbol in SCALARS:
             return getattr(self.problem.instance, SCALARS[symbol])
         name, kind = SLOTS[self.family.over][symbol]
-        values = self.problem.data[name][way(self.problem.instance, kind)]
+        values = self.problem.data[name][index_map(self.problem.instance, kind)]
         return values if self.everywhere else values[self.elements]
 
     @cached_property
@@ -161,7 +161,7 @@ class PlacedFamily:
     def values(self, point: Floats) -> Floats:
         """The expression (of a row: left minus right side) at a point, shape (count,)."""
         symbols = sorted(self.family.body.free_symbols, key=str)
-        evaluate = numeric(symbols, self.family.body)
+        evaluate = numpy_function(symbols, self.family.body)
         given = (point[self.column_of(s)] if s in self.variables else self._datum(s) for s in symbols)
         return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
 
@@ -192,21 +192,21 @@ def monomials(family: Family, variables: tuple[sp.Symbol, ...]) -> Monomials | N
     )
 
 
-def ordered(factors: tuple[Ints, ...]) -> Ints:
+def sort_factors(factors: tuple[Ints, ...]) -> Ints:
     """Columns of each monomial in ascending order, shape (count, degree)."""
     if len(factors) == 2:  # nearly all monomials, and faster than sorting rows
         return np.stack([np.minimum(*factors), np.maximum(*factors)], axis=1)
     return np.sort(np.stack(factors, axis=1), axis=1)
 
 
-def merged(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
+def merge_monomials(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
     """Sums over equal rows of `index`, sorted, without noise. columns: a number above every index."""
     key = index[:, 0].astype(np.int64)
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]
     _, place, rank = np.unique(key, return_index=True, return_inverse=True)
     total, largest = (_sums(values, rank, len(place)) for values in (coefficient, scale))
-    kept = beyond_noise(total, largest)
+    kept = exceeds_noise(total, largest)
     return index[place[kept]], total[kept]
 
 
@@ -214,6 +214,6 @@ def _sums(values: Floats, rank: NDArray[np.intp], count: int) -> Floats:
     return np.bincount(rank, weights=values, minlength=count).astype(np.float64, copy=False)
 
 
-def beyond_noise(total: Floats, scale: Floats) -> Bools:
+def exceeds_noise(total: Floats, scale: Floats) -> Bools:
     """Whether sums exceed rounding, for terms of that scale."""
     return np.abs(total) > _NOISE * scale

@@ -74,7 +74,7 @@ def _digits(instance: Instance) -> int:
     return max(2, len(str(max(instance.grid.height, instance.grid.width) - 1)))
 
 
-def stacked(matrices: list[Bytes]) -> Bytes:
+def stack_names(matrices: list[Bytes]) -> Bytes:
     """Matrices of names below each other, narrower ones padded with NUL on the right."""
     width = max((matrix.shape[1] for matrix in matrices), default=1)
     out = np.zeros((sum(len(matrix) for matrix in matrices), width), dtype=np.uint8)
@@ -87,7 +87,7 @@ def stacked(matrices: list[Bytes]) -> Bytes:
 
 def column_names(problem: Problem) -> Bytes:
     """Names of all columns in column order, shape (columns, width), padded with NUL."""
-    return stacked(
+    return stack_names(
         [element_names(problem.instance, block.name, block.over) for block in problem.blocks.values()]
     )
 
@@ -100,4 +100,4 @@ def family_names(family: PlacedFamily) -> Bytes:
 
 def row_names(problem: Problem) -> Bytes:
     """Names of all rows in row order, shape (rows, width), padded with NUL."""
-    return stacked([family_names(family) for family in problem.rows])
+    return stack_names([family_names(family) for family in problem.rows])

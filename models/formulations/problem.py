@@ -16,18 +16,18 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ..arguments import check_kind, checked_arguments, numbers
+from ..arguments import check_arguments, check_kind, float_array
 from ..errors import FormulationError, InputError
 from ..field.field import CrossField
 from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance, whole_numbers
 from ..previews import table_of
-from .arrays import ProblemArrays, arrays_of, check_highs, highs_of
+from .arrays import ProblemArrays, build_highs, check_highs, problem_arrays
 from .catalogue import declare, lift_products, norm_of
 from .declaration import Family, Formulation
-from .families import ANY_DEGREE, Block, PlacedFamily, merged, ordered
-from .symbols import NARROWED, SLOTS, VARIABLES, Variable, elements, numeric, way
+from .families import ANY_DEGREE, Block, PlacedFamily, merge_monomials, sort_factors
+from .symbols import NARROWED, SLOTS, VARIABLES, Variable, count_elements, index_map, numpy_function
 from .windows import Windows
 
 STAMP_DIGITS: Final = 11
@@ -91,10 +91,9 @@ class Problem:
             )
         if self.jumps is not None:
             jumps = whole_numbers(self.jumps, "p", FormulationError)
-            if jumps.shape != (elements(self.instance, "pairs"),):
-                raise FormulationError(
-                    f"p has shape {jumps.shape}, but the grid has {elements(self.instance, 'pairs')} pairs"
-                )
+            pairs = count_elements(self.instance, "pairs")
+            if jumps.shape != (pairs,):
+                raise FormulationError(f"p has shape {jumps.shape}, but the grid has {pairs} pairs")
             object.__setattr__(self, "jumps", jumps)
         if self.pinned is not None:
             self.pinned.check_instance(self.instance)
@@ -178,7 +177,7 @@ class Problem:
         offset = 0
         for name in self.formulation.variables:
             variable = self.variable(name)
-            shape = (elements(self.instance, variable.over),)
+            shape = (count_elements(self.instance, variable.over),)
             lower, upper = (
                 np.broadcast_to(self._value(bound), shape) for bound in (variable.lower, variable.upper)
             )
@@ -193,7 +192,9 @@ class Problem:
     def _value(self, bound: sp.Expr) -> Floats:
         """Values of a bound: one for each element, or one for all."""
         symbols = sorted(bound.free_symbols, key=str)
-        return np.asarray(numeric(symbols, bound)(*(self.data[str(each)] for each in symbols)), np.float64)
+        return np.asarray(
+            numpy_function(symbols, bound)(*(self.data[str(each)] for each in symbols)), np.float64
+        )
 
     @property
     def n_columns(self) -> int:
@@ -218,20 +219,20 @@ class Problem:
     @cached_property
     def objective(self) -> tuple[PlacedFamily, ...]:
         """Terms of the objective bound to the instance, empty ones left out."""
-        return self._placed(self.formulation.objective)
+        return self._place_families(self.formulation.objective)
 
     @cached_property
     def rows(self) -> tuple[PlacedFamily, ...]:
         """Families of rows bound to the instance, in row order, empty ones left out."""
-        return self._placed(self.formulation.rows)
+        return self._place_families(self.formulation.rows)
 
-    def _placed(self, families: tuple[Family, ...]) -> tuple[PlacedFamily, ...]:
+    def _place_families(self, families: tuple[Family, ...]) -> tuple[PlacedFamily, ...]:
         placed = (PlacedFamily(family, self, self._elements(family)) for family in families)
         return tuple(family for family in placed if family.count)
 
     def _elements(self, family: Family) -> Ints:
         if family.only is None:
-            return np.arange(elements(self.instance, family.over), dtype=np.int32)
+            return np.arange(count_elements(self.instance, family.over), dtype=np.int32)
         name, parity = family.only
         return np.nonzero(self.data[name] & 1 == parity)[0].astype(np.int32)
 
@@ -293,9 +294,9 @@ class Problem:
             return np.zeros((1, 0), np.int32), np.array([total])
         if not terms:
             return np.zeros((0, degree), np.int32), np.zeros(0)
-        index = np.concatenate([ordered(term.factors) for term, _ in terms])
+        index = np.concatenate([sort_factors(term.factors) for term, _ in terms])
         scale = np.concatenate([family.scale for _, family in terms])
-        return merged(index, np.concatenate(coefficients), scale, self.n_columns)
+        return merge_monomials(index, np.concatenate(coefficients), scale, self.n_columns)
 
     def to_arrays(self, *, names: bool = True) -> ProblemArrays:
         """Return the problem up to degree 2 as NumPy arrays and SciPy matrices.
@@ -311,7 +312,7 @@ class Problem:
             Costs, matrices, bounds and names. `nonlinear` lists the parts that the arrays do not contain.
 
         """
-        return arrays_of(self, names=names)
+        return problem_arrays(self, names=names)
 
     def to_highs(self) -> Any:
         """Return a `highspy.Highs` with the problem, passed by arrays; its output is switched off.
@@ -325,11 +326,11 @@ class Problem:
 
         """
         check_highs(self.problem_class, convex=self.convex)
-        return highs_of(self.to_arrays(), self.instance.name)
+        return build_highs(self.to_arrays(), self.instance.name)
 
     def objective_value(self, point: Floats) -> float:
         """The objective at a point (columns,). Raises InputError for another shape."""
-        point = self._checked(point)
+        point = self._check_point(point)
         return float(sum(np.sum(family.values(point)) for family in self.objective))
 
     def violation(self, point: Floats) -> Violation:
@@ -337,7 +338,7 @@ class Problem:
 
         Raises InputError for another shape.
         """
-        point = self._checked(point)
+        point = self._check_point(point)
         worst = {family.family.tag: float(np.max(family.excess(point))) for family in self.rows}
         tag = max(worst, key=lambda name: worst[name], default="")
         bounds = np.maximum(np.maximum(self.lower - point, point - self.upper), 0.0)
@@ -364,7 +365,7 @@ class Problem:
 
         Raises InputError for another shape, and InstanceError for jumps beyond 32 bits.
         """
-        point = self._checked(point)
+        point = self._check_point(point)
         if self.jumps is not None:
             jumps = self.jumps
         elif "p" in self.blocks:
@@ -376,8 +377,8 @@ class Problem:
             self.instance, point[self.blocks["alpha"].slice], point[self.blocks["beta"].slice], jumps
         )
 
-    def _checked(self, point: Floats) -> Floats:
-        values = numbers(point, "point")
+    def _check_point(self, point: Floats) -> Floats:
+        values = float_array(point, "point")
         if values.shape != (self.n_columns,):
             raise InputError(
                 f"point has shape {values.shape}; give one value for each of {self.n_columns} columns"
@@ -420,8 +421,8 @@ def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
     sources = problem.data | given
     symbols = sorted(variable.value.free_symbols, key=str)
     slots = (SLOTS[variable.over][symbol] for symbol in symbols)
-    arguments = (sources[quantity][way(problem.instance, kind)] for quantity, kind in slots)
-    return np.asarray(numeric(symbols, variable.value)(*arguments), dtype=np.float64)
+    arguments = (sources[quantity][index_map(problem.instance, kind)] for quantity, kind in slots)
+    return np.asarray(numpy_function(symbols, variable.value)(*arguments), dtype=np.float64)
 
 
 def stamp_of(sha256: str) -> str:
@@ -429,7 +430,7 @@ def stamp_of(sha256: str) -> str:
     return f"sha256_{sha256[:STAMP_DIGITS]}"
 
 
-@checked_arguments
+@check_arguments
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
     """Bind a formulation to an instance.
 
@@ -459,7 +460,7 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
     return Problem(instance, declare(name, **options), p)
 
 
-@checked_arguments
+@check_arguments
 def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
     """Return a problem with its integer columns fixed at the jumps of a field: a continuous problem.
 
@@ -486,7 +487,7 @@ def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
     return replace(problem, pinned=field)
 
 
-def tightened(problem: Problem, windows: Windows) -> Problem:
+def with_windows(problem: Problem, windows: Windows) -> Problem:
     """The same problem with narrower windows of alpha and beta and ranges of jumps.
 
     Raises InstanceError for windows that are not within the windows of its gauge.
@@ -494,6 +495,6 @@ def tightened(problem: Problem, windows: Windows) -> Problem:
     return replace(problem, windows=windows)
 
 
-def lifted(problem: Problem) -> Problem:
+def with_products_lifted(problem: Problem) -> Problem:
     """The problem with each p1 beta_i lifted to z, for formats up to quadratic (`Formulation.weakened`)."""
     return replace(problem, formulation=lift_products(problem.formulation))

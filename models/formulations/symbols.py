@@ -20,7 +20,7 @@ from ..instance.grid import Ints
 from ..instance.instance import Instance
 
 IndexSet = Literal["pixels", "strokes", "pairs"]
-Way = Literal["itself", "first", "second", "stroke"]
+IndexMap = Literal["itself", "first", "second", "stroke"]
 
 
 def _symbol(name: str) -> sp.Symbol:
@@ -96,7 +96,7 @@ COLUMNS: Final = {variable.name: variable.over for variable in VARIABLES.values(
 NARROWED: Final = VARIABLES | {"beta": replace(VARIABLES["beta"], lower=beta_lo, upper=beta_up)}
 """`VARIABLES` for windows that a proof has narrowed, so that bounds of beta are data too."""
 
-SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
+SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, IndexMap]]]] = {
     "pixels": {
         symbol: (symbol.name, "itself") for symbol in (alpha, beta, psi, alpha_lo, alpha_up, beta_lo, beta_up)
     },
@@ -143,7 +143,7 @@ LATEX: Final = {
 }
 
 
-def elements(instance: Instance, over: IndexSet) -> int:
+def count_elements(instance: Instance, over: IndexSet) -> int:
     """Number of elements of an index set."""
     sizes = {
         "pixels": instance.grid.size,
@@ -153,7 +153,7 @@ def elements(instance: Instance, over: IndexSet) -> int:
     return sizes[over]
 
 
-def way(instance: Instance, kind: Way) -> Ints | slice:
+def index_map(instance: Instance, kind: IndexMap) -> Ints | slice:
     """Index array from the elements of a family to the elements of a quantity."""
     if kind == "first":
         return instance.grid.first
@@ -171,12 +171,12 @@ def pixel_of(instance: Instance, over: IndexSet) -> Ints:
     return instance.stroke_index
 
 
-def numeric(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., Any]:
+def numpy_function(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., Any]:
     """A NumPy function of the symbols that evaluates the expression over whole arrays."""
-    return _compiled(tuple(arguments), expression)
+    return _compile_expression(tuple(arguments), expression)
 
 
 @cache
-def _compiled(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
+def _compile_expression(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
     """The compiled expression; declarations are few and fixed, so each is compiled once."""
     return sp.lambdify(arguments, expression, modules="numpy", cse=True)  # type: ignore[no-any-return]

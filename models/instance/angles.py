@@ -70,12 +70,12 @@ def arctangent(y: Floats, x: Floats) -> Floats:
     return np.where(y < 0, -angle, angle)
 
 
-def length(x: Floats, y: Floats) -> Floats:
+def vector_length(x: Floats, y: Floats) -> Floats:
     """The length of vectors (x, y), without protection from overflow; shapes are broadcast."""
     return np.sqrt(x * x + y * y)
 
 
-def turned(vectors: Floats, matrix: Floats) -> Floats:
+def transform_vectors(vectors: Floats, matrix: Floats) -> Floats:
     """The vectors (..., k) times the matrix (c, k), shape (..., c), summed from left to right."""
     total = vectors[..., :1] * matrix[:, 0]
     for k in range(1, matrix.shape[1]):

@@ -13,8 +13,8 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from ..arguments import checked_arguments
-from ..array_archive import ArrayArchive, Expected, pack_arrays
+from ..arguments import check_arguments
+from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
 from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
 from ..storage import read_bytes, write_bytes
@@ -36,16 +36,16 @@ _SCALARS = {
 _ARRAYS = ("mask", "stroke_pixels", "theta", "w")
 _MOST_ERRORS: Final = 100  # of a document; the outermost of them is reported
 _ARCHIVE: Final = {
-    "head": Expected(1, MAX_HEAD, "u"),
-    "origin": Expected(1, 2),
-    "mask": Expected(2, MAX_GRID, "b"),
-    "stroke_pixels": Expected(2, MAX_GRID**2, "iuf"),
-    "theta": Expected(1, MAX_GRID**2),
-    "w": Expected(1, MAX_GRID**2),
+    "head": ExpectedArray(1, MAX_HEAD, "u"),
+    "origin": ExpectedArray(1, 2),
+    "mask": ExpectedArray(2, MAX_GRID, "b"),
+    "stroke_pixels": ExpectedArray(2, MAX_GRID**2, "iuf"),
+    "theta": ExpectedArray(1, MAX_GRID**2),
+    "w": ExpectedArray(1, MAX_GRID**2),
 }
 
 
-@checked_arguments
+@check_arguments
 def write_instance(instance: Instance, path: str | Path) -> Path:
     """Write an instance. Equal instances give equal bytes.
 
@@ -69,10 +69,12 @@ def write_instance(instance: Instance, path: str | Path) -> Path:
     """
     path = Path(path)
     packed = path.suffix.lower() == ".npz"
-    return write_bytes(path, pack_arrays(arrays_of(instance)) if packed else to_json(instance).encode())
+    return write_bytes(
+        path, pack_arrays(instance_arrays(instance)) if packed else instance_to_json(instance).encode()
+    )
 
 
-@checked_arguments
+@check_arguments
 def read_instance(path: str | Path) -> Instance:
     """Read an instance.
 
@@ -97,14 +99,14 @@ def read_instance(path: str | Path) -> Instance:
     data = read_bytes(path, MAX_ARCHIVE)
     with naming(path):
         if data[:2] != b"PK":
-            return of_document(parse_json(decoded(data)))
+            return instance_of_document(parse_json(decode_json(data)))
         archive = ArrayArchive(data)
-        instance = of_archive(archive)
+        instance = instance_of_archive(archive)
         archive.finish()
         return instance
 
 
-def to_json(instance: Instance) -> str:
+def instance_to_json(instance: Instance) -> str:
     """The instance as JSON text, one line per stroke pixel [row, column, theta, w] and per mask row."""
     head = _head(instance) | {"origin": list(instance.origin)}
     lines = [f"  {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
@@ -124,7 +126,7 @@ def _head(instance: Instance) -> dict[str, Any]:
     return {"format": FORMAT, "version": VERSION} | scalars
 
 
-def decoded(data: bytes) -> str:
+def decode_json(data: bytes) -> str:
     """The text of a JSON file. Raises InstanceError for other content and for more than MAX_BYTES bytes."""
     if len(data) > MAX_BYTES:
         raise InstanceError(f"has {len(data)} bytes of JSON; at most {MAX_BYTES} are read, write it as .npz")
@@ -137,12 +139,12 @@ def decoded(data: bytes) -> str:
 def parse_json(text: str) -> object:
     """Parse JSON text, with or without byte order mark. Raises InstanceError with the line."""
     try:
-        return cast("object", json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_once))
+        return cast("object", json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_unique_keys))
     except (ValueError, RecursionError) as error:
         raise InstanceError(f"is not valid JSON: {shortened(error)}") from error
 
 
-def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+def _unique_keys(pairs: list[tuple[str, object]]) -> dict[str, object]:
     """An object of a JSON document. Refuses repeated keys, because programs differ on which one counts."""
     found = dict(pairs)
     if len(found) < len(pairs):
@@ -179,7 +181,7 @@ def _check_writable(document: object) -> None:
         raise InstanceError("has a number that is not finite; write it again") from error
 
 
-def of_document(document: object) -> Instance:
+def instance_of_document(document: object) -> Instance:
     """Read an instance from a parsed JSON document. Raises InstanceError with the place in the document."""
     check_version(document, FORMAT, VERSION)
 
@@ -288,7 +290,7 @@ def check_version(document: object, form: str, version: int) -> None:
         )
 
 
-def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
+def instance_arrays(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
     """The instance as named arrays; `head` is JSON text with format, version and scalars."""
     arrays = {
         "head": np.frombuffer(json.dumps(_head(instance)).encode(), dtype=np.uint8),
@@ -297,14 +299,14 @@ def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
     return arrays | {key: getattr(instance, key) for key in _ARRAYS}
 
 
-def of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
+def instance_of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
     """Read an instance from arrays whose names start with a prefix. Raises InstanceError."""
-    return of_arrays(archive.arrays(_ARCHIVE, prefix))
+    return instance_of_arrays(archive.arrays(_ARCHIVE, prefix))
 
 
-def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
-    """The instance whose arrays `arrays_of` returned. Raises InstanceError with the array's name."""
-    head = head_of(arrays)
+def instance_of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
+    """The instance whose arrays `instance_arrays` returned. Raises InstanceError with the array's name."""
+    head = parse_head(arrays)
     check_version(head, FORMAT, VERSION)
     check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
     try:
@@ -316,7 +318,7 @@ def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
         raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error
 
 
-def head_of(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, Any]:
+def parse_head(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, Any]:
     """The parsed JSON text in the array `head`. Raises InstanceError."""
     try:
         head = parse_json(arrays["head"].tobytes().decode())

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from ..arguments import check_fields, check_kind, numbers
+from ..arguments import check_fields, check_kind, float_array
 from ..errors import CrossfieldError, InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import HALF, MOST_ANGLE, QUARTER, wrap
@@ -52,7 +52,7 @@ class Reading:
 
 def whole_numbers(values: Any, name: str, error: type[CrossfieldError] = InstanceError) -> Ints:
     """The values as int32. Raises the error, with their name, for fractions and for numbers beyond int32."""
-    array = values if getattr(values, "dtype", None) == np.int32 else numbers(values, name, error)
+    array = values if getattr(values, "dtype", None) == np.int32 else float_array(values, name, error)
     if not ((array >= -(2**31)) & (array < 2**31)).all() or (array != np.floor(array)).any():
         raise error(f"{name} holds something other than whole numbers of 32 bits")
     return array.astype(np.int32)
@@ -61,14 +61,14 @@ def whole_numbers(values: Any, name: str, error: type[CrossfieldError] = Instanc
 def _mask(values: Any) -> Bools:
     """The values as booleans. Raises InstanceError unless they are True and False, or 1 and 0."""
     booleans = isinstance(values, np.ndarray) and values.dtype.kind == "b"
-    array = values if booleans else numbers(values, "mask", InstanceError)
+    array = values if booleans else float_array(values, "mask", InstanceError)
     mask: Bools = array != 0
     if (array != mask).any():
         raise InstanceError("mask holds something other than True and False")
     return mask
 
 
-def in_digits(value: float) -> float:
+def round_to_digits(value: float) -> float:
     """The number to 12 significant digits, equal on processors that differ in the last digit."""
     return float(f"{value:.12g}") + 0.0  # no -0.0
 
@@ -157,14 +157,14 @@ class Instance(Pictured):
         self._freeze("mask", _mask(self.mask))
         self._freeze("stroke_pixels", whole_numbers(self.stroke_pixels, "stroke_pixels"))
         for name in ("theta", "w"):
-            self._freeze(name, numbers(getattr(self, name), name, InstanceError))
-        origin = numbers(self.origin, "origin", InstanceError)
+            self._freeze(name, float_array(getattr(self, name), name, InstanceError))
+        origin = float_array(self.origin, "origin", InstanceError)
         if origin.shape != (2,):
             raise InstanceError(f"origin has shape {origin.shape}; give two numbers, x and y")
-        object.__setattr__(self, "origin", (in_digits(origin[0]), in_digits(origin[1])))
+        object.__setattr__(self, "origin", (round_to_digits(origin[0]), round_to_digits(origin[1])))
         for name in ("stroke_coefficient", "skew_coefficient"):
             object.__setattr__(self, name, float(getattr(self, name)))
-        object.__setattr__(self, "pixel_size", in_digits(self.pixel_size))
+        object.__setattr__(self, "pixel_size", round_to_digits(self.pixel_size))
         self._check_scalars()
         self._check_strokes()
         theta = np.round(wrap(self.theta, 0.0, np.pi), _DECIMALS)
@@ -332,7 +332,7 @@ class Instance(Pictured):
 
     def _weight(self, term: str) -> float:
         side, power = max(self.mask.shape), _POWERS[term]
-        return in_digits(getattr(self, f"{term}_coefficient") * side**power / REFERENCE**power)
+        return round_to_digits(getattr(self, f"{term}_coefficient") * side**power / REFERENCE**power)
 
     def with_strokes(self, kept: Bools) -> Instance:
         """Return the same instance with a part of its strokes.
@@ -364,19 +364,19 @@ class Instance(Pictured):
         """The instance of the sketch turned by a quarter counter-clockwise."""
         row, column = self.stroke_pixels.T
         pixels = np.stack([self.mask.shape[1] - 1 - column, row], axis=1)
-        return self._moved(np.rot90(self.mask), pixels, 1, HALF)
+        return self._move(np.rot90(self.mask), pixels, 1, HALF)
 
     def mirrored(self) -> Instance:
         """The instance of the sketch mirrored left to right."""
         row, column = self.stroke_pixels.T
         pixels = np.stack([row, self.mask.shape[1] - 1 - column], axis=1)
-        return self._moved(self.mask[:, ::-1], pixels, -1, np.pi)
+        return self._move(self.mask[:, ::-1], pixels, -1, np.pi)
 
     def transposed(self) -> Instance:
         """The instance mirrored at its main diagonal: rows and columns are exchanged."""
-        return self._moved(self.mask.T, self.stroke_pixels[:, ::-1], -1, -HALF)
+        return self._move(self.mask.T, self.stroke_pixels[:, ::-1], -1, -HALF)
 
-    def _moved(self, mask: Bools, pixels: Ints, sense: int, turn: float) -> Instance:
+    def _move(self, mask: Bools, pixels: Ints, sense: int, turn: float) -> Instance:
         """The instance with its stroke pixels moved and every theta changed to sense theta + turn."""
         order = np.lexsort((pixels[:, 1], pixels[:, 0]))
         return replace(

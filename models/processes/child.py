@@ -20,9 +20,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from .control import Stop, Task, WorkerError, reason, send
+from .control import StopMessage, TaskMessage, WorkerError, error_text, send
 from .deadline import Deadline, Over, never
-from .groups import KILLED, ending, kill, start
+from .groups import KILLED, describe_exit, kill_group, start_group
 
 GRACE: Final = 0.5
 GRACE_SHARE: Final = 0.05
@@ -95,16 +95,16 @@ class Child(AbstractContextManager["Child"]):
         if watch.deadline.passed():
             raise KilledError("no time was left to start the work")
         try:
-            process = self._running(watch)
+            process = self._ensure_process(watch)
             self._load(work, process, watch)
-            self._send(Task(_pickled(work, arguments), log), process)
-            answer = self._next(watch)
+            self._send(TaskMessage(_pickle_task(work, arguments), log), process)
+            answer = self._next_message(watch)
         except _UnsentError:
             raise
         except BaseException:
             self.end()
             raise
-        return Returned(_result(answer), watch.interrupted)
+        return Returned(_unpickle_result(answer), watch.interrupted)
 
     def close(self) -> None:
         """Kill the process, and prevent another start."""
@@ -117,13 +117,13 @@ class Child(AbstractContextManager["Child"]):
             process, self._process = self._process, None
         if process is None:
             return
-        kill(process)
+        kill_group(process)
         process.wait()
         if process.stdin is not None:
             with suppress(OSError):  # unwritten output is lost
                 process.stdin.close()
 
-    def _running(self, watch: _Watch) -> subprocess.Popen[bytes]:
+    def _ensure_process(self, watch: _Watch) -> subprocess.Popen[bytes]:
         """Return the process, started if needed and ready for a call."""
         with self._lock:
             if self._closed:
@@ -131,9 +131,9 @@ class Child(AbstractContextManager["Child"]):
             process = self._process
             fresh = process is None
             if process is None:
-                process = self._process = self._started()
+                process = self._process = self._start_process()
         if fresh:
-            self._next(watch)  # the worker reports that it is ready
+            self._next_message(watch)  # the worker reports that it is ready
         return process
 
     def _load(self, work: Callable[..., Any], process: subprocess.Popen[bytes], watch: _Watch) -> None:
@@ -141,19 +141,19 @@ class Child(AbstractContextManager["Child"]):
         module = getattr(work, "func", work).__module__
         if module in self._loaded:
             return
-        self._send(Task(_pickled(_imported, (work,)), None), process)
-        _result(self._next(watch))
+        self._send(TaskMessage(_pickle_task(_import_only, (work,)), None), process)
+        _unpickle_result(self._next_message(watch))
         self._loaded.add(module)
 
     @staticmethod
-    def _send(task: Task, process: subprocess.Popen[bytes]) -> None:
+    def _send(task: TaskMessage, process: subprocess.Popen[bytes]) -> None:
         assert process.stdin is not None
         with suppress(BrokenPipeError):  # the child died; its exit code shows why
             send(task, process.stdin)
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _start_process(self) -> subprocess.Popen[bytes]:
         # -P: a folder `crossfield` or a file numpy.py in the current folder must not be imported.
-        process = start(
+        process = start_group(
             [sys.executable, "-P", "-c", _PROGRAM, *sys.path],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -164,7 +164,7 @@ class Child(AbstractContextManager["Child"]):
         threading.Thread(target=_listen, args=(process, self._answers), daemon=True).start()
         return process
 
-    def _next(self, watch: _Watch) -> Any:
+    def _next_message(self, watch: _Watch) -> Any:
         """Wait for the next message of the child."""
         while True:
             try:
@@ -186,16 +186,16 @@ class Child(AbstractContextManager["Child"]):
             return "the work was ended before its time"
         code = process.wait()
         remedy = ", probably for lack of memory; try fewer jobs or threads" if code == KILLED else ""
-        return f"a process ended before its work was done: it {ending(code)}{remedy}"
+        return f"a process ended before its work was done: it {describe_exit(code)}{remedy}"
 
     def _ask_to_stop(self) -> None:
         process = self._process
         if process is not None and process.stdin is not None:
             with suppress(OSError):
-                send(Stop(), process.stdin)
+                send(StopMessage(), process.stdin)
 
 
-def _imported(_work: Callable[..., Any]) -> None:
+def _import_only(_work: Callable[..., Any]) -> None:
     """Do nothing; the module of the work was imported when this call arrived."""
 
 
@@ -203,19 +203,19 @@ class _UnsentError(WorkerError):
     """A task that pickle refuses; the child is unchanged."""
 
 
-def _pickled(work: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+def _pickle_task(work: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
     try:
         return pickle.dumps(partial(work, *arguments))
     except Exception as error:
-        raise _UnsentError(f"a task cannot be sent to a process: {reason(error)}") from error
+        raise _UnsentError(f"a task cannot be sent to a process: {error_text(error)}") from error
 
 
-def _result(answer: bytes) -> Any:
+def _unpickle_result(answer: bytes) -> Any:
     """Return the result in an answer, or raise the error in it."""
     try:
         done, found = pickle.loads(answer)  # noqa: S301 - from a process of our own
     except Exception as error:
-        raise WorkerError(f"the result of a task cannot be read: {reason(error)}") from error
+        raise WorkerError(f"the result of a task cannot be read: {error_text(error)}") from error
     if not done:
         raise found
     return found

@@ -14,7 +14,7 @@ _PATIENCE: Final = "10s"  # to reach a scheduler
 
 
 @contextmanager
-def cluster(address: str) -> Iterator[Any]:
+def connect_cluster(address: str) -> Iterator[Any]:
     """Yield a client of a scheduler.
 
     Raises InputError without dask or a scheduler there, and WorkerError when scheduler or workers are lost.

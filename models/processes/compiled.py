@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar, cast
 import numba
 import numpy as np
 
-from .side_by_side import checked
+from .process_pool import check_jobs
 
 _Part = TypeVar("_Part")
 _Work = TypeVar("_Work", bound=Callable[..., Any])
@@ -53,18 +53,18 @@ def _made(work: _Work, *, fastmath: bool | set[str]) -> _Work:
     return cast("_Work", made)
 
 
-def all_compiled() -> bool:
+def is_all_compiled() -> bool:
     """Whether each function of `compiled` is cached on disk where possible: it then only has to be loaded."""
-    _KEPT.update(made for made in _MADE if made not in _KEPT and _is_kept(made))
+    _KEPT.update(made for made in _MADE if made not in _KEPT and _is_cached(made))
     return len(_KEPT) == len(_MADE)
 
 
-def place() -> Path:
+def cache_folder() -> Path:
     """The folder with the cache of the first function. Raises IndexError without a function."""
     return Path(_MADE[0].stats.cache_path)
 
 
-def _is_kept(made: Any) -> bool:
+def _is_cached(made: Any) -> bool:
     """Whether there is an index of compiled code for the function (`*.nbi`, named after its first line)."""
     code, folder = made.py_func.__code__, made.stats.cache_path
     named = f"*.{code.co_name}-{code.co_firstlineno}.*.nbi"
@@ -107,5 +107,5 @@ class Crew:
 @contextmanager
 def crew(count: int) -> Iterator[Crew]:
     """A thread pool that ends with the block. Raises InputError for a number of threads out of range."""
-    with ThreadPoolExecutor(max(1, checked(count) - 1)) as others:
+    with ThreadPoolExecutor(max(1, check_jobs(count) - 1)) as others:
         yield Crew(count, others)

@@ -25,14 +25,14 @@ class WorkerError(CrossfieldError):
     """A child process ended early, or a task, result or error cannot be sent to or from it."""
 
 
-class Task(NamedTuple):
+class TaskMessage(NamedTuple):
     """A pickled function with its arguments, and the file for its output, or None."""
 
     work: bytes
     log: Path | None
 
 
-class Stop(NamedTuple):
+class StopMessage(NamedTuple):
     """A request to end the current work with its present result."""
 
 
@@ -42,12 +42,12 @@ def send(value: Any, stream: IO[bytes]) -> None:
     stream.flush()
 
 
-def reason(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """Name and message of an error of any kind."""
     return f"{type(error).__name__}: {error}"
 
 
-def stopped() -> bool:
+def is_stopped() -> bool:
     """Return whether the parent has requested a stop of the current work."""
     return _STOP.is_set()
 
@@ -76,14 +76,14 @@ def ask_to_stop() -> None:
         hook()
 
 
-def begin() -> None:
+def forget_stops() -> None:
     """Forget requests to stop earlier work."""
     _STOP.clear()
 
 
 def main() -> None:
     """Answer each task from standard input by a message on standard output, until the input closes."""
-    tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
+    tasks: queue.SimpleQueue[TaskMessage] = queue.SimpleQueue()
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)  # output of libraries is not an answer
         threading.Thread(target=_receive, args=(tasks,), daemon=True).start()
@@ -95,17 +95,17 @@ def main() -> None:
             send(answer, answers)
 
 
-def _receive(tasks: queue.SimpleQueue[Task]) -> None:
+def _receive(tasks: queue.SimpleQueue[TaskMessage]) -> None:
     """Queue tasks and pass on requests to stop; end this process when the parent is gone."""
     try:
         # Not sys.stdin: Python aborts at exit while a thread waits there.
         with os.fdopen(os.dup(0), "rb") as stream:
             while True:
                 message = pickle.load(stream)  # noqa: S301 - from the process that started this one
-                if isinstance(message, Stop):
+                if isinstance(message, StopMessage):
                     ask_to_stop()
                 else:
-                    begin()
+                    forget_stops()
                     tasks.put(message)
     finally:
         os._exit(1)
@@ -116,33 +116,33 @@ def _answer(task: bytes) -> bytes:
     try:
         work: Callable[[], object] = pickle.loads(task)  # noqa: S301 - from the process that started this one
     except Exception as error:  # noqa: BLE001 - imports raise anything
-        message = f"a process cannot import the function of its task or read its data: {reason(error)}"
-        return pickle.dumps((False, _noted(WorkerError(message))))
+        message = f"a process cannot import the function of its task or read its data: {error_text(error)}"
+        return pickle.dumps((False, _with_traceback(WorkerError(message))))
     try:
         found = work()
     except Exception as error:  # noqa: BLE001 - the parent raises it where the task came from
-        return _failure(error)
+        return _pickle_error(error)
     try:
         return pickle.dumps((True, found))
     except Exception as error:  # noqa: BLE001 - pickling calls methods of any class
-        message = f"the result of a task cannot be sent back: {reason(error)}"
-        return pickle.dumps((False, _noted(WorkerError(message))))
+        message = f"the result of a task cannot be sent back: {error_text(error)}"
+        return pickle.dumps((False, _with_traceback(WorkerError(message))))
 
 
-def _failure(error: Exception) -> bytes:
+def _pickle_error(error: Exception) -> bytes:
     """Pickle of an error of the work, or of a WorkerError that names it if it cannot be pickled."""
     try:
         # Pickles call the class of an error with its `args`, which do not fit every constructor.
-        sent = pickle.dumps((False, _noted(error)))
+        sent = pickle.dumps((False, _with_traceback(error)))
         _, arrived = pickle.loads(sent)  # noqa: S301 - made in the line above
         if type(arrived) is type(error) and str(arrived) == str(error):
             return sent
     except Exception:  # noqa: BLE001, S110 - an exception while pickling does not concern the work
         pass
-    return pickle.dumps((False, _noted(WorkerError(reason(error)))))
+    return pickle.dumps((False, _with_traceback(WorkerError(error_text(error)))))
 
 
-def _noted(error: Exception) -> Exception:
+def _with_traceback(error: Exception) -> Exception:
     """The error, with the traceback of the exception being handled as a note."""
     error.add_note(traceback.format_exc())
     return error

@@ -1,7 +1,7 @@
 """Ctrl-C, and child processes in groups of their own: starting and killing them on each system.
 
 Ctrl-C on a terminal reaches the group in the foreground. A child in another group is controlled by the
-process that started it. On Windows, `kill` ends the child but not its children.
+process that started it. On Windows, `kill_group` ends the child but not its children.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ KILLED: Final = 1 if sys.platform == "win32" else -int(signal.SIGKILL)
 """Exit code of a killed process; on Windows other failures have it too."""
 
 
-def start(command: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
+def start_group(command: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
     """Child process in a group of its own. `options` are the options of `subprocess.Popen`."""
     if sys.platform == "win32":
         return subprocess.Popen(command, creationflags=subprocess.CREATE_NEW_PROCESS_GROUP, **options)
     return subprocess.Popen(command, start_new_session=True, **options)
 
 
-def kill(child: subprocess.Popen[Any]) -> None:
-    """Kill a child of `start` with its group, even when the child itself has ended."""
+def kill_group(child: subprocess.Popen[Any]) -> None:
+    """Kill a child of `start_group` with its group, even when the child itself has ended."""
     if sys.platform == "win32":
         child.kill()
         return
@@ -35,7 +35,7 @@ def kill(child: subprocess.Popen[Any]) -> None:
         os.killpg(child.pid, signal.SIGKILL)
 
 
-def ending(code: int) -> str:
+def describe_exit(code: int) -> str:
     """Description of an exit code: 'ended with code 3' or 'was killed by signal SIGSEGV'."""
     if code >= 0:
         return f"ended with code {code}"
@@ -46,7 +46,7 @@ def ending(code: int) -> str:
 
 
 class _Presses:
-    """The handler of Ctrl-C of all nested blocks of `interruptible`."""
+    """The handler of Ctrl-C of all nested blocks of `catch_interrupts`."""
 
     def __init__(self) -> None:
         self._pressed = False
@@ -61,7 +61,7 @@ class _Presses:
 
 
 @contextmanager
-def interruptible() -> Iterator[Callable[[], bool]]:
+def catch_interrupts() -> Iterator[Callable[[], bool]]:
     """A function that returns whether Ctrl-C was pressed; a second Ctrl-C interrupts at once.
 
     A block inside another one has the same function, so Ctrl-C ends the work of both: a proof, and the search

@@ -9,7 +9,7 @@ from typing import Final
 from ..arguments import check_fields
 from ..errors import InputError
 from .deadline import Deadline
-from .side_by_side import checked
+from .process_pool import check_jobs
 
 LEAST: Final = 0.01  # seconds of a solve for which no time is left: its starting point is still returned
 
@@ -49,7 +49,7 @@ class Limits:
                 f"a time limit of {self.time_limit} s and a gap of {self.gap} are out of range; "
                 "give a positive number of seconds, and a gap that is not negative"
             )
-        checked(self.threads, "threads", least=0)
+        check_jobs(self.threads, "threads", least=0)
 
     @classmethod
     def bounded(cls, given: Limits | None) -> Limits:

@@ -48,11 +48,11 @@ from typing import Final, cast
 
 import numpy as np
 
-from ..arguments import checked_arguments
+from ..arguments import check_arguments
 from ..array_archive import Arrays, Packing
 from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField, Norm
-from ..instance.file import arrays_of, of_arrays
+from ..instance.file import instance_arrays, instance_of_arrays
 from ..instance.instance import Instance
 from ..processes.deadline import Over, Stop, stop_function
 from ..storage import read_bytes, write_bytes
@@ -108,7 +108,7 @@ class Certificate(Claim):
         return self.verdict.forced
 
 
-@checked_arguments
+@check_arguments
 def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = None) -> Certificate:
     """Write the certificate of a proof, as far as the checker confirms it.
 
@@ -172,7 +172,7 @@ def checked_proof(proof: Proof, over: Over) -> Proof:
     return found
 
 
-@checked_arguments
+@check_arguments
 def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certificate:
     """Read and check a certificate.
 
@@ -229,8 +229,8 @@ def _checked(arrays: Arrays) -> Verdict:
 def _field(arrays: Arrays) -> CrossField:
     """The field of a certificate; its instance must not round the arrays, which alone are proven."""
     parts = {name.removeprefix(_PREFIX): array for name, array in arrays.items() if name.startswith(_PREFIX)}
-    field = CrossField(of_arrays(parts), arrays["alpha"], arrays["beta"], arrays["p"])
-    written = arrays_of(field.instance)
+    field = CrossField(instance_of_arrays(parts), arrays["alpha"], arrays["beta"], arrays["p"])
+    written = instance_arrays(field.instance)
     for name, array in parts.items():
         if not np.array_equal(array, written[name]):
             raise InstanceError(f"array {_PREFIX + name!r} is not as crossfield writes it; prove it again")
@@ -266,7 +266,7 @@ def _arrays(proof: Proof) -> Arrays:
     """The arrays of a proof's certificate without its head."""
     field = proof.field
     arrays: Arrays = {"alpha": field.alpha, "beta": field.beta, "p": field.p}
-    arrays |= {_PREFIX + name: array for name, array in arrays_of(field.instance).items()}
+    arrays |= {_PREFIX + name: array for name, array in instance_arrays(field.instance).items()}
     if proof.norm != 2:
         arrays |= _slopes(proof)
     if any(branch.pixel >= 0 for branch in proof.branches):

@@ -16,7 +16,7 @@ from filelock import FileLock
 
 from ..errors import CrossfieldError, SolverError
 from ..processes.child import Child, KilledError
-from ..processes.compiled import all_compiled, crew, place
+from ..processes.compiled import cache_folder, crew, is_all_compiled
 from ..processes.control import WorkerError
 from ..processes.deadline import Deadline, Over, Progress, never, silent
 from ..sketch.samples import sample
@@ -29,7 +29,7 @@ from .work import Work, WorkLimits
 @contextmanager
 def compiling() -> Iterator[None]:
     """Compile the functions of proofs in the background, unless they are; stop at the end of the context."""
-    if all_compiled():
+    if is_all_compiled():
         yield
         return
     with Child() as child:
@@ -48,7 +48,7 @@ def compile_proofs(progress: Progress, stop: Over = never) -> bool:
     It takes up to a minute, and no time limit includes it. What is compiled by the end stays. progress:
     receives a line if there is something to compile. Raises SolverError when the work fails.
     """
-    if all_compiled():
+    if is_all_compiled():
         return True
     progress("compiling the functions of proofs, once on this machine, before the time limit begins")
     with TemporaryDirectory() as folder, Child() as child:
@@ -65,10 +65,10 @@ def compile_proofs(progress: Progress, stop: Over = never) -> bool:
 
 def compile_all() -> None:
     """Compile the functions of proofs, by the certificate of a few pixels and by a pass with a cluster."""
-    if all_compiled():
+    if is_all_compiled():
         return
-    with FileLock(place() / "compiling.lock"):
-        if all_compiled():
+    with FileLock(cache_folder() / "compiling.lock"):
+        if is_all_compiled():
             return
         instance = sample("mouse", 4).with_gauge("strokes")
         limits = WorkLimits(Deadline(), never, gap=0.0, work=math.inf)

@@ -22,8 +22,8 @@ from ..instance.angles import HALF, QUARTER
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
-from ..search.box_qp import field_at, least_in_box
-from ..search.energy import Quadratic, energy_at
+from ..search.box_qp import field_at, minimise_in_box
+from ..search.energy import QuadraticForm, energy_at
 from ..smooth.systems import stroke_weight
 from .check_certificate import convex_error
 from .pruning import RemainingCells
@@ -134,7 +134,7 @@ class Piece:
         """The field that minimises the quadratic on the piece, and a lower bound of the energy there."""
         lattice = self.left.lattice
         (lower, upper), quadratic = self.left.bounds, self._quadratic()
-        x = least_in_box(quadratic, np.concatenate([lattice.alpha, lattice.beta]), lower, upper, over=over)
+        x = minimise_in_box(quadratic, np.concatenate([lattice.alpha, lattice.beta]), lower, upper, over=over)
         gradient = 2 * quadratic.slope(x)
         field = field_at(lattice.instance, x, lattice.p)
         value = field.energy().total - float(self._given(field).sum())
@@ -200,7 +200,7 @@ class Piece:
         given: Floats = weight * (counted * counted - np.where(self.lines == 0, u * u - tilt, v * v))
         return given
 
-    def _quadratic(self) -> Quadratic:
+    def _quadratic(self) -> QuadraticForm:
         """The quadratic of the piece without its constant."""
         lattice = self.left.lattice
         instance, n = lattice.instance, lattice.instance.grid.size
@@ -213,7 +213,7 @@ class Piece:
         vector[n + at] += weight * np.where(v, of_v, turned + 2 * (above - below))
         places = (np.concatenate([at, at + n]), np.concatenate([at + n, at]))
         swapped = sparse.csr_array((np.tile(-2 * weight * v, 2), places), shape=energy.matrix.shape)
-        return Quadratic(energy.matrix + swapped, vector)
+        return QuadraticForm(energy.matrix + swapped, vector)
 
 
 def forced(left: RemainingCells, target: Floats | None = None) -> Forced:

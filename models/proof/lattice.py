@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..field.field import AbsoluteNorm, CrossField, Norm
-from ..field.jumps import stepped
+from ..field.jumps import step_labels
 from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import Instance
@@ -185,7 +185,7 @@ class Lattice:
 def labels_at(field: CrossField, lattice: Lattice) -> tuple[Floats, Floats, Ints]:
     """Angles (n,) and jumps (m,) of a field, with the labels nearest to the centres of a lattice."""
     steps = np.round((lattice.alpha - field.alpha) / HALF).astype(np.int32)
-    return stepped(lattice.instance.grid, field.alpha, field.beta, field.p, steps)
+    return step_labels(lattice.instance.grid, field.alpha, field.beta, field.p, steps)
 
 
 def offsets(grid: Grid) -> Floats:

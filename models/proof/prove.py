@@ -7,14 +7,14 @@ import time
 from dataclasses import replace
 from typing import Final
 
-from ..arguments import check_count, checked_arguments
-from ..field.field import CrossField, Norm, check_norm, relabelled
+from ..arguments import check_arguments, check_count
+from ..field.field import CrossField, Norm, check_norm, field_in_windows
 from ..instance.instance import Instance
 from ..processes.compiled import crew
 from ..processes.deadline import Deadline, Progress, Stop, never, silent, stop_function
-from ..processes.groups import interruptible
+from ..processes.groups import catch_interrupts
 from ..processes.limits import Limits
-from ..processes.side_by_side import checked
+from ..processes.process_pool import check_jobs
 from ..smooth.systems import one_thread
 from .certificate import REFUSALS, checked_proof
 from .compiling import compile_proofs
@@ -27,7 +27,7 @@ KINDS: Final[dict[Norm, type[Work]]] = {1: WorkIn1Norm, 2: Work, "mixed": WorkIn
 """The work of a proof, by norm."""
 
 
-@checked_arguments
+@check_arguments
 @one_thread()
 def prove(
     instance: Instance,
@@ -97,13 +97,13 @@ def prove(
         check_count("work", work, 1)
     if start is not None:
         start.check_instance(instance)
-        start = relabelled(instance.with_gauge("strokes"), start.alpha, start.beta, start.p)
+        start = field_in_windows(instance.with_gauge("strokes"), start.alpha, start.beta, start.p)
     instance = instance.with_gauge("strokes")
     part = stroked_parts(instance)
     start = None if start is None else restricted(start, part)
-    checked(jobs)
+    check_jobs(jobs)
     given, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
-    with interruptible() as interrupted, crew(given.threads or jobs) as hands:
+    with catch_interrupts() as interrupted, crew(given.threads or jobs) as hands:
 
         def over() -> bool:
             return interrupted() or asked()

@@ -19,7 +19,7 @@ from ..instance.grid import Floats
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
-from ..search.absolute_fit import absolute_fit, fitted_absolute, settled_absolute
+from ..search.absolute_fit import absolute_fit, alternate_absolute, fit_absolute
 from ..search.box_qp import field_at
 from .forced import MARGIN, Forced, Least, Piece, at_pairs
 from .lattice import Lattice
@@ -89,23 +89,23 @@ class WorkAbsolute(Work):
     def first(cls, instance: Instance, given: CrossField | None, over: Over) -> CrossField:
         """The better one of the 2-norm's first field and the user's field, both fitted."""
         fields = [first_of(instance, None, over)] + ([] if given is None else [given])
-        settled = [settled_absolute(each, cls.norm, over) for each in fields]
+        settled = [alternate_absolute(each, cls.norm, over) for each in fields]
         return min(settled, key=lambda field: field.energy(cls.norm).total)
 
     def level(self, centre: CrossField) -> Lattice:
         """The first level round a field: its strokes have the slopes of the best angles for its jumps."""
         instance = centre.instance
         jumps = best_jumps(instance, centre.alpha, centre.beta, absolute=True)
-        around, slopes = fitted_absolute(CrossField(instance, centre.alpha, centre.beta, jumps), self.norm)
+        around, slopes = fit_absolute(CrossField(instance, centre.alpha, centre.beta, jumps), self.norm)
         return Lattice.common(around, self.norm, slopes, COARSEST)
 
     def improve(self, found: CrossField, best: CrossField, over: Over) -> CrossField:
         """The better one of a best field and a new one, fitted."""
-        return min(best, settled_absolute(found, self.norm, over), key=self.energy)
+        return min(best, alternate_absolute(found, self.norm, over), key=self.energy)
 
     def improved(self, field: CrossField, over: Over = never) -> CrossField:
         """The field, fitted."""
-        return settled_absolute(field, self.norm, over)
+        return alternate_absolute(field, self.norm, over)
 
     def _search(self, share: float) -> None:
         """Do nothing: rounding finds better fields than the search, which is for the 2-norm."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ..field.field import CrossField, relabelled
+from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps
 from ..processes.deadline import Over, never
 from ..search.box_qp import FreeField
@@ -42,7 +42,7 @@ class Rounding:
     def _rounded(self, best: CrossField, over: Over, *, forwards: bool) -> CrossField:
         instance = best.instance
         alpha, beta = self._dual.decoded(forwards=forwards)
-        found = relabelled(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
+        found = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
         known = found.p.tobytes()
         if known in self._tried:
             return best
@@ -56,4 +56,6 @@ def improve(found: CrossField, best: CrossField, over: Over) -> CrossField:
     settle(state, LinearSolver(), over)
     if state.energy >= best.energy().total * (1 - _BETTER):
         return best
-    return min(best, improved_field(state.bounded(over), stop=over), key=lambda field: field.energy().total)
+    return min(
+        best, improved_field(state.fit_in_bounds(over), stop=over), key=lambda field: field.energy().total
+    )

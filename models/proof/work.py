@@ -28,7 +28,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from ..field.field import CrossField, Norm, relabelled
+from ..field.field import CrossField, Norm, field_in_windows
 from ..field.jumps import free_jumps
 from ..instance.angles import QUARTER
 from ..instance.grid import Floats
@@ -500,7 +500,7 @@ class Work:
             found, bound, chain.multipliers, chain.cuts = what.least(energy, self.limits.over)
             chain.last[len(chain.levels) - 1] = min(bound, chain.levels[-1].energy)
             if bound < energy:
-                better = relabelled(self.instance, found.alpha, found.beta, found.p)
+                better = field_in_windows(self.instance, found.alpha, found.beta, found.p)
                 self._offer(self.improved(better, self.limits.over))
         return what
 
@@ -533,4 +533,4 @@ def _centre(field: CrossField) -> CrossField:
     """The crosses of a field in the gauge `strokes`, each pair with its best jump."""
     instance = field.instance.with_gauge("strokes")
     alpha, beta = (np.round(angle, _DECIMALS) for angle in (field.alpha, field.beta))
-    return relabelled(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
+    return field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])

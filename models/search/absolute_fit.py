@@ -29,7 +29,7 @@ from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
 from ..smooth.systems import one_thread
-from .box_qp import bounds, field_at
+from .box_qp import angle_bounds, field_at
 
 if TYPE_CHECKING:
     import clarabel
@@ -128,13 +128,13 @@ def absolute_fit(
     solution; one always exists.
     """
     terms, tilt = Residuals.at(instance, p, norm, lines), np.zeros(len(lower)) if tilt is None else tilt
-    x, multipliers = _best(terms, lower, upper, tilt)
+    x, multipliers = _solve_program(terms, lower, upper, tilt)
     multipliers = np.where(terms.squared, multipliers, np.clip(multipliers, -1.0, 1.0))
     multipliers[terms.weight == 0] = 0.0
     return AbsoluteFit(x, multipliers, terms.bound(multipliers, lower, upper, tilt))
 
 
-def _best(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+def _solve_program(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
     """The angles and the multipliers that solve the program, with a size t >= |r| for each absolute value."""
     import clarabel
 
@@ -153,7 +153,7 @@ def _best(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple
         ),
         np.concatenate([-constant, constant, upper, -lower]),
         [clarabel.NonnegativeConeT(2 * (m + n))],
-        _settings(),
+        _clarabel_settings(),
     )
     found = program.solve()
     if not np.isfinite([*found.x, *found.z]).all():
@@ -166,7 +166,7 @@ def _best(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple
     return angles, multipliers
 
 
-def _settings() -> clarabel.DefaultSettings:
+def _clarabel_settings() -> clarabel.DefaultSettings:
     """One thread, and more digits than usual, for they are the proof's."""
     import clarabel
 
@@ -177,9 +177,9 @@ def _settings() -> clarabel.DefaultSettings:
 
 
 @one_thread()
-def fitted_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, Floats]:
+def fit_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, Floats]:
     """Return the field of least energy for the jumps of `field`, and the multipliers of its strokes, (s,)."""
-    instance, m, within = field.instance, len(field.p), bounds(field.instance)
+    instance, m, within = field.instance, len(field.p), angle_bounds(field.instance)
     fit = absolute_fit(instance, field.p, norm, *within)
     # Rounding makes equal angles equal, which the solver returns with its error.
     rounded = np.clip(np.round(fit.x, _DECIMALS), *within)
@@ -189,12 +189,12 @@ def fitted_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, 
 
 
 @one_thread()
-def settled_absolute(field: CrossField, norm: AbsoluteNorm, over: Over = never) -> CrossField:
+def alternate_absolute(field: CrossField, norm: AbsoluteNorm, over: Over = never) -> CrossField:
     """The field after alternating best jumps and best angles, which lower its energy in that norm."""
     best, least = field, field.energy(norm).total
     while not over():
         jumps = best_jumps(field.instance, best.alpha, best.beta, absolute=True)
-        found, _ = fitted_absolute(CrossField(field.instance, best.alpha, best.beta, jumps), norm)
+        found, _ = fit_absolute(CrossField(field.instance, best.alpha, best.beta, jumps), norm)
         energy = found.energy(norm).total
         if energy >= least * (1 - _BETTER):
             break

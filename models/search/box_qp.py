@@ -13,13 +13,13 @@ from typing import Final
 
 import numpy as np
 
-from ..field.field import CrossField, relabelled
+from ..field.field import CrossField, field_in_windows
 from ..instance.angles import QUARTER
 from ..instance.grid import Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.systems import PULL, one_thread
-from .energy import LinearSolver, Quadratic, energy_at
+from .energy import LinearSolver, QuadraticForm, energy_at
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15
 _NEAR: Final = 1e-3  # radians from a bound within which it may hold a variable
@@ -29,13 +29,13 @@ _MOST_HALVINGS: Final = 40
 _DECREASE: Final = 0.1  # least share of the decrease that the slope promises
 
 
-def fitted(field: CrossField, over: Over = never) -> CrossField:
+def fit_in_box(field: CrossField, over: Over = never) -> CrossField:
     """The field of least 2-norm energy with the jumps of `field` in its bounds: the optimum of `qp-fixed`.
 
     Where the energy does not determine angles (parts without strokes), they stay near the given ones.
     """
     energy, x = energy_at(field.instance, field.p), np.concatenate([field.alpha, field.beta])
-    x = least_in_box(energy, x, *bounds(field.instance), over=over)
+    x = minimise_in_box(energy, x, *angle_bounds(field.instance), over=over)
     return field_at(field.instance, x, field.p)
 
 
@@ -45,16 +45,16 @@ def field_at(instance: Instance, x: Floats, p: Ints) -> CrossField:
     return CrossField(instance, alpha, beta, p)
 
 
-def bounds(instance: Instance) -> tuple[Floats, Floats]:
+def angle_bounds(instance: Instance) -> tuple[Floats, Floats]:
     """Least and greatest (alpha, beta) of a field, shapes (2n,)."""
     quarter = np.full(instance.grid.size, QUARTER)
     lower = np.concatenate([instance.alpha_lower, -quarter])
     return lower, np.concatenate([instance.alpha_upper, quarter])
 
 
-def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
-    """As `bounds`, with alpha bounded only at strokes."""
-    lower, upper = bounds(instance)
+def stroke_bounds(instance: Instance) -> tuple[Floats, Floats]:
+    """As `angle_bounds`, with alpha bounded only at strokes."""
+    lower, upper = angle_bounds(instance)
     free = np.ones(instance.grid.size, dtype=bool)
     free[instance.stroke_index] = False
     lower[: len(free)][free], upper[: len(free)][free] = -np.inf, np.inf
@@ -62,8 +62,8 @@ def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
 
 
 @one_thread()
-def least_in_box(
-    energy: Quadratic,
+def minimise_in_box(
+    energy: QuadraticForm,
     x: Floats,
     lower: Floats,
     upper: Floats,
@@ -93,14 +93,14 @@ def least_in_box(
         held = np.where(slope > 0, x <= lower + near, x >= upper - near)
         step = np.where(held, plain, solver.step(energy.matrix, -slope, _NEWTON, ~held))
         ends = (np.clip(x + 0.5**k * step, lower, upper) for k in range(_MOST_HALVINGS))
-        end = next((end for end in ends if _falls(energy, slope, end - x)), None)
+        end = next((end for end in ends if _falls_enough(energy, slope, end - x)), None)
         if end is None:
             break
         x = end
     return x
 
 
-def _falls(energy: Quadratic, slope: Floats, step: Floats) -> bool:
+def _falls_enough(energy: QuadraticForm, slope: Floats, step: Floats) -> bool:
     """Whether a nonzero step lowers the energy by a fair share of the decrease that the slope promises."""
     promised = float(slope @ step)
     return promised < 0 and energy.change(slope, step) <= 2 * _DECREASE * promised
@@ -142,6 +142,6 @@ class FreeField:
         """The 2-norm energy."""
         return self.field.energy().total
 
-    def bounded(self, over: Over = never) -> CrossField:
+    def fit_in_bounds(self, over: Over = never) -> CrossField:
         """The field of least 2-norm energy for these jumps, within the bounds of alpha, beta and p."""
-        return fitted(relabelled(self.instance, self.alpha, self.beta, self.p), over)
+        return fit_in_box(field_in_windows(self.instance, self.alpha, self.beta, self.p), over)

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from ..field.field import CrossField
-from ..field.jumps import stepped
+from ..field.jumps import step_labels
 from ..instance.angles import HALF
 from ..instance.grid import Floats, Ints
 from ..instance.instance import MOST_WEIGHT, Instance
@@ -28,7 +28,7 @@ CREEP: Final = 1e-3
 """Relative fall of the energy in a round: a smaller one does not justify a round on a fine grid."""
 
 
-def halved(instance: Instance) -> Instance | None:
+def halve_resolution(instance: Instance) -> Instance | None:
     """The instance with 2 x 2 pixels merged into one, strokes by mean double angles; None without strokes."""
     height, width = instance.mask.shape
     even = np.pad(instance.mask, ((0, height % 2), (0, width % 2)))
@@ -52,29 +52,31 @@ def halved(instance: Instance) -> Instance | None:
     )
 
 
-def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
-    """The improved field that grows on the fine grid of `instance` out of a field on `halved(instance)`."""
-    return improved_field(grown(coarse, instance, over), stop=over)
+def prolong_field(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
+    """The improved field that grows on the fine grid of an instance out of a field on the coarse one."""
+    return improved_field(grow_field(coarse, instance, over), stop=over)
 
 
-def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
+def grow_field(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
     """The field that grows on the fine grid: its crosses and jumps start as the coarse ones, then settle."""
-    state = lifted(coarse, instance)
+    state = copy_to_fine_grid(coarse, instance)
     settle(state, LinearSolver(), over, enough=CREEP)
-    return state.bounded(over)
+    return state.fit_in_bounds(over)
 
 
-def lifted(coarse: CrossField, instance: Instance) -> FreeField:
+def copy_to_fine_grid(coarse: CrossField, instance: Instance) -> FreeField:
     """The coarse crosses and jumps on the fine grid; strokes have the label whose u is nearest to them."""
     grid = instance.grid
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
     alpha, beta, at = coarse.alpha[parent], coarse.beta[parent], instance.stroke_index
     steps = np.zeros(grid.size, dtype=np.int32)
     steps[at] = _nearest_label(instance.target, alpha[at], beta[at])
-    return FreeField(instance, *stepped(grid, alpha, beta, _jumps(coarse, parent, instance), steps))
+    return FreeField(
+        instance, *step_labels(grid, alpha, beta, _jumps_between_parents(coarse, parent, instance), steps)
+    )
 
 
-def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:
+def _jumps_between_parents(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:
     """The jump between the parents of each pair, shape (m,), 0 inside one."""
     grid, above = instance.grid, coarse.instance.grid
     first, second = parent[grid.first], parent[grid.second]

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
-from ..smooth.systems import PULL, Solve, factored, stroke_weight, symmetric
+from ..smooth.systems import PULL, Solve, factor_matrix, stroke_weight, symmetric_matrix
 
 CLOSE: Final = 1e-2  # relative residual of a step that ranks jumps as the exact one does
 
@@ -25,7 +25,7 @@ _MOST_STEPS: Final = 25  # of conjugate gradients; beyond, a new factorisation i
 
 
 @dataclass(frozen=True, eq=False)
-class Quadratic:
+class QuadraticForm:
     """A quadratic x'Hx - 2 b'x: matrix H, sparse (2n, 2n), positive semidefinite, and vector b (2n,)."""
 
     matrix: Any
@@ -41,7 +41,7 @@ class Quadratic:
         return float(step @ (2 * slope + self.matrix @ step))
 
 
-def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadratic:
+def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> QuadraticForm:
     """The 2-norm energy as a function of the angles, over the pairs of known jump (None: all)."""
     n, at, strokes = instance.grid.size, instance.stroke_index, instance.stroke_terms
     pairs = instance.pair_terms
@@ -53,10 +53,10 @@ def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadra
     couplings = np.concatenate([np.full(len(p), -2.0), -2.0 * parity_sign(p), weight[at]])
     diagonal = np.concatenate([degree + weight, degree + weight + instance.skew_coefficient])
     row, column = np.concatenate([i, i + n, at]), np.concatenate([j, j + n, at + n])
-    matrix = symmetric(row, column, couplings, diagonal)
+    matrix = symmetric_matrix(row, column, couplings, diagonal)
     goal = strokes.at_pixels(strokes.weight * strokes.goal, n)
     pulled = np.bincount(j, turn, n) - np.bincount(i, turn, n)
-    return Quadratic(matrix, np.concatenate([pulled + goal, goal]))
+    return QuadraticForm(matrix, np.concatenate([pulled + goal, goal]))
 
 
 class LinearSolver:
@@ -74,7 +74,7 @@ class LinearSolver:
             step, done = self.attempt(matrix, right, tolerance)
             if done:
                 return step
-        self._inverse = factored(matrix)
+        self._inverse = factor_matrix(matrix)
         return self.attempt(matrix, right, tolerance)[0]
 
     def attempt(self, matrix: Any, right: Floats, tolerance: float) -> tuple[Floats, bool]:

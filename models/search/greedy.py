@@ -12,13 +12,13 @@ from typing import Final
 
 import numpy as np
 
-from ..arguments import checked_arguments
+from ..arguments import check_arguments
 from ..field.field import CrossField
 from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
-from ..smooth.systems import locally, one_thread
+from ..smooth.systems import one_thread, solve_locally
 from .box_qp import FreeField
 from .energy import CLOSE, LinearSolver, energy_at
 from .nearest_stroke import nearest_strokes
@@ -40,7 +40,7 @@ _LARGE: Final = _Pace(1.0, 3e-2)
 _ROUGH: Final = _Pace(0.5, 1e-2, 0.1)
 
 
-@checked_arguments
+@check_arguments
 @one_thread()
 def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop | None = None) -> CrossField:
     """Greedy field of BendFields: the minimum 2-norm energy for its jumps, within all bounds.
@@ -64,21 +64,21 @@ def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop 
         The field.
 
     """
-    state, nearest = _cells(instance)
+    state, nearest = _grow_cells(instance)
     pace = _CLOSE if instance.grid.size <= _CLOSE_UP_TO else _LARGE
     over = stop_function(stop)
     _stitch(state, nearest, pace, over, progress)
-    return state.bounded(over)
+    return state.fit_in_bounds(over)
 
 
 def rough_greedy(instance: Instance, over: Over = never) -> FreeField:
     """As `greedy_field`, without bounds, in a tenth of its time: 60 batches, angles updated locally."""
-    state, nearest = _cells(instance)
+    state, nearest = _grow_cells(instance)
     _stitch(state, nearest, _ROUGH, over)
     return state
 
 
-def _cells(instance: Instance) -> tuple[FreeField, Ints]:
+def _grow_cells(instance: Instance) -> tuple[FreeField, Ints]:
     """Each pixel with the angle of its nearest stroke, without a jump, and the numbers of these strokes."""
     nearest = nearest_strokes(instance)
     angle = np.append(instance.target, 0.0)[nearest]
@@ -90,7 +90,7 @@ def _stitch(state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: 
     """Decide the jumps between cells, cheapest first, in batches."""
     grid, solver = state.instance.grid, LinearSolver()
     known = nearest[grid.first] == nearest[grid.second]
-    _settle(state, known, solver, pace.local)
+    _update_angles(state, known, solver, pace.local)
     added = 0.0
     while not known.all():
         open_ = np.nonzero(~known)[0]
@@ -104,15 +104,15 @@ def _stitch(state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: 
         chosen = open_ if late else open_[order[:many]]
         state.p[chosen] = jumps[chosen]
         known[chosen] = True
-        _settle(state, known, solver, _LARGE.local if late else pace.local)
+        _update_angles(state, known, solver, _LARGE.local if late else pace.local)
         progress(f"{int(known.sum())} of {len(known)} jumps")
 
 
-def _settle(state: FreeField, known: Bools, solver: LinearSolver, local: float | None) -> None:
+def _update_angles(state: FreeField, known: Bools, solver: LinearSolver, local: float | None) -> None:
     """Update angles, accurately enough to rank the unknown jumps."""
     energy = energy_at(state.instance, state.p, known)
     right = -energy.slope(state.x)
     if local is None:
         state.x = state.x + solver.step(energy.matrix, right, CLOSE)
     else:
-        state.x = state.x + locally(energy.matrix, right, local)
+        state.x = state.x + solve_locally(energy.matrix, right, local)

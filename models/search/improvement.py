@@ -13,18 +13,18 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..arguments import checked_arguments
+from ..arguments import check_arguments
 from ..field.field import CrossField
-from ..field.jumps import free_jumps, stepped
+from ..field.jumps import free_jumps, step_labels
 from ..instance.angles import HALF, QUARTER, line_difference
 from ..instance.grid import Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, Stop, never, stop_function
 from ..smooth.systems import one_thread
-from .box_qp import FreeField, free_bounds, least_in_box
+from .box_qp import FreeField, minimise_in_box, stroke_bounds
 from .energy import CLOSE, LinearSolver, energy_at
-from .nearest_stroke import chamfer, nearest_strokes
+from .nearest_stroke import chamfer_distances, nearest_strokes
 
 FALL: Final = 1e-9  # least fall of the energy, relative to 1 + energy: less may be rounding
 
@@ -34,7 +34,7 @@ _MOST_CURVES: Final = 40  # that may change their family, those with the largest
 _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less belong to one curve
 
 
-@checked_arguments
+@check_arguments
 @one_thread()
 def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField:
     """Field that neither best jumps, nor best angles, nor the turn of a curve improve further.
@@ -59,7 +59,7 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
     settle(state, solver, over)
     if field.instance.gauge == "strokes":
         _exchange_families(state, solver, over)
-    found = state.bounded(over)
+    found = state.fit_in_bounds(over)
     return found if found.energy().total < field.energy().total else field
 
 
@@ -68,13 +68,13 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough
 
     Singularities move by a pixel per round, on fine grids for a hundred rounds.
     """
-    bounds = free_bounds(state.instance)
+    bounds = stroke_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
     for _ in range(_ROUNDS):
         if over():
             break
         energy = energy_at(state.instance, state.p)
-        state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
+        state.x = minimise_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
         reached = state.energy
         fall = (least - reached) / (1 + reached)
         if fall >= FALL:
@@ -117,7 +117,7 @@ def _exchange_families(state: FreeField, solver: LinearSolver, over: Over) -> No
 def _turn_if_better(state: FreeField, own: Ints, solver: LinearSolver, over: Over) -> None:
     """Turn the crosses round a curve (own = 1) by a quarter either way, and keep the largest decrease."""
     enough = state.energy * (1 - 1e-6) - 1e-9
-    trials = [_turned(state, quarters, solver) for quarters in (own, -own)]
+    trials = [_turn_trial(state, quarters, solver) for quarters in (own, -own)]
     best = min(trials, key=lambda trial: round(trial.energy, 9))
     if best.energy < enough:
         settle(best, solver, over)
@@ -125,10 +125,10 @@ def _turn_if_better(state: FreeField, own: Ints, solver: LinearSolver, over: Ove
             state.x, state.p = best.x, best.p
 
 
-def _turned(state: FreeField, quarters: Ints, solver: LinearSolver) -> FreeField:
+def _turn_trial(state: FreeField, quarters: Ints, solver: LinearSolver) -> FreeField:
     """The state after turning labels back by `quarters`, solved: strokes pull at the other line."""
     grid, sign = state.instance.grid, parity_sign(quarters)
-    trial = FreeField(state.instance, *stepped(grid, state.alpha, state.beta, state.p, -quarters))
+    trial = FreeField(state.instance, *step_labels(grid, state.alpha, state.beta, state.p, -quarters))
     energy = energy_at(trial.instance, trial.p)
     # In the old labels the system has changed only at these strokes, so that the present factorisation is
     # close.
@@ -150,7 +150,7 @@ def stroke_curves(instance: Instance) -> Ints:
     count = len(instance.theta)
     number = np.full(instance.grid.size, -1)
     number[instance.stroke_index] = np.arange(count)
-    first, second = (number[end] for end in chamfer(instance.grid).tocoo().coords)
+    first, second = (number[end] for end in chamfer_distances(instance.grid).tocoo().coords)
     joined = (first >= 0) & (second >= 0)
     joined[joined] = (
         line_difference(instance.theta[first[joined]], instance.theta[second[joined]]) < _SAME_CURVE

@@ -38,7 +38,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import PairTerms, parity_sign
 from ..smooth.systems import PULL
-from .box_qp import free_bounds
+from .box_qp import stroke_bounds
 from .energy import energy_at
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)  # changes of one jump in the rows of `gains`
@@ -50,7 +50,7 @@ _MOST_HOLDS: Final = 60
 _DRIFT: Final = 1e-8  # error of updates, relative to 1 + energy, beyond which everything is solved anew
 
 
-class Point(NamedTuple):
+class FieldPoint(NamedTuple):
     """Angles (alpha, beta) (2n,) and jumps (m,) of the whole field, and their 2-norm energy."""
 
     energy: float
@@ -109,9 +109,9 @@ class Patch:
         """Local numbers of their pixels, shape (t,)."""
         return np.searchsorted(self.pixels, self.instance.stroke_index[self.strokes]).astype(np.int32)
 
-    def turned(self, own: Ints) -> tuple[Ints, Ints]:
-        """The pairs, and the steps of their jumps, that turn the labels of pixels by own (k,) quarters."""
-        steps = own[self.terms.first] - own[self.terms.second]
+    def turn_steps(self, quarters: Ints) -> tuple[Ints, Ints]:
+        """The pairs, and the steps of their jumps, that turn the labels of pixels by quarters (k,)."""
+        steps = quarters[self.terms.first] - quarters[self.terms.second]
         pairs = np.nonzero(steps)[0].astype(np.int32)
         return pairs, steps[pairs]
 
@@ -169,7 +169,7 @@ class Landscape:
         self._defined = PatchEnergy(patch.instance, patch.pixels, x, p)
         soft = max(PULL, _SOFTEST - patch.instance.skew_coefficient)
         self._soft = np.repeat([PULL, soft], len(patch.pixels))
-        self._lower, self._upper = (each[patch.unknowns] for each in free_bounds(patch.instance))
+        self._lower, self._upper = (end[patch.unknowns] for end in stroke_bounds(patch.instance))
         self._held: dict[int, float] = {}
         self._solve()
         self._settle()
@@ -182,14 +182,14 @@ class Landscape:
         return x
 
     @property
-    def point(self) -> Point:
+    def point(self) -> FieldPoint:
         """The field within its bounds, with its energy by definition."""
         inside = np.clip(self._x, self._lower, self._upper)
         x = self._around.copy()
         x[self.patch.unknowns] = inside
-        return Point(self._defined(inside, self.p), x, self.p.copy())
+        return FieldPoint(self._defined(inside, self.p), x, self.p.copy())
 
-    def saved(self) -> _State:
+    def save_state(self) -> _State:
         """A state for `restore`."""
         return _State(
             self._inverse.copy(order="F"), self._x.copy(), self.p.copy(), self.energy, dict(self._held)
@@ -251,9 +251,9 @@ class Landscape:
 
     def turn(self, stroke: int) -> None:
         """Let line v carry the stroke with this place in `turn_gains`, by the shorter turn."""
-        own = np.zeros(len(self.patch.pixels), dtype=np.int32)
-        own[self.patch.stroke_pixels[stroke]] = self._leaning()[1][stroke]
-        self.change(*self.patch.turned(own))
+        quarters = np.zeros(len(self.patch.pixels), dtype=np.int32)
+        quarters[self.patch.stroke_pixels[stroke]] = self._leaning()[1][stroke]
+        self.change(*self.patch.turn_steps(quarters))
 
     def change(self, pairs: Ints, steps: Ints) -> None:
         """Add steps (c,) to the jumps of the patch's pairs with those local numbers, each at most once."""
@@ -267,7 +267,7 @@ class Landscape:
     def _follow(self, pairs: Ints, steps: Ints) -> None:
         """Update energy, angles and inverse after a change of jumps."""
         self._fresh = False
-        push, gain = self._pushed(pairs, steps)
+        push, gain = self._push_of(pairs, steps)
         touched = np.nonzero(push)[0]
         moved = self._inverse[:, touched] @ push[touched]
         self.energy += gain - float(push[touched] @ moved[touched])
@@ -309,11 +309,11 @@ class Landscape:
         for _ in range(2):
             with suppress(np.linalg.LinAlgError):
                 self._keep_bounds()
-                if self._as_defined():
+                if self._matches_definition():
                     return
             self._solve()
 
-    def _as_defined(self) -> bool:
+    def _matches_definition(self) -> bool:
         """Whether the updates give the energy of the angles; from now on the energy is the defined one."""
         followed, self.energy = self.energy, self._defined_energy()
         return bool(abs(followed - self.energy) <= _DRIFT * (1 + self.energy))
@@ -324,7 +324,7 @@ class Landscape:
         pulls = float(self._soft @ (self._x * self._x)) + _HOLD * float(held @ held)
         return self._defined(self._x, self.p) + pulls
 
-    def _pushed(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
+    def _push_of(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
         """The change of b, shape (2k,), and the change of c - 2 x'b."""
         terms, q = self.patch.terms.chosen(pairs), HALF * steps
         a = terms.residual_a(self._x, self.p[self.patch.pairs[pairs]])

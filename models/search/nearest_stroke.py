@@ -13,10 +13,14 @@ from ..instance.instance import Instance
 
 
 def nearest_strokes(instance: Instance) -> Ints:
-    """The number of each pixel's nearest stroke pixel by `chamfer`, -1 in a part without strokes; (n,)."""
+    """The nearest stroke pixel's number by `chamfer_distances`, -1 in a part without strokes; (n,)."""
     grid = instance.grid
     _, _, source = dijkstra(
-        chamfer(grid), directed=False, indices=instance.stroke_index, min_only=True, return_predecessors=True
+        chamfer_distances(grid),
+        directed=False,
+        indices=instance.stroke_index,
+        min_only=True,
+        return_predecessors=True,
     )
     number = np.full(grid.size + 1, -1, dtype=np.int32)
     number[instance.stroke_index] = np.arange(len(instance.stroke_index))
@@ -24,7 +28,7 @@ def nearest_strokes(instance: Instance) -> Ints:
     return nearest
 
 
-def chamfer(grid: Grid) -> Any:
+def chamfer_distances(grid: Grid) -> Any:
     """Distances between neighbours: 3 along the grid, 4 across a corner next to a pixel of the mask."""
     number = grid.number
     squares = [(number[1:, :-1], number[:-1, 1:], number[:-1, :-1], number[1:, 1:])]

@@ -14,26 +14,26 @@ from typing import Final
 
 import numpy as np
 
-from ..arguments import check_count, checked_arguments
+from ..arguments import check_arguments, check_count
 from ..field.field import CrossField
 from ..instance.grid import Bools
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
-from ..processes.groups import interruptible
+from ..processes.groups import catch_interrupts
 from ..processes.limits import Limits
-from ..processes.side_by_side import checked, side_by_side
+from ..processes.process_pool import check_jobs, parallel_map
 from ..smooth.polyvector import power_field
 from ..smooth.systems import one_thread
-from .box_qp import FreeField, free_bounds
-from .coarse import halved, prolonged
+from .box_qp import FreeField, stroke_bounds
+from .coarse import halve_resolution, prolong_field
 from .energy import LinearSolver
 from .improvement import improved_field, pixel_curves, settle
-from .landscape import Point
+from .landscape import FieldPoint
 from .nearest_stroke import nearest_strokes
-from .starts import different, polyvector_start, rounded_energy, starts
-from .walk import LOWER, Explored, Task, explore
+from .starts import polyvector_start, rounded_energy, start_fields
+from .walk import LOWER, PatchResult, PatchTask, explore
 
-Explorers = Callable[[list[Task]], list[Explored]]
+Explorers = Callable[[list[PatchTask]], list[PatchResult]]
 """Explores patches in parallel and returns the results in the order of the tasks."""
 
 _PATCH: Final = 320  # pixels; its matrix has 640 rows, and a change of one jump costs 0.3 ms
@@ -74,7 +74,7 @@ class Search:
     ended: str
 
 
-@checked_arguments
+@check_arguments
 @one_thread()
 def search(
     instance: Instance,
@@ -133,24 +133,24 @@ def search(
     if rounds is not None:
         check_count("rounds", rounds)
     check_count("seed", seed)
-    checked(jobs)
+    check_jobs(jobs)
     if start is not None:
         start.check_instance(instance)
-    with interruptible() as pressed:
+    with catch_interrupts() as pressed:
         deadline = (limits or Limits(math.inf)).deadline()
         ends = _Ends(deadline, rounds, lambda: pressed() or asked())
-        closing = _closing(deadline)
+        closing = _closing_limit(deadline)
         hunt = _Hunt(instance, seed, _starts(instance, start, ends))
         alone = instance.grid.size <= _ALONE or deadline.left() < _HURRY
         try:
-            with side_by_side(explore, 1 if alone else jobs) as explorers:
+            with parallel_map(explore, 1 if alone else jobs) as explorers:
                 ended = hunt.run(explorers, ends, progress)
         except KeyboardInterrupt:
             ended = "interrupted"
         return Search(hunt.best(closing()), hunt.round, tuple(hunt.energies), ended)
 
 
-def _closing(deadline: Deadline) -> Callable[[], Over]:
+def _closing_limit(deadline: Deadline) -> Callable[[], Over]:
     """End of the last solve, counted from the end of the search, or from a deadline before that."""
     share, more = _CLOSING
     seconds = share * deadline.left() + more
@@ -183,9 +183,11 @@ class _Ends:
         return replace(self, deadline=self.deadline.share(1 - _FINE), rounds=many)
 
 
-def _from_coarse(instance: Instance, seed: int, ends: _Ends, explorers: Explorers) -> Iterator[CrossField]:
+def _fields_from_coarse(
+    instance: Instance, seed: int, ends: _Ends, explorers: Explorers
+) -> Iterator[CrossField]:
     """Fields found on the grid of half the resolution, prolonged to this one, the best there first."""
-    coarse = halved(instance)
+    coarse = halve_resolution(instance)
     if coarse is None:
         return
     sooner = ends.coarse()
@@ -194,12 +196,16 @@ def _from_coarse(instance: Instance, seed: int, ends: _Ends, explorers: Explorer
     for field in hunt.latest(ends.over):
         if ends.over():
             return
-        yield prolonged(field, instance, ends.over)
+        yield prolong_field(field, instance, ends.over)
 
 
 def _starts(instance: Instance, given: CrossField | None, ends: _Ends) -> list[CrossField]:
     """All starts, the lowest first."""
-    return different(starts(instance, given, ends.over, polyvector_start, lambda each, _: power_field(each)))
+    return start_fields(instance, given, ends.over, polyvector_start, _power_start)
+
+
+def _power_start(instance: Instance, _: Over) -> CrossField:
+    return power_field(instance)
 
 
 class _Hunt:
@@ -215,7 +221,7 @@ class _Hunt:
         self._seed = seed
         self._start = start
         self._state = FreeField.of(start)
-        self._bounds = free_bounds(instance)
+        self._bounds = stroke_bounds(instance)
         self._solver = LinearSolver()
         self._latest = [start]
         self._unsettled = False
@@ -226,7 +232,7 @@ class _Hunt:
     def best(self, over: Over) -> CrossField:
         """The field of least energy so far."""
         self._settle(over)
-        return min(self._state.bounded(over), self._start, key=rounded_energy)
+        return min(self._state.fit_in_bounds(over), self._start, key=rounded_energy)
 
     @property
     def large(self) -> bool:
@@ -234,7 +240,7 @@ class _Hunt:
         return self._instance.grid.size > _PATCH * 5 // 4
 
     @property
-    def _is_apart(self) -> bool:
+    def _explores_starts(self) -> bool:
         """Whether this round explores from several starts."""
         return not self.large and self.round < _APART
 
@@ -251,32 +257,32 @@ class _Hunt:
     def run(self, explorers: Explorers, ends: _Ends, progress: Progress) -> str:
         """Adopt fields from coarser grids, then explore until a limit is met; return which one."""
         if self.large:
-            for field in _from_coarse(self._instance, self._seed, ends, explorers):
+            for field in _fields_from_coarse(self._instance, self._seed, ends, explorers):
                 self.offer(field)
         while not (ended := ends.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
             tasks = self.tasks(ends.deadline)
             found = explorers(tasks)
-            self._take(tasks, [each.better for each in found], ends.over)
+            self._adopt_results(tasks, [each.better for each in found], ends.over)
             if all(each.whole for each in found) and not ends.over():
                 self.round += 1
             progress(f"energy {self.energies[-1][1]:.5g} after {self.round} rounds")
         return ended
 
-    def tasks(self, deadline: Deadline) -> list[Task]:
+    def tasks(self, deadline: Deadline) -> list[PatchTask]:
         """The tasks of this round, with their deadline."""
         rng = np.random.default_rng((self._seed, self.round))
         curve, seed = self._curve, (self._seed, self.round)
-        patches = enumerate(zip(self._explored(), self._patches(rng), strict=True))
+        patches = enumerate(zip(self._states_to_explore(), self._patches(rng), strict=True))
         return [
-            Task(self._instance, at.x, at.p, free, curve, _KICKS, (*seed, number), deadline)
+            PatchTask(self._instance, at.x, at.p, free, curve, _KICKS, (*seed, number), deadline)
             for number, (at, free) in patches
         ]
 
-    def _explored(self) -> list[FreeField]:
+    def _states_to_explore(self) -> list[FreeField]:
         """The fields from which the patches of this round are explored."""
-        if not self._is_apart:
+        if not self._explores_starts:
             return [self._state] * _PATCHES
         first = self.round * _PATCHES
         return [self._apart[number % len(self._apart)] for number in range(first, first + _PATCHES)]
@@ -293,11 +299,11 @@ class _Hunt:
             away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
             yield (away <= np.partition(away, _PATCH)[_PATCH]) & self._reached
 
-    def _take(self, tasks: list[Task], found: list[Point | None], over: Over) -> None:
+    def _adopt_results(self, tasks: list[PatchTask], found: list[FieldPoint | None], over: Over) -> None:
         """Adopt lower points, the lowest first, and update the whole grid now and then."""
         self.fruitless += _KICKS * len(tasks)
-        if self._is_apart:
-            self._take_apart(found)
+        if self._explores_starts:
+            self._adopt_in_starts(found)
         else:
             lower = [(task, better) for task, better in zip(tasks, found, strict=True) if better is not None]
             for task, better in sorted(lower, key=lambda pair: pair[1].energy):
@@ -309,9 +315,9 @@ class _Hunt:
         if self.large and (self.round + 1) % _IMPROVE == 0:
             self.offer(improved_field(self.best(over), stop=over))
 
-    def _take_apart(self, found: list[Point | None]) -> None:
+    def _adopt_in_starts(self, found: list[FieldPoint | None]) -> None:
         """Adopt lower points in the fields that were explored, and the lowest of these."""
-        for at, better in zip(self._explored(), found, strict=True):
+        for at, better in zip(self._states_to_explore(), found, strict=True):
             if better is not None and better.energy < at.energy:
                 at.x, at.p = np.clip(better.x, *self._bounds), better.p
         best = min(self._apart, key=lambda at: at.energy)
@@ -320,7 +326,7 @@ class _Hunt:
             self._unsettled, self.fruitless = True, 0
             self.energies.append((self.round, best.energy))
 
-    def _adopt(self, task: Task, better: Point, over: Over) -> None:
+    def _adopt(self, task: PatchTask, better: FieldPoint, over: Over) -> None:
         """Adopt a patch's angles and jumps if they lower the energy together with other adopted patches."""
         state = self._state
         trial = FreeField(

@@ -15,14 +15,14 @@ from typing import Final
 import numpy as np
 
 from ..field.field import CrossField
-from ..field.fusion import fused
+from ..field.fusion import fuse_fields
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
-from ..smooth.systems import locally, one_thread
-from .box_qp import FreeField, fitted, free_bounds
-from .coarse import CREEP, halved, lifted
+from ..smooth.systems import one_thread, solve_locally
+from .box_qp import FreeField, fit_in_box, stroke_bounds
+from .coarse import CREEP, copy_to_fine_grid, halve_resolution
 from .energy import LinearSolver, energy_at
 from .greedy import greedy_field, rough_greedy
 from .improvement import improved_field, settle
@@ -46,17 +46,17 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
     """
     if instance.grid.size <= _SMALL:
         return improved_field(greedy_field(instance, stop=over), stop=over)
-    return _best_of_many(instance, over)[0].bounded(over)
+    return _fuse_many(instance, over)[0].fit_in_bounds(over)
 
 
 def best_start(
     instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
 ) -> CrossField:
-    """The lowest-energy field that `starts` returns."""
-    return starts(instance, given, over, *others)[0]
+    """The lowest-energy field that `start_fields` returns."""
+    return start_fields(instance, given, over, *others)[0]
 
 
-def starts(
+def start_fields(
     instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
 ) -> list[CrossField]:
     """The first field, the given one and, in time, the others, each improved.
@@ -67,10 +67,10 @@ def starts(
     if given is not None:
         fields.append(improved_field(given, stop=over))
     fields.extend(improved_field(other(instance, over), stop=over) for other in others if not over())
-    return different(fields)
+    return distinct_by_energy(fields)
 
 
-def different(fields: list[CrossField]) -> list[CrossField]:
+def distinct_by_energy(fields: list[CrossField]) -> list[CrossField]:
     """The first field of each energy, the lowest energy first."""
     found = {rounded_energy(field): field for field in reversed(fields)}
     return [found[energy] for energy in sorted(found)]
@@ -79,11 +79,11 @@ def different(fields: list[CrossField]) -> list[CrossField]:
 @one_thread()
 def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
     """The field of least 2-norm energy among the PolyVector fields of all `HOLDS`, with their best angles."""
-    best = fitted(polyvector_field(instance, hold=HOLDS[0]), over)
+    best = fit_in_box(polyvector_field(instance, hold=HOLDS[0]), over)
     for hold in HOLDS[1:]:
         if over():
             break
-        tried = fitted(polyvector_field(instance, hold=hold), over)
+        tried = fit_in_box(polyvector_field(instance, hold=hold), over)
         best = min(best, tried, key=rounded_energy)
     return best
 
@@ -113,47 +113,47 @@ _STRATEGIES: Final[tuple[_Strategy, ...]] = (
 """Pairs of a strategy and a factor of the stroke weights, in the order of their additional benefit."""
 
 
-def _best_of_many(instance: Instance, over: Over) -> list[FreeField]:
+def _fuse_many(instance: Instance, over: Over) -> list[FreeField]:
     """The fusion of approximate fields, then these fields: from strategies here and on coarser grids."""
     starts: list[FreeField] = []
-    coarse = halved(instance) if instance.grid.size > _SMALL else None
+    coarse = halve_resolution(instance) if instance.grid.size > _SMALL else None
     if coarse is not None:
-        for state in _best_of_many(coarse, over)[:_LIFTED]:
+        for state in _fuse_many(coarse, over)[:_LIFTED]:
             if starts and over():
                 break
-            starts.append(lifted(state.field, instance))
+            starts.append(copy_to_fine_grid(state.field, instance))
             _settle_roughly(starts[-1])
     for strategy in _STRATEGIES[: max(1, _EFFORT // instance.grid.size)]:
         if starts and over():
             break
         starts.append(strategy(instance, over))
         _settle_roughly(starts[-1])
-    starts.sort(key=_of_state)
-    return [_together(starts, over), *starts]
+    starts.sort(key=_state_energy)
+    return [_fuse_states(starts, over), *starts]
 
 
 def _settle_roughly(state: FreeField) -> None:
     """Update angles and jumps, accurately enough to compare regions; the smooth part needs no comparison."""
-    bounds = free_bounds(state.instance)
+    bounds = stroke_bounds(state.instance)
     for _ in range(_HASTE):
         energy = energy_at(state.instance, state.p)
-        state.x = np.clip(state.x + locally(energy.matrix, -energy.slope(state.x), _HASTY), *bounds)
+        state.x = np.clip(state.x + solve_locally(energy.matrix, -energy.slope(state.x), _HASTY), *bounds)
         state.p = free_jumps(state.instance, state.alpha, state.beta)[0]
 
 
-def _together(states: list[FreeField], over: Over) -> FreeField:
+def _fuse_states(states: list[FreeField], over: Over) -> FreeField:
     """The first and lowest field, settled, with the regions of others that lower it."""
     best = states[0].field
     for other in states[1:]:
         if over():
             break
-        best = fused(best, other.field)
+        best = fuse_fields(best, other.field)
     state = FreeField.of(best)
     settle(state, LinearSolver(), over, enough=CREEP)
-    return min(state, states[0], key=_of_state)
+    return min(state, states[0], key=_state_energy)
 
 
-def _of_state(state: FreeField) -> float:
+def _state_energy(state: FreeField) -> float:
     return round(state.energy, 9)
 
 

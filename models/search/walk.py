@@ -22,7 +22,7 @@ from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over
 from ..smooth.systems import one_thread
 from .box_qp import field_at
-from .landscape import STEPS, Landscape, Patch, Point
+from .landscape import STEPS, FieldPoint, Landscape, Patch
 
 Change = tuple[Ints, Ints]
 """Local numbers of pairs of a patch, each at most once, and the steps that are added to their jumps."""
@@ -41,7 +41,7 @@ _SIDES: Final = (1, 1, -1, -1)  # signs of the pairs of a quad on its counter-cl
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class PatchTask:
     """A patch to explore from a field."""
 
     instance: Instance
@@ -54,53 +54,53 @@ class Task:
     deadline: Deadline
 
 
-class Explored(NamedTuple):
+class PatchResult(NamedTuple):
     """The point of least energy, with the task's values outside the patch; None if none was 1e-7 lower.
 
     whole: whether all perturbations were tried; if not, the point depends on the clock.
     """
 
-    better: Point | None
+    better: FieldPoint | None
     whole: bool
 
 
-def explore(task: Task) -> Explored:
+def explore(task: PatchTask) -> PatchResult:
     """Explore a patch on one thread: the same task gives the same point unless its deadline cuts it off."""
     with one_thread(), suppress(np.linalg.LinAlgError):
         return _explore(task, task.deadline.passed)
-    return Explored(None, whole=True)
+    return PatchResult(None, whole=True)
 
 
-def _explore(task: Task, over: Over) -> Explored:
+def _explore(task: PatchTask, over: Over) -> PatchResult:
     rng, turning = np.random.default_rng(task.seed), np.random.default_rng((*task.seed, 1))
     patch = Patch.of(task.instance, task.free)
     land = Landscape(patch, task.x, task.p)
-    home, perturbations = land.saved(), Perturbations(patch, task.curve)
+    home, perturbations = land.save_state(), Perturbations(patch, task.curve)
     given = field_at(task.instance, task.x, task.p).energy().total
     # Solved in the patch alone, the angles may be lower already; jumps have to improve on that.
     least = min(given, land.point.energy)
-    best: Point | None = None
+    best: FieldPoint | None = None
     for number in range(task.perturbations if len(patch.pairs) else 0):
-        trials = [partial(_perturbed, perturbations.draw(rng, land.p), rng)]
+        trials = [partial(_walk_from_perturbation, perturbations.draw(rng, land.p), rng)]
         if number % _PLAIN == 0 and len(patch.strokes):
-            trials.append(partial(_turned, turning))
+            trials.append(partial(_walk_of_turns, turning))
         for trial in trials:
-            lower = _lower(land, trial, home.energy - LOWER, over)
+            lower = _lower_landscape(land, trial, home.energy - LOWER, over)
             if lower is not None and lower.point.energy < least - LOWER:
-                land, home, best = lower, lower.saved(), lower.point
+                land, home, best = lower, lower.save_state(), lower.point
                 least = best.energy
             elif over():
-                return Explored(best, whole=False)
+                return PatchResult(best, whole=False)
             else:
                 land.restore(home)
-    return Explored(best, whole=not over())
+    return PatchResult(best, whole=not over())
 
 
 Trial = Callable[[Landscape, float, Over], Ints | None]
 """A walk from a landscape: the jumps (m,) of its lowest point below a goal; None without one."""
 
 
-def _lower(land: Landscape, trial: Trial, goal: float, over: Over) -> Landscape | None:
+def _lower_landscape(land: Landscape, trial: Trial, goal: float, over: Over) -> Landscape | None:
     """The landscape at the lowest point below `goal` that a trial finds; None without one."""
     with suppress(np.linalg.LinAlgError):
         jumps = trial(land, goal, over)
@@ -109,7 +109,7 @@ def _lower(land: Landscape, trial: Trial, goal: float, over: Over) -> Landscape 
     return None
 
 
-def _perturbed(
+def _walk_from_perturbation(
     perturbation: Change, rng: np.random.Generator, land: Landscape, goal: float, over: Over
 ) -> Ints | None:
     """A walk that changes jumps after a perturbation."""
@@ -117,7 +117,7 @@ def _perturbed(
     return _walk(land, rng, goal, over)
 
 
-def _turned(rng: np.random.Generator, land: Landscape, goal: float, over: Over) -> Ints | None:
+def _walk_of_turns(rng: np.random.Generator, land: Landscape, goal: float, over: Over) -> Ints | None:
     """A walk that turns strokes, the first one at random."""
     land.turn(int(rng.integers(len(land.patch.strokes))))
     return _walk(land, rng, goal, over, turning=True)
@@ -221,4 +221,4 @@ class Perturbations:
         inside = (away <= radius) & (self._curve >= 0)
         if rng.random() < 0.7:
             inside &= self._curve == self._curve[centre]
-        return self._patch.turned(inside.astype(np.int32) * np.int32(rng.choice([-1, 1])))
+        return self._patch.turn_steps(inside.astype(np.int32) * np.int32(rng.choice([-1, 1])))

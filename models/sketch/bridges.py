@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.angles import length as vector_length
+from ..instance.angles import vector_length
 from ..instance.grid import Bools, Floats
 from .cover import Frame, Indices, covering_curves
 from .outline import enclosed

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..input_limits import MAX_PIECES
-from ..instance.angles import length as vector_length
+from ..instance.angles import vector_length
 from ..instance.grid import Bools, Floats, Ints
 
 Box = tuple[float, float, float, float]

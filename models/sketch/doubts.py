@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.angles import length, line_difference, line_of
+from ..instance.angles import line_difference, line_of, vector_length
 from ..instance.grid import Bools, Floats
 from .cover import Box, Cover, Frame
 from .outline import THICK, convex_area, without_narrow_parts
@@ -27,7 +27,7 @@ def describe_gaps(bridges: Floats) -> str | None:
     """The gaps in the outline that bridges (m, 2, 2) closed."""
     if not len(bridges):
         return None
-    wide = length(*(bridges[:, 1] - bridges[:, 0]).T)
+    wide = vector_length(*(bridges[:, 1] - bridges[:, 0]).T)
     order = np.argsort(-wide, kind="stable")
     places = [f"{_place(bridges[k].mean(axis=0))} over {wide[k]:.4g}" for k in order[:_MOST_PLACES]]
     more = f" and {len(order) - _MOST_PLACES} more" if len(order) > _MOST_PLACES else ""

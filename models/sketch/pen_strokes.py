@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError, shortened
 from ..input_limits import LEAST_LENGTH, MAX_LINES
-from ..instance.angles import cosine, sine, turned
+from ..instance.angles import cosine, sine, transform_vectors
 from ..instance.grid import Bools, Floats, Ints
 from .cover import Box
 from .curves import Curves, lines_as_cubics
@@ -78,7 +78,7 @@ def read_curves(data: bytes, view: str | None = None) -> Curves:
     """
     strokes = _spatial(data)
     axes = _principal(strokes) if view is None else axes_of(view)
-    flat = [turned(stroke, axes) for stroke in strokes]
+    flat = [transform_vectors(stroke, axes) for stroke in strokes]
     ends = np.concatenate(flat)
     least, most = ends.min(axis=0), ends.max(axis=0)
     longer = float((most - least).max())

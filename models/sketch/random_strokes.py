@@ -10,7 +10,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from ..arguments import checked_arguments
+from ..arguments import check_arguments
 from ..errors import InputError, NoStrokeError
 from ..instance.angles import line_of
 from ..instance.grid import Bools, Floats, Ints
@@ -32,7 +32,7 @@ _BEND: Final = 0.3  # sides of the grid by which inner control points of a curve
 _CURVES_PER_PIXEL: Final = 4  # of the side: later curves mostly cross earlier ones, which removes directions
 
 
-@checked_arguments
+@check_arguments
 def random_instance(
     seed: int,
     *,

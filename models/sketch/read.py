@@ -15,7 +15,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from ..arguments import checked_arguments
+from ..arguments import check_arguments
 from ..errors import InputError, NoStrokeError, naming, printable, shortened
 from ..instance.angles import line_of
 from ..instance.grid import Bools
@@ -43,7 +43,7 @@ BYTES_PER_PIXEL: Final = 5000  # while its problem is written
 Silhouette = Literal["none", "outer"]
 
 
-@checked_arguments
+@check_arguments
 def read_sketch(
     path: str | Path,
     *,

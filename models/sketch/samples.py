@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from typing import Final, Literal
 
-from ..arguments import checked_arguments
+from ..arguments import check_arguments
 from ..errors import InputError
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from .read import DEFAULT_SIZE, Silhouette, check_silhouette, check_size, instance_of
@@ -54,7 +54,7 @@ def samples() -> list[Sample]:
     return list(SAMPLES.values())
 
 
-@checked_arguments
+@check_arguments
 def sample(
     name: str,
     size: int = DEFAULT_SIZE,

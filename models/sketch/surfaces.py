@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from ..arguments import checked_arguments
+from ..arguments import check_arguments
 from ..errors import InputError
-from ..instance.angles import arctangent, cosine, length, sine, turned, wrap
+from ..instance.angles import arctangent, cosine, sine, transform_vectors, vector_length, wrap
 from ..instance.grid import Bools, Floats
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from .cover import LEAST_WEIGHT, Frame, cover_by_segments, fit_frame
@@ -48,11 +48,13 @@ class CurvaturePatch:
 
     def point(self, s: Floats, t: Floats) -> Floats:
         """Points of the turned surface, shape (..., 3)."""
-        return turned(self.position(s, t), self.turn)
+        return transform_vectors(self.position(s, t), self.turn)
 
     def tangents(self, s: Floats, t: Floats) -> tuple[Floats, Floats]:
         """Derivatives of the turned surface by s and by t, shape (..., 3) each."""
-        return turned(self.along_s(s, t), self.turn), turned(self.along_t(s, t), self.turn)
+        return transform_vectors(self.along_s(s, t), self.turn), transform_vectors(
+            self.along_t(s, t), self.turn
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ def turned_by(tilt: float, spin: float) -> Floats:
     a, b = np.radians([-tilt, spin])
     about_x = np.array([[1, 0, 0], [0, cosine(a), -sine(a)], [0, sine(a), cosine(a)]])
     about_z = np.array([[cosine(b), -sine(b), 0], [sine(b), cosine(b), 0], [0, 0, 1]])
-    return turned(about_x.T, about_z).T
+    return transform_vectors(about_x.T, about_z).T
 
 
 def _vectors(x: Floats, y: Floats, z: Floats) -> Floats:
@@ -112,10 +114,10 @@ def _ellipsoid(long: float, deep: float, short: float) -> CurvaturePatch:
     k = (long**2 - deep**2) / (long**2 - short**2)
 
     def wide(t: Floats) -> Floats:
-        return length(sine(t), np.sqrt(k) * cosine(t))
+        return vector_length(sine(t), np.sqrt(k) * cosine(t))
 
     def high(s: Floats) -> Floats:
-        return length(sine(s), np.sqrt(1 - k) * cosine(s))
+        return vector_length(sine(s), np.sqrt(1 - k) * cosine(s))
 
     return CurvaturePatch(
         position=lambda s, t: _vectors(
@@ -194,7 +196,7 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
 """The surfaces by name. Cylinder, wave and cone are developable; the last one has no symmetry of rotation."""
 
 
-@checked_arguments
+@check_arguments
 def analytic(
     name: str,
     size: int = DEFAULT_SIZE,
@@ -283,7 +285,7 @@ def _towards_viewer(first: Floats, second: Floats) -> Floats:
     (ax, ay, az), (bx, by, bz) = first.T, second.T
     normal = _vectors(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
     x, y, z = normal.T
-    return normal * (np.where(z < 0, -1.0, 1.0) / length(length(x, y), z))[:, None]
+    return normal * (np.where(z < 0, -1.0, 1.0) / vector_length(vector_length(x, y), z))[:, None]
 
 
 def _frame(surface: CurvaturePatch, size: int) -> Frame:
@@ -297,7 +299,7 @@ def _parameters(surface: CurvaturePatch, frame: Frame) -> tuple[Floats, Floats, 
     row, column = np.indices(frame.shape).reshape(2, -1)
     wanted = np.stack([frame.x + (column + 0.5) * frame.pixel, -frame.y - (row + 0.5) * frame.pixel], axis=-1)
     s, t = _invert(surface, wanted)
-    miss = length(*(surface.point(s, t)[:, :2] - wanted).T)
+    miss = vector_length(*(surface.point(s, t)[:, :2] - wanted).T)
     on_patch = miss < 1e-9
     for value, ends in ((s, surface.s_range), (t, surface.t_range)):
         on_patch &= (value >= ends[0] - 1e-9) & (value <= ends[1] + 1e-9)
@@ -355,7 +357,7 @@ def _lines(surface: CurvaturePatch, frame: Frame, spacing: float) -> tuple[Float
     along_s, along_t = np.linspace(*surface.s_range, _SAMPLES), np.linspace(*surface.t_range, _SAMPLES)
     middle_lines = ((along_s, np.full(_SAMPLES, middle_t)), (np.full(_SAMPLES, middle_s), along_t))
     wide, high = (
-        float(length(*np.diff(surface.point(*line)[:, :2], axis=0).T).sum()) / frame.pixel
+        float(vector_length(*np.diff(surface.point(*line)[:, :2], axis=0).T).sum()) / frame.pixel
         for line in middle_lines
     )
     at_t, at_s = _spread(surface.t_range, high / spacing), _spread(surface.s_range, wide / spacing)

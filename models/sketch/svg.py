@@ -30,7 +30,7 @@ from ..input_limits import (
     MAX_USE_DEPTH,
     MAX_USES,
 )
-from ..instance.angles import turned
+from ..instance.angles import transform_vectors
 from ..instance.grid import Floats
 from .colour import is_paper, is_red
 from .cover import Box
@@ -194,7 +194,7 @@ class _Walk:
             raise too_many_curves()
         with np.errstate(over="ignore", invalid="ignore"):
             turn, shift = np.array([[m.a, m.c], [m.b, m.d]], dtype=float), np.array([m.e, m.f], dtype=float)
-            placed: Floats = turned(points, turn) + shift
+            placed: Floats = transform_vectors(points, turn) + shift
         if not (np.abs(placed) <= _GREATEST).all():
             raise InputError(
                 f"{_named(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"

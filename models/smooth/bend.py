@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..arguments import check_positive, checked_arguments
+from ..arguments import check_arguments, check_positive
 from ..field.field import CrossField
 from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.grid import Floats, Ints
 from ..processes.deadline import Over, Stop, stop_function
-from .systems import SimilarSystems, dissected, one_thread
+from .systems import SimilarSystems, nested_dissection_order, one_thread
 
 _Places = NDArray[np.intp]
 
@@ -39,7 +39,7 @@ _STEPS: Final = 5  # of conjugate gradients; where they do not suffice, a system
 _FALL: Final = 1e-4  # least share of the energy that a round has to remove before another one
 
 
-@checked_arguments
+@check_arguments
 @one_thread()
 def bend_field(
     start: CrossField, *, harmonic: float | None = None, hold: float = HOLD, stop: Stop | None = None
@@ -96,7 +96,7 @@ def bend_field(
     if over():
         return start
     grid = start.instance.grid
-    places = dissected(grid.rows, grid.columns, reach=1)
+    places = nested_dissection_order(grid.rows, grid.columns, reach=1)
     order = np.stack([places, places + grid.size], axis=1).ravel()
     solver = SimilarSystems(order, residual=_RESIDUAL, steps=_STEPS)
     x = np.concatenate([start.u_angle, start.v_angle])
@@ -125,7 +125,7 @@ class _Round:
     slope: Floats
     step: Floats
 
-    def accelerated(self, past: Collection[_Round]) -> Floats:
+    def accelerate(self, past: Collection[_Round]) -> Floats:
         """The angles after this round, by Anderson acceleration with rounds before it.
 
         The combination of rounds that has the smallest slope, measured by the energy of its step.
@@ -178,11 +178,11 @@ class _Bend:
         past: deque[_Round] = deque(maxlen=_PAST)
         for _ in range(_ROUNDS):
             present = _Round(x, slope, self._step(along, slope, solver))
-            moved = present.accelerated(past)
+            moved = present.accelerate(past)
             there = self.at(moved)
             if past and there[0] >= energy:
                 past.clear()
-                moved = present.accelerated(past)
+                moved = present.accelerate(past)
                 there = self.at(moved)
             fallen = energy - there[0]
             if fallen > 0:

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..arguments import check_positive, checked_arguments
-from ..field.field import CrossField, relabelled
+from ..arguments import check_arguments, check_positive
+from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps, label_of
 from ..instance.angles import HALF
 from ..instance.grid import Floats
 from ..instance.instance import Instance
-from .systems import factored, locally, one_thread, smoothness, stroke_weight
+from .systems import factor_matrix, one_thread, smoothness, solve_locally, stroke_weight
 
 _Complex = NDArray[np.complex128]
 
@@ -28,7 +28,7 @@ _HARDEST: Final = 1e4  # weight of a stroke, far above the 2 of a pair; `PULL` s
 _DECIMALS: Final = 9  # of line angles in quarter turns: rounding errors must not decide jumps
 
 
-@checked_arguments
+@check_arguments
 @one_thread()
 def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float | None = None) -> CrossField:
     """Field of the smoothest polynomials whose roots are the lines, with the best jumps.
@@ -71,7 +71,7 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float 
     found = _polynomials(instance, hold, tolerance)
     u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*found))
     alpha, beta = label_of(u, v)
-    start = relabelled(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
+    start = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
     return start.with_best_jumps()
 
 
@@ -86,13 +86,13 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
 
     alike = smoothness(instance) + sparse.diags_array(strokes.at_pixels(weight, size))
     once = sums(weight * root)
-    matrix = _coupled(alike, once, instance.skew_coefficient)
+    matrix = _couple_coefficients(alike, once, instance.skew_coefficient)
     right = np.concatenate([-sums(weight * root**2), -once])
-    x = factored(matrix)(right) if tolerance is None else locally(matrix, right, tolerance)
+    x = factor_matrix(matrix)(right) if tolerance is None else solve_locally(matrix, right, tolerance)
     return x[:size], x[size:]
 
 
-def _coupled(alike: Any, cross: _Complex, skew: float) -> Any:
+def _couple_coefficients(alike: Any, cross: _Complex, skew: float) -> Any:
     """The Hermitian matrix (2n, 2n) of both coefficients: `alike` for each, diagonals that couple them."""
     size = len(cross)
     at = np.nonzero(cross)[0]
@@ -109,7 +109,7 @@ def roots(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
     return np.angle(apart - x1) / 2, np.angle(-apart - x1) / 2
 
 
-@checked_arguments
+@check_arguments
 @one_thread()
 def power_field(instance: Instance) -> CrossField:
     """Field of orthogonal crosses from the harmonic extension of exp(4 i theta), with the best jumps.
@@ -134,7 +134,7 @@ def power_field(instance: Instance) -> CrossField:
     goal = np.stack(
         [strokes.at_pixels(strokes.weight * f(4 * theta), grid.size) for f in (np.cos, np.sin)], axis=-1
     )
-    z = factored(smoothness(instance) + sparse.diags_array(stroke_weight(instance)))(goal)
+    z = factor_matrix(smoothness(instance) + sparse.diags_array(stroke_weight(instance)))(goal)
     alpha, beta = np.arctan2(z[:, 1], z[:, 0]) / 4, np.zeros(grid.size)
-    start = relabelled(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
+    start = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
     return start.with_best_jumps()

@@ -38,10 +38,10 @@ def smoothness(instance: Instance) -> Any:
     grid = instance.grid
     degree = instance.pair_terms.degree(grid.size)
     beside = np.full(len(grid.first), -2.0)
-    return symmetric(grid.first, grid.second, beside, 2 * degree.astype(np.float64))
+    return symmetric_matrix(grid.first, grid.second, beside, 2 * degree.astype(np.float64))
 
 
-def symmetric(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
+def symmetric_matrix(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
     """The sparse symmetric matrix with those entries on one side of the diagonal, each place once."""
     every = np.arange(len(diagonal), dtype=np.int32)
     values = np.concatenate([beside, beside, diagonal])
@@ -49,11 +49,11 @@ def symmetric(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
     return sparse.csr_array((values, place), shape=(len(diagonal), len(diagonal)))
 
 
-def factored(matrix: Any, order: Ints | None = None) -> Solve:
+def factor_matrix(matrix: Any, order: Ints | None = None) -> Solve:
     """The solver of a positive semidefinite Hermitian system H, made definite as H + 1e-9.
 
-    order: of elimination, which keeps the factors sparse, as from `dissected`. None finds one by minimum
-    degree, which is better for systems where only neighbours meet.
+    order: of elimination, which keeps the factors sparse, as from `nested_dissection_order`. None finds one
+    by minimum degree, which is better for systems where only neighbours meet.
     """
     pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
     with one_thread():
@@ -80,7 +80,7 @@ def factored(matrix: Any, order: Ints | None = None) -> Solve:
     return solve
 
 
-def dissected(row: Ints, column: Ints, reach: int) -> Ints:
+def nested_dissection_order(row: Ints, column: Ints, reach: int) -> Ints:
     """The order of elimination of unknowns at places of a grid by nested dissection, (n,).
 
     row, column: of the unknowns, (n,). reach: rows or columns between two unknowns that meet in an equation.
@@ -103,7 +103,7 @@ def dissected(row: Ints, column: Ints, reach: int) -> Ints:
     return np.concatenate(order[::-1])
 
 
-def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.ndarray[Any, Any]:
+def solve_locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.ndarray[Any, Any]:
     """The x with Ax = right to a relative residual, A Hermitian, by diagonally scaled conjugate gradients."""
     inverse = 1 / (matrix.diagonal().real + PULL)
     scaled = LinearOperator(matrix.shape, matvec=lambda v: inverse * v, dtype=matrix.dtype)
@@ -120,7 +120,7 @@ class SimilarSystems:
     Parameters
     ----------
     order
-        Of elimination, as of `factored`.
+        Of elimination, as of `factor_matrix`.
     residual
         Relative residual of solutions by the factors of an earlier system; others are exact.
     steps
@@ -151,7 +151,7 @@ class SimilarSystems:
             if not late:
                 found: Floats = solution
                 return found
-        self._factors = factored(matrix() if callable(matrix) else matrix, self._order)
+        self._factors = factor_matrix(matrix() if callable(matrix) else matrix, self._order)
         return self._factors(right)
 
 

@@ -14,7 +14,7 @@ from scipy import sparse
 from ..instance.grid import Bools, Floats, Ints
 from ..processes.deadline import Over
 from ..smooth.systems import SimilarSystems
-from .stencils import SLOPES, Crosses, Stencils, scaled
+from .stencils import SLOPES, Crosses, Stencils, scale_rows
 
 CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree
 FORGIVEN: Final = 0.007  # cosine of the angle in space from which a cross counts less and less
@@ -91,7 +91,7 @@ class Equations:
     def _second(self, line: Floats, other: Floats) -> Any:
         """The matrix (b, N) of line . d_other g."""
         return sum(
-            scaled(_along(self.stencils.changes, other) @ slope, line[:, axis])
+            scale_rows(_along(self.stencils.changes, other) @ slope, line[:, axis])
             for axis, slope in enumerate(self.stencils.slopes)
         )
 
@@ -231,7 +231,7 @@ def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
     return changes
 
 
-def descended(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
+def descend(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
     """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
     energy, damping = equations.energy(z), _DAMPING
     solver = SimilarSystems(equations.stencils.order, residual=_RESIDUAL, steps=_STEPS, few=_FEW)
@@ -258,4 +258,4 @@ def descended(equations: Equations, z: Floats, over: Over) -> tuple[float, Float
 
 def _along(matrices: tuple[Any, Any], line: Floats) -> Any:
     """The derivative along a line of directions (k, 2), from those by x and y."""
-    return scaled(matrices[0], line[:, 0]) + scaled(matrices[1], line[:, 1])
+    return scale_rows(matrices[0], line[:, 0]) + scale_rows(matrices[1], line[:, 1])

@@ -15,7 +15,7 @@ from ..instance.angles import HALF
 from ..instance.grid import Floats
 from ..instance.instance import Instance
 from .equations import Rows
-from .stencils import Level
+from .stencils import GridLevel
 
 WEIGHT: Final = 0.1  # weight of each pixel of the disc about a hint, whose normals differ a little
 _DISC: Final = 0.05  # radius in parts of the root of the number of pixels
@@ -72,7 +72,7 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
             raise InputError(f"{place} has the tilt {hint.tilt}, not a direction; give a finite angle")
 
 
-def rows_of(hint: Hint, level: Level) -> Rows:
+def hint_rows(hint: Hint, level: GridLevel) -> Rows:
     """The squares that require the slopes of a hint on a disc of pixels of a level, at least one."""
     grid, (top, left) = level.grid, level.corner
     away = np.hypot(

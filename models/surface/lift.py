@@ -10,16 +10,16 @@ from typing import Final
 import numpy as np
 from scipy import ndimage
 
-from ..arguments import checked_arguments
+from ..arguments import check_arguments
 from ..field.field import CrossField
 from ..instance.grid import Floats, Grid
 from ..processes.deadline import Over, Progress, Stop, silent, stop_function
 from ..smooth.systems import one_thread
-from .equations import FORGIVEN, Equations, Weights, descended, normals_of
-from .hints import Hint, check_hints, rows_of
-from .stencils import Crosses, Level, Stencils, levels_of
+from .equations import FORGIVEN, Equations, Weights, descend, normals_of
+from .hints import Hint, check_hints, hint_rows
+from .stencils import Crosses, GridLevel, Stencils, levels_of
 from .surface import Surface
-from .trust import confidence_of, doubts_of, firmness, freedom_of, off_right_angles
+from .trust import confidence_of, doubts_of, firmness, freedom_of, right_angle_deviation
 
 FIRST: Final = Weights(even=1e-4, facing=1e-2)  # stiff, so that starts converge to the same surface
 WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)  # found on surfaces of docs/surface.md
@@ -28,7 +28,7 @@ TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z fr
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
 
 
-@checked_arguments
+@check_arguments
 @one_thread()
 def surface(
     field: CrossField,
@@ -84,15 +84,15 @@ def surface(
         mask = part_of == number
         window = ndimage.find_objects(mask.astype(np.int8))[0]
         stencils, crosses = Stencils(Grid(mask[window])), Crosses.of(field).at(mask[instance.mask])
-        level = Level(stencils, crosses, (window[0].start, window[1].start))
+        level = GridLevel(stencils, crosses, (window[0].start, window[1].start))
         own = [hint for hint in given if part_of[hint.row, hint.column] == number]
-        z = _solved(level, own, cut, flip=flip)
+        z = _solve_part(level, own, cut, flip=flip)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
         found.append((level.grid.size, level, z, own))
     _, level, z, own = max(found, key=itemgetter(0))
-    firm = firmness(level, z, [rows_of(hint, level) for hint in own])
-    off = off_right_angles(field, heights)
+    firm = firmness(level, z, [hint_rows(hint, level) for hint in own])
+    off = right_angle_deviation(field, heights)
     freedom = freedom_of(firm, hinted=_decide_side(own))
     lifted = Surface(field, heights, confidence_of(field, off), (), freedom, firm)
     slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
@@ -113,26 +113,26 @@ class TimeLimit:
         return self.off
 
 
-def _solved(part: Level, hints: Sequence[Hint], over: Over, *, flip: bool) -> Floats:
+def _solve_part(part: GridLevel, hints: Sequence[Hint], over: Over, *, flip: bool) -> Floats:
     """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
     coarse, *finer = levels_of(part)
     dome, *planes = ([*_from_start(coarse, z, hints, over, flip=flip)] for z in coarse.starts)
     found = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
     _, z = min(found, key=itemgetter(0))
     for level in finer:
-        z = _settled(level, level.refined(coarse, z), hints, over)[1]
+        z = _descend_with_hints(level, level.refined(coarse, z), hints, over)[1]
         coarse = level
-    return z if hints else _oriented(part, z, flip=flip)
+    return z if hints else _orient(part, z, flip=flip)
 
 
 def _from_start(
-    level: Level, z: Floats, hints: Sequence[Hint], over: Over, *, flip: bool
+    level: GridLevel, z: Floats, hints: Sequence[Hint], over: Over, *, flip: bool
 ) -> Iterator[tuple[float, Floats]]:
     """Energies and heights reached from a start, with hints from the possible sides."""
-    _, z = descended(Equations(level.stencils, level.crosses, FIRST), z, over)
-    z = _oriented(level, z, flip=flip)
+    _, z = descend(Equations(level.stencils, level.crosses, FIRST), z, over)
+    z = _orient(level, z, flip=flip)
     for side in (z, -z) if _decide_side(hints) else (z,):
-        yield _settled(level, side, hints, over)
+        yield _descend_with_hints(level, side, hints, over)
 
 
 def _decide_side(hints: Sequence[Hint]) -> bool:
@@ -140,13 +140,15 @@ def _decide_side(hints: Sequence[Hint]) -> bool:
     return any(hint.slant >= TELLING for hint in hints)
 
 
-def _settled(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> tuple[float, Floats]:
+def _descend_with_hints(
+    level: GridLevel, z: Floats, hints: Sequence[Hint], over: Over
+) -> tuple[float, Floats]:
     """The energy and heights reached from z by descent, with the hints."""
-    extra = [rows_of(hint, level) for hint in hints]
-    return descended(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, over)
+    extra = [hint_rows(hint, level) for hint in hints]
+    return descend(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, over)
 
 
-def _oriented(level: Level, z: Floats, *, flip: bool) -> Floats:
+def _orient(level: GridLevel, z: Floats, *, flip: bool) -> Floats:
     """The heights or their negatives, whichever lean outward at the border, else upwards; or the opposite."""
     lean = normals_of(level.stencils, z)[:2].T
     inside = np.pad(level.grid.mask, 1)

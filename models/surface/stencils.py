@@ -13,7 +13,7 @@ from scipy import sparse
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..smooth.polyvector import roots
-from ..smooth.systems import dissected
+from ..smooth.systems import nested_dissection_order
 
 SMALL: Final = 500  # most pixels of the coarsest level, where all starts are tried
 SLOPES: Final = np.array([[-0.5, 0.5, -0.5, 0.5], [0.5, 0.5, -0.5, -0.5]])
@@ -35,7 +35,7 @@ class Stencils:
     def used(self) -> Bools:
         """Which corners [height + 1, width + 1] belong to a pixel of the mask."""
         used = np.zeros((self.grid.height + 1, self.grid.width + 1), dtype=bool)
-        for corner in around(used):
+        for corner in corners_of_blocks(used):
             corner[self.grid.mask] = True
         return used
 
@@ -48,7 +48,7 @@ class Stencils:
     def order(self) -> Ints:
         """The order of elimination of the heights (N,), of which those two rows or columns apart meet."""
         row, column = np.nonzero(self.used)
-        return dissected(row.astype(np.int32), column.astype(np.int32), reach=2)
+        return nested_dissection_order(row.astype(np.int32), column.astype(np.int32), reach=2)
 
     @cached_property
     def slopes(self) -> tuple[Any, Any]:
@@ -63,21 +63,21 @@ class Stencils:
     @cached_property
     def blocks(self) -> Ints:
         """Numbers of the pixels of each block, shape (4, b): upper left and right, lower left and right."""
-        pixels = np.stack(around(self.grid.number))
+        pixels = np.stack(corners_of_blocks(self.grid.number))
         return pixels[:, (pixels >= 0).all(axis=0)]
 
     @cached_property
     def changes(self) -> tuple[Any, Any]:
         """The matrices (b, n) from values of pixels to derivatives by x and y at the centres of blocks."""
         size = self.grid.size
-        return _sums(self.blocks, size, *SLOPES[0]), _sums(self.blocks, size, *SLOPES[1])
+        return _weighted_sums(self.blocks, size, *SLOPES[0]), _weighted_sums(self.blocks, size, *SLOPES[1])
 
     @cached_property
     def unevenness(self) -> Any:
         """The matrix (n, n) of sum (x_i - x_j)^2 over pairs of neighbours."""
         grid = self.grid
         ends = np.stack([grid.second, grid.first])
-        difference = _sums(ends, grid.size, 1.0, -1.0)
+        difference = _weighted_sums(ends, grid.size, 1.0, -1.0)
         return difference.T @ difference
 
     @cached_property
@@ -85,10 +85,10 @@ class Stencils:
         """Numbers of the corners of each pixel, shape (4, n): upper left and right, lower left and right."""
         number = np.full(self.used.shape, -1, dtype=np.int32)
         number[self.used] = np.arange(self.count, dtype=np.int32)
-        return np.stack([corner[self.grid.mask] for corner in around(number)])
+        return np.stack([corner[self.grid.mask] for corner in corners_of_blocks(number)])
 
     def _at_pixels(self, *weights: float) -> Any:
-        return _sums(self.corners, self.count, *weights)
+        return _weighted_sums(self.corners, self.count, *weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,18 +120,18 @@ class Crosses:
         return first, second
 
 
-def around(corners: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:
+def corners_of_blocks(corners: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:
     """Views of a picture of points: upper left and right, lower left and right of each 2 x 2 of them."""
     ends = (slice(None, -1), slice(1, None))
     return [corners[down, right] for down in ends for right in ends]
 
 
-def scaled(matrix: Any, by: Floats) -> Any:
+def scale_rows(matrix: Any, by: Floats) -> Any:
     """The sparse matrix with each row multiplied by a number."""
     return sparse.diags_array(by) @ matrix
 
 
-def _sums(places: Ints, size: int, *weights: float) -> Any:
+def _weighted_sums(places: Ints, size: int, *weights: float) -> Any:
     """The matrix (k, size) of weighted sums of the values at places (w, k)."""
     count = places.shape[1]
     at = (np.tile(np.arange(count), len(weights)), places.ravel())
@@ -139,7 +139,7 @@ def _sums(places: Ints, size: int, *weights: float) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class GridLevel:
     """A mask and its crosses, with pixels of 2^`halved` of the pixels of the field.
 
     corner: row and column, in pixels of the field, of the upper left corner of the mask's picture.
@@ -155,7 +155,7 @@ class Level:
         """Its pixels."""
         return self.stencils.grid
 
-    def coarser(self) -> Level:
+    def coarser(self) -> GridLevel:
         """The level of pixels twice as large: one for each nonempty 2 x 2, with its mean cross."""
         grid = self.grid
         even = np.pad(grid.mask, [(0, size % 2) for size in grid.mask.shape])
@@ -163,9 +163,9 @@ class Level:
         at = larger.number[grid.rows // 2, grid.columns // 2]
         share = 1 / np.bincount(at, minlength=larger.size)[at]
         mean = sparse.csr_array((share, (at, np.arange(grid.size))), shape=(larger.size, grid.size))
-        return Level(Stencils(larger), self.crosses.averaged(mean), self.corner, self.halved + 1)
+        return GridLevel(Stencils(larger), self.crosses.averaged(mean), self.corner, self.halved + 1)
 
-    def refined(self, coarse: Level, heights: Floats) -> Floats:
+    def refined(self, coarse: GridLevel, heights: Floats) -> Floats:
         """The heights (N,) interpolated from the coarser level, which was made from this one."""
         picture = np.zeros(coarse.stencils.used.shape)
         picture[coarse.stencils.used] = heights
@@ -181,13 +181,13 @@ class Level:
         used = self.stencils.used
         row, column = np.nonzero(used)
         inside = ndimage.distance_transform_edt(np.pad(self.grid.mask, 1))
-        depth = np.min(around(inside), axis=0)[used]
+        depth = np.min(corners_of_blocks(inside), axis=0)[used]
         radius = depth.max() + 1
         dome = _DOME * np.sqrt(depth * (2 * radius - depth))
         return [dome, _PLANE * (column - column.mean()), -_PLANE * (row - row.mean())]
 
 
-def levels_of(level: Level) -> list[Level]:
+def levels_of(level: GridLevel) -> list[GridLevel]:
     """The level and coarser ones, the coarsest first."""
     found = [level]
     while found[0].grid.size > SMALL:

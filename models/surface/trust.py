@@ -10,9 +10,9 @@ from scipy import linalg
 
 from ..field.field import CrossField
 from ..instance.grid import Floats
-from ..smooth.systems import factored
+from ..smooth.systems import factor_matrix
 from .equations import Equations, Rows, Weights, changes_of_normals
-from .stencils import Crosses, Level, Stencils, around, scaled
+from .stencils import Crosses, GridLevel, Stencils, corners_of_blocks, scale_rows
 
 OFF: Final = np.radians(10)  # lines whose angle in space deviates more from a right angle do not fit
 UNFIT: Final = 0.25  # share of misfit crosses from which a surface is doubted (docs/surface.md)
@@ -27,7 +27,7 @@ _PULL: Final = 1e-7  # of the normals, so that directions without cost do not ma
 _TWIST: Final = 1e-3
 
 
-def off_right_angles(field: CrossField, heights: Floats) -> Floats:
+def right_angle_deviation(field: CrossField, heights: Floats) -> Floats:
     """Deviation from a right angle between each cross's lines on the surface, in [0, pi/2] radians; (n,)."""
     stencils = Stencils(field.instance.grid)
     cosine = Equations(stencils, Crosses.of(field), _PLAIN).right_angles(heights[stencils.used])
@@ -38,7 +38,7 @@ def confidence_of(field: CrossField, off: Floats) -> Floats:
     """1 / (1 + (off / OFF)^2) at each pixel, and 0 at the four pixels of a singular spot; shape (n,)."""
     spots = field.singularities
     singular = np.zeros(field.instance.mask.shape, dtype=bool)
-    for quad in around(singular):
+    for quad in corners_of_blocks(singular):
         quad[spots.row, spots.column] = True
     return np.where(singular[field.instance.mask], 0.0, 1 / (1 + (off / OFF) ** 2))
 
@@ -62,12 +62,13 @@ def freedom_of(firm: float, *, hinted: bool) -> tuple[str, ...]:
     found = [] if hinted else ["inside out it has the same crosses: see whether it bulges the right way"]
     if firm < LOOSE:
         found.append(
-            f"other surfaces fit as well, steeper or leaning otherwise: {in_words(firm)}; a hint settles it"
+            "other surfaces fit as well, steeper or leaning otherwise: "
+            f"{describe_firmness(firm)}; a hint settles it"
         )
     return tuple(found)
 
 
-def in_words(firm: float) -> str:
+def describe_firmness(firm: float) -> str:
     """Sentence that describes a firmness."""
     return (
         "when its normals turn by 10 degrees, the angles between its lines change by "
@@ -75,7 +76,7 @@ def in_words(firm: float) -> str:
     )
 
 
-def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:
+def firmness(level: GridLevel, z: Floats, extra: Sequence[Rows] = ()) -> float:
     """Least change of the equations when the normals turn: radians per radian, both rms.
 
     It is 0 along a family of surfaces with the same crosses, and for masks that are too small.
@@ -87,9 +88,9 @@ def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:
     _, curvature = Equations(level.stencils, level.crosses, _PLAIN, extra).model(z)
     curvature = curvature + _TWIST * (twist.T @ twist)
     change, slopes = changes_of_normals(level.stencils, z), level.stencils.slopes
-    turns = [scaled(slopes[0], part[0]) + scaled(slopes[1], part[1]) for part in change]
+    turns = [scale_rows(slopes[0], part[0]) + scale_rows(slopes[1], part[1]) for part in change]
     turning = sum(turn.T @ turn for turn in turns)
-    solve = factored(curvature + _PULL * turning, level.stencils.order)
+    solve = factor_matrix(curvature + _PULL * turning, level.stencils.order)
     vectors = np.random.default_rng(0).standard_normal((level.stencils.count, _VECTORS))
     least = np.zeros(_VECTORS)
     for _ in range(_ROUNDS):

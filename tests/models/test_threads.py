@@ -13,8 +13,8 @@ import pytest
 PROGRAM = """
 import hashlib, json, time
 import crossfield as cf
-from crossfield.models.search.absolute_fit import fitted_absolute
-from crossfield.models.search.box_qp import FreeField, fitted
+from crossfield.models.search.absolute_fit import fit_absolute
+from crossfield.models.search.box_qp import FreeField, fit_in_box
 from crossfield.models.search.energy import LinearSolver
 from crossfield.models.search.improvement import settle
 from crossfield.models.search.starts import first_field
@@ -26,13 +26,13 @@ power = cf.power_field(instance)
 def settled():
     state = FreeField.of(power)
     settle(state, LinearSolver())
-    return state.bounded()
+    return state.fit_in_bounds()
 
 methods = {
     "power": lambda: cf.power_field(instance), "polyvector": lambda: cf.polyvector_field(instance),
     "bend": lambda: cf.bend_field(power), "greedy": lambda: cf.greedy_field(instance),
-    "improved": lambda: cf.improved_field(power), "fitted": lambda: fitted(power), "settled": settled,
-    "fitted_1norm": lambda: fitted_absolute(power, 1)[0], "first": lambda: first_field(instance),
+    "improved": lambda: cf.improved_field(power), "fitted": lambda: fit_in_box(power), "settled": settled,
+    "fitted_1norm": lambda: fit_absolute(power, 1)[0], "first": lambda: first_field(instance),
     "surface": lambda: cf.surface(power),
 }
 results = {}

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from crossfield.models.processes.groups import start
+from crossfield.models.processes.groups import start_group
 
 
 def interrupted(program: str) -> list[str]:
@@ -19,7 +19,7 @@ def interrupted(program: str) -> list[str]:
     a number; it must end well.
     """
     command = [sys.executable, "-c", program]
-    child = start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    child = start_group(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert int(child.stdout.readline()) > 0
     child.send_signal(signal.SIGINT)
     out, err = child.communicate()

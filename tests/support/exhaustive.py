@@ -6,7 +6,7 @@ import numpy as np
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
-from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.box_qp import fit_in_box
 
 
 def sketch(mask, theta, skew_coefficient=1e-6, gauge="strokes", w=None):
@@ -59,7 +59,7 @@ def optimum(instance):
     energies = np.concatenate([least_energy(instance, part) for part in parts])
     best = np.concatenate(parts)[np.argmax(energies <= energies.min() + 1e-9)]
     angles = np.zeros(instance.grid.size)
-    return fitted(CrossField(instance, angles, angles, best))
+    return fit_in_box(CrossField(instance, angles, angles, best))
 
 
 def every_jump(instance):

@@ -11,7 +11,7 @@ from crossfield.models.processes.deadline import Deadline
 def until_stopped(begun: Path) -> str:
     """Wait until the parent requests a stop."""
     begun.touch()
-    while not control.stopped():
+    while not control.is_stopped():
         time.sleep(0.01)
     return "stopped"
 

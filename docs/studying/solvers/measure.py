@@ -18,7 +18,7 @@ from crossfield.export.formats.registry import generator
 from crossfield.export.solving.local import Solvers
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedBySolverError
 from crossfield.models.field.field import Norm
-from crossfield.models.formulations.problem import Problem, tightened
+from crossfield.models.formulations.problem import Problem, with_windows
 from crossfield.models.formulations.windows import Windows
 from crossfield.models.instance.instance import Instance
 from crossfield.models.proof.certificate import read_certificate
@@ -161,7 +161,7 @@ def _narrowed(run: Run, problem: Problem, watch: Watch, certificates: Path) -> P
         limits = cf.Limits(run.limit, gap=0)
         proof = cf.prove(problem.instance, norm=_norm(run), limits=limits, jobs=1, stop=watch.over)
         cf.write_certificate(proof, path)
-    return tightened(problem, _windows(path, problem.instance))
+    return with_windows(problem, _windows(path, problem.instance))
 
 
 def _windows(path: Path, instance: Instance) -> Windows:

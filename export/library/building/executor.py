@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from typing import Any, Final, TypeVar
 
 from ....models.errors import CrossfieldError
-from ....models.processes.cluster import cluster
+from ....models.processes.cluster import connect_cluster
 from ....models.processes.control import WorkerError
-from ....models.processes.side_by_side import workers
+from ....models.processes.process_pool import process_pool
 
 T = TypeVar("T")
 
@@ -35,7 +35,7 @@ def ahead(jobs: int, scheduler: str | None) -> int:
 def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
     """Yield an executor. Raises InputError without a scheduler or dask; BuildError when workers die."""
     try:
-        with _cluster(scheduler) if scheduler else workers(jobs) as chosen:
+        with _cluster(scheduler) if scheduler else process_pool(jobs) as chosen:
             yield chosen
     except WorkerError as error:
         raise BuildError(f"{error}; complete files are kept") from error
@@ -43,7 +43,7 @@ def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
 
 @contextmanager
 def _cluster(address: str) -> Iterator[Executor]:
-    with cluster(address) as client:
+    with connect_cluster(address) as client:
         yield client.get_executor(pure=False, retries=_TRIES)
 
 

@@ -11,7 +11,7 @@ from ....models.instance.angles import HALF
 from ....models.instance.instance import Instance
 from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
-from ....models.search.pinned import pinned
+from ....models.search.reproducible_angles import reproducible_field
 from ..ledger.given import Given
 from ..ledger.points import (
     Certified,
@@ -34,7 +34,7 @@ def found_fields(instance: Instance, recipe: InstanceRecipe, sent: Sequence[Cert
     if effort == "none":
         nearest = _nearest(instance)
         return nearest, [nearest], []
-    baseline = Known(pinned(greedy_field(instance)), ours("greedy"))
+    baseline = Known(reproducible_field(greedy_field(instance)), ours("greedy"))
     if effort == "greedy":
         return baseline, [baseline], []
     if effort == "proven":
@@ -43,7 +43,7 @@ def found_fields(instance: Instance, recipe: InstanceRecipe, sent: Sequence[Cert
     searched = searched_field(instance)
     low, proven = _proof(searched, recipe, sent)
     found = better_in_1norm(searched.field, recipe.rung)
-    staged = [Known(pinned(each.field), ours("two stages")) for each in found]
+    staged = [Known(reproducible_field(each.field), ours("two stages")) for each in found]
     return baseline, [searched, *low, *found, *staged], proven
 
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 from ....models.errors import NoStrokeError
 from ....models.field.field import CrossField
 from ....models.field.file import field_of_json, field_to_json
-from ....models.instance.file import to_json
+from ....models.instance.file import instance_to_json
 from ....models.instance.instance import Instance
 from ....models.sketch.random_strokes import STROKE_SHARE
 from ...formats.registry import generator
@@ -115,7 +115,7 @@ def files_of(task: Preparation, instance: Instance) -> Files:
     ]
     # The ledger does not decide on the baseline, whose jumps are the data of `qp-fixed`.
     chosen = {"baseline": baseline} | {f"least_{norm}": least_energy(every, norm) for norm in NORMS}
-    files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
+    files: Files = {f"{task.name}.instance.json": instance_to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
     for role in reversed(SUFFIXES):
         known = chosen[role]

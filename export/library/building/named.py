@@ -9,7 +9,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from ....models.arguments import checked_arguments
+from ....models.arguments import check_arguments
 from ....models.errors import InputError, InstanceError, shortened
 from ....models.field.field import CrossField
 from ....models.formulations.catalogue import FORMULATIONS
@@ -166,7 +166,7 @@ class LibraryEntry:
                     yield Known(field, ours("ledger"))
 
 
-@checked_arguments
+@check_arguments
 def entries(*, where: str | None = None, rung: str | None = None) -> list[LibraryEntry]:
     """Entries of the library that ships, with their facts, in its order.
 
@@ -197,7 +197,7 @@ def entries(*, where: str | None = None, rung: str | None = None) -> list[Librar
     return [LibraryEntry(row) for row in _rows().values() if rung in (None, row["rung"]) and obeys(row)]
 
 
-@checked_arguments
+@check_arguments
 def entry(name: str) -> LibraryEntry:
     """Entry of the library that ships, by its name.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from ....models.array_archive import ArrayArchive, Expected
+from ....models.array_archive import ArrayArchive, ExpectedArray
 from ....models.errors import CrossfieldError, InputError, InstanceError
 from ....models.field import file as fields
 from ....models.input_limits import MAX_HEAD, MAX_LOG
@@ -102,7 +102,7 @@ def kinds_of(path: Path) -> set[Kind]:
 
 def _is_certificate(data: bytes) -> bool:
     with suppress(InstanceError):
-        head = ArrayArchive(data).arrays({"head": Expected(1, MAX_HEAD, "u")})["head"].tobytes()
+        head = ArrayArchive(data).arrays({"head": ExpectedArray(1, MAX_HEAD, "u")})["head"].tobytes()
         return check_certificate.FORMAT.encode() in head
     return False
 

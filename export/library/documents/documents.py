@@ -17,7 +17,7 @@ import numpy as np
 
 from ....models.errors import InputError, InstanceError
 from ....models.formulations.catalogue import FORMULATIONS
-from ....models.formulations.problem import Problem, formulate, tightened
+from ....models.formulations.problem import Problem, formulate, with_windows
 from ....models.instance.file import read_document, read_instance
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.proof.tightening import windows_left
@@ -136,7 +136,7 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
 
 def tightened_by(certificate: Certificate, problem: Problem) -> Problem:
     """Return a problem in the windows that a certificate leaves."""
-    return tightened(problem, windows_left(certificate))
+    return with_windows(problem, windows_left(certificate))
 
 
 def listed_jumps(problem: Problem) -> list[list[int]] | None:

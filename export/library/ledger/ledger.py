@@ -19,7 +19,7 @@ from ....models.errors import InputError, InstanceError, naming, shortened
 from ....models.field.field import CrossField, Norm
 from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import read_document, schema_error
-from ....models.processes.groups import interruptible
+from ....models.processes.groups import catch_interrupts
 from ....models.storage import read_bytes, write_bytes
 from .. import documents
 from ..plan.spec import day
@@ -220,7 +220,7 @@ def write_ledger(ledger: Ledger) -> None:
     """
     path = ledger.folder / FILE
     data = (json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n").encode()
-    with interruptible() as pressed:
+    with catch_interrupts() as pressed:
         for name, content in ledger.unwritten.items():
             write_bytes(ledger.folder / name, content)
         if not path.exists() or read_bytes(path) != data:

@@ -22,7 +22,7 @@ from ....models.instance.angles import QUARTER
 from ....models.instance.grid import Floats
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import Certificate, read_certificate, write_certificate
-from ....models.search.pinned import pinned
+from ....models.search.reproducible_angles import reproducible_field
 from ....models.search.search import search
 from ...bundle.starts import write_start
 from ...formats.registry import generator, write
@@ -69,7 +69,7 @@ def ours(method: str) -> Provenance:
 
 def searched_field(instance: Instance) -> Known:
     """Return a field of low 2-norm energy."""
-    return Known(pinned(search(instance, rounds=_ROUNDS, jobs=1).field), ours("search"))
+    return Known(reproducible_field(search(instance, rounds=_ROUNDS, jobs=1).field), ours("search"))
 
 
 def better_in_1norm(start: CrossField, rung: str) -> list[Known]:
@@ -134,7 +134,7 @@ def certified(start: CrossField, file: str, norm: Norm = 2) -> tuple[Known, Cert
     from ....models.proof.prove import prove  # loads compiled functions
 
     found = prove(start.instance, norm=norm, start=start, work=_MOST_WORK, jobs=1)
-    field = pinned(found.field) if norm == 2 else found.field
+    field = reproducible_field(found.field) if norm == 2 else found.field
     proof = replace(found, field=field, energy=field.energy(norm).total)
     with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
         path = Path(folder) / "a.certificate.npz"

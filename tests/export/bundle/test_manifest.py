@@ -23,7 +23,7 @@ from crossfield.models.errors import (
     UnsupportedByFormatError,
 )
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.problem import formulate, lifted, with_integers_fixed
+from crossfield.models.formulations.problem import formulate, with_integers_fixed, with_products_lifted
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import Instance
 from loops import for_each
@@ -268,11 +268,11 @@ def test_documents_that_contradict_themselves(keys, value, error, message, writt
 
 def test_problems_that_no_manifest_records(tmp_path):
     problem = make_problem("minlp-cubic", make_instance())
-    for other in (lifted(problem), with_integers_fixed(problem, make_field(problem.instance))):
+    for other in (with_products_lifted(problem), with_integers_fixed(problem, make_field(problem.instance))):
         with pytest.raises(InputError, match="a manifest cannot record minlp-cubic"):
             write_problem(other, tmp_path / "set")
     assert list(tmp_path.iterdir()) == []
-    write(lifted(problem), tmp_path / "single.lp")
+    write(with_products_lifted(problem), tmp_path / "single.lp")
     fixed = with_integers_fixed(problem, make_field(problem.instance))
     with pytest.raises(UnsupportedByFormatError, match="write nl, lp or mps"):
         write(fixed, tmp_path / "fixed.mod")

@@ -11,7 +11,7 @@ from crossfield.export.bundle.manifest import read_manifest, write_problem
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.writing.canonical import Canonical
 from crossfield.models.errors import InstanceError, SolutionError
-from crossfield.models.formulations.problem import lifted
+from crossfield.models.formulations.problem import with_products_lifted
 
 
 def raw_of_glpk(path, form, file, point):
@@ -33,9 +33,9 @@ def test_values_without_names_follow_the_file_that_the_manifest_lists(tmp_path):
     assert {name: form.sha256 == problem.sha256 for name, form in held.items()} == {
         "nl": True, "gms": True, "lp": False, "mps": False,
     }  # fmt: skip
-    point = lifted(problem).point(make_field(problem.instance))
+    point = with_products_lifted(problem).point(make_field(problem.instance))
     for file in ("lp", "mps"):
-        path = raw_of_glpk(tmp_path / "x.sol", Canonical(lifted(problem)), file, point)
+        path = raw_of_glpk(tmp_path / "x.sol", Canonical(with_products_lifted(problem)), file, point)
         for found in (read_solution(path, problem, held=held), read_solution(path, problem)):
             np.testing.assert_array_equal(found.point, point)
         with pytest.raises(SolutionError, match="the problem has"):

@@ -16,9 +16,9 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models import input_limits
-from crossfield.models.array_archive import ArrayArchive, Expected, pack_arrays
+from crossfield.models.array_archive import ArrayArchive, ExpectedArray, pack_arrays
 from crossfield.models.errors import LONGEST, CrossfieldError, InputError, InstanceError, printable, shortened
-from crossfield.models.instance.file import arrays_of
+from crossfield.models.instance.file import instance_arrays
 from crossfield.models.sketch.svg import read_svg
 from PIL import Image
 
@@ -70,7 +70,7 @@ def instance():
 
 def archive_with(name, shape, kind, length):
     """An instance in which one array consists of so many zero bytes."""
-    arrays = {key: array for key, array in arrays_of(instance()).items() if key != name}
+    arrays = {key: array for key, array in instance_arrays(instance()).items() if key != name}
     data = io.BytesIO(pack_arrays(arrays))
     entry = zipfile.ZipInfo(f"{name}.npy")
     entry.compress_type = zipfile.ZIP_DEFLATED
@@ -343,7 +343,7 @@ def test_damaged_headers_are_refused_without_a_warning(tmp_path, header):
         content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(packed)) + packed + bytes(24)
         archive.writestr("u.npy", content)
     with pytest.raises(InstanceError, match="no header as NumPy writes it"):
-        ArrayArchive(buffer.getvalue()).arrays({"u": Expected(1, 10)})
+        ArrayArchive(buffer.getvalue()).arrays({"u": ExpectedArray(1, 10)})
 
 
 def test_pictures_are_the_same_for_any_number_of_rows_per_band(tmp_path, monkeypatch):
@@ -389,7 +389,7 @@ def test_texts_from_files_are_safe_in_messages(tmp_path):
 
 
 def test_the_error_for_a_damaged_archive_is_short(tmp_path):
-    whole = arrays_of(instance())
+    whole = instance_arrays(instance())
     arrays = io.BytesIO(pack_arrays({name: array for name, array in whole.items() if name != "w"}))
     with zipfile.ZipFile(arrays, "a") as archive:
         header = b"{'descr': '" + b"\x1b[31m\x07" * 300 + b"'}\n"

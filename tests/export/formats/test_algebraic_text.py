@@ -21,7 +21,7 @@ from crossfield.export.writing.canonical import Canonical
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names
-from crossfield.models.formulations.problem import Problem, tightened, with_integers_fixed
+from crossfield.models.formulations.problem import Problem, with_integers_fixed, with_windows
 from crossfield.models.formulations.windows import Windows
 from crossfield.models.instance.angles import QUARTER
 from crossfield.models.instance.instance import Instance
@@ -67,7 +67,7 @@ def combinations() -> list[tuple[str, str, dict[str, Any]]]:
 def changed(problem: Problem, field: CrossField, change: str) -> Problem:
     if change == "jumps fixed" and problem.integer.any():
         return with_integers_fixed(problem, field)
-    return tightened(problem, narrow_windows(field)) if change == "windows narrowed" else problem
+    return with_windows(problem, narrow_windows(field)) if change == "windows narrowed" else problem
 
 
 def narrow_windows(field: CrossField) -> Windows:

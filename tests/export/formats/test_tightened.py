@@ -15,7 +15,7 @@ from crossfield.export.verify.verify import verify
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.file import write_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.problem import formulate, tightened
+from crossfield.models.formulations.problem import formulate, with_windows
 from crossfield.models.formulations.windows import Windows
 from crossfield.models.instance.file import write_instance
 from crossfield.models.proof.certificate import read_certificate, write_certificate
@@ -41,7 +41,7 @@ def problems(proof, name):
     """A formulation with the windows of the gauge, and with the narrowed ones."""
     recipe, field = FORMULATIONS[name], proof.field
     plain = formulate(field.instance, name, p=field.p if recipe.fixed else None)
-    return plain, tightened(plain, windows_left(proof))
+    return plain, with_windows(plain, windows_left(proof))
 
 
 def test_windows_are_narrower_and_hold_the_optimum(proof):
@@ -81,15 +81,15 @@ def test_windows_of_another_norm_keep_the_optimum_of_its_formulations(norm, form
     windows = windows_left(write_certificate(found, tmp_path / "it.npz"))
     for name in FORMULATIONS:
         problem = formulate(found.field.instance, name, p=found.field.p if FORMULATIONS[name].fixed else None)
-        narrow = tightened(problem, windows)
+        narrow = with_windows(problem, windows)
         assert ("the optimum stays" in narrow.tightened) == (name in formulations)
         assert narrow.violation(narrow.point(found.field)).worst < 1e-9
         assert Windows.of_document(narrow.windows.document()).norm == norm
     other = formulate(found.field.instance, "milp-mccormick", stroke_norm=2)
-    assert "may rise" in tightened(other, windows).tightened
+    assert "may rise" in with_windows(other, windows).tightened
     if norm == 1:
         plain = formulate(found.field.instance, "milp-mccormick")
-        for problem in (plain, tightened(plain, windows)):
+        for problem in (plain, with_windows(plain, windows)):
             assert cf.solve(problem, "highs").objective == pytest.approx(found.energy, abs=1e-6)
 
 
@@ -103,7 +103,7 @@ def test_no_better_field_is_cut_off(gauge, least, tmp_path):
         beta = np.clip(best.beta + np.random.default_rng(seed).normal(0, 0.02, 4), -np.pi / 4, np.pi / 4)
         best, worse = sorted((best, replace(best, beta=beta)), key=lambda field: field.energy().total)
         found = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
-        narrow = tightened(formulate(instance, "minlp-parity"), windows_left(found))
+        narrow = with_windows(formulate(instance, "minlp-parity"), windows_left(found))
         assert narrow.violation(narrow.point(best)).worst < 1e-9
         plain = formulate(instance, "minlp-parity")
         checked += (narrow.upper - narrow.lower).sum() < 0.9 * (plain.upper - plain.lower).sum()
@@ -163,12 +163,12 @@ def test_what_does_not_fit_is_refused(proof, tmp_path, capsys):
         read_certificate(path, on=other)
     windows = windows_left(certificate)
     with pytest.raises(InstanceError, match="window of beta number 0 is empty or beyond"):
-        tightened(
+        with_windows(
             formulate(certificate.field.instance, "miqp-exact"),
             replace(windows, beta_lower=windows.beta_lower - 2),
         )
     with pytest.raises(InstanceError, match="do not fit the grid"):
-        tightened(formulate(random_instance(1, (2, 2)), "miqp-exact"), windows)
+        with_windows(formulate(random_instance(1, (2, 2)), "miqp-exact"), windows)
     field = tmp_path / "field.npz"
     write_field(certificate.field, field)
     instance = tmp_path / "it.json"

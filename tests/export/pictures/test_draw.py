@@ -9,7 +9,7 @@ import pytest
 from crossfield.export.pictures import marks, panels
 from crossfield.export.pictures.draw import KINDS, _caption, draw
 from crossfield.models.errors import InputError
-from crossfield.models.field.field import CrossField, relabelled
+from crossfield.models.field.field import CrossField, field_in_windows
 from crossfield.models.instance.instance import Instance
 from defusedxml import ElementTree
 from loops import for_each
@@ -28,7 +28,7 @@ def singular(size, index=0.25, x0=1.2, y0=0.4):
     x, y = instance.grid.columns - (size - 1) / 2, (size - 1) / 2 - instance.grid.rows
     alpha = index * np.arctan2(y - y0, x - x0)
     alpha -= alpha[0]
-    return relabelled(instance, alpha, 0 * alpha, np.zeros(len(instance.grid.first), dtype=np.int32))
+    return field_in_windows(instance, alpha, 0 * alpha, np.zeros(len(instance.grid.first), dtype=np.int32))
 
 
 def picture_of(path):
@@ -132,7 +132,7 @@ def test_singularities_are_dots_in_their_place(tmp_path, kind, index, colour):
 def test_both_families_have_their_colours(tmp_path):
     instance = instance_of(np.ones((9, 9)), 4, 4)
     flat = np.zeros(81)
-    field = relabelled(instance, flat, flat, np.zeros(len(instance.grid.first), dtype=np.int32))
+    field = field_in_windows(instance, flat, flat, np.zeros(len(instance.grid.first), dtype=np.int32))
     for kind in ("field", "crosses"):
         picture = picture_of(draw(field, tmp_path / "a.png", kind=kind))[:1000]
         level, upright = (like(picture, colour, 60) for colour in marks.FAMILIES)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from crossfield.export.pictures.streamlines import CLOSEST, combed, streamlines
 from crossfield.models.errors import InputError
-from crossfield.models.field.field import CrossField, relabelled
+from crossfield.models.field.field import CrossField, field_in_windows
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.instance import Instance
 from scipy.spatial import cKDTree
@@ -22,7 +22,7 @@ def field_of(mask, line, skew, stroke=0):
     angle, beta = line(x, y) + 0.0 * x, skew(x, y) + 0.0 * x
     pixel = np.array([[row[stroke], column[stroke]]])
     instance = Instance("sample", mask, pixel, angle[[stroke]], np.array([1.0]))
-    return relabelled(instance, angle - beta, beta, np.zeros(len(instance.grid.first), dtype=np.int32))
+    return field_in_windows(instance, angle - beta, beta, np.zeros(len(instance.grid.first), dtype=np.int32))
 
 
 def square(size):

@@ -55,7 +55,7 @@ def test_only_feasible_points_that_are_lower_are_kept(relaxed):
     try:
         assert watch.eval([ca.DM(np.zeros(size)) for size in watch.sizes.values()]) == [1]
     finally:
-        control.begin()
+        control.forget_stops()
 
 
 def test_a_stop_at_an_iterate_that_breaks_rows_leaves_the_start(relaxed, own_interrupt):

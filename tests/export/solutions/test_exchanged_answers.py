@@ -21,7 +21,7 @@ from crossfield.export.solutions.readers.registry import read_raw
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.writing.nl_layout import Layout
 from crossfield.models.errors import SolutionError
-from crossfield.models.formulations.problem import formulate, tightened
+from crossfield.models.formulations.problem import formulate, with_windows
 from crossfield.models.formulations.windows import Windows
 
 MILP = "milp-mccormick"
@@ -43,7 +43,7 @@ def with_another_bound(problem):
     quarter = np.full(instance.grid.size, np.pi / 4)
     upper = instance.alpha_upper - np.array([0, 0, 1e-3, 0])
     ends = (instance.alpha_lower, upper, -quarter, quarter, instance.p_min, instance.p_max)
-    return tightened(problem, Windows(*ends, energy=9.0, proof="by hand", norm=1))
+    return with_windows(problem, Windows(*ends, energy=9.0, proof="by hand", norm=1))
 
 
 @pytest.fixture(scope="module")

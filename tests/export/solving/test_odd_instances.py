@@ -11,8 +11,8 @@ from crossfield.export.verify.leeway import saved
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS, norm_of
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.search.absolute_fit import fitted_absolute
-from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.absolute_fit import fit_absolute
+from crossfield.models.search.box_qp import fit_in_box
 from odd_instances import odd_instance
 
 BUNDLED = {"highs": ("lp", "mps"), "ipopt": ("nl",), "bonmin": ("nl",)}
@@ -111,7 +111,7 @@ def assert_answers_of(seed, solvers, folder):
     norm = norm_of(problems[0].formulation)
     if norm is None:
         return count
-    best = fitted(field) if norm == 2 else fitted_absolute(field, norm)[0]
+    best = fit_in_box(field) if norm == 2 else fit_absolute(field, norm)[0]
     for other in FORMULATIONS:
         problem = cf.formulate(instance, other, p=field.p if FORMULATIONS[other].fixed else None)
         if norm_of(problem.formulation) == norm:

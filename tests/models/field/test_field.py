@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError, InstanceError
-from crossfield.models.field.field import DEGENERATE, CrossField, relabelled
+from crossfield.models.field.field import DEGENERATE, CrossField, field_in_windows
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
@@ -232,7 +232,7 @@ def test_energies_do_not_depend_on_the_labels(seed, norm):
     assert other.energy(norm).smooth == pytest.approx(field.energy(norm).smooth, abs=1e-9)
     assert lines(other) == pytest.approx(lines(field), abs=1e-9)
     assert (other.singularities.index == field.singularities.index).all()
-    back = relabelled(field.instance, alpha, beta, p)
+    back = field_in_windows(field.instance, alpha, beta, p)
     assert back.energy().total == pytest.approx(field.energy().total, abs=1e-9)
     assert back.alpha == pytest.approx(field.alpha, abs=1e-9)
     assert back.beta == pytest.approx(field.beta, abs=1e-9)
@@ -248,7 +248,7 @@ def test_relabelling_into_the_box_keeps_strokes_that_fit(seed):
     fits = CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
     assert fits.energy().strokes == pytest.approx(0, abs=1e-12)
     step = np.random.default_rng(seed).integers(-5, 6, grid.size)
-    back = relabelled(
+    back = field_in_windows(
         instance,
         alpha + HALF * step,
         np.where(step % 2 == 0, 1, -1) * beta,
@@ -262,7 +262,7 @@ def test_relabelled_is_inside_every_bound(seed, gauge):
     instance = random_instance(seed, gauge=gauge)
     rng = np.random.default_rng(seed)
     size, pairs = instance.grid.size, len(instance.grid.first)
-    field = relabelled(
+    field = field_in_windows(
         instance, rng.uniform(-9, 9, size), rng.uniform(-2, 2, size), rng.integers(-9, 9, pairs)
     )
     assert ((instance.alpha_lower <= field.alpha) & (field.alpha <= instance.alpha_upper)).all()

@@ -6,11 +6,11 @@ from itertools import product
 import numpy as np
 import pytest
 from crossfield.models.field.field import CrossField
-from crossfield.models.field.fusion import fused
+from crossfield.models.field.fusion import fuse_fields
 from crossfield.models.field.jumps import free_jumps
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import MOST_WEIGHT
-from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import polyvector_field
@@ -32,7 +32,7 @@ def test_it_takes_the_better_half_of_each():
     left, right = (CrossField(good.instance, good.alpha + 0.5 * bump, good.beta, good.p) for bump in bumps)
     for one, other in ((left, right), (right, left)):
         assert one.energy().total > 1
-        assert fused(one, other).energy().total == pytest.approx(good.energy().total, abs=1e-9)
+        assert fuse_fields(one, other).energy().total == pytest.approx(good.energy().total, abs=1e-9)
 
 
 @pytest.mark.filterwarnings("error")
@@ -45,7 +45,7 @@ def test_prices_beyond_32_bits_are_as_good_as_infinite():
     off = np.zeros(len(bump))
     off[good.instance.stroke_index[-2:]] = 0.5
     one, other = (CrossField(good.instance, good.alpha + more, good.beta, good.p) for more in (bump / 2, off))
-    assert fused(one, other).energy().total == pytest.approx(0, abs=1e-9)
+    assert fuse_fields(one, other).energy().total == pytest.approx(0, abs=1e-9)
 
 
 def test_it_is_the_best_choice_of_all_where_a_cut_can_say_it():
@@ -58,7 +58,7 @@ def test_it_is_the_best_choice_of_all_where_a_cut_can_say_it():
         least = min(
             mixed(one, other, choice).energy().total for choice in product([False, True], repeat=pixels)
         )
-        found = fused(one, other).energy().total
+        found = fuse_fields(one, other).energy().total
         assert found <= one.energy().total
         assert found == pytest.approx(least, rel=1e-5)
 
@@ -67,8 +67,8 @@ def test_fields_of_two_strategies_made_one_are_below_both_and_the_same_each_time
     lower = 0
     for name in ("mouse", "saddle", "cylinder_bend"):
         instance = sample(name, 40)
-        one, other = greedy_field(instance), fitted(polyvector_field(instance, hold=0.1))
-        found, again = fused(one, other), fused(one, other)
+        one, other = greedy_field(instance), fit_in_box(polyvector_field(instance, hold=0.1))
+        found, again = fuse_fields(one, other), fuse_fields(one, other)
         assert found.energy().total <= one.energy().total
         assert found.p.tobytes() == again.p.tobytes()
         assert found.alpha.tobytes() == again.alpha.tobytes()
@@ -79,5 +79,5 @@ def test_fields_of_two_strategies_made_one_are_below_both_and_the_same_each_time
 def test_fields_that_are_one_stay_as_they_are():
     field = greedy_field(random_instance(1))
     turned = CrossField(field.instance, field.alpha + HALF, -field.beta, field.p)
-    assert fused(field, field) is field
-    assert fused(field, turned) is field
+    assert fuse_fields(field, field) is field
+    assert fuse_fields(field, turned) is field

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from crossfield.models.field.field import CrossField
-from crossfield.models.field.jumps import best_jumps, free_jumps, stepped
+from crossfield.models.field.jumps import best_jumps, free_jumps, step_labels
 from crossfield.models.instance.instance import Instance
 
 pytestmark = pytest.mark.numeric
@@ -22,7 +22,7 @@ def test_steps_of_the_label_leave_crosses_and_the_sizes_of_all_residuals():
         field, rng = some_field(seed)
         steps = rng.integers(-3, 4, field.instance.grid.size).astype(np.int32)
         moved = CrossField(
-            field.instance, *stepped(field.instance.grid, field.alpha, field.beta, field.p, steps)
+            field.instance, *step_labels(field.instance.grid, field.alpha, field.beta, field.p, steps)
         )
         assert np.allclose(
             moved.cross_error(field.alpha + field.beta, field.alpha + np.pi / 2 - field.beta), 0

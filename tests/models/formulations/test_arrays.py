@@ -8,7 +8,7 @@ import pytest
 from cases import CASES, make_field, make_instance, make_problem, points_of, problem_of
 from crossfield.export.formats.registry import write
 from crossfield.models.errors import SolverError, UnsupportedBySolverError
-from crossfield.models.formulations.arrays import highs_of
+from crossfield.models.formulations.arrays import build_highs
 from loops import for_each
 from scipy import sparse
 
@@ -131,7 +131,7 @@ def test_highs_is_not_given_what_it_does_not_take(name):
 def test_arrays_that_highs_refuses_are_an_error():
     arrays = make_problem("milp-mccormick", make_instance("full")).to_arrays()
     with pytest.raises(SolverError, match="refuses the arrays of broken"):
-        highs_of(replace(arrays, row_lower=np.full_like(arrays.row_lower, np.inf)), "broken")
+        build_highs(replace(arrays, row_lower=np.full_like(arrays.row_lower, np.inf)), "broken")
 
 
 def test_arrays_do_not_share_memory_with_the_problem():

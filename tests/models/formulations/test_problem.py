@@ -13,7 +13,7 @@ from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.models.errors import FormulationError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.problem import formulate, lifted, with_integers_fixed
+from crossfield.models.formulations.problem import formulate, with_integers_fixed, with_products_lifted
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
 from loops import for_each
@@ -130,7 +130,7 @@ def test_a_field_is_a_feasible_point_and_comes_back(label):
 def test_lifted_problems_are_exact(name):
     """At any angles and any binary p1, with z = p1 beta, far outside of the bounds as well."""
     problem = make_problem(name, make_instance())
-    other = lifted(problem)
+    other = with_products_lifted(problem)
     assert (other.objective_degree, other.row_degree, other.convex) == (2, 1, name == "minlp-quartic")
     rng = np.random.default_rng(7)
     for point in points_of(problem):
@@ -142,7 +142,9 @@ def test_lifted_problems_are_exact(name):
         assert other.objective_value(extended) == pytest.approx(problem.objective_value(point), rel=1e-12)
     assert "hull" in other.formulation.lifted
     assert other.sha256 != problem.sha256
-    assert lifted(make_problem("minlp-cubic", make_instance(), relax=True)).problem_class == "QP"
+    assert (
+        with_products_lifted(make_problem("minlp-cubic", make_instance(), relax=True)).problem_class == "QP"
+    )
 
 
 def test_convex_means_convex():

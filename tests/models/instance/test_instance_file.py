@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from crossfield.models.array_archive import pack_arrays
 from crossfield.models.errors import InputError
-from crossfield.models.instance.file import arrays_of, read_instance, to_json, write_instance
+from crossfield.models.instance.file import instance_arrays, instance_to_json, read_instance, write_instance
 from damage import change, full_instance, refused, same_instance, without
 from loops import for_each
 
@@ -104,7 +104,7 @@ def test_json_needs_only_name_mask_and_strokes(tmp_path):
 )
 def test_json_that_breaks_the_rules_is_named_with_its_place(instance, tmp_path, edit, message):
     path = tmp_path / "broken.json"
-    path.write_text(json.dumps(edit(json.loads(to_json(instance)))))
+    path.write_text(json.dumps(edit(json.loads(instance_to_json(instance)))))
     refused(read_instance, path, message)
 
 
@@ -129,7 +129,7 @@ def test_what_is_no_instance_file_is_refused(tmp_path, data, message):
 
 def test_json_with_a_byte_order_mark_is_read(instance, tmp_path):
     path = tmp_path / "bom.json"
-    path.write_bytes(b"\xef\xbb\xbf" + to_json(instance).encode())
+    path.write_bytes(b"\xef\xbb\xbf" + instance_to_json(instance).encode())
     assert same_instance(read_instance(path), instance)
 
 
@@ -170,7 +170,7 @@ def test_npz_that_promises_too_much_is_refused(instance, tmp_path):
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (10**7,)})
     path = tmp_path / "bomb.npz"
-    others = arrays_of(instance)
+    others = instance_arrays(instance)
     del others["theta"]
     path.write_bytes(pack_arrays(others))
     with zipfile.ZipFile(path, "a") as archive:
@@ -180,7 +180,7 @@ def test_npz_that_promises_too_much_is_refused(instance, tmp_path):
 
 def test_a_key_that_is_there_twice_is_named(instance, tmp_path):
     path = tmp_path / "broken.json"
-    path.write_text(to_json(instance).replace('"mask"', '"gauge": "box",\n  "mask"', 1))
+    path.write_text(instance_to_json(instance).replace('"mask"', '"gauge": "box",\n  "mask"', 1))
     refused(read_instance, path, "is not valid JSON: the key 'gauge' appears twice")
 
 

@@ -13,7 +13,7 @@ from children import all_end, complaints, descendants, running
 from crossfield.export.cli.app import invoke
 from crossfield.export.solving.methods import METHODS
 from crossfield.export.solving.run import PICTURES, plan
-from crossfield.models.processes.side_by_side import MOST
+from crossfield.models.processes.process_pool import MOST
 
 FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj", "field.sings"}
 

@@ -14,7 +14,7 @@ from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.prove_absolute import forced_absolute
 from crossfield.models.proof.pruning import RemainingCells
-from crossfield.models.search.absolute_fit import Residuals, absolute_fit, fitted_absolute
+from crossfield.models.search.absolute_fit import Residuals, absolute_fit, fit_absolute
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 from second_checker import Refused, arrays_of, check
@@ -161,7 +161,7 @@ def test_any_multipliers_bound_the_energy_in_a_box(norm):
     rng = np.random.default_rng(2)
     instance = random_instance(3, (3, 4))
     field = first_field(instance)
-    fitted, _ = fitted_absolute(field, norm)
+    fitted, _ = fit_absolute(field, norm)
     assert fitted.energy(norm).total <= field.energy(norm).total
     terms = Residuals.at(instance, field.p, norm)
     lower = np.concatenate([fitted.alpha, fitted.beta]) - rng.uniform(0, 1, 24)

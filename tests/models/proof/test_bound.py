@@ -6,7 +6,7 @@ from itertools import product
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.field.field import relabelled
+from crossfield.models.field.field import field_in_windows
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.compiled import crew
@@ -191,7 +191,7 @@ def test_pruning_keeps_every_field_of_no_more_energy():
                     alpha = best.alpha + rng.normal(0, wide, instance.grid.size)
                     beta = np.clip(best.beta + rng.normal(0, wide, instance.grid.size), -HALF / 2, HALF / 2)
 
-                    field = relabelled(instance, alpha, beta, best.p)
+                    field = field_in_windows(instance, alpha, beta, best.p)
                     if field.energy().total <= energy:
                         assert holds(lattice, (field.alpha, field.beta)), seed
                 dual.move(lattice)

@@ -15,12 +15,12 @@ from allowed_labels import with_allowed
 from archives import forged, members_of, npy, packed
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.file import of_arrays
+from crossfield.models.instance.file import instance_of_arrays
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.clusters import clusters_on
 from crossfield.models.proof.prove import prove
-from crossfield.models.search.absolute_fit import settled_absolute
+from crossfield.models.search.absolute_fit import alternate_absolute
 from exhaustive import optimum, random_instance
 
 REFUSED = (check_certificate.RefusedError, check_certificate.UnreadableError, second_checker.Refused)
@@ -121,10 +121,10 @@ def changes(arrays, rng):
 def least_energy(arrays, known, norm):
     """The energy of a good field of the instance in a certificate; InstanceError where it is none."""
     parts = {key.removeprefix("instance_"): arrays[key] for key in arrays if key.startswith("instance_")}
-    instance = of_arrays(parts)
+    instance = instance_of_arrays(parts)
     if instance.sha256 not in known:
         field = optimum(instance)
-        known[instance.sha256] = (field if norm == 2 else settled_absolute(field, norm)).energy(norm).total
+        known[instance.sha256] = (field if norm == 2 else alternate_absolute(field, norm)).energy(norm).total
     return known[instance.sha256]
 
 

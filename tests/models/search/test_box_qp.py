@@ -8,8 +8,8 @@ from crossfield.export.solving.two_stage import fit_angles
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
-from crossfield.models.search.box_qp import fitted
-from crossfield.models.search.pinned import pinned
+from crossfield.models.search.box_qp import fit_in_box
+from crossfield.models.search.reproducible_angles import reproducible_field
 from crossfield.models.sketch.samples import sample, samples
 from crossfield.models.smooth.polyvector import power_field
 from hypothesis import given, settings
@@ -80,7 +80,7 @@ def assert_optimal(field):
 def test_random_jumps_are_fitted_to_the_optimum(seed, gauge, skew_coefficient, stroke_coefficient):
     instance = random_instance(seed, gauge=gauge, skew_coefficient=skew_coefficient)
     field = random_field(replace(instance, stroke_coefficient=stroke_coefficient), seed)
-    best = fitted(field)
+    best = fit_in_box(field)
     assert_optimal(best)
     assert (best.p == field.p).all()
     assert best.energy().total <= field.energy().total
@@ -89,12 +89,12 @@ def test_random_jumps_are_fitted_to_the_optimum(seed, gauge, skew_coefficient, s
 @pytest.mark.parametrize("gauge", ["strokes", "box"])
 def test_thousands_of_active_bounds(gauge):
     instance = random_instance(3, (80, 100), gauge, 1e-6)
-    assert assert_optimal(fitted(random_field(instance, 0))) > 1000
+    assert assert_optimal(fit_in_box(random_field(instance, 0))) > 1000
 
 
 def test_contact_along_the_strokes_of_a_drawing():
     # Where strokes lean on the box for long stretches the right bounds are found slowly, from the ends.
-    assert assert_optimal(fitted(power_field(sample("mouse", 96, gauge="box")))) > 200
+    assert assert_optimal(fit_in_box(power_field(sample("mouse", 96, gauge="box")))) > 200
 
 
 @pytest.mark.parametrize(
@@ -112,14 +112,14 @@ def test_same_optimum_as_ipopt_on_the_file(name, size):
         np.zeros(instance.grid.size),
         random_field(instance, size).p,
     )
-    best, other = fitted(centre), fit_angles(centre).field
+    best, other = fit_in_box(centre), fit_angles(centre).field
     assert assert_optimal(best) > 10
     assert best.energy().total == pytest.approx(other.energy().total, rel=1e-8)
 
 
 def test_one_pixel_in_the_box_of_the_paper():
     instance = Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0], gauge="box")
-    field = fitted(CrossField(instance, [0.1], [0.2], []))
+    field = fit_in_box(CrossField(instance, [0.1], [0.2], []))
     # beta = (theta - alpha) / (1 + skew_coefficient), and alpha leans on its bound.
     assert field.alpha.tolist() == [HALF]
     assert field.beta == pytest.approx([np.pi / 6 / (1 + 1e-6)], rel=1e-12)
@@ -130,7 +130,7 @@ def test_pair_with_a_jump_between_two_strokes():
     instance = Instance(
         "two", [[True, True]], [[0, 0], [0, 1]], [0.3, 0.3 + HALF], [1.0, 1.0], skew_coefficient=0
     )
-    field = fitted(CrossField(instance, [0.0, HALF], [0.5, 0.1], [1]))
+    field = fit_in_box(CrossField(instance, [0.0, HALF], [0.5, 0.1], [1]))
     assert field.energy().total == pytest.approx(0, abs=1e-18)
     assert field.alpha + field.beta == pytest.approx([0.3, 0.3 + HALF])
 
@@ -141,7 +141,7 @@ def test_angles_stay_where_the_energy_does_not_say():
     instance = Instance("parts", mask, [[0, 0]], [0.7], [1.0], skew_coefficient=0)
     rng = np.random.default_rng(0)
     given = CrossField(instance, *rng.uniform(0.3, 0.5, (2, 24)), np.zeros(len(instance.p_min)))
-    field = fitted(given)
+    field = fit_in_box(given)
     apart = instance.grid.columns > 4
     for before, after in ((given.alpha, field.alpha), (given.beta, field.beta)):
         # The nearest constant is the mean.
@@ -150,8 +150,8 @@ def test_angles_stay_where_the_energy_does_not_say():
 
 
 def test_the_optimum_comes_back_as_it_is():
-    best = fitted(random_field(random_instance(7, (12, 12)), 7))
-    again = fitted(best)
+    best = fit_in_box(random_field(random_instance(7, (12, 12)), 7))
+    again = fit_in_box(best)
     assert again.alpha.tobytes() == best.alpha.tobytes()
     assert again.beta.tobytes() == best.beta.tobytes()
 
@@ -161,12 +161,15 @@ def test_the_optimum_comes_back_as_it_is():
 def test_pinned_angles_depend_on_the_jumps_alone(seed, gauge):
     instance = random_instance(seed, (4, 5), gauge, 1e-6)
     field, other = (random_field(instance, number) for number in (seed, seed + 100))
-    found, same = pinned(field), pinned(CrossField(instance, other.alpha, other.beta, field.p))
+    found, same = (
+        reproducible_field(field),
+        reproducible_field(CrossField(instance, other.alpha, other.beta, field.p)),
+    )
     assert found.alpha.tobytes() == same.alpha.tobytes()
     assert found.beta.tobytes() == same.beta.tobytes()
     assert_optimal(found)
-    assert found.energy().total <= fitted(field).energy().total * (1 + 1e-12)
-    again = pinned(found)
+    assert found.energy().total <= fit_in_box(field).energy().total * (1 + 1e-12)
+    again = reproducible_field(found)
     assert again.alpha.tobytes() == found.alpha.tobytes()
     assert again.beta.tobytes() == found.beta.tobytes()
 
@@ -177,12 +180,12 @@ def test_pinned_angles_are_optimal_where_the_energy_does_not_say_all(skew_coeffi
     instance = replace(
         random_instance(7, (5, 5)), skew_coefficient=skew_coefficient, stroke_coefficient=stroke_coefficient
     )
-    assert_optimal(pinned(random_field(instance, 7)))
+    assert_optimal(reproducible_field(random_field(instance, 7)))
 
 
 def test_pinned_angles_of_a_part_without_strokes_stay():
     mask = np.array([[True, True, False, True, True]])
     instance = Instance("parts", mask, np.array([[0, 0]]), np.array([0.3]), np.ones(1))
     alpha = np.array([0.3, 0.3, 0.7, 0.7])
-    found = pinned(CrossField(instance, alpha, np.zeros(4), np.zeros(2, int)))
+    found = reproducible_field(CrossField(instance, alpha, np.zeros(4), np.zeros(2, int)))
     assert found.alpha.tolist() == alpha.tolist()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
-from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.nearest_stroke import nearest_strokes
 from crossfield.models.search.search import search
@@ -203,7 +203,7 @@ def test_progress_counts_up_to_all_jumps():
 @pytest.mark.parametrize("gauge", ["strokes", "box"])
 def test_answer_is_the_optimum_for_its_jumps(gauge):
     field = greedy_field(some_curves().with_gauge(gauge))
-    assert fitted(field).energy().total == pytest.approx(field.energy().total, rel=1e-12)
+    assert fit_in_box(field).energy().total == pytest.approx(field.energy().total, rel=1e-12)
 
 
 def test_mostly_equal_to_the_optimum_over_all_jumps():

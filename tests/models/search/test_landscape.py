@@ -10,7 +10,7 @@ import pytest
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import GAUGES
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.search.box_qp import free_bounds, least_in_box
+from crossfield.models.search.box_qp import minimise_in_box, stroke_bounds
 from crossfield.models.search.energy import energy_at
 from crossfield.models.search.improvement import pixel_curves
 from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
@@ -96,7 +96,7 @@ def walked(instance, seed, perturbations, steps):
 def explored(instance, seed, perturbations):
     """Results of the patches of a round, checked, and a round of the search."""
     tasks = _Hunt(instance, seed, [first_field(instance)]).tasks(Deadline(np.inf))
-    lower, upper = free_bounds(instance)
+    lower, upper = stroke_bounds(instance)
     for task in tasks:
         better, whole = explore(replace(task, perturbations=perturbations))
         assert whole
@@ -136,7 +136,7 @@ def test_a_walk_that_leaves_and_enters_a_soft_state_keeps_its_energy(name, size,
 def unbounded(instance, x, p):
     """The least energy of all angles without bounds, by a solve of the whole system."""
     infinite = np.full(len(x), np.inf)
-    return definition(instance, least_in_box(energy_at(instance, p), x, -infinite, infinite), p)
+    return definition(instance, minimise_in_box(energy_at(instance, p), x, -infinite, infinite), p)
 
 
 def test_the_gain_of_a_turn_is_the_change_of_the_least_energy():
@@ -144,7 +144,7 @@ def test_the_gain_of_a_turn_is_the_change_of_the_least_energy():
     field = first_field(instance)
     patch = Patch.of(instance, np.ones(instance.grid.size, bool))
     land = Landscape(patch, np.concatenate([field.alpha, field.beta]), field.p)
-    home, gains = land.saved(), land.turn_gains()
+    home, gains = land.save_state(), land.turn_gains()
     before = unbounded(instance, land.angles, land.p)
     assert home.energy == pytest.approx(before, rel=1e-6)  # no bound holds an angle
     changes = []

@@ -12,12 +12,12 @@ from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.search.coarse import halved, prolonged
+from crossfield.models.search.coarse import halve_resolution, prolong_field
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.improvement import improved_field, pixel_curves
 from crossfield.models.search.landscape import STEPS, Landscape, Patch
 from crossfield.models.search.starts import first_field
-from crossfield.models.search.walk import Perturbations, Task, explore
+from crossfield.models.search.walk import PatchTask, Perturbations, explore
 from exhaustive import assert_feasible, exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -72,7 +72,7 @@ def test_energy_after_many_changes_is_that_of_its_jumps(seed):
     land = landscape(field)
     rng = np.random.default_rng(seed)
     perturbations = perturbations_of(land.patch)
-    start = land.saved()
+    start = land.save_state()
     for _ in range(6):
         land.change(*perturbations.draw(rng, land.p))
     least = least_energy(field.instance, land.p[None])[0]
@@ -235,8 +235,8 @@ class Hourglass:
 WORK = {
     "greedy": lambda over: greedy_field(cf.sample("mouse", 16), stop=over),
     "improved": lambda over: improved_field(greedy_field(cf.sample("mouse", 16)), stop=over),
-    "prolonged": lambda over: prolonged(
-        first_field(halved(cf.sample("mouse", 16))), cf.sample("mouse", 16), over
+    "prolonged": lambda over: prolong_field(
+        first_field(halve_resolution(cf.sample("mouse", 16))), cf.sample("mouse", 16), over
     ),
 }
 
@@ -255,7 +255,7 @@ def test_work_ends_soon_after_its_time_and_gives_a_field(work):
 def test_a_patch_without_time_is_not_whole_and_its_walk_stops():
     field = first_field(cf.sample("mouse", 12))
     free, curve = np.ones(field.instance.grid.size, bool), np.full(field.instance.grid.size, -1)
-    task = Task(field.instance, angles(field), field.p, free, curve, 10**9, (0,), Deadline.after(0.0))
+    task = PatchTask(field.instance, angles(field), field.p, free, curve, 10**9, (0,), Deadline.after(0.0))
     assert explore(task) == (None, False)
 
 
@@ -310,9 +310,9 @@ def test_a_constant_field_stays_constant_on_finer_grids():
     theta = np.full((9, 7), np.nan)
     theta[2], theta[6], theta[3:6, 3] = 0.3, 0.3, 1.6
     fine = sketch(np.ones(theta.shape, bool), theta)
-    coarse = halved(fine)
+    coarse = halve_resolution(fine)
     assert coarse.mask.shape == (5, 4)
-    field = prolonged(first_field(coarse), fine)
+    field = prolong_field(first_field(coarse), fine)
     assert field.energy().total < fine.grid.size * fine.skew_coefficient
     assert not len(field.singularities.index)
 
@@ -323,15 +323,15 @@ def test_smooth_energy_is_the_same_on_both_grids():
     around = np.arctan2(-(rows - 15.5), columns - 15.5) / 4
     theta = np.where((rows - 15.5) ** 2 + (columns - 15.5) ** 2 > 14**2, around, np.nan)
     fine = sketch(np.ones(theta.shape, bool), theta)
-    field, above = first_field(fine), first_field(halved(fine))
+    field, above = first_field(fine), first_field(halve_resolution(fine))
     assert field.singularities.index.tolist() == above.singularities.index.tolist() == [0.25]
-    assert prolonged(above, fine).singularities.index.tolist() == [0.25]
-    assert prolonged(above, fine).energy().total == pytest.approx(field.energy().total, rel=0.01)
+    assert prolong_field(above, fine).singularities.index.tolist() == [0.25]
+    assert prolong_field(above, fine).energy().total == pytest.approx(field.energy().total, rel=0.01)
 
 
 def test_crossing_strokes_leave_no_coarse_stroke():
     theta = np.array([[0.0, HALF], [HALF, 0.0]])
-    assert halved(sketch(np.ones((2, 2), bool), theta)) is None
+    assert halve_resolution(sketch(np.ones((2, 2), bool), theta)) is None
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from crossfield.models.proof.work import first_of
 from crossfield.models.search import starts
-from crossfield.models.search.coarse import grown, halved, prolonged
+from crossfield.models.search.coarse import grow_field, halve_resolution, prolong_field
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.improvement import improved_field
 from crossfield.models.search.starts import first_field, polyvector_start
@@ -68,10 +68,12 @@ def test_ragged_grids_grow_from_coarse_ones_to_valid_fields(monkeypatch):
         instance = random_instance(seed, (9, 14), strokes=14, gauge=("strokes", "box")[seed % 2])
         field = first_field(instance)
         assert_feasible(field)
-        coarse = halved(instance)
+        coarse = halve_resolution(instance)
         assert coarse is not None
         below = first_field(coarse)
-        assert prolonged(below, instance).energy().total <= grown(below, instance).energy().total + 1e-9
+        assert (
+            prolong_field(below, instance).energy().total <= grow_field(below, instance).energy().total + 1e-9
+        )
 
 
 def test_a_first_field_of_no_time_is_a_field_after_few_questions():

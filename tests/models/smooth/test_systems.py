@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from crossfield.models.smooth.systems import dissected, factored
+from crossfield.models.smooth.systems import factor_matrix, nested_dissection_order
 from scipy import ndimage, sparse
 
 
 @pytest.mark.parametrize("reach", [1, 2])
 def test_the_last_unknowns_part_the_others(reach):
     row, column = np.nonzero(np.ones((30, 20), dtype=bool))
-    order = dissected(row, column, reach)
+    order = nested_dissection_order(row, column, reach)
     assert sorted(order) == list(range(600))
     rest = np.ones((30, 20), dtype=bool)
     last = order[-20 * reach :]
@@ -29,6 +29,6 @@ def test_an_order_does_not_change_the_solution():
     squares = sparse.csr_array(np.where(near, rng.standard_normal(near.shape), 0.0))
     matrix = (squares.T @ squares + sparse.eye_array(len(row))).tocsr()
     right = rng.standard_normal(len(row))
-    found = [factored(matrix, order)(right) for order in (None, dissected(row, column, 4))]
+    found = [factor_matrix(matrix, order)(right) for order in (None, nested_dissection_order(row, column, 4))]
     assert found[0] == pytest.approx(found[1], abs=1e-9)
     assert matrix @ found[1] == pytest.approx(right, abs=1e-6)

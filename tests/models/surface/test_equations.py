@@ -6,8 +6,8 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.processes.deadline import never
-from crossfield.models.surface.equations import CONJUGACY, Equations, Rows, Weights, descended
-from crossfield.models.surface.stencils import Crosses, Level, Stencils, levels_of
+from crossfield.models.surface.equations import CONJUGACY, Equations, Rows, Weights, descend
+from crossfield.models.surface.stencils import Crosses, GridLevel, Stencils, levels_of
 from loops import for_each
 from scipy import sparse
 
@@ -78,12 +78,12 @@ def test_the_way_down_ends_where_the_slope_does_and_time_cuts_it_short():
     energies = []
     for most in (0, 1, 3, 1000):
         left = iter(range(most))
-        energy, low = descended(found, z, lambda left=left: next(left, None) is None)
+        energy, low = descend(found, z, lambda left=left: next(left, None) is None)
         assert energy == found.energy(low)
         energies.append(energy)
     assert energies[0] == found.energy(z)
     assert energies == sorted(energies, reverse=True)
-    again, _ = descended(found, low, never)
+    again, _ = descend(found, low, never)
     assert again == pytest.approx(energies[-1], rel=1e-2)
     assert again <= energies[-1]
 
@@ -92,14 +92,14 @@ def test_the_way_down_ends_where_the_slope_does_and_time_cuts_it_short():
 def test_large_systems_are_solved_by_few_factorisations_as_well_as_by_many(monkeypatch):
     field = cf.bend_field(cf.polyvector_field(cf.sample("bottle", 64), hold=100))
     stencils = Stencils(field.instance.grid)
-    level = Level(stencils, Crosses.of(field))
+    level = GridLevel(stencils, Crosses.of(field))
     found = Equations(stencils, level.crosses, Weights(5e-6, 5e-5, 0.007))
-    energy, low = descended(found, level.starts[0], never)
+    energy, low = descend(found, level.starts[0], never)
     monkeypatch.setattr("crossfield.models.surface.equations._FEW", stencils.count)
-    exact, _ = descended(found, level.starts[0], never)
+    exact, _ = descend(found, level.starts[0], never)
     assert stencils.count > 1000
     assert energy == pytest.approx(exact, rel=1e-3)
-    assert descended(found, low, never)[0] == pytest.approx(energy, rel=1e-3)
+    assert descend(found, low, never)[0] == pytest.approx(energy, rel=1e-3)
 
 
 def test_a_plane_stays_a_plane_on_finer_levels():
@@ -107,7 +107,7 @@ def test_a_plane_stays_a_plane_on_finer_levels():
     mask[:9, :13] = False
     grid = cf.Instance("bit", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1)).grid
     cross = np.full(grid.size, 1.0 + 0j)
-    levels = levels_of(Level(Stencils(grid), Crosses(-cross, 0 * cross)))
+    levels = levels_of(GridLevel(Stencils(grid), Crosses(-cross, 0 * cross)))
     assert [level.halved for level in levels] == [1, 0]
     assert all((level.crosses.product == -1).all() for level in levels)
     for coarse, fine in itertools.pairwise(levels):

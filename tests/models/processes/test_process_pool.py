@@ -8,14 +8,14 @@ import time
 import pytest
 from children import descendants
 from crossfield.models.errors import InputError
-from crossfield.models.processes import side_by_side as module
+from crossfield.models.processes import process_pool as module
 from crossfield.models.processes.control import WorkerError
-from crossfield.models.processes.side_by_side import MOST, checked, side_by_side, workers
+from crossfield.models.processes.process_pool import MOST, check_jobs, parallel_map, process_pool
 
 
 def test_answers_come_in_the_order_of_the_tasks():
     for jobs in (1, 3):
-        with side_by_side(int, jobs) as work:
+        with parallel_map(int, jobs) as work:
             assert work([str(number) for number in range(20)]) == list(range(20))
             assert work([]) == []
             assert work(["7"]) == [7]
@@ -23,7 +23,7 @@ def test_answers_come_in_the_order_of_the_tasks():
 
 def test_there_are_as_many_processes_as_tasks_and_jobs_allow():
     before = descendants(os.getpid())
-    with side_by_side(time.sleep, 4) as work:
+    with parallel_map(time.sleep, 4) as work:
         assert work([0.0]) == [None]
         assert len(descendants(os.getpid()) - before) == 1
         work([0.3] * 9)
@@ -79,7 +79,7 @@ def module_of_a_user(tmp_path, monkeypatch):
     ],
 )
 def test_what_cannot_be_sent_back_is_named_and_the_process_goes_on(module_of_a_user, task, message):
-    with side_by_side(module_of_a_user.work, 2) as work:
+    with parallel_map(module_of_a_user.work, 2) as work:
         with pytest.raises(WorkerError) as caught:
             work([task])
         assert str(caught.value) == message
@@ -88,7 +88,7 @@ def test_what_cannot_be_sent_back_is_named_and_the_process_goes_on(module_of_a_u
 
 
 def test_an_error_of_ours_arrives_as_it_was(module_of_a_user):
-    with side_by_side(module_of_a_user.work, 2) as work, pytest.raises(InputError) as caught:
+    with parallel_map(module_of_a_user.work, 2) as work, pytest.raises(InputError) as caught:
         work(["long"])
     with pytest.raises(InputError) as here:
         module_of_a_user.work("long")
@@ -97,7 +97,7 @@ def test_an_error_of_ours_arrives_as_it_was(module_of_a_user):
 
 def test_a_function_that_a_process_cannot_import_is_named(module_of_a_user, tmp_path):
     (tmp_path / "users_module.py").write_text("raise ImportError('half of it is missing')")
-    with side_by_side(module_of_a_user.work, 2) as work, pytest.raises(WorkerError) as caught:
+    with parallel_map(module_of_a_user.work, 2) as work, pytest.raises(WorkerError) as caught:
         work(["a"])
     expected = "cannot import the function of its task or read its data: ImportError: half of it is missing"
     assert expected in str(caught.value)
@@ -116,7 +116,7 @@ def test_a_task_is_sent_when_its_process_has_imported_the_work(tmp_path, monkeyp
 
     flag = tmp_path / "slow_work.imported"
     flag.unlink()
-    with side_by_side(slow, 2) as work:
+    with parallel_map(slow, 2) as work:
         assert work([Sent(flag)]) == [True]
 
 
@@ -132,7 +132,7 @@ class Sent:
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_an_error_waits_in_the_future_of_its_task(jobs):
-    with workers(jobs) as chosen:
+    with process_pool(jobs) as chosen:
         futures = [chosen.submit(int, text) for text in ("1", "x", "3")]
         assert (futures[0].result(), futures[2].result()) == (1, 3)
         with pytest.raises(ValueError, match="'x'"):
@@ -142,14 +142,14 @@ def test_an_error_waits_in_the_future_of_its_task(jobs):
 def test_no_process_stays_behind():
     """Neither after a good end, nor after an error of the caller's, nor while tasks are under way."""
     before = descendants(os.getpid())
-    with side_by_side(abs, 2) as work:
+    with parallel_map(abs, 2) as work:
         work([1, 2, 3])
         assert len(descendants(os.getpid()) - before) == 2
     assert descendants(os.getpid()) == before
-    with pytest.raises(TypeError), side_by_side(abs, 2) as work:
+    with pytest.raises(TypeError), parallel_map(abs, 2) as work:
         len(work([1, 2, 3])[0])
     assert descendants(os.getpid()) == before
-    with side_by_side(time.sleep, 2) as work, pytest.raises(TypeError):
+    with parallel_map(time.sleep, 2) as work, pytest.raises(TypeError):
         work([None, 600])
     assert descendants(os.getpid()) == before
 
@@ -157,16 +157,16 @@ def test_no_process_stays_behind():
 def test_a_file_where_the_user_happens_to_be_is_not_run(tmp_path, monkeypatch):
     (tmp_path / "pickle.py").write_text("raise SystemExit('taken for a library')")
     monkeypatch.chdir(tmp_path)
-    with side_by_side(abs, 2) as work:
+    with parallel_map(abs, 2) as work:
         assert work([-1, -2]) == [1, 2]
 
 
 def test_how_many_may_be_asked_for_is_said():
-    assert checked(1) == 1
-    assert checked(MOST) == MOST >= 16
+    assert check_jobs(1) == 1
+    assert check_jobs(MOST) == MOST >= 16
     for count in (0, -1, MOST + 1, 100000):
         with pytest.raises(InputError, match=f"jobs must be between 1 and {MOST}, got {count}"):
-            checked(count)
-    with pytest.raises(InputError, match="got 100000"), side_by_side(abs, 100000):
+            check_jobs(count)
+    with pytest.raises(InputError, match="got 100000"), parallel_map(abs, 100000):
         pass
     assert 1 <= module.cores() <= (os.cpu_count() or 1)

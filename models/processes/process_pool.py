@@ -25,7 +25,7 @@ MOST: Final = max(16, 2 * (os.cpu_count() or 1))
 """Most threads or processes: beyond twice the cores there is no gain, and each takes memory."""
 
 
-def checked(count: int, what: str = "jobs", *, least: int = 1) -> int:
+def check_jobs(count: int, what: str = "jobs", *, least: int = 1) -> int:
     """The number of threads or processes. Raises InputError if it is out of range."""
     if not least <= count <= MOST:
         raise InputError(f"{what} must be between {least} and {MOST}, got {count}")
@@ -38,25 +38,25 @@ def cores() -> int:
 
 
 @contextmanager
-def side_by_side(work: Callable[[Task], Found], jobs: int) -> Iterator[Callable[[list[Task]], list[Found]]]:
+def parallel_map(work: Callable[[Task], Found], jobs: int) -> Iterator[Callable[[list[Task]], list[Found]]]:
     """A function that does the work on tasks in that many processes; results in the tasks' order.
 
     work: a function of a module, not of the user's program. Raises the exceptions of the work and of
-    `workers`.
+    `process_pool`.
     """
-    with workers(jobs) as chosen:
+    with process_pool(jobs) as chosen:
         yield lambda tasks: list(chosen.map(work, tasks))
 
 
 @contextmanager
-def workers(jobs: int) -> Iterator[Executor]:
+def process_pool(jobs: int) -> Iterator[Executor]:
     """Executor with that many processes; a single job runs in this process.
 
     Functions must belong to a module, not to the user's program. A process starts when there is a task for
     it. All processes end with the block. Raises InputError for a number of jobs that is out of range. Futures
     raise the exceptions of their task, and WorkerError when a process dies or a value cannot be sent.
     """
-    if checked(jobs) == 1:
+    if check_jobs(jobs) == 1:
         yield _InProcess()
         return
     with _Processes(jobs) as processes:

@@ -16,8 +16,8 @@ import numpy as np
 from ..field.field import CrossField
 from ..instance.grid import Floats
 from ..smooth.systems import one_thread
-from .box_qp import bounds, field_at, fitted
-from .energy import LinearSolver, Quadratic, energy_at
+from .box_qp import angle_bounds, field_at, fit_in_box
+from .energy import LinearSolver, QuadraticForm, energy_at
 from .nearest_stroke import nearest_strokes
 
 _DECIMALS: Final = 12  # as in directions of strokes
@@ -29,10 +29,10 @@ _SPLITTER: Final = 2.0**27 + 1
 
 
 @one_thread()
-def pinned(field: CrossField) -> CrossField:
+def reproducible_field(field: CrossField) -> CrossField:
     """Field of least 2-norm energy with the jumps of `field`, angles rounded to twelve decimals.
 
-    Within the bounds that `fitted` keeps. Parts of the mask without strokes keep the angles from `fitted`,
+    Within the bounds that `fit_in_box` keeps. Parts of the mask without strokes keep the angles from there,
     also rounded.
 
     Parameters
@@ -46,8 +46,8 @@ def pinned(field: CrossField) -> CrossField:
         The same jumps with their best angles.
 
     """
-    instance, start = field.instance, fitted(field)
-    lower, upper = bounds(instance)
+    instance, start = field.instance, fit_in_box(field)
+    lower, upper = angle_bounds(instance)
     energy, solver = energy_at(instance, field.p), LinearSolver()
     unreached = np.tile(nearest_strokes(instance) < 0, 2)
     x, rest = np.concatenate([start.alpha, start.beta]), np.zeros(len(lower))
@@ -65,7 +65,7 @@ def pinned(field: CrossField) -> CrossField:
     return field_at(instance, x, field.p)
 
 
-def _slope(energy: Quadratic, x: Floats, rest: Floats) -> Floats:
+def _slope(energy: QuadraticForm, x: Floats, rest: Floats) -> Floats:
     """Half the gradient at x + rest, shapes (2n,), each entry rounded once."""
     matrix = energy.matrix
     product, error = _two_product(matrix.data, x[matrix.indices])
