@@ -17,7 +17,6 @@ from loops import for_each
 from PIL import Image, ImageDraw
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 60 40">{}</svg>'
-STROKES = '<path d="M5 5 L55 35 M5 35 L55 5" stroke="black"/>'
 
 
 def listing(folder):

@@ -39,8 +39,6 @@ def corner(gauge: str = "strokes") -> Instance:
     return Instance("corner", CORNER, [[0, 1], [1, 0]], [2.5, 1.2], [0.5, 0.7], gauge=gauge)
 
 
-PAIR = Instance("pair", [[True, True]], [[0, 0]], [2.5], [0.75], stroke_coefficient=0.5)
-
 INSTANCES = {
     "extreme": Instance(
         "extreme", CORNER, [[0, 0], [1, 0]], [0.0, 3.1], [1e-6, 1.0],

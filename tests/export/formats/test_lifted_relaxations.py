@@ -1,13 +1,11 @@
 """Without integrality a lifted product is a relaxation, as files, manifests, tables and `verify` state."""
 
-import json
 from dataclasses import replace
 
 import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.bundle.manifest import write_all
-from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.solving.local import solver_for
 from crossfield.export.verify.checks import Verdict
@@ -49,11 +47,6 @@ def test_a_lifted_relaxation_is_called_one(name, written):
         assert any("a relaxation" in line for line in head)
         assert not any("exact" in line for line in head)
         assert any(f"continuous relaxation of {name}" in line for line in head)
-
-
-def test_the_table_tells_both():
-    cells = {row["name"]: row["mps"] for row in tables()["formulations"][1]}
-    assert {cells[name] for name in LIFTED} == {"lifted, exact; relaxed, weaker"}
 
 
 def test_no_other_relaxation_is_called_the_same_problem(written):
@@ -108,15 +101,3 @@ def test_verify_compares_optima_across_formats(written, two, tmp_path):
     assert Verdict.DIFFERS in {each.verdict for each in compared(called_exact)}
     too_high = [replace(weak, objective=0.3, bound=None), whole]
     assert [each.verdict for each in compared(too_high)] == [Verdict.DIFFERS, whole.verdict]
-
-
-@pytest.mark.oracles
-def test_verify_reads_what_a_manifest_says_of_lifting(two, tmp_path):
-    (manifest,) = write_all(
-        two, tmp_path, formulations=["minlp-quartic"], formats=["mps"], options={"relax": True}
-    )
-    document = json.loads(manifest.path.read_text())
-    document["files"][0]["lifted"] = "z = p1 beta_i with the hull facets (26)-(29), exact"
-    manifest.path.write_text(json.dumps(document))
-    (bad,) = verify(tmp_path, programs=["highs"]).bad
-    assert "the manifest states" in bad.reason

@@ -24,7 +24,7 @@ from crossfield.export.bundle.manifest import read_manifest, write_all, write_pr
 from crossfield.export.formats.registry import DEFAULTS, FORMATS, carried, write
 from crossfield.export.programs import glpk as glpk_program
 from crossfield.export.programs import scip as scip_program
-from crossfield.export.programs.reading import Meaning, Points
+from crossfield.export.programs.reading import Points
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
 from crossfield.export.writing.canonical import Canonical
@@ -251,23 +251,6 @@ def test_the_ampl_model_refuses_fixed_integers(label: str, tmp_path: Path):
 
 
 # OSiL
-
-
-def assert_means(model: Meaning, problem: Problem) -> None:
-    """Names, bounds, types and rows are the problem's to the bit; ONE and its row are missing."""
-    expected = of_problem(problem)
-    n, m = problem.n_columns, problem.n_rows
-    assert (model.columns, model.rows) == (expected.columns[:n], expected.rows[:m])
-    for name in ("lower", "upper", "integer"):
-        np.testing.assert_array_equal(getattr(model, name), getattr(expected, name)[:n], err_msg=name)
-    for name in ("row_lower", "row_upper"):
-        np.testing.assert_array_equal(getattr(model, name), getattr(expected, name)[:m], err_msg=name)
-    for name in ("matrix_at", "matrix", "row_quadratic_at", "row_quadratic") if m else ():
-        np.testing.assert_array_equal(getattr(model, name), getattr(expected, name), err_msg=name)
-    if problem.objective_degree <= 2:
-        np.testing.assert_array_equal(model.costs, expected.costs[:n])
-        np.testing.assert_array_equal(model.quadratic_at, expected.quadratic_at)
-        np.testing.assert_array_equal(model.quadratic, expected.quadratic)
 
 
 @for_each("label", CASES)

@@ -147,15 +147,6 @@ def test_every_format_carries_them(proof, tmp_path):
     assert read >= {"nl", "lp", "mps", "mod"} & present
 
 
-def test_files_without_a_certificate_say_nothing_of_it(proof, tmp_path):
-    certificate, _ = proof
-    (manifest,) = write_all(
-        certificate.field.instance, tmp_path, formulations=["milp-mccormick"], formats=["lp"]
-    )
-    assert not {"windows", "tightened"} & set(manifest.document)
-    assert SAID not in (tmp_path / "random.milp-mccormick.lp").read_text()
-
-
 def test_what_does_not_fit_is_refused(proof, tmp_path, capsys):
     certificate, path = proof
     other = random_instance(104, (2, 3), 9)

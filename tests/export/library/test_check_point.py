@@ -172,21 +172,6 @@ def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_pat
     assert float(label(found, "claimed").rsplit(" ", 1)[1].rstrip(")")) < 1e-6
 
 
-@pytest.mark.parametrize("style", [0, 4])
-def test_a_solution_of_highs_is_read_in_both_styles(style, tmp_path):
-    model, answer = tmp_path / "m.mps", tmp_path / "a.sol"
-    write(formulate(make_instance(), "milp-mccormick"), model)
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", False)
-    highs.readModel(str(model))
-    highs.run()
-    highs.writeSolution(str(answer), style)
-    found = check(str(model), str(answer))
-    assert found.worst < 1e-5
-    assert float(found.objective) == pytest.approx(highs.getObjectiveValue(), rel=1e-9)
-    assert float(label(found, "claimed").rsplit(" ", 1)[1].rstrip(")")) < 1e-6
-
-
 @pytest.mark.parametrize(
     "file",
     [
@@ -355,20 +340,6 @@ def test_columns_left_out_are_zero_or_what_they_are_fixed_to_and_those_that_solv
 # as a program
 
 
-def test_it_needs_nothing_but_python(tmp_path, script):
-    write(problem_of("milp-mccormick gauge=strokes"), tmp_path / "m.mps.gz")
-    problem = problem_of("milp-mccormick gauge=strokes")
-    field = make_field(problem.instance)
-    save_point(tmp_path / "p.sol", problem, problem.point(field))
-    (tmp_path / "p.sol.gz").write_bytes(gzip.compress((tmp_path / "p.sol").read_bytes()))
-    write_instance(problem.instance, tmp_path / "i.json")
-    for model in ("m.mps.gz", "i.json"):
-        for point in ("p.sol", "p.sol.gz"):
-            done = run(script, tmp_path / model, tmp_path / point)
-            assert (done.returncode, done.stderr) == (0, "")
-            assert done.stdout.endswith("feasible within 1e-08\n")
-
-
 def test_it_is_one_file_for_python_3_9_with_the_standard_library_alone(script):
     tree = ast.parse(script.read_text(), feature_version=(3, 9))
     bound = [node.name for node in tree.body if isinstance(node, ast.ClassDef | ast.FunctionDef)]
@@ -487,15 +458,6 @@ def test_bad_points_are_one_line(what, tmp_path, capsys):
     refused(capsys, tmp_path / "m.mps", tmp_path / "p")
 
 
-def test_the_good_ones_are_good(tmp_path):
-    """The bad inputs differ from these in one place each."""
-    (tmp_path / "p").write_text(GOOD_POINT)
-    for model in (linear(), json.dumps(PAIR)):
-        (tmp_path / "m").write_text(model)
-        (tmp_path / "p").write_text(GOOD_POINT if model[0] == "N" else BY_HAND)
-        assert check(str(tmp_path / "m"), str(tmp_path / "p")).worst == 0
-
-
 @for_each(
     "arguments",
     [
@@ -533,16 +495,6 @@ def test_a_packed_file_that_grows_without_end_is_refused_before_it_is_unpacked(t
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 8 << 20
-
-
-def test_an_instance_of_an_earlier_version_with_crossings_is_refused(tmp_path):
-    path, instance = tmp_path / "old.json", make_instance()
-    document = json.loads(write_instance(instance, path).read_text())
-    path.write_text(json.dumps(document | {"crossings": document["strokes"][:1]}))
-    problem = formulate(instance, "milp-mccormick")
-    point = save_point(tmp_path / "a.sol", problem, np.zeros(problem.n_columns))
-    with pytest.raises(BadInputError, match="holds crossings"):
-        check(str(path), point)
 
 
 def test_a_point_of_another_instance_is_named_as_such(tmp_path):

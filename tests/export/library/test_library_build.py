@@ -23,13 +23,12 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.documents.documents import problem_of, read_library
 from crossfield.export.library.documents.statistics import tangent_bound
-from crossfield.export.library.ledger.points import better_in_1norm, complete_point
+from crossfield.export.library.ledger.points import better_in_1norm
 from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
-from crossfield.export.library.plan.spec import default_spec, read_spec
+from crossfield.export.library.plan.spec import read_spec
 from crossfield.export.solutions.solution import read_solution
 from crossfield.models.errors import InputError
-from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.file import read_instance
@@ -39,7 +38,6 @@ from crossfield.models.sketch.samples import sample, sample_svg
 from crossfield.models.sketch.svg import read_svg
 from libraries import HEAD, content
 from loops import for_each
-from scipy import ndimage
 
 SCHEMAS = places.ROOT / "export" / "library" / "documents"
 
@@ -115,16 +113,6 @@ def by_formulation(library, instance, facet="hull"):
 
 
 # The specification
-
-
-def test_the_shipped_specification_is_a_ladder_of_every_sample(tmp_path):
-    spec = default_spec()
-    entries = [entry.name for each in plan(spec) for entry in each.entries]
-    assert len(entries) == len(set(entries)) > 8 * 4 * 8
-    assert all(re.fullmatch(r"cf_[a-z0-9_]{1,29}", name) for name in entries)
-    assert [rung.name for rung in spec.rungs] == ["tiny", "small", "medium", "large"]
-    assert len({each.what for each in spec.sketches if each.kind == "sample"}) == 10
-    assert {name for rung in spec.rungs for name in rung.formats} >= {"nl", "gms", "lp", "mps"}
 
 
 RUNG = "[rungs.tiny]\nsizes = [4]\n"
@@ -415,54 +403,7 @@ def test_the_printed_facet_gives_a_point_that_is_no_worse(built):
         assert each["best"]["objective"] <= hull[name]["best"]["objective"] + 1e-12
 
 
-def test_the_free_z_of_the_printed_facet_is_the_best_for_its_field(built):
-    """No other z in its interval gives a lower t: tried on a lattice of values."""
-    document = by_formulation(built, "cf_own_n004", "printed")["milp-mccormick"]
-    problem = problem_of(built, document)
-    rng = np.random.default_rng(5)
-    instance = problem.instance
-    jumps = rng.integers(instance.p_min, instance.p_max + 1)
-    field = CrossField(
-        instance,
-        rng.uniform(instance.alpha_lower, instance.alpha_upper),
-        rng.uniform(-0.78, 0.78, instance.grid.size),
-        jumps,
-    )
-    point = complete_point(problem, field)
-    assert problem.violation(point).worst < 1e-12
-    z, t = (problem.blocks[name].slice for name in ("z", "t"))
-    first, second = field.beta[instance.grid.first], field.beta[instance.grid.second]
-    for share in np.linspace(-np.pi / 4, np.pi / 4, 101):
-        trial = point.copy()
-        trial[z] = share
-        allowed = np.ones(len(first), dtype=bool)
-        for family in problem.rows:
-            if family.family.tag in {"c26", "c27", "c28", "c29"}:
-                values = family.values(trial)
-                allowed &= (values <= 1e-12) if family.family.sense == "<=" else (values >= -1e-12)
-        assert (np.abs(first - 2 * share - second)[allowed] >= point[t][allowed] - 1e-12).all()
-
-
 # Counts, curvature, letters
-
-
-def test_letters_and_curvature_are_those_of_the_formulation(built):
-    found = {
-        name: (each["probtype"], each["curvature"]["objective"], each["curvature"]["constraints"])
-        for name, each in by_formulation(built, "cf_own_n004").items()
-    }
-    expected = {
-        "minlp-parity": (None, "nonconvex", "none"),
-        "minlp-quartic": (None, "nonconvex", "linear"),
-        "minlp-cubic": (None, "nonconvex", "linear"),
-        "miqcp-bilinear": ("CGQ", "convex", "indefinite"),
-        "miqcp-bilinear-l1": ("LGQ", "linear", "indefinite"),
-        "miqp-mccormick": ("CGL", "convex", "linear"),
-        "milp-mccormick": ("LGL", "linear", "linear"),
-        "qp-fixed": ("CCB", "convex", "none"),
-        "miqp-exact": ("CGL", "convex", "linear"),
-    }
-    assert {name: found[name] for name in expected} == expected
 
 
 def test_the_tangent_bound_never_exceeds_the_optimum(built):
@@ -477,19 +418,6 @@ def test_the_tangent_bound_never_exceeds_the_optimum(built):
 
 
 # Random instances
-
-
-def test_random_instances_follow_size_and_seed_alone():
-    spec = default_spec()
-    recipes = {each.recipe.name: each.recipe for each in plan(spec) if each.recipe.seed is not None}
-    first, again, other = (instance_from(recipes[f"cf_rand_n024_s{seed}"]) for seed in (1, 1, 2))
-    assert first.sha256 == again.sha256 != other.sha256
-    assert ndimage.label(first.mask)[1] == 1
-    assert 0.4 < first.mask.mean() < 0.8
-    assert len(first.theta) == round(first.grid.size / 5)
-    assert 0.1 <= first.w.min() <= first.w.max() <= 1
-    full = replace(recipes["cf_rand_n024_s1"], sketch=replace(recipes["cf_rand_n024_s1"].sketch, what="full"))
-    assert instance_from(full).mask.all()
 
 
 # The same bytes, however it is made

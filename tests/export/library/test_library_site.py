@@ -18,13 +18,11 @@ import pytest
 from browsing import CONTRAST, find, served, show, sideways
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.documents.documents import problem_of
-from crossfield.export.library.site.formulas import lines_of
-from crossfield.export.library.site.site import count, percent, size, solvers, statuses, value, write_site
+from crossfield.export.library.site.site import count, write_site
 from crossfield.export.pictures.draw import counted
 from crossfield.export.pictures.marks import FAMILIES, NEGATIVE, POSITIVE, STROKE
 from crossfield.models.errors import InputError, InstanceError, OutputError
 from crossfield.models.field.file import read_field
-from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.formulations.latex import latex
 from crossfield.models.instance.file import read_instance
 from forging import change, seal
@@ -56,7 +54,6 @@ seeds = [1]
 """
 ENTRY, INSTANCE = "cf_mouse_n006_milp", "cf_mouse_n006"
 KINDS = ("index.html", "about.html", f"instance/{INSTANCE}.html", f"entry/{ENTRY}.html")
-MATHML = "{http://www.w3.org/1998/Math/MathML}"
 
 
 RUNS = [
@@ -207,15 +204,6 @@ def test_the_whole_library_is_in_the_folder_of_files(library, site):
     assert content_of(site / "files") == content_of(library.folder)
 
 
-def test_an_edit_in_the_site_leaves_the_library_as_it_is(library, tmp_path):
-    write_site(library.folder, tmp_path / "site")
-    before = {path.name: path.read_bytes() for path in library.folder.iterdir()}
-    for path in (tmp_path / "site" / "files").iterdir():
-        with path.open("ab") as stream:
-            stream.write(b"of another hand")
-    assert {path.name: path.read_bytes() for path in library.folder.iterdir()} == before
-
-
 def test_the_command_prints_the_number_of_pages_and_replaces_an_earlier_site(library, site, tmp_path, capsys):
     earlier = shutil.copytree(site, tmp_path / "web")
     (earlier / "index.html").write_text("old")
@@ -326,27 +314,6 @@ def test_every_internal_link_leads_somewhere_and_only_anchors_lead_out(site, pag
     assert "@import" not in css
 
 
-def test_checksums_and_sizes_on_the_pages_are_those_of_the_files(library, site, pages):
-    checked = set()
-    for name, page in pages.items():
-        if "/" not in name:
-            continue
-        rows = re.findall(
-            r'href="\.\./files/([^"]+)" download>\1</a></th>(?:\s*<td>[^<]*</td>)?\s*<td '
-            r'class="number">([^<]+)</td>\s*'
-            r'<td><code class="sum">([0-9a-f]{64})</code>',
-            (site / name).read_text(),
-        )
-        for file, told_size, told_sum in rows:
-            data = (site / "files" / file).read_bytes()
-            assert hashlib.sha256(data).hexdigest() == told_sum
-            assert size(len(data)) == told_size
-            checked.add(file)
-        assert len(rows) == len([each for each in page.all("code") if each.get("class") == "sum"])
-    of_entries = {file["name"] for entry in library.entries for file in entry["files"]}
-    assert of_entries < checked
-
-
 def test_pages_are_well_formed_and_accessible(pages):
     titles = []
     for name, page in pages.items():
@@ -398,27 +365,6 @@ def test_an_entry_shows_its_sidecar(library, site, pages):
         assert {f"../files/{file['name']}" for file in entry["files"]} <= set(download)
 
 
-def test_statistics_count_entries_and_solved_runs():
-    entries = [
-        {"rung": rung, "status": status, "formulation": name, "runs": runs}
-        for rung, status, name, runs in (
-            (
-                "small",
-                "optimal",
-                "qp",
-                [{"solver": "A", "status": "optimal"}, {"solver": "B", "status": "limit"}],
-            ),
-            ("tiny", "claimed", "qp", [{"solver": "A", "status": "limit"}]),
-            ("tiny", "best known", "milp", []),
-            ("tiny", "best known", "milp", [{"solver": "B", "status": "optimal"}]),
-        )
-    ]
-    assert statuses(entries).rows == {"tiny": ["0", "1", "2"], "small": ["1", "0", "0"]}
-    found = solvers(entries)
-    assert (found.columns, found.rows) == (("A", "B"), {"qp": ["1 of 2", "0 of 1"], "milp": ["", "1 of 1"]})
-    assert solvers(entries[2:3]) is None
-
-
 def test_the_command_that_a_page_shows_checks_the_point(site, pages):
     for name in (f"entry/{ENTRY}.html", f"entry/{INSTANCE}_quartic.html", "about.html"):
         (command,) = {text for tag, text in pages[name].texts if text.startswith("python3 check_point.py")}
@@ -428,31 +374,6 @@ def test_the_command_that_a_page_shows_checks_the_point(site, pages):
             [sys.executable, *arguments], cwd=site / "files", capture_output=True, text=True, check=False
         )
         assert (done.returncode, done.stderr) == (0, "")
-
-
-def test_numbers_are_written_for_people():
-    assert [count(n) for n in (0, 999, 1234567)] == ["0", "999", "1\u202f234\u202f567"]
-    assert [value(x) for x in (None, 0.0, -0.0, -1.5, 3.14159265, 1e-28)] == [
-        "–",
-        "0",
-        "0",
-        "−1.5",
-        "3.14159",
-        "1e−28",
-    ]
-    assert [percent(x) for x in (None, 0.0, 1e-9, 0.12345, 1.0)] == [
-        "–",
-        "0\u202f%",
-        "≈ 0\u202f%",
-        "12.3\u202f%",
-        "100\u202f%",
-    ]
-    assert [size(n) for n in (0, 999, 12345, 2500000)] == [
-        "0\u202fB",
-        "999\u202fB",
-        "12.3\u202fkB",
-        "2.5\u202fMB",
-    ]
 
 
 # pictures and mathematics
@@ -475,44 +396,11 @@ def test_pictures_hold_the_strokes_and_the_singularities(library, site):
         assert counted(field).startswith(f"{len(index) or 'no'} singularit")
 
 
-@for_each("name", FORMULATIONS)
-def test_the_mathematics_has_every_line_of_the_declaration(name):
-    declared = declare(name)
-    lines = lines_of(latex(declared))
-    assert len(lines) == len(declared.objective) + len(declared.rows) + len(declared.variables)
-    assert [line["label"] for line in lines if line["label"]] == [row.paper for row in declared.rows]
-    assert [line["role"] for line in lines if line["role"]] == [
-        "minimise",
-        *(["subject to"] if declared.rows else []),
-        "where",
-    ]
-    for piece in (each for line in lines for each in (line["formula"], line["over"]) if each):
-        root = ET.fromstring(f"<p>{piece}</p>")
-        assert {child.tag for child in root} - {"wbr"} == {f"{MATHML}math"}
-        assert "\\" not in "".join(root.itertext())
-        assert "&" not in "".join(root.itertext())
-    fractions = sum(line["formula"].count("<mfrac>") for line in lines)
-    assert fractions == len(re.findall(r"\\t?frac", latex(declared)))
-
-
 def text_of(site, entry):
     return (site / "entry" / f"{entry}.html").read_text()
 
 
 # structure
-
-
-def test_every_matrix_and_every_hessian_has_its_picture(library, site):
-    for entry in library.entries:
-        counts, text = entry["counts"], text_of(site, entry["name"])
-        for kind, there in (("matrix", counts["nonzeros"]), ("hessian", counts["nonlinear_variables"])):
-            name = f"{entry['name']}.{kind}.svg"
-            assert (f"../pictures/{name}" in text) == (site / "pictures" / name).is_file() == bool(there)
-        assert ("all is linear" in text) == (entry["class"] == "MILP")
-        if counts["nonzeros"]:
-            drawn = ET.parse(site / "pictures" / f"{entry['name']}.matrix.svg").getroot()
-            assert drawn.findall(f".//*[@fill='{FAMILIES[0]}']")
-            assert bool(drawn.findall(f".//*[@fill='{STROKE}']")) == bool(counts["nonlinear_nonzeros"])
 
 
 # runs, origin and citation
@@ -846,43 +734,11 @@ def test_without_javascript_the_table_is_complete(browser, address, library):
         browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
 
 
-def test_the_formulation_is_rendered_as_mathematics(browser, address):
-    from selenium.webdriver.support.wait import WebDriverWait
-
-    browser.get(f"{address}/entry/{ENTRY}.html")
-    boxes = browser.execute_script(
-        "return [...document.querySelectorAll('.model mfrac')].map(each => [...each.children].map(part => "
-        "part.getBoundingClientRect().top))"
-    )
-    assert len(boxes) >= 5
-    assert all(over < under for over, under in boxes)
-    find(browser, "summary").click()
-    assert find(browser, "details code").text.startswith("\\begin{aligned}")
-    find(browser, "details button").click()
-    WebDriverWait(browser, 5).until(lambda _: find(browser, "details button").text in {"Copied", "Selected"})
-
-
 @pytest.fixture(scope="module")
 def facts(detailed):
     """Address of the site whose entry has every optional fact."""
     with served(detailed) as address:
         yield address
-
-
-@pytest.mark.parametrize("width", [320, 390])
-@pytest.mark.parametrize("page", ["index.html", f"instance/{INSTANCE}.html"])
-def test_a_phone_shows_every_status_and_gap_without_scrolling_sideways(browser, facts, page, width):
-    show(browser, width=width, height=844)
-    browser.get(f"{facts}/{page}")
-    script = """return [...document.querySelectorAll('table.entries tbody tr')].map(row =>
-      [row.cells[0], row.querySelector('.status'), row.cells[2]].map(each => each.getBoundingClientRect())
-      .map(box => [box.left, box.right]))"""
-    rows = browser.execute_script(script)
-    assert len(rows) >= 3
-    for name, status, gap in rows:
-        assert name[0] >= 0
-        assert name[1] <= status[0], "the name that stays in sight covers no status"
-        assert status[1] <= gap[1] <= width
 
 
 @pytest.mark.parametrize("page", [f"entry/{ENTRY}.html", f"entry/{INSTANCE}_quartic.html", "about.html"])

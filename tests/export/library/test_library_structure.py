@@ -6,7 +6,6 @@ import xml.etree.ElementTree as ET
 import casadi as ca
 import crossfield as cf
 import numpy as np
-import pytest
 from cases import CASES, make_instance, make_problem, problem_of
 from crossfield.export.library.documents.statistics import counts
 from crossfield.export.library.site.study import blocks, hessian, matrix
@@ -102,20 +101,3 @@ def test_a_large_matrix_is_binned_and_its_picture_stays_small():
     assert names == ["one", "other", "one", "other"]
     assert len(picture) < 50_000
     assert sparsity_picture(pattern) == picture
-
-
-@pytest.mark.parametrize("name", ["a", "a_rather_long_name_of_a_column"])
-def test_names_and_numbers_have_room_on_the_page(name):
-    parts = Parts(("other", name), (100, 2))
-    nowhere = np.zeros(0, np.int64)
-    pattern = Pattern(parts, parts, nowhere, nowhere, np.zeros(0, bool))
-    root = ET.fromstring(sparsity_picture(pattern))
-    left, top, width, height = map(float, root.get("viewBox").split())
-    for each in root.iter(f"{SVG}text"):
-        x, y, reach = float(each.get("x")), float(each.get("y")), 6 * len(each.text)
-        if each.get("transform"):
-            assert y - reach * np.sin(np.pi / 3) >= top
-            assert x + reach * np.cos(np.pi / 3) <= left + width
-        elif each.get("text-anchor") == "end":
-            assert x - reach >= left
-        assert y + 3 <= top + height

@@ -12,7 +12,6 @@ from crossfield.export.library.building.table import read_table
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.contributions.submit import submit
 from crossfield.export.library.documents.documents import problem_of
-from crossfield.export.library.site.site import write_site
 from crossfield.models.errors import InputError
 from forging import change, seal
 from libraries import library_of, spec_of
@@ -151,15 +150,6 @@ def test_a_field_outside_the_windows_is_not_better_and_not_refused(lib, tmp_path
     assert [each.outcome for each in submit(lib, [path])] == ["not better"]
 
 
-def test_its_page_links_its_certificate_and_its_plain_entry(built, tmp_path):
-    write_site(built.folder, tmp_path / "site")
-    page = (tmp_path / "site" / "entry" / f"{STEM}_milp_tight.html").read_text()
-    assert f'href="{STEM}_milp.html"' in page
-    assert f'href="../files/{CERTIFICATES["milp"]}"' in page
-    plain = (tmp_path / "site" / "entry" / f"{STEM}_milp.html").read_text()
-    assert f'href="{STEM}_milp_tight.html"' in plain
-
-
 @pytest.mark.parametrize(
     "stated, words",
     [
@@ -173,15 +163,3 @@ def test_a_bad_list_is_refused(tmp_path, stated, words):
     with pytest.raises(InputError, match=r"spec\.toml") as error:
         spec_of(tmp_path, SPEC.replace('["exact", "milp-mccormick"]', stated))
     assert words in str(error.value)
-
-
-@pytest.mark.parametrize("name", ["cf_skew_n008_milp", "cf_skew_n008_exact"])
-def test_the_library_that_ships_has_them_by_name(name, tmp_path):
-    narrow, plain = cf.entry(f"{name}_tight"), cf.entry(name)
-    assert (narrow.objective, narrow.bound, narrow.status) == (plain.objective, plain.bound, "optimal")
-    assert narrow.instance.sha256 == plain.instance.sha256
-    assert narrow.problem.sha256 != plain.problem.sha256
-    assert narrow.certificate.energy == pytest.approx(narrow.objective)
-    assert narrow.problem.violation(narrow.problem.point(narrow.field)).worst < 1e-8
-    assert narrow.name in {each.name for each in cf.entries(where="tightened == True")}
-    assert narrow.write(tmp_path / "it.mps").files.keys() == {"it.mps"}

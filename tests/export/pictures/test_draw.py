@@ -7,11 +7,10 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from crossfield.export.pictures import marks, panels
-from crossfield.export.pictures.draw import KINDS, _caption, draw
+from crossfield.export.pictures.draw import KINDS, draw
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField, field_in_windows
 from crossfield.models.instance.instance import Instance
-from defusedxml import ElementTree
 from loops import for_each
 from PIL import Image
 
@@ -149,25 +148,6 @@ def test_degenerate_pixels_are_marked(tmp_path):
     assert (across, down) == pytest.approx((0.75, 0.75), abs=0.02)
 
 
-def test_caption_counts():
-    instance = instance_of(np.ones((2, 3)), 0, 0)
-    p = np.zeros(7, dtype=np.int32)
-    grid = instance.grid
-    p[grid.pair_number[1][1, 0]] = -2  # bottom side of the left block, walked forwards: index +1/2
-    field = CrossField(instance, np.zeros(6), np.zeros(6), p)
-    caption = _caption(panels.Picture(instance, field, 100.0), full=True)
-    energy = 2 * np.pi**2
-    assert caption == (
-        "3 × 2 pixels  ·  1 stroke pixel  ·  1 singularity (1 of +1/2)  ·  "
-        f"energy {energy:.4g} (2-norm), {2 * np.pi:.4g} (1-norm)  ·  gauge strokes"
-    )
-
-
-def test_titles_are_taken_as_they_are(tmp_path):
-    path = draw(singular(5), tmp_path / "a.svg", kind="crosses", title="5 $ & <b> \\frac " + "long " * 60)
-    assert ElementTree.parse(path).getroot().tag.endswith("svg")
-
-
 @pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1)])
 @pytest.mark.parametrize("kind", ["overview", "energy"])
 def test_odd_shapes(tmp_path, shape, kind):
@@ -177,19 +157,6 @@ def test_odd_shapes(tmp_path, shape, kind):
         instance, np.full(count, 0.3), np.zeros(count), np.zeros(len(instance.grid.first), dtype=np.int32)
     )
     assert draw(field, tmp_path / "a.png", kind=kind).stat().st_size > 1000
-
-
-@pytest.mark.parametrize("name", ["picture.jpg", "picture", "picture.png.txt"])
-def test_other_suffixes_are_named(tmp_path, name):
-    with pytest.raises(InputError, match=r"use one of \.png, \.svg, \.pdf") as caught:
-        draw(singular(4), tmp_path / name)
-    assert name in str(caught.value)
-    assert not list(tmp_path.iterdir())
-
-
-def test_unknown_kind_is_named(tmp_path):
-    with pytest.raises(InputError, match="no kind of picture 'colour'; choose one of instance, crosses"):
-        draw(singular(4), tmp_path / "a.png", kind="colour")
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "instance"])

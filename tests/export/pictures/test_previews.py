@@ -3,8 +3,6 @@
 import base64
 import io
 import re
-import subprocess
-import sys
 
 import crossfield as cf
 import numpy as np
@@ -31,19 +29,6 @@ def problem(instance):
 @pytest.fixture(scope="module")
 def solution(instance, field):
     return cf.solve(cf.formulate(instance, "qp-fixed", p=field.p))
-
-
-def test_every_repr_is_one_line_with_sizes_and_energy(instance, field, problem, solution):
-    lines = [repr(each) for each in (instance, field, problem, solution)]
-    for line, name in zip(lines, ("Instance", "CrossField", "Problem", "Solution"), strict=True):
-        assert re.fullmatch(rf"<{name} .*>", line)
-        assert len(line) < 130
-    assert instance.summary in lines[0]
-    assert f"{field.energy().total:.6g}" in lines[1]
-    assert f"{problem.n_columns} columns" in lines[2]
-    assert f"{problem.n_rows} rows" in lines[2]
-    assert f"objective {solution.objective:.6g}" in lines[3]
-    assert "optimal" in lines[3]
 
 
 def test_instances_and_fields_are_pictures(instance, field):
@@ -81,13 +66,3 @@ def test_a_solution_without_a_point_is_reported(problem):
     assert repr(empty) == "<Solution of milp-mccormick on skew: infeasible>"
     assert "<img" not in empty._repr_html_()
     assert "&lt;no&gt; &amp; never" in empty._repr_html_()
-
-
-@pytest.mark.slow
-def test_a_module_alone_shows_pictures_too():
-    """The top-level package registers the drawing function before any of its modules is loaded."""
-    code = (
-        "from crossfield.models.sketch.samples import sample; import sys; i = sample('skew', 4); "
-        "assert 'matplotlib' not in sys.modules; sys.exit(not i._repr_png_().startswith(b'\\x89PNG'))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

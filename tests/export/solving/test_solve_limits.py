@@ -1,7 +1,5 @@
 """Solves without time, shares of limits, and the modules that a solver's child process loads."""
 
-import subprocess
-import sys
 import threading
 
 import crossfield as cf
@@ -102,22 +100,6 @@ def test_the_second_stage_keeps_a_part_of_the_time():
     for seconds, kept in ((60, 12.0), (10, 2.0), (6, 2.0), (2, 1.0), (0.1, 0.05), (0, 0.0)):
         whole = Deadline.after(seconds, lambda: now[0])
         assert whole.at - jumps_until(whole).at == pytest.approx(kept)
-
-
-def test_limits_become_what_is_left():
-    now = [0.0]
-    deadline = Deadline.after(10.0, lambda: now[0])
-    limits = cf.Limits(60.0, 1e-3, 2)
-    assert limits.until(deadline) == cf.Limits(10.0, 1e-3, 2)
-    now[0] = 20.0
-    assert 0 < limits.until(deadline).time_limit < 0.1
-
-
-def test_the_child_process_of_a_solver_loads_neither_formulas_nor_writers():
-    code = "import sys, crossfield.export.programs.casadi; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "casadi" in done.stdout.split()
-    assert not {"sympy", "scipy", "jinja2", "highspy"} & set(done.stdout.split())
 
 
 def test_an_event_ends_a_solve_with_its_best_point(tmp_path):

@@ -24,7 +24,6 @@ from crossfield.export.statuses import Status
 from crossfield.models.errors import (
     InputError,
     MissingSolverError,
-    SolutionError,
     SolverError,
     UnsupportedBySolverError,
 )
@@ -134,13 +133,6 @@ def test_one_pixel_has_the_optimum_of_the_hand_calculation(solver, gauge):
     assert solution.field.alpha[0] == pytest.approx(alpha, abs=1e-4)
 
 
-@pytest.mark.parametrize("solver", ["highs", "ipopt", "bonmin"])
-def test_one_pixel_in_the_1_norm(solver):
-    solution = cf.solve(cf.formulate(one_pixel("box", 1e-2), "milp-mccormick"), solver)
-    assert solution.objective == pytest.approx(1e-2 * np.pi / 6, abs=1e-7)
-    assert solution.field.beta[0] == pytest.approx(np.pi / 6, abs=1e-5)
-
-
 @pytest.mark.parametrize(
     "name,solver", [("milp-mccormick", "highs"), ("milp-mccormick", "bonmin"), ("miqp-exact", "bonmin")]
 )
@@ -184,13 +176,6 @@ def test_the_exact_miqp_has_the_optimum_of_the_enumeration(seed, gauge):
     assert solution.objective == pytest.approx(expected, abs=2e-5)
     assert solution.field.energy(2).total == pytest.approx(expected, abs=2e-5)
     assert solution.violation.worst < 1e-6
-
-
-def test_three_solvers_agree_on_a_qp():
-    instance = random_instance(5, 6, 6)
-    problem = formulated(instance, "qp-fixed")
-    found = [cf.solve(problem, solver, start=cf.greedy_field(instance)).objective for solver in BUNDLED]
-    assert found == pytest.approx([least_squares(instance, cf.greedy_field(instance).p)] * 3, abs=1e-6)
 
 
 # The table of solvers and classes
@@ -314,17 +299,6 @@ def test_a_time_limit_ends_with_the_incumbent(hard, name, solver):
     assert not solution.interrupted
 
 
-def test_without_a_start_and_time_there_is_no_point(tmp_path):
-    instance = cf.sample("mouse", 30)
-    (tmp_path / "mouse.milp-mccormick.highs.sol").write_text("that of yesterday")
-    problem = cf.formulate(instance, "milp-mccormick")
-    found = cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(1e-6))
-    assert (found.status, found.point) == (Status.LIMIT_WITHOUT_POINT, None)
-    with pytest.raises(SolutionError, match="returned no answer within its time; give it more, or a start"):
-        _ = found.field
-    assert not (tmp_path / "mouse.milp-mccormick.highs.sol").exists()
-
-
 def run_in_children(program, folder, monkeypatch):
     """Let children of this process run the program when they start, with highspy available."""
     (folder / "sitecustomize.py").write_text("import highspy\n" + textwrap.dedent(program))
@@ -408,15 +382,6 @@ def test_highs_takes_the_start_as_incumbent_and_a_wide_gap_ends_its_search(tmp_p
     assert (solution.claimed, solution.status) == (Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT)
     assert solution.bound < 0.9 * solution.objective
     assert solution.objective - solution.bound <= 0.97 * solution.objective + 1e-9
-
-
-def test_bonmin_keeps_a_start_that_is_the_optimum(small):
-    problem = cf.formulate(small, "miqp-exact")
-    best = cf.solve(problem, "bonmin").field
-    fitted = cf.fit_angles(best).field
-    again = cf.solve(problem, "bonmin", start=fitted)
-    assert again.status == Status.OPTIMAL_LOCAL
-    assert again.objective == pytest.approx(fitted.energy(2).total, abs=1e-7)
 
 
 def test_bonmin_improves_a_start_that_is_not(small):

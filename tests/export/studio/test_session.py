@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import shlex
 import zipfile
 
@@ -12,10 +11,10 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.studio.document import Document
-from crossfield.export.studio.files import DOWNLOADS, download
+from crossfield.export.studio.files import download
 from crossfield.export.studio.opening import opened
 from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, drawn, field_of, hints_of
-from crossfield.export.studio.views import field_step, lines_step, surface_step
+from crossfield.export.studio.views import field_step
 from crossfield.models.sketch.samples import sample_svg
 from PIL import Image, ImageDraw
 from studios import CONTRADICTING, PEBBLE, changed
@@ -173,40 +172,9 @@ def test_hints_are_placed_on_pixels_and_those_outside_are_left_out():
     )
 
 
-def test_views_hold_arrays_of_the_grid():
-    data = changed()
-    view, found, field = field_step(data)
-    assert view["numbers"]["pixels"] == field.instance.grid.size
-    assert view["size"] == 16
-    families = lines_step(field)["families"]
-    assert all(len(line) % 2 == 0 and len(line) >= 4 for family in families for line in family)
-    surface = surface_step(data, found, field)
-    assert surface["width"] == surface["columns"] * 30
-    json.dumps([view, surface])
-
-
 def test_strokes_that_the_field_does_not_follow_are_suspects():
     assert field_step(changed(strokes=CONTRADICTING, size=32))[0]["suspects"] == [8, 9]
     assert field_step(changed(strokes=CONTRADICTING[:8], size=32))[0]["suspects"] == []
-
-
-def test_only_a_few_strokes_are_suspects_at_a_time():
-    ends = np.random.default_rng(0).uniform([12, 12, 12, 12], [108, 88, 108, 88], (30, 4))
-    lines = [{"points": each.tolist(), "mark": "line", "weight": 1} for each in ends]
-    data = changed(strokes=[PEBBLE["strokes"][0], *lines], size=24)
-    _, found, field = field_step(data)
-    suspects = surface_step(data, found, field)["suspects"]
-    assert 1 <= len(suspects) <= 5
-    assert suspects == sorted(suspects)
-    assert min(suspects) >= 1
-
-
-@pytest.mark.parametrize("what", [name for name in DOWNLOADS if name != "solver"])
-def test_downloads_are_the_same_twice(what):
-    name, content = download(changed(), what)
-    assert name.startswith("pebble.")
-    assert content
-    assert download(changed(), what) == (name, content)
 
 
 def test_solver_files_come_with_their_manifest():

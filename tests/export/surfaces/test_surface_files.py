@@ -162,18 +162,3 @@ def test_facts_are_those_of_a_plane():
     assert facts["right_angle_error_mean_degrees"] == pytest.approx(error, abs=1e-3)
     assert facts["slant_mean_degrees"] == pytest.approx(45.0)
     assert facts["height_range_pixels"] == pytest.approx(0.6 * 8 + 0.8 * 6)
-
-
-def test_surfaces_are_drawn_in_their_own_kinds(tmp_path):
-    surface = ball(10)
-    default = cf.draw(surface, tmp_path / "a.png").read_bytes()
-    assert cf.draw(surface, tmp_path / "b.png", kind="shaded").read_bytes() == default
-    assert cf.draw(surface, tmp_path / "b.svg", kind="normals", title="A ball").stat().st_size > 10_000
-    assert cf.draw(surface, tmp_path / "b.png", kind="relief").read_bytes() != default
-    assert surface._repr_png_().startswith(b"\x89PNG")
-    with pytest.raises(InputError, match="choose one of shaded"):
-        cf.draw(surface, tmp_path / "b.png", kind="crosses")
-    with pytest.raises(InputError, match="show a surface"):
-        cf.draw(surface.field, tmp_path / "b.png", kind="shaded")
-    with pytest.raises(InputError, match="no kind of picture 'wings'; choose one of shaded"):
-        cf.draw(surface, tmp_path / "b.png", kind="wings")

@@ -118,18 +118,6 @@ def test_a_failure_leaves_no_file_and_no_thread(tmp_path, monkeypatch, begun):
     assert begun() == 0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("compress", [False, True])
-def test_files_written_at_once_are_the_same(compress, tmp_path):
-    for jobs in (1, 3):
-        write_all(make_instance(), tmp_path / str(jobs), jobs=jobs, compress=compress)
-    one, three = (
-        {path.name: path.read_bytes() for path in (tmp_path / jobs).iterdir()} for jobs in ("1", "3")
-    )
-    assert one == three
-    assert len(one) == 9 * 7 - 2 + 1
-
-
 def test_ctrl_c_begins_no_further_file(tmp_path, begun):
     def stop(name: str) -> None:
         raise KeyboardInterrupt

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from crossfield.models.errors import InputError, InstanceError
+from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import DEGENERATE, CrossField, field_in_windows
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
@@ -136,17 +136,6 @@ def test_cross_error_takes_the_better_assignment():
     )
 
 
-def test_cross_error_names_the_shape_that_it_needs():
-    field = CrossField(pixels([[1, 1, 1]], {(0, 0): 0}), [0, 0, 0], [0, 0, 0], [0, 0])
-    with pytest.raises(InputError, match=r"^u_angle has shape \(3, 2\), but \w+ has 3 pixels; give an angle"):
-        field.cross_error(field.u, field.v)
-    with pytest.raises(InputError, match=r"^v_angle has shape \(2,\), but"):
-        field.cross_error([0, 0, 0], [HALF, HALF])
-    assert field.cross_error(0.0, [HALF]) == pytest.approx([0, 0, 0])
-    with pytest.raises(InputError, match=r"^u_angle has shape \(3, 2\)"):
-        CrossField.from_lines(field.instance, field.u, field.v)
-
-
 @pytest.mark.parametrize("index", [0.25, -0.25])
 def test_quarter_singularity_of_four_pixels(index):
     # The middle of the quad is the origin; the crosses turn by index * 360 degrees on the way round.
@@ -174,12 +163,6 @@ def test_singularity_is_found_at_its_quad():
     field = CrossField(instance, alpha, np.zeros(30), np.zeros(len(instance.grid.first))).with_best_jumps()
     found = field.singularities
     assert (found.row.tolist(), found.column.tolist(), found.index.tolist()) == ([2], [1], [-0.25])
-
-
-def test_image_puts_values_back():
-    field = CrossField(pixels([[1, 0], [1, 1]], {(0, 0): 0}), np.arange(3.0), np.zeros(3), [0, 0])
-    assert field.image(field.alpha, -1).tolist() == [[0, -1], [1, 2]]
-    assert np.isnan(field.image(field.alpha)[0, 1])
 
 
 @for_each(

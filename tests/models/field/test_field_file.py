@@ -58,12 +58,6 @@ def test_field_comes_back_and_gives_the_same_bytes(field, tmp_path, suffix):
     assert first.read_bytes() == second.read_bytes()
 
 
-@pytest.mark.parametrize("suffix", ["json", "npz"])
-def test_field_of_one_pixel_comes_back(tmp_path, suffix):
-    field = CrossField(Instance("one", [[True]], [[0, 0]], [1.0], [1.0]), [0.9], [-0.0], [])
-    assert same_field(field, read_field(write_field(field, tmp_path / f"one.{suffix}")))
-
-
 def test_json_states_each_jump_beside_its_pixel(tmp_path):
     instance = Instance("small", [[1, 1], [1, 0]], [[0, 0]], [1.0], [1.0])
     field = CrossField(instance, [0.1, 0.2, 0.3], [0, 0.5, 0], [-1, 2])
@@ -88,10 +82,6 @@ def test_unknown_ending_is_refused_before_anything_is_written(field, tmp_path):
         InputError,
     )
     assert list(tmp_path.iterdir()) == []
-
-
-def test_missing_file_is_named(tmp_path):
-    refused(read_field, tmp_path / "none.npz", "cannot be read: no such file", InputError)
 
 
 def pixel(number, column, value):
@@ -231,14 +221,6 @@ def test_singularities_are_the_vertices_round_which_the_crosses_turn(tmp_path, n
 def only_named_errors(read, path):
     with suppress(CrossfieldError):
         read(path)
-
-
-@given(data=st.binary(max_size=300) | st.binary(max_size=300).map(lambda tail: b"PK\x03\x04" + tail))
-@settings(files)
-def test_random_bytes_give_named_errors(tmp_path, data):
-    for read, name in ((read_instance, "x.json"), (read_field, "x.json"), (read_field, "x.npz")):
-        (tmp_path / name).write_bytes(data)
-        only_named_errors(read, tmp_path / name)
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import crossfield as cf
 import numpy as np
 import pytest
 from cases import CASES, make_field, make_instance, make_problem, points_of, problem_of
@@ -99,25 +98,6 @@ def test_what_is_beyond_degree_2_is_named():
     assert quartic.to_arrays().nonlinear
     assert not make_problem("miqcp-bilinear", instance).to_arrays().nonlinear
     assert len(make_problem("miqcp-bilinear", instance).to_arrays().quadratic_rows) > 0
-
-
-@pytest.mark.parametrize("name", ["milp-mccormick", "qp-fixed"])
-def test_highs_finds_the_same_optimum_by_arrays_and_from_the_file(name, tmp_path):
-    instance = cf.sample("skew", 4)
-    problem = make_problem(name, instance)
-    write(problem, tmp_path / "model.mps")
-    ours, theirs = problem.to_highs(), highspy.Highs()
-    theirs.setOptionValue("output_flag", False)
-    theirs.readModel(str(tmp_path / "model.mps"))
-    for highs in (ours, theirs):
-        assert highs.run() == highspy.HighsStatus.kOk
-        assert highs.getModelStatus() == highspy.HighsModelStatus.kOptimal
-    value = ours.getInfo().objective_function_value
-    assert value == pytest.approx(theirs.getInfo().objective_function_value, rel=1e-7, abs=1e-7)
-    point = np.array(ours.getSolution().col_value)
-    assert problem.objective_value(point) == pytest.approx(value, rel=1e-7, abs=1e-7)
-    assert problem.violation(point).worst < 1e-6
-    assert ours.getLp().col_names_ == problem.to_arrays().column_names.tolist()
 
 
 @pytest.mark.parametrize("name", ["minlp-parity", "miqcp-bilinear", "miqp-exact"])

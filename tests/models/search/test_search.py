@@ -198,27 +198,12 @@ def test_a_large_grid_is_searched_from_coarse_to_fine_by_patches():
     assert [line.split(" after ")[1] for line in seen] == ["1 rounds", "2 rounds"]
 
 
-@pytest.mark.slow
-def test_search_ends_by_itself_when_nothing_is_found():
-    instance = cf.sample("skew", 5)
-    found = cf.search(instance)
-    assert found.ended == "patience"
-    # Crosses of one skew cost nothing but that: 25 pixels, beta^2 = 0.18.
-    assert found.field.energy().total < 5 * instance.skew_coefficient
-
-
 @pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
 def test_a_search_without_time_gives_a_field_within_its_bounds(name):
     instance = cf.sample(name, 24)
     found = cf.search(instance, limits=cf.Limits(1e-9), jobs=1)
     assert (found.rounds, found.ended) == (0, "time")
     assert_feasible(found.field)
-
-
-def test_a_deadline_that_is_far_changes_no_bit():
-    instance = cf.sample("ring", 10)
-    fields = [cf.search(instance, rounds=1, limits=limits, jobs=1).field for limits in (None, cf.Limits(1e9))]
-    assert fields[0].alpha.tobytes() == fields[1].alpha.tobytes()
 
 
 class Hourglass:
@@ -257,21 +242,6 @@ def test_a_patch_without_time_is_not_whole_and_its_walk_stops():
     free, curve = np.ones(field.instance.grid.size, bool), np.full(field.instance.grid.size, -1)
     task = PatchTask(field.instance, angles(field), field.p, free, curve, 10**9, (0,), Deadline.after(0.0))
     assert explore(task) == (None, False)
-
-
-@pytest.mark.parametrize(
-    "given,message",
-    [
-        ({"time_limit": 0}, "a positive number of seconds"),
-        ({"time_limit": np.nan}, "a positive number of seconds"),
-        ({"rounds": -1}, "rounds is -1"),
-        ({"jobs": 0}, "jobs must be between 1"),
-    ],
-)
-def test_limits_that_cannot_be_are_refused(given, message):
-    instance, seconds = cf.sample("skew", 6), given.pop("time_limit", 1)
-    with pytest.raises(cf.CrossfieldError, match=message):
-        cf.search(instance, limits=cf.Limits(seconds), **given)
 
 
 def test_an_event_ends_a_search_with_the_best_field_so_far():

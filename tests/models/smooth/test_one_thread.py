@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 
 import pytest
-from crossfield.models.smooth import systems
 from crossfield.models.smooth.systems import one_thread
 from threadpoolctl import ThreadpoolController
 
@@ -53,28 +52,3 @@ def test_overlapping_threads_restore_the_setting(many):
         thread.join()
     assert found == [{1}]
     assert numbers() == {MANY}
-
-
-def test_nested_contexts_restore_the_setting(many):
-    @one_thread()
-    def inner() -> set[int]:
-        return numbers()
-
-    with one_thread():
-        assert inner() == {1}
-        assert numbers() == {1}
-    assert numbers() == {MANY}
-
-
-def test_an_error_restores_the_setting(many):
-    with pytest.raises(ZeroDivisionError), one_thread():
-        raise ZeroDivisionError
-    assert numbers() == {MANY}
-
-
-def test_a_blas_that_nothing_controls_is_no_error(monkeypatch):
-    none = ThreadpoolController().select(user_api="nothing")
-    assert none.info() == []
-    monkeypatch.setattr(systems, "_libraries", lambda: none)
-    with one_thread(), one_thread():
-        pass
