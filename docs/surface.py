@@ -26,7 +26,7 @@ from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
-from crossfield.models.sketch.surfaces import CurvaturePatch, analytic_instance, turned_by
+from crossfield.models.sketch.surfaces import CurvaturePatch, analytic_instance, rotation_by
 from crossfield.models.surface.trust import OFF, right_angle_deviation
 from drawings import SUFFIXES
 from make import markdown, replace_between
@@ -142,7 +142,7 @@ def sides(name: str, size: int) -> Rows:
     step = 1e-6
     rows = []
     for tilt, side in VIEWS:
-        seen = turned_by(tilt, 15) @ np.diag([1, 1, side])
+        seen = rotation_by(tilt, 15) @ np.diag([1, 1, side])
         patch = CurvaturePatch(
             position,
             lambda s, t: (position(s + step, t) - position(s - step, t)) / (2 * step),

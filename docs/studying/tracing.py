@@ -16,7 +16,7 @@ from crossfield.models.errors import InputError, naming
 from crossfield.models.instance.angles import arctangent, line_difference
 from crossfield.models.instance.grid import Ints
 from crossfield.models.instance.instance import Instance
-from crossfield.models.sketch.cover import LEAST_WEIGHT, Frame, Indices, covering_curves
+from crossfield.models.sketch.cover import LEAST_WEIGHT, Frame, Indices, curve_pixels
 from crossfield.models.sketch.curves import Curves
 from crossfield.models.sketch.drawing_file import parse_drawing, read_file
 from crossfield.models.sketch.read import DEFAULT_SIZE
@@ -45,7 +45,7 @@ def curves_of(instance: Instance, sketch: str | Path | None = None) -> Ints:
     x, y = instance.origin
     frame = Frame(x, y, instance.pixel_size, instance.grid.height, instance.grid.width)
     segments, curve, line = curves.segments(frame)
-    owner, row, column = covering_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
+    owner, row, column = curve_pixels(segments[line], curve[line], frame, LEAST_WEIGHT)
     number = np.full(frame.shape, -1, dtype=np.int64)
     number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
     stroke = number[row, column]

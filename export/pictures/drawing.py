@@ -21,8 +21,8 @@ from ...models.errors import InputError, naming
 from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.bitmap import Bitmap
-from ...models.sketch.cover import Box, Frame, covering_curves
-from ...models.sketch.curves import Curves, are_straight, runs
+from ...models.sketch.cover import Box, Frame, curve_pixels
+from ...models.sketch.curves import Curves, are_straight, run_numbers
 from ...models.sketch.drawing_file import parse_drawing, read_file
 from ...models.sketch.read import DEFAULT_SIZE
 from ...models.sketch.samples import SAMPLES, sample_svg
@@ -81,7 +81,7 @@ def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
 def _covered(curves: Curves, frame: Frame) -> Bools:
     """The pixels of a grid that a curve touches, shape (h, w)."""
     segments, curve, _ = curves.segments(frame)
-    _, row, column = covering_curves(segments, curve, frame, 0.0)
+    _, row, column = curve_pixels(segments, curve, frame, 0.0)
     drawn = np.zeros(frame.shape, dtype=bool)
     drawn[row, column] = True
     return drawn
@@ -89,7 +89,7 @@ def _covered(curves: Curves, frame: Frame) -> Bools:
 
 def _inked(picture: Bitmap, frame: Frame) -> Bools:
     """The pixels of a grid with ink, shape (h, w)."""
-    at = (np.argwhere(picture.ink > _INK)[:, ::-1] + 0.5) * picture.reduced
+    at = (np.argwhere(picture.ink > _INK)[:, ::-1] + 0.5) * picture.reduction
     column, row = np.floor((at - (frame.x, frame.y)) / frame.pixel).astype(int).T
     on = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
     drawn = np.zeros(frame.shape, dtype=bool)
@@ -102,7 +102,7 @@ def _of_curves(curves: Curves, data: bytes) -> Drawing:
     x, y, width, height = curves.page or (0.0, 0.0, 0.0, 0.0)
     left, top = min(left, x), min(top, y)
     page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
-    starts = np.flatnonzero(np.diff(runs(curves.points, curves.curve), prepend=-1))
+    starts = np.flatnonzero(np.diff(run_numbers(curves.points, curves.curve), prepend=-1))
     found: dict[str, list[Floats]] = {name: [] for name in INK}
     for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):
         found["red" if red else "black"].append(run[:, [0, 3]] if are_straight(run) else run)
@@ -135,7 +135,7 @@ def _of_ink(picture: Bitmap) -> Drawing:
     level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
     ink = (level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)).astype(np.uint8)
     page = (0.0, 0.0, float(picture.width), float(picture.height))
-    return Drawing(page, {}, size_in_units(page), ink, float(picture.reduced))
+    return Drawing(page, {}, size_in_units(page), ink, float(picture.reduction))
 
 
 def ink_colours() -> Any:

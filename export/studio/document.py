@@ -19,7 +19,7 @@ from ...models.instance.file import parse_json
 from ...models.instance.grid import Bools, Floats, Ints
 from ...models.instance.instance import STROKE_WEIGHT
 from ...models.sketch.curves import Curves, lines_as_cubics
-from ...models.sketch.read import Silhouette, name_from
+from ...models.sketch.read import Silhouette, name_from_text
 
 Mark = Literal["line", "cut", "ignored"]
 EditKind = Literal["paint", "erase", "toggle", "gap"]
@@ -94,7 +94,7 @@ class Document:
             raise InputError(f"the session has version {shortened(given.get('version'))}, not {VERSION}")
         low, high = SIZES
         found = cls(
-            name=name_from(str(given.get("name", ""))[:200]) or "drawing",
+            name=name_from_text(str(given.get("name", ""))[:200]) or "drawing",
             page=_page(given.get("page")),
             strokes=_each(given, "strokes", _stroke),
             mask=_each(given, "mask", _edit),

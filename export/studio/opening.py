@@ -12,10 +12,10 @@ from ...models.errors import InputError
 from ...models.instance.grid import Bools, Floats
 from ...models.sketch.bitmap import Bitmap
 from ...models.sketch.cover import Box, block_means
-from ...models.sketch.curves import Curves, flatten, runs
-from ...models.sketch.drawing_file import kind_of, parse_drawing
-from ...models.sketch.read import name_from
-from ...models.sketch.thinning import thinned
+from ...models.sketch.curves import Curves, flatten, run_numbers
+from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
+from ...models.sketch.read import name_from_text
+from ...models.sketch.thinning import thin_shape
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
 _THINNED: Final = 700  # pixels on the longer side of a picture while it is traced
@@ -38,10 +38,15 @@ def opened(data: bytes, file_name: str, view: str | None = None) -> dict[str, An
         raise InputError("the file is empty; save the drawing again")
     stem, dot, suffix = file_name.rpartition(".")
     suffix = f".{suffix.lower()}" if dot else ""
-    spatial = kind_of(data, suffix) == "curves"
+    spatial = detect_file_kind(data, suffix) == "curves"
     drawing = parse_drawing(data, suffix, _THINNED // 4, view=view if spatial else None)
     page, strokes = _of_picture(drawing) if isinstance(drawing, Bitmap) else _of_curves(drawing)
-    return {"name": name_from(stem or file_name), "page": list(page), "strokes": strokes, "spatial": spatial}
+    return {
+        "name": name_from_text(stem or file_name),
+        "page": list(page),
+        "strokes": strokes,
+        "spatial": spatial,
+    }
 
 
 def _stroke(points: Floats, *, line: bool) -> dict[str, Any]:
@@ -54,7 +59,7 @@ def _of_curves(curves: Curves) -> tuple[Box, list[dict[str, Any]]]:
     left, top, right, bottom = curves.box
     page = curves.page or (left, top, max(right - left, 1e-6), max(bottom - top, 1e-6))
     segments, owner = flatten(curves.points, _FINE * max(right - left, bottom - top, 1e-6))
-    run = runs(curves.points, curves.curve)[owner]
+    run = run_numbers(curves.points, curves.curve)[owner]
     starts = np.flatnonzero(np.diff(run, prepend=-1))
     strokes = [
         _stroke(np.concatenate([part[:, 0], part[-1:, 1]]), line=bool(line))
@@ -69,12 +74,12 @@ def _of_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
     rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in picture.ink.shape)
     small = block_means(picture.ink, rows, columns)
     red = block_means(picture.red * picture.ink, rows, columns) / np.maximum(small, 1e-6)
-    line = thinned(small * max(1.0, reduced / picture.stroke_width) > _INK)
+    line = thin_shape(small * max(1.0, reduced / picture.stroke_width) > _INK)
     ways = [np.array(way) for way in _ways(line)]
     ways = [way for way in ways if len(way) >= _SHORTEST] or ways
     is_red = np.array([np.median(red[tuple(way.T)]) > _RED for way in ways], dtype=bool)
     as_lines = is_red if is_red.any() and not is_red.all() else np.ones(len(ways), dtype=bool)
-    scale = reduced * picture.reduced
+    scale = reduced * picture.reduction
     strokes = [
         _stroke(scale * (_smoothed(way)[:, ::-1] + 0.5), line=bool(marked))
         for way, marked in zip(ways, as_lines, strict=True)

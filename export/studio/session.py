@@ -18,9 +18,9 @@ from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats, Ints
 from ...models.instance.instance import SKEW_WEIGHT, Instance, Reading
 from ...models.processes.control import is_stopped
-from ...models.sketch.cover import LEAST_WEIGHT, Frame, covering_curves
-from ...models.sketch.outline import enclosed
-from ...models.sketch.read import build_instance, find_mask, frame_box, without_silhouette
+from ...models.sketch.cover import LEAST_WEIGHT, Frame, curve_pixels
+from ...models.sketch.outline import enclosed_region
+from ...models.sketch.read import drop_silhouette, find_mask, frame_around, instance_of_mask
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.surface.hints import Hint
@@ -56,19 +56,19 @@ class Drawn:
 def drawn(document: Document, size: int | None = None) -> Drawn:
     """The instance of a document. size: instead of that of the document. Raises InputError."""
     curves = document.curves()
-    frame = frame_box(curves.box, size or document.size, margin=True)
+    frame = frame_around(curves.box, size or document.size, margin=True)
     covers = curves.covers(frame)
     mask, reading = find_mask(curves, covers, frame)
     edited, gaps = _edited(document.mask, mask, covers.walls, reading, frame)
     left_out = edited | _enclosed(~edited & ~covers.walls)
     mask = edited & ~covers.cuts
     if document.silhouette == "outer":
-        covers, mask = without_silhouette(covers, mask)
-    instance = build_instance(
+        covers, mask = drop_silhouette(covers, mask)
+    instance = instance_of_mask(
         frame, covers.lines, mask, reading, name=document.name, source=f"{document.name}.svg"
     ).with_weights(stroke_weight=document.stroke_weight, skew_weight=SKEW_WEIGHT)
     segments, curve, line = curves.segments(frame)
-    owner, row, column = covering_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
+    owner, row, column = curve_pixels(segments[line], curve[line], frame, LEAST_WEIGHT)
     number = np.full(frame.shape, -1)
     number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
     pairs = np.stack([owner, number[row, column]], axis=1)
@@ -132,9 +132,9 @@ def _closed(walls: Bools, bridges: Floats, frame: Frame) -> Bools:
     """The region inside of the walls and these bridges (m, 2, 2)."""
     closed = walls.copy()
     if len(bridges):
-        _, row, column = covering_curves(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
+        _, row, column = curve_pixels(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
         closed[row, column] = True
-    return enclosed(closed)
+    return enclosed_region(closed)
 
 
 def _cell(cells: Ints, point: Floats, frame: Frame) -> Bools:

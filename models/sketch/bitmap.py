@@ -22,8 +22,8 @@ from ..input_limits import MAX_PIXELS, MAX_SIDE
 from ..instance.grid import Bools, Floats
 from .colour import REDDISH, ink_of, redness
 from .cover import Box, Cover, Covers, Frame, block_means
-from .thinning import thinned
-from .tiff import unpacked
+from .thinning import thin_shape
+from .tiff import unpack_tiff
 
 Ink = NDArray[np.float32]
 
@@ -53,13 +53,13 @@ class Bitmap:
     """A bitmap sketch, ready for any frame.
 
     ink: [h, w], 0 for paper to 1 for ink as dark as the strokes. red: [h, w] in [0, 1], the part of the ink
-    that is red. reduced: pixels of the file per pixel of these arrays in each direction. width, height: size
-    of the file in pixels.
+    that is red. reduction: pixels of the file per pixel of these arrays in each direction. width, height: in
+    pixels of the file.
     """
 
     ink: Ink
     red: Ink
-    reduced: int
+    reduction: int
     width: int
     height: int
 
@@ -73,7 +73,7 @@ class Bitmap:
         """Left, top, right, bottom of the ink in pixels of the file."""
         rows, columns = (np.nonzero((self.ink > _INK).any(axis=axis))[0] for axis in (1, 0))
         edges = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1], dtype=float)
-        left, top, right, bottom = (self.reduced * edges).tolist()
+        left, top, right, bottom = (self.reduction * edges).tolist()
         return left, top, right, bottom
 
     @cached_property
@@ -86,24 +86,26 @@ class Bitmap:
 
     def covers(self, frame: Frame) -> Covers:
         """The covers by curvature lines and by other strokes, separated where red and others occur."""
-        width = self.stroke_width * self.reduced / frame.pixel
+        width = self.stroke_width * self.reduction / frame.pixel
         red = self.ink * self.red
         share = float(red.sum() / self.ink.sum())
         if _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
             black = self.ink * (1 - self.red)
-            return Covers(self._cover(red, frame, width), self._cover(black, frame, width), width)
+            return Covers(
+                self._cover_by_ink(red, frame, width), self._cover_by_ink(black, frame, width), width
+            )
         nothing = Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
-        return Covers(self._cover(self.ink, frame, width), nothing, width)
+        return Covers(self._cover_by_ink(self.ink, frame, width), nothing, width)
 
     def ends(self) -> Floats:
         """Ends of strokes, in pixels of the file: points and directions of continuation (n, 2, 2)."""
         # A stroke extends half its width beyond its thinned line, which is far below the gaps that count.
         from scipy import ndimage
 
-        reduced = max(1.0, max(self.ink.shape) / _THINNED)
-        rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in self.ink.shape)
+        block = max(1.0, max(self.ink.shape) / _THINNED)
+        rows, columns = (np.arange(int(side / block) + 1) * block for side in self.ink.shape)
         small = block_means(self.ink, rows, columns)
-        line = thinned(small * max(1.0, reduced / self.stroke_width) > _INK)
+        line = thin_shape(small * max(1.0, block / self.stroke_width) > _INK)
         neighbours = ndimage.convolve(line.astype(np.uint8), np.ones((3, 3), dtype=np.uint8), mode="constant")
         row, column = np.nonzero(line & (neighbours == 2))
         # From the middle of the line near its end to the end.
@@ -113,10 +115,10 @@ class Bitmap:
         ]
         middle = np.stack(mean[1:], axis=1) / mean[0][:, None]
         ends = np.stack([column, row], axis=1)
-        return self.reduced * np.stack([(ends + 0.5) * reduced, (ends - middle) * reduced], axis=1)
+        return self.reduction * np.stack([(ends + 0.5) * block, (ends - middle) * block], axis=1)
 
-    def _cover(self, ink: Ink, frame: Frame, width: float) -> Cover:
-        rows, columns = (edges / self.reduced for edges in frame.edges)
+    def _cover_by_ink(self, ink: Ink, frame: Frame, width: float) -> Cover:
+        rows, columns = (edges / self.reduction for edges in frame.edges)
         tangent = stroke_directions(ink, self.stroke_width)
         dark = block_means(ink, rows, columns)
         direction = (
@@ -146,19 +148,19 @@ def stroke_directions(ink: Ink, width: float) -> Ink:
 
 def read_bitmap(data: bytes, size: int) -> Bitmap:
     """The ink of a bitmap, fine enough for a grid of `size` pixels. Raises InputError for other content."""
-    image = _opened(data)
+    image = _open_image(data)
     width, height = image.size
-    reduced = max(1, max(width, height) // max(_WORKING_SIDE, _ENOUGH * size))
-    pixels = np.concatenate([_reduced(band, reduced) for band in _bands(image, reduced)])
+    reduction = max(1, max(width, height) // max(_WORKING_SIDE, _ENOUGH * size))
+    pixels = np.concatenate([_reduce(band, reduction) for band in _split_into_bands(image, reduction)])
     del image  # the file's pixels take the most memory at any time
-    rgb = _on_paper(pixels)
+    rgb = _relative_to_paper(pixels)
     raw = ink_of(rgb)
     strongest = float(raw.max())
     if strongest < _FAINTEST:
         raise InputError("shows no stroke: it is paper all over; expected dark strokes on lighter paper")
     level = float(np.median(raw[raw > strongest / 2]))
     ink = np.clip((raw / level - _NOISE) / (_FULL - _NOISE), 0, 1).astype(np.float32)
-    ink[_specks(ink)] = 0
+    ink[_find_specks(ink)] = 0
     if not (ink > _INK).any():
         raise InputError("shows no stroke but a few specks; expected dark strokes on lighter paper")
     covered = float((ink > 0.5).mean())
@@ -167,17 +169,17 @@ def read_bitmap(data: bytes, size: int) -> Bitmap:
             f"shows ink on {covered:.0%} of the paper, and strokes would leave most of it bare; "
             "crop it to the drawing, take the picture in brighter light, or thin the strokes"
         )
-    return Bitmap(ink, _red_part(rgb, raw), reduced, width, height)
+    return Bitmap(ink, _find_red(rgb, raw), reduction, width, height)
 
 
-def read_white(data: bytes) -> Bools:
+def read_white_pixels(data: bytes) -> Bools:
     """The white part of a mask picture, bool [h, w]. Raises InputError like read_bitmap."""
-    image = _opened(data)
-    bands = [pixels.mean(axis=-1, dtype=np.float32) >= 127.5 for pixels in _bands(image, 1)]
+    image = _open_image(data)
+    bands = [pixels.mean(axis=-1, dtype=np.float32) >= 127.5 for pixels in _split_into_bands(image, 1)]
     return np.concatenate(bands)
 
 
-def _opened(data: bytes) -> Any:
+def _open_image(data: bytes) -> Any:
     """The decoded picture, upright. Its size is checked before its pixels."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 
@@ -187,7 +189,7 @@ def _opened(data: bytes) -> Any:
             image = Image.open(io.BytesIO(data), formats=FORMATS)
             _check_size(*image.size)
             if any(tile[0] == "libtiff" for tile in image.tile):
-                image = Image.open(io.BytesIO(unpacked(data)), formats=["TIFF"])
+                image = Image.open(io.BytesIO(unpack_tiff(data)), formats=["TIFF"])
             image.load()
             ImageOps.exif_transpose(image, in_place=True)
         except InputError:
@@ -209,17 +211,17 @@ def _check_size(width: int, height: int) -> None:
         )
 
 
-def _bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
+def _split_into_bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
     """The picture on white, uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows."""
     # Colours of all pixels at once would take many times the memory of the picture.
     width, height = image.size
     rows = max(1, _BAND // (width * multiple)) * multiple
     bands = [(0, top, width, min(top + rows, height)) for top in range(0, height, rows)]
-    white = _white(image, bands)
-    return (_eight_bit(image.crop(band), white) for band in bands)
+    white = _value_of_white(image, bands)
+    return (_as_eight_bit(image.crop(band), white) for band in bands)
 
 
-def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
+def _value_of_white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
     """The value of white in pictures of 16 bit and floating point greys, None for other pictures."""
     if image.mode.startswith("I;16") or image.mode == "I":
         return 65535.0
@@ -232,7 +234,7 @@ def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
     return next((top for top in (1.0, 255.0) if max(most) <= top), 65535.0)
 
 
-def _eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
+def _as_eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
     """The picture on white as uint8 [h, w, 1 or 3]; greys up to `white` are scaled down."""
     from PIL import Image
 
@@ -248,7 +250,7 @@ def _eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
     return pixels[..., None] if pixels.ndim == 2 else pixels
 
 
-def _reduced(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+def _reduce(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     """The means over blocks of that many rows and columns."""
     from PIL import Image
 
@@ -259,7 +261,7 @@ def _reduced(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     return np.asarray(small).reshape(small.height, small.width, channels)
 
 
-def _on_paper(pixels: NDArray[np.uint8]) -> Floats:
+def _relative_to_paper(pixels: NDArray[np.uint8]) -> Floats:
     """Colours [h, w, 1 or 3] relative to the paper, in [0, 1]."""
     # At least a quarter of a drawing is bare paper, so the upper quartile is a level of the paper.
     paper = np.percentile(pixels.reshape(-1, pixels.shape[-1]), 75, axis=0).astype(np.float32)
@@ -267,13 +269,13 @@ def _on_paper(pixels: NDArray[np.uint8]) -> Floats:
         raise InputError("is dark all over; expected dark strokes on lighter paper, invert the picture")
     colours: Floats = pixels.astype(np.float32)
     colours /= np.maximum(paper, 1)
-    light = _light(colours)
+    light = _estimate_light(colours)
     if max(float(light.max()), 1 / float(light.min())) > _EVEN:
         colours /= light[..., None]
     return np.minimum(colours, 1, out=colours)
 
 
-def _light(colours: Floats) -> Ink:
+def _estimate_light(colours: Floats) -> Ink:
     """The light on the paper [h, w], 1 where it equals the light of the whole picture."""
     from scipy import ndimage
 
@@ -289,10 +291,10 @@ def _light(colours: Floats) -> Ink:
         np.interp(np.arange(side) + 0.5, (edges[:-1] + edges[1:]) / 2, np.arange(len(edges) - 1.0))
         for side, edges in ((height, rows), (width, columns))
     ]
-    return _between(_between(smooth.astype(np.float32), places[0]).T, places[1]).T
+    return _interpolate_rows(_interpolate_rows(smooth.astype(np.float32), places[0]).T, places[1]).T
 
 
-def _between(rows: Ink, place: Floats) -> Ink:
+def _interpolate_rows(rows: Ink, place: Floats) -> Ink:
     """Rows at fractional places, interpolated linearly between the rows of an array."""
     below = np.minimum(place.astype(np.intp), max(len(rows) - 2, 0))
     above = np.minimum(below + 1, len(rows) - 1)
@@ -300,7 +302,7 @@ def _between(rows: Ink, place: Floats) -> Ink:
     return np.asarray(rows[below] * (1 - part) + rows[above] * part)
 
 
-def _specks(ink: Ink) -> Bools:
+def _find_specks(ink: Ink) -> Bools:
     """The marks that hold less ink than a small dot: dust and noise."""
     from scipy import ndimage
 
@@ -309,7 +311,7 @@ def _specks(ink: Ink) -> Bools:
     return np.asarray(weight[label] < _SPECK)
 
 
-def _red_part(rgb: Floats, ink: Floats) -> Ink:
+def _find_red(rgb: Floats, ink: Floats) -> Ink:
     """1 where the blurred ink is red, else 0: colour is coarser than brightness in JPEG."""
     from scipy import ndimage
 

@@ -65,11 +65,11 @@ class Cover:
         single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
         return np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
 
-    def joined(self, other: Cover) -> Cover:
+    def __add__(self, second: Cover) -> Cover:
         """The cover by both kinds of strokes."""
-        parts = [each.amount[..., None] * each.direction for each in (self, other)]
-        amount = self.amount + other.amount
-        return Cover(amount, sum(parts) / np.where(amount > 0, amount, 1)[..., None])
+        sums = [cover.amount[..., None] * cover.direction for cover in (self, second)]
+        amount = self.amount + second.amount
+        return Cover(amount, sum(sums) / np.where(amount > 0, amount, 1)[..., None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,20 +119,20 @@ def fit_frame(box: Box, size: int, *, margin: bool) -> Frame:
 
 def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
     """The cover by straight segments (m, 2, 2), each cut exactly at the pixel edges. Raises InputError."""
-    cut = _cut(segments, frame)
-    unit = cut.unit
+    pieces = _cut_segments(segments, frame)
+    unit = pieces.unit
     double = np.stack([np.ones(len(unit)), unit[:, 0] ** 2 - unit[:, 1] ** 2, -2 * unit[:, 0] * unit[:, 1]])
     amount, cosine, sine = np.zeros((3, *frame.shape))
     for nudge in product((-_NUDGE, _NUDGE), repeat=2):
-        cell, kept = _cells(cut.middle + nudge, frame)
+        cell, on_grid = _cells_of_points(pieces.middle + nudge, frame)
         amount, cosine, sine = (
-            total + np.bincount(cell, value[kept], total.size).reshape(frame.shape)
-            for total, value in zip((amount, cosine, sine), cut.covered / 4 * double, strict=True)
+            total + np.bincount(cell, value[on_grid], total.size).reshape(frame.shape)
+            for total, value in zip((amount, cosine, sine), pieces.covered / 4 * double, strict=True)
         )
     return Cover(amount, np.stack([cosine, sine], axis=-1) / np.where(amount > 0, amount, 1)[..., None])
 
 
-def covering_curves(
+def curve_pixels(
     segments: Floats, curve: Ints, frame: Frame, least: float
 ) -> tuple[Indices, Indices, Indices]:
     """Curve, row and column (k,) of each pixel that a curve covers, in the order of the curves.
@@ -140,13 +140,13 @@ def covering_curves(
     curve: int (m,), 0 or more, the curve of each segment (m, 2, 2). A curve covers a pixel over a length of
     `least` pixel sides and more; without such a curve the longest one counts.
     """
-    cut = _cut(segments, frame)
-    number, size = curve[cut.segment].astype(np.int64), frame.height * frame.width
+    pieces = _cut_segments(segments, frame)
+    number, size = curve[pieces.segment].astype(np.int64), frame.height * frame.width
     keys, lengths = [], []
     for nudge in product((-_NUDGE, _NUDGE), repeat=2):
-        cell, kept = _cells(cut.middle + nudge, frame)
-        keys.append(number[kept] * size + cell)
-        lengths.append(cut.covered[kept] / 4)
+        cell, on_grid = _cells_of_points(pieces.middle + nudge, frame)
+        keys.append(number[on_grid] * size + cell)
+        lengths.append(pieces.covered[on_grid] / 4)
     key, place = np.unique(np.concatenate(keys), return_inverse=True)
     owner, pixel = np.divmod(key, size)
     amount = np.bincount(place, np.concatenate(lengths), len(key))
@@ -157,7 +157,7 @@ def covering_curves(
 
 
 @dataclass(frozen=True, eq=False)
-class _Cut:
+class _Pieces:
     """Segments cut at the pixel edges, in pixels: segment, middle, length and unit vector of each piece."""
 
     segment: Indices
@@ -166,32 +166,32 @@ class _Cut:
     unit: Floats
 
 
-def _cut(segments: Floats, frame: Frame) -> _Cut:
-    segments, number = _clipped((segments - (frame.x, frame.y)) / frame.pixel, frame)
+def _cut_segments(segments: Floats, frame: Frame) -> _Pieces:
+    segments, number = _clip_segments((segments - (frame.x, frame.y)) / frame.pixel, frame)
     step = segments[:, 1] - segments[:, 0]
     length = vector_length(*step.T)
     long = length > 0
     segments, step, length, number = segments[long], step[long], length[long], number[long]
-    owner, start, end = _pieces(segments, step)
+    owner, start, end = _piece_ends(segments, step)
     middle = segments[owner, 0] + ((start + end) / 2)[:, None] * step[owner]
-    return _Cut(number[owner], middle, (end - start) * length[owner], (step / length[:, None])[owner])
+    return _Pieces(number[owner], middle, (end - start) * length[owner], (step / length[:, None])[owner])
 
 
-def _clipped(segments: Floats, frame: Frame) -> tuple[Floats, Indices]:
+def _clip_segments(segments: Floats, frame: Frame) -> tuple[Floats, Indices]:
     """The parts of segments (in pixels) that lie on the grid, and their numbers; others are dropped."""
     start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
     limit = np.array([frame.width, frame.height], dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         walls = np.stack([-start / step, (limit - start) / step])
-    inside = np.where((start >= 0) & (start <= limit), -np.inf, np.inf)  # for a segment along the walls
-    low = np.where(step == 0, inside, walls.min(axis=0)).max(axis=1).clip(0, None)
-    high = np.where(step == 0, -inside, walls.max(axis=0)).min(axis=1).clip(None, 1)
-    kept = low < high
-    start, step, low, high = start[kept], step[kept], low[kept, None], high[kept, None]
-    return np.stack([start + low * step, start + high * step], axis=1), np.nonzero(kept)[0]
+    along = np.where((start >= 0) & (start <= limit), -np.inf, np.inf)  # for a segment along the walls
+    low = np.where(step == 0, along, walls.min(axis=0)).max(axis=1).clip(0, None)
+    high = np.where(step == 0, -along, walls.max(axis=0)).min(axis=1).clip(None, 1)
+    inside = low < high
+    start, step, low, high = start[inside], step[inside], low[inside, None], high[inside, None]
+    return np.stack([start + low * step, start + high * step], axis=1), np.nonzero(inside)[0]
 
 
-def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
+def _piece_ends(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
     """Segment number and the parameters of both ends of each piece between pixel edges."""
     count = len(segments)
     low, high = segments.min(axis=1), segments.max(axis=1)
@@ -214,11 +214,11 @@ def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
     return number, start, end
 
 
-def _cells(points: Floats, frame: Frame) -> tuple[Indices, Bools]:
+def _cells_of_points(points: Floats, frame: Frame) -> tuple[Indices, Bools]:
     """Numbers of the pixels, row by row, at the points (m, 2) on the grid, and which points these are."""
     column, row = np.floor(points).astype(np.int64).T
-    kept = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
-    return row[kept] * frame.width + column[kept], kept
+    on_grid = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
+    return row[on_grid] * frame.width + column[on_grid], on_grid
 
 
 def block_means(image: Pixels, rows: Floats, columns: Floats) -> Floats:

@@ -86,7 +86,7 @@ def are_straight(cubics: Floats) -> bool:
     return np.allclose(cubics, lines_as_cubics(cubics[:, 0], cubics[:, 3]), rtol=1e-9, atol=0)
 
 
-def runs(points: Floats, shape: Ints) -> Ints:
+def run_numbers(points: Floats, shape: Ints) -> Ints:
     """The number (k,), from 0, of the unbroken run of one shape (k,) that contains each cubic (k, 4, 2)."""
     apart = (points[1:, 0] != points[:-1, 3]).any(axis=1) | (np.diff(shape) != 0)
     return np.concatenate([[0], np.cumsum(apart)]).astype(np.int32)
@@ -104,11 +104,11 @@ def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]
         raise InputError(f"has more than {MAX_SEGMENTS} segments; simplify it, or choose a smaller size")
     owner = np.repeat(np.arange(len(points)), steps)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)
-    ends = [_at(points[owner], (step + side) / steps[owner]) for side in (0, 1)]
+    ends = [_evaluate_cubics(points[owner], (step + side) / steps[owner]) for side in (0, 1)]
     return np.stack(ends, axis=1), owner
 
 
-def _at(points: Floats, t: Floats) -> Floats:
+def _evaluate_cubics(points: Floats, t: Floats) -> Floats:
     t = t[:, None]
     back = 1 - t
     start, first, second, end = points.swapaxes(0, 1)

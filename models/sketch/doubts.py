@@ -9,7 +9,7 @@ import numpy as np
 from ..instance.angles import line_difference, line_of, vector_length
 from ..instance.grid import Bools, Floats
 from .cover import Box, Cover, Frame
-from .outline import THICK, convex_area, without_narrow_parts
+from .outline import THICK, convex_area, drop_narrow_parts
 
 _MOST_PLACES: Final = 5  # in one warning
 BLOCK: Final = 4  # side in pixels of a block filled by strokes; no sample has one from 16 pixels on
@@ -29,7 +29,7 @@ def describe_gaps(bridges: Floats) -> str | None:
         return None
     wide = vector_length(*(bridges[:, 1] - bridges[:, 0]).T)
     order = np.argsort(-wide, kind="stable")
-    places = [f"{_place(bridges[k].mean(axis=0))} over {wide[k]:.4g}" for k in order[:_MOST_PLACES]]
+    places = [f"{_describe_point(bridges[k].mean(axis=0))} over {wide[k]:.4g}" for k in order[:_MOST_PLACES]]
     more = f" and {len(order) - _MOST_PLACES} more" if len(order) > _MOST_PLACES else ""
     return (
         f"outline open here: {', '.join(places)}{more}; it is taken as closed by a straight line, "
@@ -57,7 +57,7 @@ def describe_loose_strokes(walls: Bools, region: Bools, frame: Frame) -> str | N
         return None
     return (
         f"{size.sum()} of {walls.sum()} stroke pixels bound no area, most of them round "
-        f"{_middle(label == np.argmax(size), frame)}: what they should enclose is left out; "
+        f"{_describe_middle(label == np.argmax(size), frame)}: what they should enclose is left out; "
         "close the outline there or give a mask"
     )
 
@@ -66,9 +66,9 @@ def describe_box(walls: Bools, region: Bools, strokes: Cover) -> str | None:
     """An outermost outline that is a box of straight lines round another outline."""
     from scipy import ndimage
 
-    shape, theta = without_narrow_parts(region, 5), line_of(strokes.direction)
+    shape, theta = drop_narrow_parts(region, 5), line_of(strokes.direction)
     border = walls & shape & ndimage.binary_dilation(~shape, border_value=1)
-    if region.all() or not border.any() or _straight(theta[border]) < BOX:
+    if region.all() or not border.any() or _share_of_main_directions(theta[border]) < BOX:
         return None
     if shape.sum() < BOX * convex_area(shape):
         return None
@@ -92,7 +92,7 @@ def describe_box(walls: Bools, region: Bools, strokes: Cover) -> str | None:
     )
 
 
-def _straight(theta: Floats) -> float:
+def _share_of_main_directions(theta: Floats) -> float:
     """The share of lines close to the three most frequent directions, each found without the earlier ones."""
     rest = np.bincount((theta / np.pi * _BINS).astype(np.intp) % _BINS, minlength=_BINS)
     for _ in range(3):
@@ -111,9 +111,9 @@ def describe_crowding(filled: Bools, mask: Bools, frame: Frame) -> str | None:
     if size.max() < max(CROWDED * mask.sum(), 1):
         return None
     return (
-        f"strokes leave no room between them round {_middle(label == np.argmax(size), frame)}, all in all on "
-        f"{size.sum() / mask.sum():.0%} of the pixels to solve for, where they give no direction; choose a "
-        "larger size, or draw fewer lines and no solid ink there"
+        f"strokes leave no room between them round {_describe_middle(label == np.argmax(size), frame)}, "
+        f"all in all on {size.sum() / mask.sum():.0%} of the pixels to solve for, where they give no "
+        "direction; choose a larger size, or draw fewer lines and no solid ink there"
     )
 
 
@@ -131,12 +131,14 @@ def describe_off_page(mask: Bools, frame: Frame, page: Box | None) -> str | None
     return f"{off:.0%} of the pixels to solve for lie off the page, where no mask reaches; enlarge the page"
 
 
-def _middle(pixels: Bools, frame: Frame) -> str:
+def _describe_middle(pixels: Bools, frame: Frame) -> str:
     """The middle of some pixels as text."""
     row, column = np.nonzero(pixels)
-    return _place(np.array([frame.x, frame.y]) + frame.pixel * (np.array([column.mean(), row.mean()]) + 0.5))
+    return _describe_point(
+        np.array([frame.x, frame.y]) + frame.pixel * (np.array([column.mean(), row.mean()]) + 0.5)
+    )
 
 
-def _place(point: Floats) -> str:
+def _describe_point(point: Floats) -> str:
     """A point (x, y) as text."""
     return f"({point[0]:.4g}, {point[1]:.4g})"

@@ -13,7 +13,7 @@ from ..storage import read_bytes
 from .bitmap import Bitmap, read_bitmap
 from .curves import Curves
 from .labels import LabelMatcher
-from .pen_strokes import SPATIAL, read_curves, read_scap
+from .pen_strokes import CURVES_START, read_curves, read_scap
 from .svg import read_svg
 
 Drawing = Curves | Bitmap
@@ -54,7 +54,7 @@ def parse_drawing(
     labels: of the curvature lines, as `label_of` returns them; none: colours decide. view: as in
     `read_sketch`. Raises InputError.
     """
-    kind = kind_of(data, suffix)
+    kind = detect_file_kind(data, suffix)
     if labels and kind in _UNLABELLED:
         raise InputError(f"{_UNLABELLED[kind]}; leave the choice of {labels[0]} out")
     if view is not None and kind != "curves":
@@ -69,13 +69,13 @@ def parse_drawing(
     return read_svg(data, matcher) if kind == "svg" else read_scap(data, matcher)
 
 
-def kind_of(data: bytes, suffix: str) -> FileKind:
+def detect_file_kind(data: bytes, suffix: str) -> FileKind:
     """Kind of a drawing, by its content first and the suffix of its file second. Raises InputError."""
     suffix, start = suffix.lower(), data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
     if data[:2] == b"\x1f\x8b":
         raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
     is_text = _PICTURE.match(data) is None
-    if SPATIAL.match(start) or (suffix == ".curves" and is_text and not start.startswith(b"<")):
+    if CURVES_START.match(start) or (suffix == ".curves" and is_text and not start.startswith(b"<")):
         return "curves"
     if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "svg"

@@ -20,7 +20,7 @@ THICK: Final = 2  # pixels of a stroke between two areas
 _NUDGE: Final = 1e-9  # of a pixel: the limit of exactly 30 degrees is decided equally on every processor
 
 
-def inside_outline(strokes: Bools) -> Bools:
+def find_inside(strokes: Bools) -> Bools:
     """The pixels [height, width] of strokes, or not reached from outside through their gaps.
 
     The narrowest of GAPS for which the drawing encloses something decides. An open drawing, which encloses
@@ -28,13 +28,13 @@ def inside_outline(strokes: Bools) -> Bools:
     """
     hull = convex_area(strokes)
     for gap in GAPS:
-        region = enclosed(strokes, gap)
-        if without_narrow_parts(region, 3).sum() >= ENCLOSED * hull:
+        region = enclosed_region(strokes, gap)
+        if drop_narrow_parts(region, 3).sum() >= ENCLOSED * hull:
             return region
     return np.ones_like(strokes)
 
 
-def without_narrow_parts(region: Bools, least: int) -> Bools:
+def drop_narrow_parts(region: Bools, least: int) -> Bools:
     """The region without parts that are narrower than so many pixels, such as ends of strokes."""
     from scipy import ndimage
 
@@ -50,7 +50,7 @@ def convex_area(pixels: Bools) -> float:
     return float(ConvexHull(corners).volume)
 
 
-def parts_with(region: Bools, weight: Floats) -> Bools:
+def keep_parts_with_strokes(region: Bools, weight: Floats) -> Bools:
     """The 4-connected parts of a region that contain curvature lines; other parts have no data.
 
     weight: [height, width], w of the strokes. The part with most strokes is always kept.
@@ -61,13 +61,13 @@ def parts_with(region: Bools, weight: Floats) -> Bools:
     size = np.bincount(label.ravel(), minlength=count + 1)
     directed = region & (weight >= LEAST_WEIGHT)
     held = np.bincount(label.ravel(), np.where(directed, weight, 0.0).ravel(), minlength=count + 1)
-    kept = (held >= HELD) & (size >= max(4, CRUMB * region.sum()))
-    kept[np.argmax(held)] = held.max() > 0
-    kept[0] = False
-    return np.asarray(kept[label])
+    is_part = (held >= HELD) & (size >= max(4, CRUMB * region.sum()))
+    is_part[np.argmax(held)] = held.max() > 0
+    is_part[0] = False
+    return np.asarray(is_part[label])
 
 
-def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
+def find_strokes_along_outline(region: Bools, direction: Floats, width: float) -> Bools:
     """The pixels [height, width] at the border of a region whose strokes, of this width, run along it.
 
     direction: [height, width, 2], double-angle vectors (y up). A stroke is followed by STEP pixels to both
@@ -95,7 +95,7 @@ def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
     return along
 
 
-def enclosed(strokes: Bools, gap: float = GAPS[0]) -> Bools:
+def enclosed_region(strokes: Bools, gap: float = GAPS[0]) -> Bools:
     """The region that a disc, of a share `gap` of the longer side, cannot reach without touching a stroke."""
     from scipy import ndimage
 
@@ -106,11 +106,11 @@ def enclosed(strokes: Bools, gap: float = GAPS[0]) -> Bools:
     label, _ = ndimage.label(free)
     outside = ndimage.distance_transform_edt(label != label[0, 0]) <= radius
     region = ~outside | walls
-    region &= ~_slits(region & ~walls, free, walls)
+    region &= ~_find_slits(region & ~walls, free, walls)
     return np.asarray(region[pad:-pad, pad:-pad])
 
 
-def _slits(inside: Bools, free: Bools, walls: Bools) -> Bools:
+def _find_slits(inside: Bools, free: Bools, walls: Bools) -> Bools:
     """The gaps between limbs: large parts of the inside that are open, and nowhere as wide as the disc.
 
     free: where the disc fits. Rooms that only their mouths close are wider than these. The strokes along a

@@ -34,27 +34,27 @@ _Coordinates = tuple[float, float] | str
 """A point, or the letter that closes the subpath in place of its last point."""
 
 
-def outline(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
+def shape_curves(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
     """Control points (k, 4, 2) of a shape in its own units; percentages refer to the page. May raise."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # refused when placed
-            return _points(tag, attributes, page)
+            return _shape_points(tag, attributes, page)
     except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError) as error:
         raise InputError("its numbers cannot be read; export the drawing again") from error
 
 
-def _points(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
+def _shape_points(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
     if tag in ("polyline", "polygon"):
-        return _polygon(attributes.get("points", ""), closed=tag == "polygon")
-    drawn = _Outline()
+        return _polygon_lines(attributes.get("points", ""), closed=tag == "polygon")
+    drawn = _PathBuilder()
     if tag == "path":
-        _trace(attributes.get("d", ""), drawn)
+        _trace_path(attributes.get("d", ""), drawn)
     else:
         _draw_basic(tag, attributes, page, drawn)
     return drawn.points()
 
 
-def pixels(text: str) -> float | None:
+def length_in_pixels(text: str) -> float | None:
     """A length in CSS pixels, None for a percentage and for unreadable text."""
     from svgelements import Length
 
@@ -67,7 +67,7 @@ def pixels(text: str) -> float | None:
     return value if isinstance(value, float) and np.isfinite(value) else None
 
 
-def _trace(data: str, drawn: _Outline) -> None:
+def _trace_path(data: str, drawn: _PathBuilder) -> None:
     from svgelements import SVGLexicalParser
 
     data = data.strip()
@@ -76,7 +76,7 @@ def _trace(data: str, drawn: _Outline) -> None:
     SVGLexicalParser().parse(drawn, data)
 
 
-def _polygon(text: str, *, closed: bool) -> Floats:
+def _polygon_lines(text: str, *, closed: bool) -> Floats:
     numbers = np.array(_NUMBER.findall(text), dtype=float)
     points = numbers[: len(numbers) // 2 * 2].reshape(-1, 2)
     if len(points) > MAX_CURVES:
@@ -86,25 +86,27 @@ def _polygon(text: str, *, closed: bool) -> Floats:
     return lines_as_cubics(points[:-1], points[1:])
 
 
-def _draw_basic(tag: str, attributes: Mapping[str, str], page: tuple[float, float], drawn: _Outline) -> None:
+def _draw_basic(
+    tag: str, attributes: Mapping[str, str], page: tuple[float, float], drawn: _PathBuilder
+) -> None:
     import svgelements
 
     kind, keys = _BASIC[tag]
-    lengths = {key: _readable(attributes[key]) for key in keys if attributes.get(key)}
+    lengths = {key: _parse_length(attributes[key]) for key in keys if attributes.get(key)}
     shape = getattr(svgelements, kind)(lengths)
     shape.render(ppi=PPI, width=page[0], height=page[1])
     for segment in shape.segments():
         drawn.add(segment)
 
 
-def _readable(length: str) -> str | float:
+def _parse_length(length: str) -> str | float:
     """A length in pixels, or the percentage."""
     if length.endswith("%"):
         return f"{float(length[:-1])}%"
-    found = pixels(length)
-    if found is None:
+    pixels = length_in_pixels(length)
+    if pixels is None:
         raise InputError(f"its length {length[:20]!r} cannot be read; give pixels, mm, in or %")
-    return found
+    return pixels
 
 
 def too_many_curves() -> InputError:
@@ -113,7 +115,7 @@ def too_many_curves() -> InputError:
 
 
 @dataclass(eq=False)
-class _Outline:
+class _PathBuilder:
     """The target of svgelements' lexer: straight lines and cubics as points of the complex plane.
 
     smooth: the kind of the last curve (2: quadratic, 3: cubic) and its last control point.
@@ -146,7 +148,7 @@ class _Outline:
 
     def line(self, point: _Coordinates, **_: bool) -> None:
         end = self._at(point)
-        self._room()
+        self._check_room()
         self.lines.append((self.here, end))
         self.here, self.smooth = end, (0, 0j)
 
@@ -165,7 +167,7 @@ class _Outline:
         self.smooth = (3, control)
 
     def smooth_cubic(self, second: _Coordinates, point: _Coordinates, **_: bool) -> None:
-        first = self._reflected(3)
+        first = self._reflected_control(3)
         self.cubic((first.real, first.imag), second, point)
 
     def quad(self, middle: _Coordinates, point: _Coordinates, **_: bool) -> None:
@@ -174,7 +176,7 @@ class _Outline:
         self.smooth = (2, control)
 
     def smooth_quad(self, point: _Coordinates, **_: bool) -> None:
-        control = self._reflected(2)
+        control = self._reflected_control(2)
         self.quad((control.real, control.imag), point)
 
     def arc(self, rx: float, ry: float, *others: Any, **_: bool) -> None:
@@ -202,19 +204,19 @@ class _Outline:
             self.here = start
             self._curve(first, second, end)
         elif isinstance(segment, svgelements.Linear):
-            self._room()
+            self._check_room()
             self.lines.append((complex(segment.start), complex(segment.end)))
 
     def _curve(self, first: complex, second: complex, end: complex) -> None:
-        self._room()
+        self._check_room()
         self.cubics.append((self.here, first, second, end))
         self.here = end
 
-    def _room(self) -> None:
+    def _check_room(self) -> None:
         if len(self.lines) + len(self.cubics) >= MAX_CURVES:
             raise too_many_curves()
 
-    def _reflected(self, kind: int) -> complex:
+    def _reflected_control(self, kind: int) -> complex:
         """A smooth curve's first control point: the last one reflected after a curve of its kind."""
         return 2 * self.here - self.smooth[1] if self.smooth[0] == kind else self.here
 

@@ -25,7 +25,7 @@ from .curves import Curves, lines_as_cubics
 from .labels import LabelMatcher
 
 _GREATEST: Final = 1e9
-SPATIAL: Final = re.compile(rb"v[ \t]+\d+[ \t]*[\r\n]")
+CURVES_START: Final = re.compile(rb"v[ \t]+\d+[ \t]*[\r\n]")
 """First line of a .curves file; a mesh, whose vertices begin with v as well, has three numbers there."""
 SIDE: Final = 1000.0  # longer side of the projected drawing, in the units of its page
 BORDER: Final = 40.0  # empty border of the page round it
@@ -38,8 +38,8 @@ def read_scap(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
 
     matcher: matches the clusters of curvature lines, cluster=NAME; None: all strokes are.
     """
-    lines = _lines(data)
-    page = _page(lines[0] if lines else "")
+    lines = _split_lines(data)
+    page = _parse_page(lines[0] if lines else "")
     strokes: list[list[tuple[float, float]]] = []
     clusters: list[str] = []
     samples: list[tuple[float, float]] = []
@@ -64,20 +64,20 @@ def read_scap(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
                 raise InputError(
                     f"line {number}: a sample stands outside of strokes; put it between {{ and }}"
                 )
-            x, y = _numbers_in(line, number, "x y pressure", 2)
+            x, y = _parse_numbers(line, number, "x y pressure", 2)
             samples.append((x, y))
     if opened:
         raise InputError(f"line {opened}: this stroke does not end; the file is cut off")
-    return _curves(strokes, clusters, page, matcher)
+    return _curves_of_clusters(strokes, clusters, page, matcher)
 
 
 def read_curves(data: bytes, view: str | None = None) -> Curves:
     """Read the strokes of a .curves file as seen from one side, on a page of their own. Raises InputError.
 
-    view: as in `axes_of`; None: along the third of the strokes' principal axes.
+    view: as in `view_axes`; None: along the third of the strokes' principal axes.
     """
-    strokes = _spatial(data)
-    axes = _principal(strokes) if view is None else axes_of(view)
+    strokes = _parse_spatial_strokes(data)
+    axes = _principal_axes(strokes) if view is None else view_axes(view)
     flat = [transform_vectors(stroke, axes) for stroke in strokes]
     ends = np.concatenate(flat)
     least, most = ends.min(axis=0), ends.max(axis=0)
@@ -86,10 +86,12 @@ def read_curves(data: bytes, view: str | None = None) -> Curves:
         raise InputError("draws no stroke: everything is one point, seen from there")
     placed = [BORDER + SIDE * ((stroke - least) / longer) for stroke in flat]
     width, height = np.ceil(SIDE * ((most - least) / longer)) + 2 * BORDER
-    return _polylines(placed, np.arange(len(placed), dtype=np.int32), (0.0, 0.0, float(width), float(height)))
+    return _curves_of_polylines(
+        placed, np.arange(len(placed), dtype=np.int32), (0.0, 0.0, float(width), float(height))
+    )
 
 
-def axes_of(view: str) -> Floats:
+def view_axes(view: str) -> Floats:
     """The directions (2, 3) to the right and down in a view, as "top" or "30,25". Raises InputError."""
     try:
         azimuth, elevation = np.radians(VIEWS.get(view) or [float(part) for part in view.split(",")])
@@ -105,7 +107,7 @@ def axes_of(view: str) -> Floats:
     return np.array([[along, 0.0, -across], [rise * across, -level, rise * along]])
 
 
-def _principal(strokes: list[Floats]) -> Floats:
+def _principal_axes(strokes: list[Floats]) -> Floats:
     """The two principal axes (2, 3) along which strokes extend farthest; the more vertical one points up."""
     starts = np.concatenate([stroke[:-1] for stroke in strokes])
     ends = np.concatenate([stroke[1:] for stroke in strokes])
@@ -117,17 +119,19 @@ def _principal(strokes: list[Floats]) -> Floats:
     # Processors differ in the last digits, which are cut off.
     axes = np.linalg.eigh(spread)[1].T[1:].round(9)
     across, up = sorted(axes, key=lambda axis: (abs(axis[1]), *axis))
-    return np.stack([_forward(across), -(np.sign(up[1]) * up if up[1] else _forward(up))])
+    return np.stack([_point_forward(across), -(np.sign(up[1]) * up if up[1] else _point_forward(up))])
 
 
-def _forward(axis: Floats) -> Floats:
+def _point_forward(axis: Floats) -> Floats:
     """The axis or its opposite, whichever has its largest part positive."""
     return axis if axis[np.argmax(np.abs(axis))] > 0 else -axis
 
 
-def _spatial(data: bytes) -> list[Floats]:
+def _parse_spatial_strokes(data: bytes) -> list[Floats]:
     """The strokes (n, 3) of two or more samples."""
-    lines = [(number, line.strip()) for number, line in enumerate(_lines(data), start=1) if line.strip()]
+    lines = [
+        (number, line.strip()) for number, line in enumerate(_split_lines(data), start=1) if line.strip()
+    ]
     strokes: list[Floats] = []
     place = 0
     while place < len(lines):
@@ -136,7 +140,7 @@ def _spatial(data: bytes) -> list[Floats]:
         if match is None:
             raise InputError(f"line {number}: expected 'v N', found {line[:30]!r}")
         count = int(match[1])
-        samples = [_numbers_in(text, at, "x y z", 3) for at, text in lines[place + 1 : place + 1 + count]]
+        samples = [_parse_numbers(text, at, "x y z", 3) for at, text in lines[place + 1 : place + 1 + count]]
         if len(samples) < count:
             follow = f"announces {count} points, and {len(samples)} follow"
             raise InputError(f"line {number}: this stroke {follow}; the file is cut off")
@@ -148,7 +152,7 @@ def _spatial(data: bytes) -> list[Floats]:
     return strokes
 
 
-def _lines(data: bytes) -> list[str]:
+def _split_lines(data: bytes) -> list[str]:
     """The lines of a text of strokes, at most MAX_LINES."""
     if sum(data.count(end) for end in (b"\n", b"\r")) > MAX_LINES:
         raise InputError(f"has more than {MAX_LINES} lines; simplify the drawing")
@@ -156,21 +160,21 @@ def _lines(data: bytes) -> list[str]:
     return re.split(r"\r\n?|\n", text)
 
 
-def _numbers_in(line: str, number: int, layout: str, count: int) -> list[float]:
+def _parse_numbers(line: str, place: int, layout: str, count: int) -> list[float]:
     """The first `count` coordinates in a line."""
     fields = line.split(maxsplit=count)[:count]
     try:
-        found = [float(field) for field in fields]
+        numbers = [float(field) for field in fields]
     except ValueError:
-        found = []
-    if len(found) < count:
-        raise InputError(f"line {number}: expected {layout!r}, found {line[:30]!r}")
-    if not all(abs(each) <= _GREATEST for each in found):
-        raise InputError(f"line {number}: a coordinate is not a finite number below {_GREATEST:g}")
-    return found
+        numbers = []
+    if len(numbers) < count:
+        raise InputError(f"line {place}: expected {layout!r}, found {line[:30]!r}")
+    if not all(abs(number) <= _GREATEST for number in numbers):
+        raise InputError(f"line {place}: a coordinate is not a finite number below {_GREATEST:g}")
+    return numbers
 
 
-def _polylines(strokes: list[Floats], curve: Ints, page: Box, taken: Bools | None = None) -> Curves:
+def _curves_of_polylines(strokes: list[Floats], curve: Ints, page: Box, taken: Bools | None = None) -> Curves:
     """The curves of pen strokes of two or more samples (n, 2), by the numbers (s,) of their curves."""
     count = [len(stroke) - 1 for stroke in strokes]
     points = np.concatenate([lines_as_cubics(stroke[:-1], stroke[1:]) for stroke in strokes])
@@ -178,7 +182,7 @@ def _polylines(strokes: list[Floats], curve: Ints, page: Box, taken: Bools | Non
     return Curves(points, np.repeat(curve, count), np.zeros(len(points), dtype=bool), page, chosen)
 
 
-def _curves(
+def _curves_of_clusters(
     strokes: list[list[tuple[float, float]]],
     clusters: list[str],
     page: Box,
@@ -195,10 +199,10 @@ def _curves(
         taken = np.array([matcher.matches([f"cluster={name}"] if " " not in name else []) for name in names])
         matcher.check(any_stroke=bool(taken.any()))
     samples = [np.array(strokes[number]) for number in drawn]
-    return _polylines(samples, np.array(curve, dtype=np.int32), page, taken)
+    return _curves_of_polylines(samples, np.array(curve, dtype=np.int32), page, taken)
 
 
-def _page(line: str) -> Box:
+def _parse_page(line: str) -> Box:
     fields = line.strip().removeprefix("#").split(maxsplit=3)
     try:
         width, height = (float(field) for field in fields)

@@ -91,7 +91,7 @@ def random_instance(
 
     """
     check_size(size)
-    _check(seed, share, mask_share, strokes, noise)
+    _check_options(seed, share, mask_share, strokes, noise)
     check_memory(size * size, available_memory())
     rng = np.random.Generator(np.random.PCG64(seed))
     mask = np.ones((size, size), dtype=bool)
@@ -101,9 +101,9 @@ def random_instance(
             raise NoStrokeError("the random mask has no pixel; choose a larger mask_share or another seed")
     count = max(1, round(share * int(mask.sum())))
     pixels, theta, w = (
-        _separate(rng, mask, count)
+        _draw_pixels(rng, mask, count)
         if strokes == "pixels"
-        else _along_curves(rng, mask, count, bend=_BEND if strokes == "curved" else 0.0)
+        else _draw_curves(rng, mask, count, bend=_BEND if strokes == "curved" else 0.0)
     )
     if noise > 0:
         theta = theta + noise * rng.standard_normal(len(theta))
@@ -114,11 +114,11 @@ def random_instance(
         theta=theta,
         w=w,
         gauge=gauge,
-        source=_source(seed, share, mask_share, strokes, noise),
+        source=_describe_source(seed, share, mask_share, strokes, noise),
     ).with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
 
 
-def _check(seed: int, share: float, mask_share: float, strokes: str, noise: float) -> None:
+def _check_options(seed: int, share: float, mask_share: float, strokes: str, noise: float) -> None:
     """Raise InputError that names the option out of range."""
     if not 0 <= seed <= MOST_SEED:
         raise InputError(f"seed is {seed}; choose 0 to {MOST_SEED}")
@@ -133,7 +133,7 @@ def _check(seed: int, share: float, mask_share: float, strokes: str, noise: floa
         raise InputError("noise needs strokes straight or curved: directions of pixels are uniform already")
 
 
-def _source(seed: int, share: float, mask_share: float, strokes: str, noise: float) -> str:
+def _describe_source(seed: int, share: float, mask_share: float, strokes: str, noise: float) -> str:
     """The source of the instance: shape and seed, then every value that is not the library's default."""
     shape, usual = ("full", 1.0) if mask_share == 1 else ("ragged", RAGGED_SHARE)
     changed = [
@@ -149,7 +149,7 @@ def _source(seed: int, share: float, mask_share: float, strokes: str, noise: flo
     return ", ".join([f"random strokes on a {shape} mask, seed {seed}", *changed])
 
 
-def _separate(rng: np.random.Generator, mask: Bools, count: int) -> tuple[Ints, Floats, Floats]:
+def _draw_pixels(rng: np.random.Generator, mask: Bools, count: int) -> tuple[Ints, Floats, Floats]:
     """Pixels (s, 2), theta (s,) and w (s,) of strokes of one pixel each."""
     inside = np.argwhere(mask)
     chosen = np.sort(rng.permutation(len(inside))[:count])
@@ -157,7 +157,7 @@ def _separate(rng: np.random.Generator, mask: Bools, count: int) -> tuple[Ints, 
     return inside[chosen].astype(np.int32), theta, rng.uniform(LEAST_WEIGHT, 1.0, count)
 
 
-def _along_curves(
+def _draw_curves(
     rng: np.random.Generator, mask: Bools, count: int, *, bend: float
 ) -> tuple[Ints, Floats, Floats]:
     """Pixels (s, 2), theta (s,) and w (s,) along random curves until `count` pixels have a direction."""
@@ -165,19 +165,19 @@ def _along_curves(
     frame, total = Frame(0.0, 0.0, 1.0, size, size), np.zeros((3, size, size))
     weight, direction = np.zeros(mask.shape), np.zeros((*mask.shape, 2))
     for _ in range(_CURVES_PER_PIXEL * size):
-        cover = _cover(_curve(rng, size, bend), frame)
+        cover = _cover_by_cubic(_draw_curve(rng, size, bend), frame)
         total += np.concatenate([cover.amount[None], np.moveaxis(cover.direction, -1, 0) * cover.amount])
         amount = total[0]
         direction = np.moveaxis(total[1:] / np.where(amount > 0, amount, 1.0), 0, -1)
         weight = np.where(mask, Cover(amount, direction).weight, 0.0)
         if (weight >= LEAST_WEIGHT).sum() >= count:
             break
-    kept = weight >= LEAST_WEIGHT
-    pixels = np.argwhere(kept).astype(np.int32)
-    return pixels, line_of(direction[kept]), np.minimum(weight[kept], 1.0)
+    stroke = weight >= LEAST_WEIGHT
+    pixels = np.argwhere(stroke).astype(np.int32)
+    return pixels, line_of(direction[stroke]), np.minimum(weight[stroke], 1.0)
 
 
-def _curve(rng: np.random.Generator, size: int, bend: float) -> Floats:
+def _draw_curve(rng: np.random.Generator, size: int, bend: float) -> Floats:
     """Control points (4, 2) of a random cubic whose ends are in the square; a line if it has no bend."""
     ends = rng.uniform(0.0, size, (2, 2))
     off = rng.uniform(-1.0, 1.0, (2, 2))
@@ -186,7 +186,7 @@ def _curve(rng: np.random.Generator, size: int, bend: float) -> Floats:
     return cubic
 
 
-def _cover(cubic: Floats, frame: Frame) -> Cover:
+def _cover_by_cubic(cubic: Floats, frame: Frame) -> Cover:
     """The cover of the pixels by one cubic."""
     curves = Curves(cubic[None], np.zeros(1, dtype=np.int32), np.zeros(1, dtype=bool), None)
     return curves.covers(frame).lines

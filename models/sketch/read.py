@@ -21,8 +21,8 @@ from ..instance.angles import line_of
 from ..instance.grid import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading
 from ..memory import available_memory
-from .bitmap import read_white
-from .bridges import closing
+from .bitmap import read_white_pixels
+from .bridges import close_outline
 from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
 from .doubts import (
     describe_box,
@@ -34,7 +34,7 @@ from .doubts import (
 )
 from .drawing_file import Drawing, parse_drawing, read_file
 from .labels import label_of
-from .outline import along_outline, inside_outline, parts_with
+from .outline import find_inside, find_strokes_along_outline, keep_parts_with_strokes
 
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
@@ -115,11 +115,11 @@ def read_sketch(
             if mask is not None:
                 with naming(mask):
                     white = read_mask(read_file(Path(mask)), drawing.page)
-            instance = instance_of(
+            instance = instance_of_drawing(
                 drawing,
                 size,
                 white=white,
-                name=name or name_from(path.stem),
+                name=name or name_from_text(path.stem),
                 source=path.name,
                 gauge=gauge,
                 silhouette=silhouette,
@@ -130,7 +130,7 @@ def read_sketch(
     return instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
 
 
-def instance_of(
+def instance_of_drawing(
     drawing: Drawing,
     size: int,
     *,
@@ -146,25 +146,25 @@ def instance_of(
     white: the picture from `read_mask`; without it the mask is the inside of the drawing.
     """
     if white is None:
-        frame = frame_box(drawing.box, size, margin=True)
+        frame = frame_around(drawing.box, size, margin=True)
         covers = drawing.covers(frame)
         mask, reading = find_mask(drawing, covers, frame)
         if silhouette == "outer":
-            covers, mask = without_silhouette(covers, mask)
+            covers, mask = drop_silhouette(covers, mask)
     else:
         assert drawing.page is not None  # as `read_mask` checked
-        frame, region = frame_white(white, drawing.page, size)
+        frame, region = frame_around_white(white, drawing.page, size)
         covers = drawing.covers(frame)
         mask = region & ~covers.cuts
-        reading = Reading(drawing.page, _present(describe_crowding(covers.filled, mask, frame)))
+        reading = Reading(drawing.page, _list_warnings(describe_crowding(covers.filled, mask, frame)))
         if silhouette == "outer":
-            covers = drop_outline(covers, region)
-    return build_instance(
+            covers = drop_outline_directions(covers, region)
+    return instance_of_mask(
         frame, covers.lines, mask, reading, name=name, source=source, gauge=gauge, view=view
     )
 
 
-def frame_box(box: Box, size: int, *, margin: bool) -> Frame:
+def frame_around(box: Box, size: int, *, margin: bool) -> Frame:
     """The grid of `size` pixels on its longer side round a box. Raises InputError for a point."""
     if max(box[2] - box[0], box[3] - box[1]) <= 0:
         raise InputError("draws no stroke: everything is one point")
@@ -173,14 +173,14 @@ def frame_box(box: Box, size: int, *, margin: bool) -> Frame:
     return frame
 
 
-def frame_white(white: Bools, page: Box, size: int) -> tuple[Frame, Bools]:
+def frame_around_white(white: Bools, page: Box, size: int) -> tuple[Frame, Bools]:
     """The grid round the white part of a page, and which pixels are white over half of their area or more."""
     x, y, width, height = page
     across, down = width / white.shape[1], height / white.shape[0]
     high, wide = (np.nonzero(white.any(axis=axis))[0] for axis in (1, 0))
     left, right = x + across * wide[0], x + across * (wide[-1] + 1)
     top, bottom = y + down * high[0], y + down * (high[-1] + 1)
-    frame = frame_box((left, top, right, bottom), size, margin=False)
+    frame = frame_around((left, top, right, bottom), size, margin=False)
     rows, columns = frame.edges
     share = block_means(white.astype(np.float32), (rows - y) / down, (columns - x) / across)
     return frame, share >= 0.5 - 1e-6
@@ -191,18 +191,18 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
     walls = covers.walls
     if not walls.any():
         raise NoStrokeError("no stroke is left on so coarse a grid; choose a larger size")
-    closed, bridges = closing(walls, drawing.ends(), frame)
-    region = inside_outline(closed)
-    mask = parts_with(region & ~covers.cuts, covers.lines.weight)
+    closed, bridges = close_outline(walls, drawing.ends(), frame)
+    region = find_inside(closed)
+    mask = keep_parts_with_strokes(region & ~covers.cuts, covers.lines.weight)
     if not mask.any():
         raise NoStrokeError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
         )
-    warnings = _present(
+    warnings = _list_warnings(
         describe_gaps(bridges),
         describe_open_drawing(region),
         describe_loose_strokes(closed, region, frame),
-        describe_box(closed, region, covers.lines.joined(covers.others)),
+        describe_box(closed, region, covers.lines + covers.others),
         describe_crowding(covers.filled, mask, frame),
         describe_off_page(mask, frame, drawing.page),
     )
@@ -210,27 +210,27 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
     return mask, Reading(drawing.page, warnings, gaps)
 
 
-def _present(*doubts: str | None) -> tuple[str, ...]:
+def _list_warnings(*doubts: str | None) -> tuple[str, ...]:
     return tuple(doubt for doubt in doubts if doubt is not None)
 
 
-def without_silhouette(covers: Covers, mask: Bools) -> tuple[Covers, Bools]:
+def drop_silhouette(covers: Covers, mask: Bools) -> tuple[Covers, Bools]:
     """The covers without directions along the outline of a mask, and its parts with other strokes."""
-    covers = drop_outline(covers, mask | covers.cuts)
-    mask = parts_with(mask, covers.lines.weight)
+    covers = drop_outline_directions(covers, mask | covers.cuts)
+    mask = keep_parts_with_strokes(mask, covers.lines.weight)
     if not mask.any():
         raise InputError("every stroke runs along the outline; choose the silhouette none")
     return covers, mask
 
 
-def drop_outline(covers: Covers, region: Bools) -> Covers:
+def drop_outline_directions(covers: Covers, region: Bools) -> Covers:
     """The covers without directions of curvature lines along the border of a region."""
     lines = covers.lines
-    along = along_outline(region, lines.direction, covers.stroke_width)
+    along = find_strokes_along_outline(region, lines.direction, covers.stroke_width)
     return replace(covers, lines=Cover(lines.amount, np.where(along[..., None], 0.0, lines.direction)))
 
 
-def build_instance(
+def instance_of_mask(
     frame: Frame,
     lines: Cover,
     mask: Bools,
@@ -263,7 +263,7 @@ def build_instance(
 
 def read_mask(data: bytes, page: Box | None) -> Bools:
     """The white part of a mask picture, which must have the size of the page. Raises InputError."""
-    white = read_white(data)
+    white = read_white_pixels(data)
     if page is None:
         raise InputError("cannot be placed: the sketch has neither a viewBox nor a width and height; add one")
     size, wanted = white.shape[::-1], (round(page[2]), round(page[3]))
@@ -277,7 +277,7 @@ def read_mask(data: bytes, page: Box | None) -> Bools:
     return white
 
 
-def name_from(text: str) -> str:
+def name_from_text(text: str) -> str:
     """An instance name made from any text, at most 32 long; runs of other characters become `_`."""
     name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
     return (name if re.match(r"[a-z]", name) else f"sketch_{name}".strip("_"))[:32].rstrip("_")

@@ -9,11 +9,11 @@ from typing import Final, Literal
 from ..arguments import check_arguments
 from ..errors import InputError
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
-from .read import DEFAULT_SIZE, Silhouette, check_silhouette, check_size, instance_of
+from .read import DEFAULT_SIZE, Silhouette, check_silhouette, check_size, instance_of_drawing
 from .surfaces import analytic
 from .svg import read_svg
 
-Kind = Literal["sketch", "analytic"]
+SampleKind = Literal["sketch", "analytic"]
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Sample:
     """A built-in sample: name, whether a drawing (`sketch`) or a surface (`analytic`), one line."""
 
     name: str
-    kind: Kind
+    kind: SampleKind
     description: str
 
 
@@ -94,25 +94,27 @@ def sample(
     """
     check_size(size)
     check_silhouette(silhouette)
-    if _known(name).kind == "analytic":
+    if _find_sample(name).kind == "analytic":
         if silhouette != "none":
             raise InputError(f"{name} is computed, not drawn; choose the silhouette none")
         return analytic(
             name, size, gauge=gauge, stroke_weight=stroke_weight, skew_weight=skew_weight
         ).instance
     drawing = read_svg(sample_svg(name).encode())
-    instance = instance_of(drawing, size, name=name, source=f"{name}.svg", gauge=gauge, silhouette=silhouette)
+    instance = instance_of_drawing(
+        drawing, size, name=name, source=f"{name}.svg", gauge=gauge, silhouette=silhouette
+    )
     return instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
 
 
 def sample_svg(name: str) -> str:
     """The SVG text of a built-in sketch. Raises InputError for an unknown name and for a computed sample."""
-    if _known(name).kind == "analytic":
+    if _find_sample(name).kind == "analytic":
         raise InputError(f"sample {name!r} is computed, not drawn; choose one of {', '.join(_DRAWN)}")
     return files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")
 
 
-def _known(name: str) -> Sample:
+def _find_sample(name: str) -> Sample:
     if name not in SAMPLES:
         raise InputError(f"there is no sample {name!r}; choose one of {', '.join(SAMPLES)}")
     return SAMPLES[name]

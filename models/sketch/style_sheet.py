@@ -112,11 +112,11 @@ def _declared(content: Any) -> dict[str, str]:
     """The known properties in a text or in the tokens of a rule; the last one counts."""
     import tinycss2
 
-    found = tinycss2.parse_blocks_contents(content, skip_comments=True, skip_whitespace=True)
+    declarations = tinycss2.parse_blocks_contents(content, skip_comments=True, skip_whitespace=True)
     return {
-        each.lower_name: _text(each.value)
-        for each in found
-        if each.type == "declaration" and each.lower_name in KNOWN
+        declaration.lower_name: _text(declaration.value)
+        for declaration in declarations
+        if declaration.type == "declaration" and declaration.lower_name in KNOWN
     }
 
 
@@ -134,9 +134,9 @@ def _selectors(prelude: list[Any]) -> Iterator[_Selector]:
     tokens = [each for each in prelude if each.type != "comment"]
     ends = [place for place, each in enumerate(tokens) if each == ","]
     for start, end in pairwise([-1, *ends, len(tokens)]):
-        found = _selector(tokens[start + 1 : end])
-        if found is not None:
-            yield found
+        selector = _selector(tokens[start + 1 : end])
+        if selector is not None:
+            yield selector
 
 
 def _selector(part: list[Any]) -> _Selector | None:

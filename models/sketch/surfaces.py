@@ -72,7 +72,7 @@ class AnalyticInstance:
     heights: Floats
 
 
-def turned_by(tilt: float, spin: float) -> Floats:
+def rotation_by(tilt: float, spin: float) -> Floats:
     """The rotation by `tilt` about x, the top away, then by `spin` about z (degrees)."""
     a, b = np.radians([-tilt, spin])
     about_x = np.array([[1, 0, 0], [0, cosine(a), -sine(a)], [0, sine(a), cosine(a)]])
@@ -84,7 +84,7 @@ def _vectors(x: Floats, y: Floats, z: Floats) -> Floats:
     return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
 
 
-def _revolved(
+def _surface_of_revolution(
     profile: tuple[_Profile, _Profile],
     slopes: tuple[_Profile, _Profile],
     t_range: tuple[float, float],
@@ -101,7 +101,7 @@ def _revolved(
         along_t=lambda s, t: _vectors(widening(t) * cosine(s), rise(t), widening(t) * sine(s)),
         s_range=(cut, np.pi - cut),
         t_range=t_range,
-        turn=turned_by(*turn),
+        turn=rotation_by(*turn),
         share=share,
     )
 
@@ -135,7 +135,7 @@ def _ellipsoid(long: float, deep: float, short: float) -> CurvaturePatch:
         ),
         s_range=(0.6, np.pi - 0.6),
         t_range=(0.9, np.pi - 0.9),
-        turn=turned_by(20, 20),
+        turn=rotation_by(20, 20),
         share=0.25,
     )
 
@@ -144,7 +144,7 @@ _TUBE: Final = 0.45  # radius of the torus's tube; its centre line has radius 1
 _WAVE: Final = 0.6  # height of the wave
 
 SURFACES: Final[dict[str, CurvaturePatch]] = {
-    "tilted_cylinder": _revolved(
+    "tilted_cylinder": _surface_of_revolution(
         (lambda t: 1 + 0 * t, lambda t: t),
         (lambda t: 0 * t, lambda t: 1 + 0 * t),
         (-1.3, 1.3),
@@ -164,7 +164,7 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
         ),
         s_range=(0.5, np.pi - 0.4),
         t_range=(0.7, np.pi - 0.3),
-        turn=turned_by(30, -10),
+        turn=rotation_by(30, -10),
         share=0.2,
     ),
     "wave_sheet": CurvaturePatch(
@@ -173,22 +173,22 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
         along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
         s_range=(-1.5 * np.pi, 1.5 * np.pi),
         t_range=(-4.0, 4.0),
-        turn=turned_by(50, 25),
+        turn=rotation_by(50, 25),
         share=0.2,
     ),
-    "cone": _revolved(
+    "cone": _surface_of_revolution(
         (lambda t: 0.9 - 0.3 * t, lambda t: t),
         (lambda t: -0.3 + 0 * t, lambda t: 1 + 0 * t),
         (-1.3, 1.3),
         0.45,
     ),
-    "vase": _revolved(
+    "vase": _surface_of_revolution(
         (lambda t: 1 + 0.2 * sine(2 * t), lambda t: t),
         (lambda t: 0.4 * cosine(2 * t), lambda t: 1 + 0 * t),
         (-1.5, 1.5),
         0.65,
     ),
-    "spheroid": _revolved(
+    "spheroid": _surface_of_revolution(
         (cosine, lambda t: 1.5 * sine(t)), (lambda t: -sine(t), lambda t: 1.5 * cosine(t)), (-0.7, 0.7), 0.75
     ),
     "ellipsoid": _ellipsoid(1.5, 1.2, 1.0),
@@ -254,11 +254,11 @@ def analytic_instance(
     skew_weight: float = SKEW_WEIGHT,
 ) -> AnalyticInstance:
     """Instance of any patch, as `analytic`."""
-    frame = _frame(surface, size)
-    s, t, mask = _parameters(surface, frame)
+    frame = _frame_patch(surface, size)
+    s, t, mask = _find_parameters(surface, frame)
     tangents = surface.tangents(s, t)
     u_angle, v_angle = (wrap(arctangent(d[:, 1], d[:, 0]), 0.0, np.pi) for d in tangents)
-    weight, on_u = _strokes(surface, frame, mask)
+    weight, on_u = _choose_strokes(surface, frame, mask)
     stroke = weight >= LEAST_WEIGHT
     instance = Instance(
         name=name,
@@ -275,12 +275,12 @@ def analytic_instance(
         instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight),
         u_angle,
         v_angle,
-        normals=_towards_viewer(*tangents),
+        normals=_normals_towards_viewer(*tangents),
         heights=surface.point(s, t)[:, 2] / frame.pixel,
     )
 
 
-def _towards_viewer(first: Floats, second: Floats) -> Floats:
+def _normals_towards_viewer(first: Floats, second: Floats) -> Floats:
     """The unit normals (n, 3) of tangent planes, z above 0."""
     (ax, ay, az), (bx, by, bz) = first.T, second.T
     normal = _vectors(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
@@ -288,17 +288,17 @@ def _towards_viewer(first: Floats, second: Floats) -> Floats:
     return normal * (np.where(z < 0, -1.0, 1.0) / vector_length(vector_length(x, y), z))[:, None]
 
 
-def _frame(surface: CurvaturePatch, size: int) -> Frame:
+def _frame_patch(surface: CurvaturePatch, size: int) -> Frame:
     s, t = np.meshgrid(np.linspace(*surface.s_range, 400), np.linspace(*surface.t_range, 400))
     x, y, _ = np.moveaxis(surface.point(s, t), -1, 0)
     return fit_frame((float(x.min()), float(-y.max()), float(x.max()), float(-y.min())), size, margin=False)
 
 
-def _parameters(surface: CurvaturePatch, frame: Frame) -> tuple[Floats, Floats, Bools]:
+def _find_parameters(surface: CurvaturePatch, frame: Frame) -> tuple[Floats, Floats, Bools]:
     """Parameters s, t (n,) of the pixels whose centre is on the patch, and the mask of these pixels."""
     row, column = np.indices(frame.shape).reshape(2, -1)
     wanted = np.stack([frame.x + (column + 0.5) * frame.pixel, -frame.y - (row + 0.5) * frame.pixel], axis=-1)
-    s, t = _invert(surface, wanted)
+    s, t = _invert_projection(surface, wanted)
     miss = vector_length(*(surface.point(s, t)[:, :2] - wanted).T)
     on_patch = miss < 1e-9
     for value, ends in ((s, surface.s_range), (t, surface.t_range)):
@@ -309,7 +309,7 @@ def _parameters(surface: CurvaturePatch, frame: Frame) -> tuple[Floats, Floats, 
     return s[mask.ravel()], t[mask.ravel()], mask
 
 
-def _invert(surface: CurvaturePatch, wanted: Floats) -> tuple[Floats, Floats]:
+def _invert_projection(surface: CurvaturePatch, wanted: Floats) -> tuple[Floats, Floats]:
     """Parameters whose projection is `wanted` (n, 2), by Newton's method from a near lattice point."""
     from scipy.spatial import cKDTree
 
@@ -334,24 +334,24 @@ def _invert(surface: CurvaturePatch, wanted: Floats) -> tuple[Floats, Floats]:
     return s, t
 
 
-def _strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
+def _choose_strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
     """Weight [height, width] of drawn lines; and which pixels (n,) have a line of family u."""
     near, far = 1.0, float(max(frame.shape))
-    found = []
+    candidates = []
     for _ in range(_BISECTIONS):  # of the spacing, by ratio
         middle = float(np.sqrt(near * far))
-        u_lines, v_lines = _lines(surface, frame, middle)
+        u_lines, v_lines = _lines_at_spacing(surface, frame, middle)
         both = cover_by_segments(np.concatenate([u_lines, v_lines]), frame)
         weight = np.where(mask, both.weight, 0.0)
         share = float((weight >= LEAST_WEIGHT).sum() / mask.sum())
         near, far = (middle, far) if share > surface.share else (near, middle)
-        found.append((abs(share - surface.share), weight, u_lines, v_lines))
-    _, weight, u_lines, v_lines = min(found, key=lambda each: each[0])
+        candidates.append((abs(share - surface.share), weight, u_lines, v_lines))
+    _, weight, u_lines, v_lines = min(candidates, key=lambda candidate: candidate[0])
     of_u, of_v = (cover_by_segments(lines, frame).amount for lines in (u_lines, v_lines))
     return weight, (of_u >= of_v)[mask]
 
 
-def _lines(surface: CurvaturePatch, frame: Frame, spacing: float) -> tuple[Floats, Floats]:
+def _lines_at_spacing(surface: CurvaturePatch, frame: Frame, spacing: float) -> tuple[Floats, Floats]:
     """Segments (m, 2, 2), y down, of at least one line t = const (family u) and s = const (family v)."""
     middle_s, middle_t = np.mean(surface.s_range), np.mean(surface.t_range)
     along_s, along_t = np.linspace(*surface.s_range, _SAMPLES), np.linspace(*surface.t_range, _SAMPLES)
@@ -360,18 +360,21 @@ def _lines(surface: CurvaturePatch, frame: Frame, spacing: float) -> tuple[Float
         float(vector_length(*np.diff(surface.point(*line)[:, :2], axis=0).T).sum()) / frame.pixel
         for line in middle_lines
     )
-    at_t, at_s = _spread(surface.t_range, high / spacing), _spread(surface.s_range, wide / spacing)
-    u = _polylines(surface, *np.broadcast_arrays(along_s[None], at_t[:, None]))
-    v = _polylines(surface, *np.broadcast_arrays(at_s[:, None], along_t[None]))
+    at_t, at_s = (
+        _spread_evenly(surface.t_range, high / spacing),
+        _spread_evenly(surface.s_range, wide / spacing),
+    )
+    u = _polyline_segments(surface, *np.broadcast_arrays(along_s[None], at_t[:, None]))
+    v = _polyline_segments(surface, *np.broadcast_arrays(at_s[:, None], along_t[None]))
     return u, v
 
 
-def _spread(ends: tuple[float, float], count: float) -> Floats:
+def _spread_evenly(ends: tuple[float, float], count: float) -> Floats:
     """Middles of about `count` equal parts of an interval."""
     number = max(1, round(count))
     return ends[0] + (np.arange(number) + 0.5) * (ends[1] - ends[0]) / number
 
 
-def _polylines(surface: CurvaturePatch, s: Floats, t: Floats) -> Floats:
+def _polyline_segments(surface: CurvaturePatch, s: Floats, t: Floats) -> Floats:
     points = surface.point(s, t)[..., :2] * (1, -1)
     return np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 2)

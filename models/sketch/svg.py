@@ -34,9 +34,9 @@ from ..instance.angles import transform_vectors
 from ..instance.grid import Floats
 from .colour import is_paper, is_red
 from .cover import Box
-from .curves import Curves, runs
+from .curves import Curves, run_numbers
 from .labels import LabelMatcher, colour_label
-from .path_data import SHAPES, outline, pixels, too_many_curves
+from .path_data import SHAPES, length_in_pixels, shape_curves, too_many_curves
 from .style_sheet import KNOWN, PAINT, StyleSheet, style_properties, style_sheet
 
 _GREATEST: Final = 1e9
@@ -48,7 +48,7 @@ _START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "co
 
 
 @dataclass(frozen=True)
-class _Place:
+class _Visit:
     """An element to visit. chosen: whether it, or an element around it, has a chosen label."""
 
     element: Element
@@ -63,27 +63,27 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
 
     matcher: matches the labels of curvature lines; None: colours decide.
     """
-    root = _parsed(data)
+    root = _parse_xml(data)
     if _tag(root) != "svg":
         tag = root.tag.split("}")[-1][:30]
         raise InputError(f"its root element is <{tag}>, not <svg>; expected an SVG drawing")
-    page = _page(root)
+    page = _page_of(root)
     texts = ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
-    walk = _Walk(style_sheet(texts), page, matcher)
+    walk = _ElementWalk(style_sheet(texts), page, matcher)
     shapes = list(walk.shapes(root))
     if not sum(len(points) for _, points, _ in shapes):
         raise InputError("draws no stroke: it has no visible path, line or shape; export it again")
     paints, outlines, taken = zip(*shapes, strict=True)
     red, points = is_red(np.array(paints)), np.concatenate(outlines)
-    shape = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(outline) for outline in outlines])
+    shape = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(points) for points in outlines])
     chosen = None
     if matcher is not None:
         chosen = np.array(taken)[shape]
         matcher.check(any_stroke=bool(chosen.any()))
-    return Curves(points, runs(points, shape), red[shape], page, chosen)
+    return Curves(points, run_numbers(points, shape), red[shape], page, chosen)
 
 
-def _parsed(data: bytes) -> Element:
+def _parse_xml(data: bytes) -> Element:
     from defusedxml.common import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 
@@ -99,13 +99,13 @@ def _parsed(data: bytes) -> Element:
 
 
 @dataclass(eq=False)
-class _Walk:
+class _ElementWalk:
     """A walk through a drawing. Results that depend only on an element are computed once for all its uses."""
 
     sheet: StyleSheet
     page: Box | None
     matcher: LabelMatcher | None
-    own: dict[Element, tuple[Mapping[str, str], Any, bool]] = field(default_factory=dict)
+    styles: dict[Element, tuple[Mapping[str, str], Any, bool]] = field(default_factory=dict)
     outlines: dict[Element, Floats] = field(default_factory=dict)
 
     visited: int = 0
@@ -118,9 +118,9 @@ class _Walk:
         from svgelements import Matrix
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
-        stack = [_Place(root, _START, Matrix(), ())]
+        stack = [_Visit(root, _START, Matrix(), ())]
         while stack:
-            place = self._styled(stack.pop())
+            place = self._apply_style(stack.pop())
             tag, element = _tag(place.element), place.element
             self.visited += 1
             if self.visited > MAX_ELEMENTS:
@@ -131,17 +131,17 @@ class _Walk:
                 paint = _paint(place.style)
                 if not (place.style["visibility"] in ("hidden", "collapse") or is_paper(np.array(paint))):
                     painted = self.matcher is not None and self.matcher.matches([colour_label(paint)])
-                    yield paint, self._placed(place), painted or place.chosen
+                    yield paint, self._place_shape(place), painted or place.chosen
             elif tag in _CONTAINERS:
                 inner = _view(place, element) if element is not root else place.matrix
                 stack += [replace(place, element=child, matrix=inner) for child in reversed(element)]
             elif tag == "use":
-                stack += self._used(place, named)
+                stack += self._follow_use(place, named)
 
-    def _styled(self, place: _Place) -> _Place:
+    def _apply_style(self, place: _Visit) -> _Visit:
         """The place with the element's own style and transform applied."""
         element = place.element
-        if element not in self.own:
+        if element not in self.styles:
             self.characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
             if self.characters > MAX_DATA:
                 raise InputError(
@@ -150,14 +150,14 @@ class _Walk:
                 )
             style = _own_style(element, self.sheet)
             taken = self.matcher is not None and self.matcher.matches(_labels(element))
-            self.own[element] = style, _transform(element, style), taken
-        own, transform, taken = self.own[element]
+            self.styles[element] = style, _transform(element, style), taken
+        changes, transform, taken = self.styles[element]
         inherited = {key: place.style[key] for key in PAINT if key in place.style}
-        style = inherited | {key: value for key, value in own.items() if value != "inherit"}
+        style = inherited | {key: value for key, value in changes.items() if value != "inherit"}
         matrix = place.matrix if transform is None else transform * place.matrix
-        return _Place(element, style, matrix, place.uses, taken or place.chosen)
+        return _Visit(element, style, matrix, place.uses, taken or place.chosen)
 
-    def _used(self, place: _Place, named: Mapping[str, Element]) -> list[_Place]:
+    def _follow_use(self, place: _Visit, named: Mapping[str, Element]) -> list[_Visit]:
         """The elements that a `use` refers to; none when it points into another file or at itself."""
         from svgelements import Matrix
 
@@ -179,15 +179,15 @@ class _Walk:
         inner = _view(used, target)
         return [replace(used, element=child, matrix=inner) for child in reversed(target)]
 
-    def _placed(self, place: _Place) -> Floats:
+    def _place_shape(self, place: _Visit) -> Floats:
         """Control points (k, 4, 2) of a shape in the units of the root."""
         if place.element not in self.outlines:
             size = self.page[2:] if self.page else (100.0, 100.0)
             try:
-                found = outline(_tag(place.element), place.element.attrib, size)
+                points = shape_curves(_tag(place.element), place.element.attrib, size)
             except InputError as error:
-                raise InputError(f"{_named(place.element)}: {error}") from error
-            self.outlines[place.element] = found
+                raise InputError(f"{_name_of(place.element)}: {error}") from error
+            self.outlines[place.element] = points
         points, m = self.outlines[place.element], place.matrix
         self.curves += len(points)
         if self.curves > MAX_CURVES:
@@ -197,7 +197,7 @@ class _Walk:
             placed: Floats = transform_vectors(points, turn) + shift
         if not (np.abs(placed) <= _GREATEST).all():
             raise InputError(
-                f"{_named(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"
+                f"{_name_of(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"
             )
         return np.asarray(placed[(placed != placed[:, :1]).any(axis=(1, 2))])
 
@@ -215,9 +215,9 @@ def _labels(element: Element) -> Iterator[str]:
 def _own_style(element: Element, sheet: StyleSheet) -> dict[str, str]:
     """The element's own style: attributes, style sheets and its `style`, of increasing priority."""
     attributes = element.attrib
-    own = {key: value.strip() for key, value in attributes.items() if key in KNOWN}
-    given = sheet.properties(_tag(element), attributes.get("id", ""), attributes.get("class", ""))
-    return {**own, **given, **style_properties(attributes.get("style", ""))}
+    presentation = {key: value.strip() for key, value in attributes.items() if key in KNOWN}
+    by_sheet = sheet.properties(_tag(element), attributes.get("id", ""), attributes.get("class", ""))
+    return {**presentation, **by_sheet, **style_properties(attributes.get("style", ""))}
 
 
 def _transform(element: Element, style: Mapping[str, str]) -> Any:
@@ -229,15 +229,15 @@ def _transform(element: Element, style: Mapping[str, str]) -> Any:
         return None
     if len(text) > MAX_TRANSFORM:
         raise InputError(
-            f"{_named(element)}: its transform has more than {MAX_TRANSFORM} characters; simplify it"
+            f"{_name_of(element)}: its transform has more than {MAX_TRANSFORM} characters; simplify it"
         )
     try:
         return Matrix(text)
     except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError) as error:
-        raise InputError(f"{_named(element)}: its transform {text[:40]!r} cannot be read") from error
+        raise InputError(f"{_name_of(element)}: its transform {text[:40]!r} cannot be read") from error
 
 
-def _view(place: _Place, element: Element) -> Any:
+def _view(place: _Visit, element: Element) -> Any:
     """The transform inside an inner svg or symbol: its viewBox centred in its width and height."""
     from svgelements import Matrix
 
@@ -262,12 +262,12 @@ def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
         numbers = ("stroke-opacity", "stroke-width") if kind == "stroke" else ("fill-opacity",)
         seen = all(_number(style.get(name)) != 0 for name in numbers)
         if seen and colour.lower() not in ("none", "transparent"):
-            return _rgb(colour)
+            return _colour_on_paper(colour)
     return 1.0, 1.0, 1.0
 
 
 @lru_cache(maxsize=1024)
-def _rgb(colour: str) -> tuple[float, float, float]:
+def _colour_on_paper(colour: str) -> tuple[float, float, float]:
     """The colour on white paper; black for gradients and for unreadable colours."""
     from svgelements import Color
 
@@ -282,7 +282,7 @@ def _rgb(colour: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _page(root: Element) -> Box | None:
+def _page_of(root: Element) -> Box | None:
     """The viewBox, or else width and height from (0, 0), or None."""
     box = _view_box(root)
     if box is not None:
@@ -299,17 +299,17 @@ def _view_box(element: Element) -> Box | None:
         x, y, width, height = (float(field) for field in fields)
     except ValueError as error:
         raise InputError(
-            f"{_named(element)}: its viewBox {element.get('viewBox', '')[:40]!r} is not four numbers"
+            f"{_name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} is not four numbers"
         ) from error
     if not (np.abs([x, y, width, height]) <= _GREATEST).all() or min(width, height) < LEAST_LENGTH:
-        raise InputError(f"{_named(element)}: its viewBox {element.get('viewBox', '')[:40]!r} has no area")
+        raise InputError(f"{_name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} has no area")
     return x, y, width, height
 
 
 def _length(element: Element, key: str, default: float) -> float:
     """A length in CSS pixels; `default` when it is missing, a percentage or unreadable."""
-    found = pixels(element.get(key, ""))
-    return default if found is None else found
+    pixels = length_in_pixels(element.get(key, ""))
+    return default if pixels is None else pixels
 
 
 def _number(text: str | None) -> float:
@@ -324,6 +324,6 @@ def _tag(element: Element) -> str:
     return tag if space in ("", "{" + _SVG) else ""
 
 
-def _named(element: Element) -> str:
+def _name_of(element: Element) -> str:
     name = element.get("id")
     return f"<{_tag(element)}" + (f' id="{name[:40]}">' if name else ">")

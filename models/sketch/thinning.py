@@ -7,18 +7,18 @@ import numpy as np
 from ..instance.grid import Bools
 
 
-def thinned(shape: Bools) -> Bools:
+def thin_shape(shape: Bools) -> Bools:
     """The shape [h, w] thinned to lines one pixel wide, after Zhang and Suen (Commun. ACM 27, 1984)."""
     line = np.pad(shape, 1)
     while True:
         before = int(line.sum())
         for first in (True, False):
-            line[1:-1, 1:-1] &= ~_removable(line, first=first)
+            line[1:-1, 1:-1] &= ~_removable_pixels(line, first=first)
         if int(line.sum()) == before:
             return line[1:-1, 1:-1]
 
 
-def _removable(line: Bools, *, first: bool) -> Bools:
+def _removable_pixels(line: Bools, *, first: bool) -> Bools:
     """The pixels of a padded shape that one of the two passes of the thinning removes."""
     # Neighbours from the upper one on, clockwise.
     steps = ((0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0), (0, 0))

@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 
-def unpacked(data: bytes) -> bytes:
+def unpack_tiff(data: bytes) -> bytes:
     """The first picture of a compressed TIFF, upright and without compression. Raises ValueError."""
     command = [sys.executable, "-P", __file__]
     done = subprocess.run(command, input=data, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
@@ -22,17 +22,17 @@ def unpacked(data: bytes) -> bytes:
 
 
 def main() -> int:
-    """Print the result of `unpacked`, or the error's message with exit code 1 if decoding fails."""
+    """Print the result of `unpack_tiff`, or the error's message with exit code 1 if decoding fails."""
     from PIL import Image, ImageOps
 
-    found = io.BytesIO()
+    decoded = io.BytesIO()
     try:
         image = Image.open(io.BytesIO(sys.stdin.buffer.read()), formats=("TIFF",))
-        ImageOps.exif_transpose(image).save(found, "TIFF", compression="raw")
+        ImageOps.exif_transpose(image).save(decoded, "TIFF", compression="raw")
     except Exception as error:  # noqa: BLE001 - damaged pictures make decoders raise nearly anything
         sys.stdout.buffer.write((str(error) or type(error).__name__).encode("utf-8", "replace"))
         return 1
-    sys.stdout.buffer.write(found.getvalue())
+    sys.stdout.buffer.write(decoded.getvalue())
     return 0
 
 

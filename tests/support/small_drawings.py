@@ -5,7 +5,7 @@ from pathlib import Path
 
 from crossfield.models.sketch.drawing_file import parse_drawing
 from crossfield.models.sketch.labels import label_of
-from crossfield.models.sketch.read import instance_of
+from crossfield.models.sketch.read import instance_of_drawing
 
 BLACK = 'fill="none" stroke="black"'
 RED = 'fill="none" stroke="#d1242f"'
@@ -30,4 +30,4 @@ def read(data, size=24, source="a.svg", *, curvature=(), view=None, **options):
     """The instance of a drawing in the bytes of a file of this name."""
     labels = tuple(map(label_of, curvature))
     drawing = parse_drawing(data, Path(source).suffix, size, labels=labels, view=view)
-    return instance_of(drawing, size, name="a", source=source, **options)
+    return instance_of_drawing(drawing, size, name="a", source=source, **options)

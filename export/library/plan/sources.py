@@ -10,7 +10,7 @@ from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.instance.instance import Gauge, Instance
 from ....models.sketch.drawing_file import parse_drawing
 from ....models.sketch.random_strokes import random_instance
-from ....models.sketch.read import instance_of, read_mask
+from ....models.sketch.read import instance_of_drawing, read_mask
 from ....models.sketch.samples import SAMPLES, sample
 from .recipe import InstanceRecipe
 
@@ -44,7 +44,9 @@ def _of_file(recipe: InstanceRecipe) -> Instance:
     drawing = parse_drawing(sketch.drawing, Path(sketch.what).suffix, recipe.size)
     white = read_mask(sketch.mask, drawing.page) if sketch.mask else None
     gauge = cast("Gauge", recipe.gauge)
-    return instance_of(drawing, recipe.size, white=white, name=recipe.name, source=sketch.what, gauge=gauge)
+    return instance_of_drawing(
+        drawing, recipe.size, white=white, name=recipe.name, source=sketch.what, gauge=gauge
+    )
 
 
 def _of_random(recipe: InstanceRecipe) -> Instance:

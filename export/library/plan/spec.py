@@ -22,7 +22,7 @@ from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
 from ....models.instance.instance import GAUGES
 from ....models.sketch.drawing_file import suffix_of_picture
-from ....models.sketch.published import published
+from ....models.sketch.publication import publishable_sketch
 from ....models.sketch.random_strokes import RAGGED_SHARE
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
@@ -475,7 +475,7 @@ def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
     source = table.get("file_name", Path(what).name)
     drawn = _content(folder / what, f"{place}file")
     try:
-        drawing, suffix = published(drawn, Path(source).suffix.lower())
+        drawing, suffix = publishable_sketch(drawn, Path(source).suffix.lower())
     except InputError as error:
         raise InputError(f"{place}file: {what}: {error}") from error
     masked = _content(folder / mask, f"{place}mask") if mask else b""

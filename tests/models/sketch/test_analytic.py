@@ -6,7 +6,7 @@ from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.sketch.cover import LEAST_WEIGHT
-from crossfield.models.sketch.surfaces import SURFACES, _frame, _parameters, analytic
+from crossfield.models.sketch.surfaces import SURFACES, _find_parameters, _frame_patch, analytic
 from crossfield.models.smooth.polyvector import polyvector_field
 
 pytestmark = pytest.mark.numeric
@@ -76,7 +76,7 @@ def test_names_and_sizes_that_do_not_exist_are_refused():
 def test_lines_are_curvature_lines_the_normals_belong_to_them_and_the_heights_to_both(name):
     """Tangents at right angles, and normals that turn along each line as the line goes: dN is along dp."""
     made, surface = analytic(name, 20), SURFACES[name]
-    s, t, _ = _parameters(surface, _frame(surface, 20))
+    s, t, _ = _find_parameters(surface, _frame_patch(surface, 20))
     tangents, h = surface.tangents(s, t), 1e-5
     assert np.abs((tangents[0] * tangents[1]).sum(axis=1)).max() < 1e-9
     for tangent, ds, dt, angle in zip(tangents, (h, 0), (0, h), (made.u_angle, made.v_angle), strict=True):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from crossfield.models import input_limits
 from crossfield.models.errors import CrossfieldError, InputError
-from crossfield.models.sketch.pen_strokes import axes_of, read_curves
+from crossfield.models.sketch.pen_strokes import read_curves, view_axes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -51,7 +51,7 @@ def test_principal_axes_do_not_depend_on_the_samples_but_on_the_strokes():
 @settings(max_examples=25, deadline=None)
 @given(st.floats(-180, 180), st.floats(-90, 90))
 def test_a_view_is_a_projection_at_right_angles_with_up_above(azimuth, elevation):
-    right, down = axes_of(f"{azimuth},{elevation}")
+    right, down = view_axes(f"{azimuth},{elevation}")
     assert np.array([right @ right, down @ down, right @ down]) == pytest.approx([1, 1, 0], abs=1e-9)
     assert right[1] == 0
     assert down[1] <= 1e-9
@@ -66,7 +66,7 @@ def test_named_views():
         "top": ([1, 0, 0], [0, 0, 1]),
     }
     for name, axes in names.items():
-        assert axes_of(name) == pytest.approx(np.array(axes), abs=1e-9)
+        assert view_axes(name) == pytest.approx(np.array(axes), abs=1e-9)
 
 
 def test_content_or_suffix_say_what_a_file_is(tmp_path):

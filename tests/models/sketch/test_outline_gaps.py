@@ -4,7 +4,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.sketch.samples import samples
-from crossfield.models.sketch.thinning import thinned
+from crossfield.models.sketch.thinning import thin_shape
 from PIL import Image, ImageDraw
 from scipy import ndimage
 from small_drawings import png, read, svg
@@ -157,7 +157,7 @@ def test_thinning_leaves_lines_of_one_pixel():
     ImageDraw.Draw(image).line((10, 10, 100, 60), fill=1, width=9)
     ImageDraw.Draw(image).ellipse((20, 40, 50, 70), fill=0, outline=1, width=5)
     shape = np.asarray(image)
-    line = thinned(shape)
+    line = thin_shape(shape)
     assert not (line & ~shape).any()
     assert ndimage.label(line, np.ones((3, 3)))[1] == ndimage.label(shape, np.ones((3, 3)))[1]
     assert not ndimage.binary_opening(line, np.ones((2, 2))).sum() > 4

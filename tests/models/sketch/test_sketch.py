@@ -14,7 +14,7 @@ from crossfield.models.sketch.bitmap import read_bitmap
 from crossfield.models.sketch.cover import Frame, cover_by_segments
 from crossfield.models.sketch.curves import flatten
 from crossfield.models.sketch.pen_strokes import read_scap
-from crossfield.models.sketch.read import check_memory, name_from, read_sketch
+from crossfield.models.sketch.read import check_memory, name_from_text, read_sketch
 from crossfield.models.sketch.svg import read_svg
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -362,7 +362,7 @@ def test_dust_does_not_widen_the_frame():
 def test_a_picture_finer_than_needed_gives_the_same_directions():
     large = png(drawn(525, 4).resize((4200, 4200)), compress_level=1)
     coarse, fine = read(png(drawn(525, 4)), 24, "a.png"), read(png(drawn(1050, 8)), 24, "a.png")
-    assert read_bitmap(large, 24).reduced == 2
+    assert read_bitmap(large, 24).reduction == 2
     reduced = read(large, 24, "a.png")
     for other in (fine, reduced):
         assert (coarse.mask == other.mask).mean() > 0.99
@@ -706,7 +706,7 @@ def test_no_bytes_at_all_give_anything_but_a_typed_error(data, source):
     ],
 )
 def test_names_are_made_from_file_names(text, name):
-    assert name_from(text) == name
+    assert name_from_text(text) == name
 
 
 def test_name_source_and_gauge_of_a_file(tmp_path):

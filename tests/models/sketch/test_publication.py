@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError
-from crossfield.models.sketch.published import published, redrawn
+from crossfield.models.sketch.publication import publishable_sketch, svg_of_curves
 from crossfield.models.sketch.samples import SAMPLES, sample_svg
 from crossfield.models.sketch.svg import read_svg
 from loops import for_each
@@ -22,9 +22,9 @@ TURNED = b"""<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm">
 @for_each("name", [*DRAWN, ""])
 def test_a_drawing_is_the_same_when_it_is_drawn_again(name):
     data = sample_svg(name).encode() if name else TURNED
-    first, again = read_svg(data), redrawn(read_svg(data))
+    first, again = read_svg(data), svg_of_curves(read_svg(data))
     second = read_svg(again)
-    assert redrawn(second) == again
+    assert svg_of_curves(second) == again
     assert (first.page, first.curve.tolist()) == (second.page, second.curve.tolist())
     assert first.red.tolist() == second.red.tolist()
     assert np.array_equal(first.points[:, [0, 3]], second.points[:, [0, 3]])
@@ -56,13 +56,13 @@ BLANK = Image.new("L", (3, 3), 255)
     ],
 )
 def test_the_suffix_of_a_published_file_follows_from_its_content(data, suffix, expected):
-    content, found = published(data, suffix)
+    content, found = publishable_sketch(data, suffix)
     assert found == expected
-    assert published(content, suffix) == (content, found)
+    assert publishable_sketch(content, suffix) == (content, found)
     assert (content == data) == (found != ".svg")
 
 
 def test_a_drawing_that_would_be_too_large_to_read_again_is_refused(monkeypatch):
-    monkeypatch.setattr("crossfield.models.sketch.published.MAX_DATA", 500)
+    monkeypatch.setattr("crossfield.models.sketch.publication.MAX_DATA", 500)
     with pytest.raises(InputError, match="has paths of more than 500 characters; simplify the drawing"):
-        published(TURNED, ".svg")
+        publishable_sketch(TURNED, ".svg")
