@@ -40,9 +40,8 @@ def shares(level: LevelRecord) -> Floats:
 
 
 def ends(proof: Proof) -> list[LevelRecord]:
-    """The last level of each spacing, up to the first that covers a part of the cells only."""
-    whole = next((number for number, branch in enumerate(proof.branches) if branch.pixel >= 0), None)
-    return list({level.h: level for level in proof.levels[:whole]}.values())
+    """The last level of each spacing."""
+    return list({level.h: level for level in proof.levels}.values())
 
 
 def of_boxes(boxes: Floats) -> Floats:

@@ -35,8 +35,8 @@ from crossfield.export.solvers_table import SOLVERS
 from crossfield.models.processes.limits import Limits
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.descent import MOST_LABELS
 from crossfield.models.proof.prove import prove
-from crossfield.models.proof.work import MOST_LABELS
 from crossfield.models.sketch.samples import SAMPLES, sample
 from drawings import PROVERS, SUFFIXES, Sketch, answered, drawings_of, optimum, sketches, tiny
 from make import generated, markdown

@@ -21,9 +21,9 @@ from ..processes.control import WorkerError
 from ..processes.deadline import Deadline, Over, Progress, never, silent
 from ..sketch.samples import sample
 from .certificate import write_certificate
+from .descent import Descent, Ends
 from .dual import Dual
 from .lattice import Lattice
-from .work import Work, WorkLimits
 
 
 @contextmanager
@@ -71,12 +71,12 @@ def compile_all() -> None:
         if is_all_compiled():
             return
         instance = sample("mouse", 4).with_gauge("strokes")
-        limits = WorkLimits(Deadline(), never, gap=0.0, work=math.inf)
-        with crew(1) as hands:
-            work = Work(instance, Work.first(instance, None, never), limits, hands, (0, 1), silent)
-            ended = work.run()
-            proof = work.proof(0.0, ended)
-            dual = Dual(Lattice.whole(proof.field, 2), hands)
+        ends = Ends(Deadline(), never, gap=0.0, work=math.inf)
+        with crew(1) as thread:
+            first = Descent.first_field(instance, None, never)
+            descent = Descent(instance, first, ends, thread, 0, 1, silent)
+            proof = descent.proof(0.0, descent.run())
+            dual = Dual(Lattice.whole(proof.field, 2), thread)
             dual.add_clusters(1, proof.field)
             dual.ascend(1)
         with TemporaryDirectory() as folder:

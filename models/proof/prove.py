@@ -18,13 +18,13 @@ from ..processes.process_pool import check_jobs
 from ..smooth.systems import one_thread
 from .certificate import REFUSALS, checked_proof
 from .compiling import compile_proofs
-from .prove_absolute import WorkIn1Norm, WorkInMixedNorm
+from .descent import Descent, Ends
+from .prove_absolute import DescentIn1Norm, DescentInMixedNorm
 from .record import Proof
 from .stroked import extended, restricted, stroked_parts
-from .work import Work, WorkLimits
 
-KINDS: Final[dict[Norm, type[Work]]] = {1: WorkIn1Norm, 2: Work, "mixed": WorkInMixedNorm}
-"""The work of a proof, by norm."""
+DESCENTS: Final[dict[Norm, type[Descent]]] = {1: DescentIn1Norm, 2: Descent, "mixed": DescentInMixedNorm}
+"""The descent of a proof, by norm."""
 
 
 @check_arguments
@@ -103,7 +103,7 @@ def prove(
     start = None if start is None else restricted(start, part)
     check_jobs(jobs)
     given, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
-    with catch_interrupts() as interrupted, crew(given.threads or jobs) as hands:
+    with catch_interrupts() as interrupted, crew(given.threads or jobs) as threads:
 
         def over() -> bool:
             return interrupted() or asked()
@@ -112,10 +112,10 @@ def prove(
         seconds = end.left()
         compile_proofs(progress, over)
         began = time.monotonic()
-        ends = WorkLimits(Deadline.after(seconds, end.clock), over, given.gap, work or math.inf)
-        kind = KINDS[norm]
-        proving = kind(part, kind.first(part, start, ends.over), ends, hands, (seed, jobs), progress)
-        proof = proving.proof(0.0, proving.run())
+        ends = Ends(Deadline.after(seconds, end.clock), over, given.gap, work or math.inf)
+        first = DESCENTS[norm].first_field(part, start, ends.over)
+        descent = DESCENTS[norm](part, first, ends, threads, seed, jobs, progress)
+        proof = descent.proof(0.0, descent.run())
     field = extended(proof.field, instance)
     energy = field.energy(norm).total
     proof = replace(proof, field=field, energy=energy, seconds=time.monotonic() - began)

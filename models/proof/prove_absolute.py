@@ -1,9 +1,9 @@
-"""The work of a proof where pairs count with absolute values: in the 1-norm and in the mixed norm.
+"""The descent of a proof where pairs count with absolute values: in the 1-norm and in the mixed norm.
 
-As in models/proof/work.py, on a lattice common to all pixels. Once a level's boxes leave no choice of jumps,
-a linear or quadratic program gives the energy on them, except for strokes at the edges of their windows,
-where boxes are cut. Its multipliers prove its least value. models/proof/check_certificate.py, 5, states and
-proves the lemmas.
+It is that of models/proof/descent.py, on a lattice common to all pixels. Once the boxes of a level leave no
+choice of jumps, a linear or quadratic program gives the energy on them, except for strokes at the edges of
+their windows, where boxes are cut. Its multipliers prove its least value. models/proof/check_certificate.py,
+5, states and proves the lemmas.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
 from ..search.absolute_fit import absolute_fit, alternate_absolute, fit_absolute
 from ..search.box_qp import field_at
+from .descent import COARSEST, Descent
 from .forced import MARGIN, Forced, Least, Piece, at_pairs
 from .lattice import Lattice
 from .pruning import RemainingCells
-from .work import COARSEST, Work, first_of
 
 
 class ForcedAbsolute(Forced):
@@ -79,21 +79,21 @@ def forced_absolute(left: RemainingCells, target: Floats | None = None) -> Force
     return ForcedAbsolute(left, pairs, away - QUARTER <= reach - MARGIN, target)
 
 
-class WorkAbsolute(Work):
-    """State of a proof where pairs count with absolute values."""
+class AbsoluteDescent(Descent):
+    """A descent where pairs count with absolute values."""
 
     norm: ClassVar[AbsoluteNorm]
     forced = staticmethod(forced_absolute)
 
     @classmethod
-    def first(cls, instance: Instance, given: CrossField | None, over: Over) -> CrossField:
+    def first_field(cls, instance: Instance, start: CrossField | None, over: Over) -> CrossField:
         """The better one of the 2-norm's first field and the user's field, both fitted."""
-        fields = [first_of(instance, None, over)] + ([] if given is None else [given])
-        settled = [alternate_absolute(each, cls.norm, over) for each in fields]
-        return min(settled, key=lambda field: field.energy(cls.norm).total)
+        fields = [super().first_field(instance, None, over)] + ([] if start is None else [start])
+        fitted = [alternate_absolute(field, cls.norm, over) for field in fields]
+        return min(fitted, key=lambda field: field.energy(cls.norm).total)
 
-    def level(self, centre: CrossField) -> Lattice:
-        """The first level round a field: its strokes have the slopes of the best angles for its jumps."""
+    def first_level(self, centre: CrossField) -> Lattice:
+        """The first lattice round a field: its strokes have the slopes of the best angles for its jumps."""
         instance = centre.instance
         jumps = best_jumps(instance, centre.alpha, centre.beta, absolute=True)
         around, slopes = fit_absolute(CrossField(instance, centre.alpha, centre.beta, jumps), self.norm)
@@ -107,20 +107,20 @@ class WorkAbsolute(Work):
         """The field, fitted."""
         return alternate_absolute(field, self.norm, over)
 
-    def _search(self, share: float) -> None:
+    def _search(self, seconds: float) -> None:
         """Do nothing: rounding finds better fields than the search, which is for the 2-norm."""
 
-    def _found_more(self) -> bool:
+    def _find_better_field(self) -> bool:
         return False
 
 
-class WorkIn1Norm(WorkAbsolute):
-    """State of a proof of the 1-norm."""
+class DescentIn1Norm(AbsoluteDescent):
+    """A descent in the 1-norm."""
 
     norm = 1
 
 
-class WorkInMixedNorm(WorkAbsolute):
-    """State of a proof of the mixed norm."""
+class DescentInMixedNorm(AbsoluteDescent):
+    """A descent in the mixed norm."""
 
     norm = "mixed"

@@ -56,12 +56,7 @@ class RemainingCells:
 
 def boxed(lattice: Lattice, cells: Bools) -> RemainingCells:
     """Cells that are left on a lattice, with the boxes round them."""
-    return boxed_between(lattice, cells, _ends(lattice, cells))
-
-
-def boxed_between(lattice: Lattice, cells: Bools, steps: Ints) -> RemainingCells:
-    """Cells that are left on a lattice, with other boxes. steps (n, 4): least and greatest k, then l."""
-    at = lattice.h * (steps + lattice.offset[:, None])
+    at = lattice.h * (_ends(lattice, cells) + lattice.offset[:, None])
     return RemainingCells(
         lattice, cells,
         lattice.alpha + at[:, 0], lattice.alpha + at[:, 1],
@@ -129,12 +124,7 @@ def _ends(lattice: Lattice, cells: Bools) -> Ints:
     """Least and greatest k, then l, of the vertices of each pixel's cells, shape (n, 4)."""
     ends = np.zeros((len(lattice.count), 4), np.int32)
     _bounds(rectangles(lattice), cells, ends)
-    return ends + first_steps(lattice)
-
-
-def first_steps(lattice: Lattice) -> Ints:
-    """First k of each pixel twice, then its first l twice, shape (n, 4)."""
-    return np.stack([lattice.alpha_first] * 2 + [lattice.beta_first] * 2, axis=1)
+    return ends + np.stack([lattice.alpha_first] * 2 + [lattice.beta_first] * 2, axis=1)
 
 
 class Rectangles(NamedTuple):

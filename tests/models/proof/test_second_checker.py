@@ -13,7 +13,6 @@ import second_checker
 from allowed_labels import with_allowed
 from crossfield.models.field.field import CrossField
 from crossfield.models.processes.limits import Limits
-from crossfield.models.proof import work
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.tightening import windows_left
@@ -120,17 +119,6 @@ def test_samples_are_confirmed(name, size, tmp_path):
 def test_a_field_with_a_vortex_is_confirmed(tmp_path):
     field = confirmed(sample("cylinder_bend", size=16), tmp_path / "it.npz")
     assert len(field.singularities.row) == 1
-
-
-@pytest.mark.slow
-def test_a_proof_in_parts_is_confirmed(tmp_path, monkeypatch):
-    """Cells are cut early, and no time limit makes the parts differ between machines."""
-    monkeypatch.setattr(work, "_CLOSED", 0.0)
-    path, proof = tmp_path / "it.npz", prove(sample("ring", size=12), jobs=1)
-    written = write_certificate(proof, path)
-    assert (arrays_of(path)["branches"][:, 1] >= 0).any()
-    assert written.status == "optimal"
-    assert written.bound <= check(arrays_of(path)) <= written.energy
 
 
 def with_head(arrays, **changes):

@@ -3,7 +3,7 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.proof.work import first_of
+from crossfield.models.proof.descent import Descent
 from crossfield.models.search import starts
 from crossfield.models.search.coarse import grow_field, halve_resolution, prolong_field
 from crossfield.models.search.greedy import greedy_field
@@ -57,7 +57,7 @@ def test_proofs_and_searches_begin_at_most_at_the_polyvector_start():
     instance = cf.sample("mouse", 16)
     polyvector = improved_field(polyvector_start(instance)).energy().total
     assert polyvector < first_field(instance).energy().total - 1e-3
-    assert first_of(instance, None, lambda: False).energy().total <= polyvector + 1e-9
+    assert Descent.first_field(instance, None, lambda: False).energy().total <= polyvector + 1e-9
     assert cf.search(instance, rounds=0).field.energy().total <= polyvector + 1e-9
 
 

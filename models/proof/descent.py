@@ -1,0 +1,387 @@
+"""The descent of a proof: lattice after lattice, until no better field is left round the best one.
+
+Each refinement level has half the spacing of the one before, or the same spacing with fewer labels. On a
+level the dual rises by passes (models/proof/dual.py), fields are rounded from it (rounding.py), and cells
+that cannot hold a better field are dropped (pruning.py), until the jumps are forced and a convex problem is
+left (forced.py). A better field that is found on a coarse lattice becomes the centre: the levels begin anew
+round it. On a finer lattice little is lost where the centre is another field.
+
+The labels of a level are those that the gap of the level before leaves. While passes close that gap, most of
+them can be dropped, and the work of a pass falls faster than the gap. A record of the level justifies that.
+
+Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
+lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second
+level if the best field has a vortex, and on every level where the gap shrinks slowly.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Final
+
+import numpy as np
+
+from ..field.field import CrossField, Norm, field_in_windows
+from ..field.jumps import free_jumps
+from ..instance.angles import QUARTER
+from ..instance.grid import Floats
+from ..instance.instance import Instance
+from ..processes.compiled import Crew
+from ..processes.deadline import Deadline, Over, Progress, never
+from ..processes.limits import Limits
+from ..search.improvement import improved_field
+from ..search.search import search
+from ..search.starts import best_start, polyvector_start
+from .check_certificate import MOST_COUNT
+from .clusters import table_sizes
+from .dual import Dual
+from .forced import forced
+from .lattice import Lattice, labels_at
+from .pruning import RemainingCells, finer, narrowed
+from .record import EXACT, LevelRecord, Proof
+from .rounding import Rounding, improve
+
+# Levels
+COARSEST: Final = 16  # steps in pi/2 of the first level: with fewer it drops nothing
+_FINEST: Final = 2**16  # steps in pi/2 of the last one: spacings of 2e-5 rad are as fine as certificates need
+MOST_LABELS: Final = 50_000_000  # labels of a level, some 100 bytes each
+_TABLES: Final = 4  # numbers of tables that take as much memory as a label
+_DECIMALS: Final = 7  # digits of centres in rad: their last digits differ between processors
+_SETTLED: Final = 4  # spacings after which another centre costs more than it helps
+_NEAR: Final = 0.75  # share of pi/4 from the centre to an alpha near both ends of the labels
+
+# Passes
+_PASSES: Final = 3  # passes forwards and backwards between two roundings: a rounding takes as long as one
+_MOST_ROUNDS: Final = 40  # roundings of a level
+_SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on: a finer one closes more
+_SLOWEST: Final = 0.005  # the same where the finer level would be too large
+_FEW: Final = 600_000  # labels of which passes take less time than one more level of the certificate
+_FEWER: Final = 0.5  # share of more labels that are left, at which passes go on over these only
+_RECORD: Final = 11  # passes that take as long as a record, with combs and two passes before it
+
+# Clusters
+_CLUSTERS: Final = 0.08  # share of quads that become clusters, later half of it: a vortex needs some 20
+_STALLED: Final = 0.25  # share of the gap, left by half the spacing, above which there are more
+
+# Fields
+_BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
+_WIDE: Final = 0.01  # relative gap of the first level above which a poor field may cause it: a search follows
+_SEARCH: Final = 0.05  # share of the time left for a search between levels
+_ROUNDS: Final = 5  # rounds of a search without a limit of time
+
+_ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which shares are rounded when it first is smaller
+
+
+@dataclass
+class Ends:
+    """When to end: a deadline, a request to stop, a sufficient gap, enough work.
+
+    work: greatest number of labels; labels: those so far.
+    """
+
+    deadline: Deadline
+    stop: Over
+    gap: float
+    work: float
+    labels: int = 0
+
+    def reason(self) -> str:
+        """The limit that is met; empty when none is."""
+        if self.stop():
+            return "interrupted"
+        if self.labels > self.work:
+            return "work"
+        return "time" if self.deadline.passed() else ""
+
+    def over(self, ahead: float = 0.0) -> bool:
+        """Whether work has to end now, or within `ahead` seconds."""
+        return bool(self.reason()) or self.deadline.left() <= ahead
+
+
+@dataclass
+class _Chain:
+    """The levels round one centre, and what they prove together.
+
+    convex: bound of the convex problem on the boxes that the last levels leave.
+    """
+
+    levels: list[LevelRecord] = field(default_factory=list)
+    convex: float = -math.inf
+    forced: int = 0
+    multipliers: Floats | None = None
+    cuts: tuple[int, ...] = (-1,)
+
+    @property
+    def bound(self) -> float:
+        """The bound that all levels prove together."""
+        return max([0.0, self.convex, *(level.bound for level in self.levels)])
+
+    @property
+    def last_of_spacings(self) -> list[LevelRecord]:
+        """The last level of each spacing."""
+        return list({level.h: level for level in self.levels}.values())
+
+
+@dataclass
+class Descent:
+    """A descent in the 2-norm, and its state: the best field, and the chain of levels that proves most.
+
+    searched: seconds of the last search between levels.
+    """
+
+    norm: ClassVar[Norm] = 2
+    improve = staticmethod(improve)
+    forced = staticmethod(forced)
+
+    instance: Instance
+    best: CrossField
+    ends: Ends
+    crew: Crew
+    seed: int
+    jobs: int
+    progress: Progress
+    chain: _Chain = field(default_factory=_Chain)
+    proven: _Chain = field(default_factory=_Chain)
+    searches: int = 0
+    searched: float = 0.0
+    began: float = 0.0
+
+    @classmethod
+    def first_field(cls, instance: Instance, start: CrossField | None, over: Over) -> CrossField:
+        """The best of the first field, the user's field and, in time, the PolyVector start, each improved."""
+        return best_start(instance, start, over, polyvector_start)
+
+    def improved(self, field: CrossField, over: Over = never) -> CrossField:
+        """The field, with jumps and angles improved."""
+        return improved_field(field, stop=over)
+
+    def first_level(self, centre: CrossField) -> Lattice:
+        """The lattice of the first level round a field."""
+        return Lattice.whole(centre, COARSEST)
+
+    def energy(self, field: CrossField) -> float:
+        """The energy that the proof is of."""
+        return field.energy(self.norm).total
+
+    @property
+    def gap(self) -> float:
+        """The difference between the least energy and the bound of the present chain."""
+        return self.energy(self.best) - self.chain.bound
+
+    def proof(self, seconds: float, ended: str) -> Proof:
+        """The proof so far, with the levels that prove it; not checked."""
+        bound, energy = min(self.proven.bound, self.energy(self.best)), self.energy(self.best)
+        return Proof(
+            self.best, energy, bound, self.proven.forced, tuple(self.proven.levels), seconds, ended,
+            self.norm, self.proven.multipliers, self.proven.cuts,
+        )  # fmt: skip
+
+    def run(self) -> str:
+        """Go through chains of levels until a limit is met or nothing helps; return the reason."""
+        ended = self._go_through_levels()
+        while not ended or (ended == "labels" and self._find_better_field()):
+            ended = self._go_through_levels()
+        return self.ends.reason() or ended
+
+    def _go_through_levels(self) -> str:
+        """Go through the levels round the best field; the reason of the end, empty for a better field."""
+        if reason := self.ends.reason():
+            return reason
+        self.chain, self.began, centre = _Chain(), time.monotonic(), self.best
+        dual = Dual(self.first_level(_rounded(centre)), self.crew)
+        patient = False  # whether a finer lattice was too large, so that this one has the same spacing
+        while True:
+            self._add_clusters(dual)
+            rising = self._raise_bound(dual, patient=patient)
+            left = self._record_level(dual)
+            if (reason := self._reason_to_end()) or left is None:
+                return reason or "time"
+            lattice = narrowed(left) if rising and not patient else finer(left)
+            self._search_between_levels(lattice)
+            better = self.energy(self.best) < self.energy(centre) * (1 - _BETTER)
+            if better and (len(self.chain.last_of_spacings) <= _SETTLED or _is_at_seam(self.best, lattice)):
+                return self.ends.reason()
+            if _is_too_large(dual, lattice) or not self._has_time_for(dual, lattice):
+                if patient and not rising:
+                    return self.ends.reason() if better else "labels"
+                if self._is_closing(dual):
+                    return self.ends.reason() or "time"
+                lattice = narrowed(left)
+            patient = lattice.h == dual.lattice.h and (patient or not rising)
+            dual.move(lattice)
+
+    def _raise_bound(self, dual: Dual, *, patient: bool) -> bool:
+        """Raise the dual of a level, and round fields from it, until the bound rises slowly.
+
+        Returns whether it does not, but the gap has become so small that passes over fewer labels are worth a
+        record. patient: whether to go on while the bound rises at all, because no finer lattice may follow.
+        """
+        rounding, reached, rises = Rounding(dual, self.improve), -math.inf, [math.inf] * 2
+        for _ in range(_MOST_ROUNDS):
+            bound = dual.ascend(_PASSES, self.ends.over, lambda: self._is_closing(dual))
+            self.best = rounding.lower(self.best, lambda: self._is_closing(dual))
+            energy = self.energy(self.best)
+            self._report(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
+            rises = [rises[1], (bound - reached) / max(energy - bound, 1e-300)]
+            slow = _SLOWEST if patient else self._slow_rise(dual, bound)
+            if self._is_closing(dual) or self._is_exact(bound) or (max(rises) <= slow and bound >= reached):
+                break
+            if self._has_few_left(dual, bound):
+                return True
+            reached = bound
+        return False
+
+    def _slow_rise(self, dual: Dual, bound: float) -> float:
+        """The share of the gap below which a rise is slow: passes pay if the next level has many labels."""
+        left = dual.count_left(bound, self.energy(self.best))
+        growth = 4 * left / int(dual.lattice.allowed.sum())  # four labels at half the spacing for each one
+        return _SLOW / max(1.0, growth) ** 2
+
+    def _has_few_left(self, dual: Dual, bound: float) -> bool:
+        """Whether passes over the labels that are left are worth a record of the level."""
+        labels = dual.lattice.allowed.sum()
+        if labels <= _FEW or dual.count_left(bound, self.energy(self.best)) > _FEWER * labels:
+            return False
+        return self._has_time_for(dual, dual.lattice)
+
+    def _record_level(self, dual: Dual) -> RemainingCells | None:
+        """Record the level and, in time, prune it; return the cells that are left, None if there are none."""
+        chain, energy = self.chain, self.energy(self.best)
+        rough, left = _ROUGH * (1 + energy), None
+        level = LevelRecord.of(dual, energy, rough if self.gap > rough else 0.0)
+        if level.bound > chain.bound or not self.ends.over():
+            chain.levels.append(level)
+        if not self.ends.over():
+            left = dual.remaining_cells(level.bound, energy)
+            if left.nothing:
+                chain.convex, left = energy, None
+            else:
+                self._solve_if_forced(left)
+        if chain.bound >= self.proven.bound:
+            self.proven = chain
+        return left
+
+    def _solve_if_forced(self, left: RemainingCells) -> None:
+        """Count the jumps that are forced, and if all choices are, solve the convex problem that is left."""
+        chain, (_, _, jumps) = self.chain, labels_at(self.best, left.lattice)
+        choices = self.forced(replace(left, lattice=replace(left.lattice, p=jumps)))
+        chain.forced = int(choices.pairs.sum())
+        if choices.everything:
+            energy = self.energy(self.best)
+            solution, bound, chain.multipliers, chain.cuts = choices.least(energy, self.ends.over)
+            chain.convex = max(chain.convex, min(bound, chain.levels[-1].energy))
+            if bound < energy:
+                better = field_in_windows(self.instance, solution.alpha, solution.beta, solution.p)
+                self._offer(self.improved(better, self.ends.over))
+
+    def _add_clusters(self, dual: Dual) -> None:
+        """Add clusters at the beginning of a spacing, if vortices cause the gap."""
+        if self._needs_clusters(dual.lattice):
+            dual.ascend(_PASSES, self.ends.over, lambda: self._is_closing(dual))
+            share = _CLUSTERS / 2 if len(dual.quads) else _CLUSTERS
+            dual.add_clusters(math.ceil(share * len(self.instance.grid.quads)), self.best)
+
+    def _needs_clusters(self, lattice: Lattice) -> bool:
+        """Whether quads should become clusters on a lattice, which is the next one."""
+        if not self.chain.levels or self.chain.levels[-1].h == lattice.h:
+            return False
+        gaps = [self.energy(self.best) - level.bound for level in self.chain.last_of_spacings[-2:]]
+        vortex = len(gaps) == 1 and len(self.best.singularities.index) > 0
+        stalled = len(gaps) == 2 and gaps[1] > _STALLED * gaps[0]
+        return vortex or stalled
+
+    def _search_between_levels(self, lattice: Lattice) -> None:
+        """Search for a better field after a first level with a wide gap, and before a level that takes long.
+
+        A search that would not be twice as long as the last one is left out.
+        """
+        began, left = time.monotonic(), self.ends.deadline.left()
+        wide = self.searches == 0 and self.gap > _WIDE * self.energy(self.best)
+        late = lattice.start[-1] > _FEW or len(self.chain.last_of_spacings) == _SETTLED
+        if not wide and not (late and self.searches <= 2):
+            return
+        seconds = min(_SEARCH * left, began - self.began)
+        if math.isinf(left) or seconds >= 2 * self.searched:
+            self._search(seconds)
+            self.searched = time.monotonic() - began
+
+    def _find_better_field(self) -> bool:
+        """Whether a search finds a better field, with as much time left as the last chain took."""
+        before, spent = self.energy(self.best), time.monotonic() - self.began
+        while not self.ends.over():
+            left = self.ends.deadline.left()
+            self._search(left / 2 if left > 2 * spent else left)
+            if math.isinf(left) or self.ends.deadline.left() > spent:
+                better = self.energy(self.best) < before * (1 - _BETTER)
+                if better or math.isinf(left):
+                    return better
+        return False
+
+    def _search(self, seconds: float) -> None:
+        """Search for a better field from the best one; without a limit of time, for some rounds."""
+        if self.ends.over():
+            return
+        timed = math.isfinite(self.ends.deadline.left())
+        result = search(
+            self.instance,
+            limits=Limits().until(self.ends.deadline.within(seconds)) if timed else None,
+            rounds=None if timed else _ROUNDS,
+            seed=self.seed + self.searches,
+            jobs=self.jobs,
+            start=self.best,
+            progress=lambda line: self.progress(f"search: {line}"),
+            stop=self.ends.stop,
+        )
+        self.searches += 1
+        self._offer(result.field)
+
+    def _offer(self, field: CrossField) -> None:
+        self.best = min(self.best, field, key=self.energy)
+
+    def _has_time_for(self, dual: Dual, lattice: Lattice) -> bool:
+        """Whether there is time for a level on the next lattice: its record, and passes that take as long."""
+        one, tables = dual.seconds_on(lattice)
+        return not self.ends.over(_RECORD * (2 * one + tables))
+
+    def _is_closing(self, dual: Dual) -> bool:
+        """Whether only the time to record the level is left."""
+        one, tables = dual.seconds_on(dual.lattice)
+        return self.ends.over(_RECORD * one + 2 * tables)
+
+    def _reason_to_end(self) -> str:
+        """The reason why the work ends; empty if it goes on."""
+        energy, bound = self.energy(self.best), self.proven.bound
+        if self._is_exact(bound):
+            return "optimal"
+        return "gap" if energy - bound <= self.ends.gap * energy else self.ends.reason()
+
+    def _is_exact(self, bound: float) -> bool:
+        energy = self.energy(self.best)
+        return energy - bound <= EXACT * (1 + energy)
+
+    def _report(self, bound: float, labels: int) -> None:
+        """Report bound, least energy and remaining labels, and count the labels as work."""
+        self.ends.labels += labels
+        self.progress(f"energy {self.energy(self.best):.5g}, bound {bound:.5g}, {labels} labels")
+
+
+def _is_too_large(dual: Dual, lattice: Lattice) -> bool:
+    """Whether the next level of a dual is beyond what memory, checker or digits of an angle allow."""
+    tables = int(table_sizes(lattice, dual.quads).sum())
+    many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
+    many = many or max(lattice.alpha_count.max(), lattice.beta_count.max()) > MOST_COUNT
+    return many or lattice.h < np.pi / 2 / _FINEST
+
+
+def _is_at_seam(field: CrossField, lattice: Lattice) -> bool:
+    """Whether a cross of the field is near both ends of the labels, where no box is small."""
+    return bool(np.abs(labels_at(field, lattice)[0] - lattice.alpha).max() > _NEAR * QUARTER)
+
+
+def _rounded(field: CrossField) -> CrossField:
+    """The crosses of a field in the gauge `strokes`, with few digits and the best jump of each pair."""
+    instance = field.instance.with_gauge("strokes")
+    alpha, beta = (np.round(angle, _DECIMALS) for angle in (field.alpha, field.beta))
+    return field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
