@@ -8,7 +8,7 @@ refuse every text whose meaning is in doubt.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -30,7 +30,6 @@ expression: [PLUS] term ((PLUS | MINUS) term)* | MINUS lead ((PLUS | MINUS) term
 term: factor (TIMES factor)*
 ?factor: power
 names: NAME ("," NAME)*
-signed: [PLUS | MINUS] NUMBER
 PLUS: "+"
 MINUS: "-"
 TIMES: "*" | "/"
@@ -81,10 +80,6 @@ class Arithmetic(Transformer):
             max(term.degree for _, term in terms),
             frozenset().union(*(term.names for _, term in terms)),
         )
-
-    def signed(self, items: list[Any]) -> float:
-        sign, number = items
-        return -float(number) if sign == "-" else float(number)
 
     def names(self, items: list[Token]) -> list[str]:
         return [str(name) for name in items]
@@ -175,17 +170,9 @@ def parsed(parser: Lark, transformer: Arithmetic, text: str) -> Any:
         raise
 
 
-def difference(model: Model, problem: Problem, start: Floats | None = None, *, one: str = "") -> str:
-    """The first difference between a model and a problem; empty if there is none.
-
-    one: the column that is fixed to 1, if the format has it.
-    """
+def difference(model: Model, problem: Problem, start: Floats | None = None) -> str:
+    """The first difference between a model and a problem; empty if there is none."""
     columns = names_of(column_names(problem))
-    if one:
-        expected = Column("continuous", 1.0, 1.0, None if start is None else 1.0)
-        if model.columns.get(one) != expected:
-            return f"{one} is {model.columns.get(one)} instead of {expected}"
-        model = replace(model, columns={name: held for name, held in model.columns.items() if name != one})
     rows = names_of(row_names(problem)) if problem.rows else []
     for what, found, expected in (("column", model.columns, columns), ("row", model.rows, rows)):
         for name in sorted(set(found) ^ set(expected)):
@@ -202,7 +189,7 @@ def difference(model: Model, problem: Problem, start: Floats | None = None, *, o
             if value != right:
                 return f"{what} of {name} is {value} instead of {right}"
     points = points_of(problem, 4)
-    values = dict(zip(columns, points.T, strict=True)) | ({one: np.ones(len(points))} if one else {})
+    values = dict(zip(columns, points.T, strict=True))
     objective = [problem.objective_value(point) for point in points]
     return _value_difference("objective", model.objective.value(values), objective) or _row_difference(
         model, problem, points, values

@@ -1,7 +1,7 @@
 """A reader of scalar GAMS models, after the GAMS User's Guide.
 
-It knows scalar variables and equations, options, definitions, assignments to attributes, one model, one solve
-and `put`; the dollar control options `$offListing` and `$ifThen set`; and nothing else.
+It knows scalar variables and equations, options, definitions, assignments to attributes, one model and one
+solve; the dollar control options `$offListing` and `$ifThen set`; and nothing else.
 """
 
 from __future__ import annotations
@@ -23,13 +23,8 @@ start: (statement ";")*
   | NAME "." NAME "=" (expression | infinite) -> assignment
   | MODEL NAME "/" ALL "/" -> model
   | SOLVE NAME USING NAME MINIMIZING NAME -> solve
-  | FILE NAME "/" QUOTED "/" -> file
-  | PUT NAME -> select
-  | PUT item+ -> put
-  | PUTCLOSE NAME -> close
 setting: NAME "=" (NUMBER | NAME)
 infinite: [PLUS | MINUS] INF
-?item: QUOTED -> text | NAME "." NAME (":" NUMBER)* -> attribute | "/" -> end_of_line
 ?lead: term
 ?power: atom ("**" atom)*
 ?atom: NUMBER -> number | NAME -> symbol | "(" expression ")"
@@ -43,29 +38,10 @@ ALL.2: /all\b/i
 SOLVE.2: /solve\b/i
 USING.2: /using\b/i
 MINIMIZING.2: /minimizing\b/i
-FILE.2: /files?\b/i
-PUT.2: /put\b/i
-PUTCLOSE.2: /putclose\b/i
 INF.2: /inf\b/i
 RELATION: /=[gle]=/i
-QUOTED: /'[^'\n]*'|"[^"\n]*"/
 NAME: /[a-z][a-z0-9_]*/i
 """
-
-LONGEST_NAME = 63
-LONGEST_LINE = 80_000
-_RESERVED = """
-abort acronym acronyms alias all and assign binary break card continue diag display do else elseif
-endfor endif endloop endwhile eps eq equation equations execute execute_load execute_unload file files
-for free function functions ge gt if imp inf integer le loop lt maximizing minimizing model models na ne
-negative no nonnegative not option options or ord parameter parameters positive prod put putclear
-putclose puthd putpage puttitle puttl repeat sameas sand scalar scalars semicont semiint set sets
-singleton smax smin solve sor sos1 sos2 sum system table tables then undf until using variable variables
-while xor yes abs arctan ceil cos errorf exp floor log log10 log2 max min mod normal pi power round sign
-sin sqr sqrt tan trunc uniform
-"""
-RESERVED = frozenset(_RESERVED.split())
-"""Words that name no symbol of a user: those of the language, and its functions."""
 
 BOUNDS = {
     None: ("continuous", -np.inf, np.inf),
@@ -92,17 +68,15 @@ TYPES = {
 
 @dataclass
 class GamsModel(Model):
-    """A model with its type, its options, and the lines that a results file would have.
+    """A model with its type and its options.
 
-    start: the level of the objective variable. unstated: bounds that are the defaults of GAMS. In the lines,
-    values are `<symbol.attribute>` with the format at that point.
+    start: the level of the objective variable. unstated: bounds that are the defaults of GAMS.
     """
 
     type: str = ""
     start: float | None = None
     unstated: set[str] = field(default_factory=set)
     options: dict[str, str] = field(default_factory=dict)
-    results: list[str] = field(default_factory=list)
 
 
 class _Statements(Arithmetic):
@@ -135,15 +109,6 @@ class _Statements(Arithmetic):
     def setting(self, items: list[Token]) -> tuple[str, str]:
         return items[0].lower(), str(items[1])
 
-    def text(self, items: list[Token]) -> str:
-        return items[0][1:-1]
-
-    def attribute(self, items: list[Token]) -> tuple[str, ...]:
-        return tuple(str(item).lower() for item in items)
-
-    def end_of_line(self, _: list[Any]) -> str:
-        return "\n"
-
     def __default__(self, data: str, children: list[Any], meta: Any) -> Any:
         return list(children) if data == "start" else (str(data), children)
 
@@ -166,33 +131,25 @@ def _parser() -> Lark:
     return Lark(GRAMMAR + ARITHMETIC, parser="lalr")
 
 
-def read(text: str, **defined: str) -> GamsModel:
-    """The model that a text hands to the solver; `defined` as by `--NAME=value` on the command line."""
-    return _Reader().run(parsed(_parser(), _Statements(), _without_controls(text, defined)))
+def read(text: str) -> GamsModel:
+    """The model that a text hands to the solver."""
+    return _Reader().run(parsed(_parser(), _Statements(), _without_controls(text)))
 
 
-def _without_controls(text: str, defined: dict[str, str]) -> str:
-    """The statements without comments; lines that a dollar control option leaves out are empty."""
-    lines, taken = [], [True]
+def _without_controls(text: str) -> str:
+    """The statements without comments; lines between `$ifThen set` and `$endIf` are empty: nothing is set."""
+    lines, taken = [], True
     for number, line in enumerate(text.splitlines(), 1):
-        if len(line) > LONGEST_LINE:
-            raise WrongTextError(f"line {number} has {len(line)} characters")
-        words = line.lower().split()
-        if line.startswith("$"):
-            match words:
-                case ["$offlisting"]:
-                    pass
-                case ["$ifthen", "set", name]:
-                    taken.append(name.upper() in defined)
-                case ["$endif"] if len(taken) > 1:
-                    taken.pop()
-                case _:
-                    raise WrongTextError(f"line {number}: {line}")
-        for name, value in defined.items():
-            line = line.replace(f"%{name}%", value)  # noqa: PLW2901
-        lines.append(line if all(taken) and not line.startswith(("*", "$")) else "")
-    if len(taken) > 1:
-        raise WrongTextError("$ifThen without $endIf")
+        match line.lower().split():
+            case ["$ifthen", "set", _] if taken:
+                taken = False
+            case ["$endif"] if not taken:
+                taken = True
+            case ["$offlisting"]:
+                pass
+            case _ if line.startswith("$"):
+                raise WrongTextError(f"line {number}: {line}")
+        lines.append(line if taken and not line.startswith(("*", "$")) else "")
     return "\n".join(lines)
 
 
@@ -203,9 +160,6 @@ class _Reader:
         self.model = GamsModel()
         self.symbols: dict[str, str] = {}
         self.undefined: set[str] = set()
-        self.formats: dict[str, str] = {}
-        self.line = ""
-        self.stream = ""
         self.solved: GamsModel | None = None
 
     def run(self, statements: list[tuple[str, list[Any]]]) -> GamsModel:
@@ -213,16 +167,12 @@ class _Reader:
             getattr(self, f"_{name}")(*parts)
         if self.solved is None:
             raise WrongTextError("nothing is solved")
-        if self.stream:
-            raise WrongTextError(f"{self.stream} is not closed")
         return self.solved
 
     def _declare(self, names: list[str], kind: str) -> list[str]:
         for name in map(str.lower, names):
             if name in self.symbols:
                 raise WrongTextError(f"{name} is declared twice")
-            if name in RESERVED or len(name) > LONGEST_NAME:
-                raise WrongTextError(f"{name} cannot be a name")
             self.symbols[name] = kind
         return list(map(str.lower, names))
 
@@ -254,9 +204,6 @@ class _Reader:
 
     def _assignment(self, name: str, attribute: str, value: Expression | float) -> None:
         number = value.constant if isinstance(value, Expression) else value
-        if self.symbols.get(name.lower()) == "file":
-            self.formats[attribute.lower()] = f"{number:g}"
-            return
         column = self.model.columns[self._expect(name, "variable")]
         if self.solved is not None:
             raise WrongTextError(f"{name}.{attribute} changes after the model is solved")
@@ -301,30 +248,3 @@ class _Reader:
             raise WrongTextError(f"the model is not of the type {kind}")
         self.model.start = goal.level
         self.solved = self.model
-
-    def _file(self, _: Token, name: str, __: str) -> None:
-        self._declare([name], "file")
-
-    def _select(self, _: Token, name: str) -> None:
-        self.stream = self._expect(name, "file")
-
-    def _put(self, _: Token, *items: Any) -> None:
-        if not self.stream:
-            raise WrongTextError("put without a file")
-        for item in items:
-            if item == "\n":
-                self.model.results.append(self.line)
-                self.line = ""
-            elif isinstance(item, str):
-                self.line += item
-            else:
-                name, attribute, *digits = item
-                if name not in self.symbols:
-                    raise WrongTextError(f"{name} is not declared")
-                formats = "".join(f" {key}={value}" for key, value in sorted(self.formats.items()))
-                self.line += f"<{name}.{attribute}{':'.join(['', *digits])}{formats}>"
-
-    def _close(self, _: Token, name: str) -> None:
-        if self.stream != self._expect(name, "file"):
-            raise WrongTextError(f"{name} is not open")
-        self.stream = ""

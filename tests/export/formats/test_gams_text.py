@@ -1,6 +1,6 @@
-"""GAMS and BARON files against their problems, through readers of the tests that follow the manuals.
+"""GAMS files against their problems, through a reader of the tests that follows the manual.
 
-GAMS and BARON need licences that end; these tests need none.
+GAMS needs a licence that ends; these tests need none.
 """
 
 from __future__ import annotations
@@ -9,25 +9,21 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import baron_reader
 import gams_reader
 import numpy as np
 import pytest
 from algebraic import difference
-from cases import CASES, make_field, make_instance, make_problem, names_of, problem_of
+from cases import CASES, make_field, make_instance, make_problem, problem_of
 from crossfield.export.formats.gams import MODEL_TYPES
 from crossfield.export.formats.registry import write
-from crossfield.export.writing.canonical import Canonical
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem, with_integers_fixed, with_windows
 from crossfield.models.formulations.windows import Windows
 from crossfield.models.instance.angles import QUARTER
 from crossfield.models.instance.instance import Instance
 from loops import for_each
 
-READERS = {"gms": gams_reader.read, "bar": baron_reader.read}
 OPTIONS = {"facet": ("hull", "printed"), "stroke_norm": (1, 2), "beta_norm": (1, 2), "relax": (False, True)}
 CHANGES = ("", "jumps fixed", "windows narrowed")
 STARTS = (False, True)
@@ -80,26 +76,15 @@ def narrow_windows(field: CrossField) -> Windows:
     return Windows(*bounds, np.maximum(field.p - 1, instance.p_min), field.p, 1.0, "none")
 
 
-def one_of(problem: Problem, suffix: str) -> str:
-    """The column that is fixed to 1, which .bar has and GAMS has not."""
-    return Canonical(problem).one.decode() if suffix == "bar" else ""
-
-
 def assert_text(problem: Problem, folder: Path, start: CrossField | None = None) -> None:
-    """Write the formats that hold the problem, and compare what they say with it."""
-    degree = max(problem.objective_degree, problem.row_degree)
+    """Write the file, and compare what it says with the problem."""
     point = None if start is None else problem.point(start)
-    for suffix, read in READERS.items():
-        if suffix == "bar" and degree > 4:
-            continue
-        path = folder / f"model.{suffix}"
-        write(problem, path, start=start)
-        model = read(path.read_text("ascii"))
-        assert difference(model, problem, point, one=one_of(problem, suffix)) == "", suffix
-        if suffix == "gms":
-            assert model.type == MODEL_TYPES[problem.problem_class]
-            assert model.unstated == set()
-            assert model.start == (None if point is None else problem.objective_value(point))
+    write(problem, folder / "model.gms", start=start)
+    model = gams_reader.read((folder / "model.gms").read_text("ascii"))
+    assert difference(model, problem, point) == ""
+    assert model.type == MODEL_TYPES[problem.problem_class]
+    assert model.unstated == set()
+    assert model.start == (None if point is None else problem.objective_value(point))
 
 
 @for_each("number", range(len(combinations())))
@@ -151,19 +136,3 @@ def test_options_of_gams_ask_for_an_optimum_and_a_short_listing(tmp_path: Path):
     gaps = {name: float(options.pop(name)) for name in ("optca", "optcr")}
     assert gaps == {"optca": 0.0, "optcr": 1e-6}
     assert options == {"limrow": "0", "limcol": "0", "solprint": "off", "sysout": "off"}
-
-
-def test_results_of_gams_are_columns_in_order(tmp_path: Path):
-    """The lines of the file that `--RESULTS` names, with 15 decimals in E format."""
-    problem = make_problem("milp-mccormick", corner())
-    write(problem, tmp_path / "model.gms")
-    text = (tmp_path / "model.gms").read_text("ascii")
-    digits = " nd=15 nr=2 nw=24"
-    assert gams_reader.read(text).results == []
-    assert gams_reader.read(text, RESULTS="values.csv").results == [
-        "model_status,<m.modelstat:0:0>",
-        "solver_status,<m.solvestat:0:0>",
-        f"problem,{problem.stamp}",
-        f"objective,<objvar.l:0{digits}>",
-        *(f"{name},<{name}.l:0{digits}>" for name in names_of(column_names(problem))),
-    ]
