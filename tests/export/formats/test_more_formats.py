@@ -2,8 +2,7 @@
 
 .mod, .dat: GLPK reads the linear ones. Of the others it evaluates every expression once variables are
 parameters: its MathProg is a second implementation of the language, and AMPL itself cannot be had for free.
-.osil: SCIP. .qplib: pyqplib, where it is installed, and a reader after
-qplib.zib.de/doc.html. .bar: BARON itself in its free size.
+.osil: SCIP. .qplib: pyqplib. .bar: BARON itself in its free size.
 """
 
 from __future__ import annotations
