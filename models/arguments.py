@@ -58,8 +58,8 @@ def check_arguments(function: Callable[_P, _Result]) -> Callable[_P, _Result]:
 
 def check_fields(item: Any, error: _ErrorClass = InputError) -> None:
     """Raise the error for a field of a dataclass that is of another kind than its annotation names."""
-    for each in fields(item):
-        check_kind(each.name, getattr(item, each.name), str(each.type), error)
+    for field_ in fields(item):
+        check_kind(field_.name, getattr(item, field_.name), str(field_.type), error)
 
 
 def check_kind(name: str, value: Any, annotation: str, error: _ErrorClass = InputError) -> None:
@@ -105,7 +105,7 @@ def _kind(annotation: str) -> tuple[str, Callable[[Any], bool]]:
     if annotation in _CLASSES:
         return _with_article(
             annotation
-        ), lambda value: annotation in {each.__name__ for each in type(value).mro()}
+        ), lambda value: annotation in {base.__name__ for base in type(value).mro()}
     outer, _, inner = annotation.removesuffix("]").partition("[")
     if outer in {"dict", "Mapping"}:
         return "a dictionary", lambda value: isinstance(value, Mapping)

@@ -140,10 +140,10 @@ def _damage_error(reason: object) -> InstanceError:
 
 def _parse_header(head: bytes, name: str, expected: ExpectedArray) -> tuple[np.dtype[Any], tuple[int, ...]]:
     """The kind and shape in the header of an array. Raises InstanceError unless they are expected."""
-    found = _ARRAY.fullmatch(head)
-    if found is None:
+    header = _ARRAY.fullmatch(head)
+    if header is None:
         raise _damage_error(f"array {name!r} has no header as NumPy writes it")
-    kind, by_columns, sides = found[1].decode(), found[2] == b"True", found[3].decode()
+    kind, by_columns, sides = header[1].decode(), header[2] == b"True", header[3].decode()
     if "O" in kind:
         raise _damage_error(f"array {name!r} is pickled")
     if not _NUMBERS.fullmatch(kind) or np.dtype(kind).kind not in expected.kinds:

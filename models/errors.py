@@ -28,11 +28,11 @@ def _visible(character: str) -> str:
 def shortened(text: object, most: int = QUOTED) -> str:
     """A printable text from a file for a message, without its middle where it exceeds `most` characters."""
     try:
-        whole = str(text)
+        full = str(text)
     except ValueError:  # a whole number of more digits than Python writes
-        whole = "a number of thousands of digits"
-    beyond = len(whole) > 2 * most  # avoids making megabytes printable to show one line
-    line = printable(whole[:most] + "..." + whole[-most:] if beyond else whole)
+        full = "a number of thousands of digits"
+    beyond = len(full) > 2 * most  # avoids making megabytes printable to show one line
+    line = printable(full[:most] + "..." + full[-most:] if beyond else full)
     head = int(_HEAD * most)
     return line if len(line) <= most else f"{line[:head]} ... {line[head + 5 - most :]}"
 

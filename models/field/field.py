@@ -117,12 +117,14 @@ class CrossField(Pictured):
         """Store read-only copies, and check shapes and values."""
         check_fields(self, InstanceError)
         grid = self.instance.grid
-        given: dict[str, np.ndarray[Any, Any]] = {
+        values_by_name: dict[str, np.ndarray[Any, Any]] = {
             "alpha": float_array(self.alpha, "alpha", InstanceError),
             "beta": float_array(self.beta, "beta", InstanceError),
             "p": whole_numbers(self.p, "p"),
         }
-        for (name, value), size in zip(given.items(), (grid.size, grid.size, len(grid.first)), strict=True):
+        for (name, value), size in zip(
+            values_by_name.items(), (grid.size, grid.size, len(grid.first)), strict=True
+        ):
             if value.shape != (size,):
                 raise InstanceError(
                     f"{name} has shape {value.shape}, but the grid of {self.instance.name} needs ({size},)"
@@ -340,14 +342,14 @@ def field_in_windows(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -
     alpha, beta, p = step_labels(
         instance.grid, alpha, beta, p, _steps_into_windows(instance, alpha, beta, inside=False)
     )
-    kept = CrossField(
+    clipped = CrossField(
         instance,
         np.clip(alpha, instance.alpha_lower, instance.alpha_upper),
         np.clip(beta, -QUARTER, QUARTER),
         np.clip(p, instance.p_min, instance.p_max),
     )
-    best = kept.with_best_jumps()
-    return best if best.energy().total < kept.energy().total else kept
+    best = clipped.with_best_jumps()
+    return best if best.energy().total < clipped.energy().total else clipped
 
 
 def _steps_into_windows(instance: Instance, alpha: Floats, beta: Floats, *, inside: bool) -> Ints:
@@ -372,9 +374,9 @@ def _steps_into_windows(instance: Instance, alpha: Floats, beta: Floats, *, insi
     return steps
 
 
-def _check_angles(instance: Instance, given: Any, name: str) -> Floats:
+def _check_angles(instance: Instance, values: Any, name: str) -> Floats:
     """The angles (n,). Raises InputError."""
-    angles = float_array(given, name)
+    angles = float_array(values, name)
     size = instance.grid.size
     if angles.shape != (size,):
         raise InputError(

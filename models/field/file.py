@@ -122,13 +122,13 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
 
 
 def _look_up_suffix(table: dict[str, _Entry], path: Path, verb: str, *others: str) -> _Entry:
-    found = table.get(path.suffix.lower())
-    if found is None:
+    entry = table.get(path.suffix.lower())
+    if entry is None:
         raise InputError(
             f"a field cannot be {verb} as {path.suffix!r}; choose one of {', '.join([*table, *others])}",
             file=path,
         )
-    return found
+    return entry
 
 
 def _field_to_npz(field: CrossField) -> bytes:
@@ -148,7 +148,7 @@ def _field_of_npz(data: bytes) -> CrossField:
     archive = ArrayArchive(data)
     arrays = archive.arrays(_ARCHIVE)
     check_version(parse_head(arrays), FORMAT, VERSION)
-    instance = _read_embedded(lambda given: instance_of_archive(given, _PREFIX), archive)
+    instance = _read_embedded(lambda source: instance_of_archive(source, _PREFIX), archive)
     archive.finish()
     return _make_field(instance, arrays["alpha"], arrays["beta"], arrays["p"])
 

@@ -49,8 +49,8 @@ def fuse_fields(one: CrossField, other: CrossField) -> CrossField:
     unit = (1 + energy) / _UNITS
     taken = _find_least_cut(far, np.rint(price / unit), links, np.rint(np.maximum(excess, 0) / unit))
     alpha, beta = np.where(taken, other.alpha, one.alpha), np.where(taken, other.beta, one.beta)
-    found = CrossField(one.instance, alpha, beta, free_jumps(one.instance, alpha, beta)[0])
-    return found if found.energy().total < energy - unit else one
+    fusion = CrossField(one.instance, alpha, beta, free_jumps(one.instance, alpha, beta)[0])
+    return fusion if fusion.energy().total < energy - unit else one
 
 
 def _pixel_costs(field: CrossField) -> Floats:

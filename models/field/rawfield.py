@@ -55,10 +55,12 @@ def to_obj(instance: Instance) -> bytes:
 def to_sings(field: CrossField) -> bytes:
     """The text of the singularities: a line `4 k`, then vertex, from 0 as in the .obj, and 4 index."""
     places, _ = vertices_of(field.instance.grid)
-    found = field.singularities
+    singularities = field.singularities
     across = field.instance.grid.width + 1
-    at = np.searchsorted(places[:, 0] * across + places[:, 1], (found.row + 1) * across + found.column + 1)
-    index = np.round(4 * found.index).astype(np.int64)
+    at = np.searchsorted(
+        places[:, 0] * across + places[:, 1], (singularities.row + 1) * across + singularities.column + 1
+    )
+    index = np.round(4 * singularities.index).astype(np.int64)
     order = np.argsort(at, kind="stable")
     return f"4 {len(at)}\n{_text_of_rows(np.stack([at[order], index[order]], axis=1))}".encode()
 
@@ -143,11 +145,11 @@ def _lines_of_vectors(vectors: Floats, numbers: list[int]) -> tuple[Floats, Floa
     _refuse((np.abs(unit[:, :, 2]) > _FLAT).any(axis=1), numbers, "has a vector out of the plane z = 0")
     rows = np.arange(len(unit))
     partner = 1 + np.argmin(np.einsum("kc,kvc->kv", unit[:, 0], unit[:, 1:]), axis=1)
-    other = np.where(partner == 1, 2, 1)
+    second_line = np.where(partner == 1, 2, 1)
     angle = arctangent(unit[:, :, 1], unit[:, :, 0])
-    u, v = angle[:, 0], angle[rows, other]
+    u, v = angle[:, 0], angle[rows, second_line]
     # Of the indices 0 to 3, which add up to 6.
-    last = 6 - partner - other
+    last = 6 - partner - second_line
     opposite = np.stack([angle[rows, partner] - u, angle[rows, last] - v])
     off = np.abs(np.mod(opposite, 2 * np.pi) - np.pi)
     _refuse((off > _OPPOSITE).any(axis=0), numbers, "has no two pairs of opposite vectors: u, v, -u, -v")

@@ -94,8 +94,8 @@ class ProblemArrays:
         """Values of the rows at a point (n,), shape (m,), to be compared with their sides."""
         row, first, second = self.row_products.T
         products = self.row_factors * point[first] * point[second]
-        found: Floats = self.a @ point + np.bincount(row, products, self.a.shape[0])
-        return found
+        values: Floats = self.a @ point + np.bincount(row, products, self.a.shape[0])
+        return values
 
 
 def problem_arrays(problem: Problem, *, names: bool) -> ProblemArrays:
@@ -109,7 +109,7 @@ def problem_arrays(problem: Problem, *, names: bool) -> ProblemArrays:
     lower, upper = row_sides(problem.rows)
     a = sparse.csr_array((values, tuple(entries.T)), shape=(len(lower), size))
     a.eliminate_zeros()
-    nonlinear = [each for each in (*problem.objective, *problem.rows) if each.degree > QUADRATIC]
+    nonlinear = [family for family in (*problem.objective, *problem.rows) if family.degree > QUADRATIC]
     for family in nonlinear:
         at_rows = places.get(family.family.tag, slice(0))
         lower[at_rows], upper[at_rows] = -np.inf, np.inf
@@ -135,9 +135,9 @@ def problem_arrays(problem: Problem, *, names: bool) -> ProblemArrays:
 def quadratic_matrix(at: Ints, factor: Floats, size: int) -> sparse.csr_array:
     """The matrix Q of 0.5 x'Qx for products of columns `at`, shape (k, 2), with factors (k,)."""
     both = np.concatenate([at, at[:, ::-1]])
-    found = sparse.csr_array((np.tile(factor, 2), tuple(both.T)), shape=(size, size))
-    found.eliminate_zeros()
-    return found
+    matrix = sparse.csr_array((np.tile(factor, 2), tuple(both.T)), shape=(size, size))
+    matrix.eliminate_zeros()
+    return matrix
 
 
 def row_terms(
@@ -171,11 +171,11 @@ def row_sides(families: Iterable[PlacedFamily]) -> tuple[Floats, Floats]:
 
 def _rows_by_tag(families: Iterable[PlacedFamily]) -> dict[str, slice]:
     """Rows of each family by its tag."""
-    found, start = {}, 0
+    rows, start = {}, 0
     for family in families:
-        found[family.family.tag] = slice(start, start + family.count)
+        rows[family.family.tag] = slice(start, start + family.count)
         start += family.count
-    return found
+    return rows
 
 
 def _decode_names(names: Bytes) -> Names:

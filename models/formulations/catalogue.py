@@ -235,8 +235,8 @@ def declare(name: str, **chosen: Any) -> Formulation:
 
     An option that is None keeps its default. Raises FormulationError for an unknown name, option or value.
     """
-    given = {key: value for key, value in chosen.items() if value is not None}
-    return declaration_of(name).with_options(given)
+    options = {key: value for key, value in chosen.items() if value is not None}
+    return declaration_of(name).with_options(options)
 
 
 def norm_of(formulation: Formulation) -> Norm | None:

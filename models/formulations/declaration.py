@@ -137,8 +137,8 @@ class Declaration:
     @cached_property
     def defaults(self) -> Options:
         """The default options."""
-        own = inspect.signature(self.families).parameters.values()
-        return Options(**{parameter.name: parameter.default for parameter in own})
+        parameters = inspect.signature(self.families).parameters.values()
+        return Options(**{parameter.name: parameter.default for parameter in parameters})
 
     @cached_property
     def settable(self) -> frozenset[str]:
@@ -150,15 +150,20 @@ class Declaration:
     @property
     def equivalent(self) -> str:
         """The first other formulation with the same optimum, empty if there is none."""
-        same = (other.name for other in FORMULATIONS.values() if other.minimises == self.minimises)
+        same = (
+            declaration.name
+            for declaration in FORMULATIONS.values()
+            if declaration.minimises == self.minimises
+        )
         return next((name for name in same if name != self.name), "")
 
     def with_options(self, chosen: Mapping[str, Any]) -> Formulation:
         """The formulation with the chosen options. Raises FormulationError for a wrong option."""
         options = self._options(chosen)
-        given = {name: getattr(options, name) for name in inspect.signature(self.families).parameters}
+        arguments = {name: getattr(options, name) for name in inspect.signature(self.families).parameters}
         families = [
-            family if family.paper else replace(family, paper=self.paper) for family in self.families(**given)
+            family if family.paper else replace(family, paper=self.paper)
+            for family in self.families(**arguments)
         ]
         objective = tuple(family for family in families if not family.is_row)
         return Formulation(self, options, objective, tuple(family for family in families if family.is_row))
@@ -293,7 +298,7 @@ def declaration_of(name: str) -> Declaration:
 
     Raises FormulationError for another word, with the nearest of these names.
     """
-    by_name = {each.short: each for each in FORMULATIONS.values()} | dict(FORMULATIONS)
+    by_name = {declaration.short: declaration for declaration in FORMULATIONS.values()} | dict(FORMULATIONS)
     if name in by_name:
         return by_name[name]
     near = difflib.get_close_matches(name.lower(), by_name, 1)
@@ -305,7 +310,7 @@ def declaration_of(name: str) -> Declaration:
 
 def short_names() -> list[str]:
     """The short names of all formulations, in the order of the table."""
-    return [each.short for each in FORMULATIONS.values()]
+    return [declaration.short for declaration in FORMULATIONS.values()]
 
 
 def formulation(

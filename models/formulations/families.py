@@ -95,8 +95,8 @@ class PlacedFamily:
     def column_of(self, symbol: sp.Symbol) -> Ints:
         """Column of the symbol at each element, shape (count,)."""
         block, inside = self.block(symbol), self.inside(symbol)
-        own = np.arange(block.count, dtype=np.int32) if inside is None else inside
-        return own + np.int32(block.offset)
+        places = np.arange(block.count, dtype=np.int32) if inside is None else inside
+        return places + np.int32(block.offset)
 
     def block(self, symbol: sp.Symbol) -> Block:
         """The block of columns that a symbol means."""
@@ -162,8 +162,8 @@ class PlacedFamily:
         """The expression (of a row: left minus right side) at a point, shape (count,)."""
         symbols = sorted(self.family.body.free_symbols, key=str)
         evaluate = numpy_function(symbols, self.family.body)
-        given = (point[self.column_of(s)] if s in self.variables else self._datum(s) for s in symbols)
-        return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
+        arguments = (point[self.column_of(s)] if s in self.variables else self._datum(s) for s in symbols)
+        return np.broadcast_to(np.asarray(evaluate(*arguments), dtype=float), (self.count,))
 
     def excess(self, point: Floats) -> Floats:
         """By how much a point breaks each row, shape (count,): 0 or less where it holds."""
@@ -206,8 +206,8 @@ def merge_monomials(index: Ints, coefficient: Floats, scale: Floats, columns: in
         key = key * columns + index[:, factor]
     _, place, rank = np.unique(key, return_index=True, return_inverse=True)
     total, largest = (_sums(values, rank, len(place)) for values in (coefficient, scale))
-    kept = exceeds_noise(total, largest)
-    return index[place[kept]], total[kept]
+    nonzero = exceeds_noise(total, largest)
+    return index[place[nonzero]], total[nonzero]
 
 
 def _sums(values: Floats, rank: NDArray[np.intp], count: int) -> Floats:

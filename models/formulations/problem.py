@@ -122,16 +122,16 @@ class Problem:
         Call it before several threads share the problem: `cached_property` takes no lock since Python 3.12,
         so each thread would compute its own array.
         """
-        for name, kept in vars(Problem).items():
-            if isinstance(kept, cached_property):
+        for name, attribute in vars(Problem).items():
+            if isinstance(attribute, cached_property):
                 getattr(self, name)
 
     @property
     def summary(self) -> str:
         """Formulation, class, instance, and how many columns and rows."""
-        whole = f" ({count} integer)" if (count := int(self.integer.sum())) else ""
+        integers = f" ({count} integer)" if (count := int(self.integer.sum())) else ""
         return (
-            f"{self.name}, {self.problem_class} on {self.instance.name}: {self.n_columns} columns{whole}, "
+            f"{self.name}, {self.problem_class} on {self.instance.name}: {self.n_columns} columns{integers}, "
             f"{self.n_rows} rows"
         )
 
@@ -193,7 +193,7 @@ class Problem:
         """Values of a bound: one for each element, or one for all."""
         symbols = sorted(bound.free_symbols, key=str)
         return np.asarray(
-            numpy_function(symbols, bound)(*(self.data[str(each)] for each in symbols)), np.float64
+            numpy_function(symbols, bound)(*(self.data[str(symbol)] for symbol in symbols)), np.float64
         )
 
     @property
@@ -357,8 +357,8 @@ class Problem:
         """
         check_kind("field", field, "CrossField")
         field.check_instance(self.instance)
-        given = _angles_and_jumps(field)
-        return np.concatenate([_at_field(self, name, given) for name in self.blocks])
+        quantities = _angles_and_jumps(field)
+        return np.concatenate([_at_field(self, name, quantities) for name in self.blocks])
 
     def field(self, point: Floats) -> CrossField:
         """The cross field of a point (columns,), jumps rounded.
@@ -413,12 +413,12 @@ def _angles_and_jumps(field: CrossField) -> dict[str, Any]:
     return {"alpha": field.alpha, "beta": field.beta, "p": p, "p1": p & 1, "p2": p >> 1}
 
 
-def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
+def _at_field(problem: Problem, name: str, quantities: dict[str, Any]) -> Floats:
     """The block of columns `name` at given angles and jumps, by the variable's definition."""
-    if name in given:
-        return np.asarray(given[name], dtype=np.float64)
+    if name in quantities:
+        return np.asarray(quantities[name], dtype=np.float64)
     variable = VARIABLES[name]
-    sources = problem.data | given
+    sources = problem.data | quantities
     symbols = sorted(variable.value.free_symbols, key=str)
     slots = (SLOTS[variable.over][symbol] for symbol in symbols)
     arguments = (sources[quantity][index_map(problem.instance, kind)] for quantity, kind in slots)

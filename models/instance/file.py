@@ -146,11 +146,11 @@ def parse_json(text: str) -> object:
 
 def _unique_keys(pairs: list[tuple[str, object]]) -> dict[str, object]:
     """An object of a JSON document. Refuses repeated keys, because programs differ on which one counts."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    document = dict(pairs)
+    if len(document) < len(pairs):
         ((name, _),) = Counter(name for name, _ in pairs).most_common(1)
         raise ValueError(f"the key {shortened(name)!r} appears twice")
-    return found
+    return document
 
 
 def read_document(
@@ -283,10 +283,10 @@ def check_version(document: object, form: str, version: int) -> None:
     """Raise InstanceError unless the document states this format and version."""
     if not isinstance(document, dict) or document.get("format") != form:
         raise InstanceError(f'is not a file of this kind: "format" must be "{form}"')
-    found = document.get("version")
-    if found != version or isinstance(found, bool):
+    stated = document.get("version")
+    if stated != version or isinstance(stated, bool):
         raise InstanceError(
-            f"has version {str(found)[:20]}, but this program reads version {version}; write it again"
+            f"has version {str(stated)[:20]}, but this program reads version {version}; write it again"
         )
 
 

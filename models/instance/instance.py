@@ -313,11 +313,11 @@ class Instance(Pictured):
 
         """
         changed: dict[str, Any] = {}
-        for term, given in (("stroke", stroke_weight), ("skew", skew_weight)):
-            if given is not None:
-                _check_weight(f"{term}_weight", given)
+        for term, weight in (("stroke", stroke_weight), ("skew", skew_weight)):
+            if weight is not None:
+                _check_weight(f"{term}_weight", weight)
                 power = _POWERS[term]
-                changed[f"{term}_coefficient"] = given * REFERENCE**power / max(self.mask.shape) ** power
+                changed[f"{term}_coefficient"] = weight * REFERENCE**power / max(self.mask.shape) ** power
         return replace(self, **changed) if changed else self
 
     @property

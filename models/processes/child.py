@@ -213,12 +213,12 @@ def _pickle_task(work: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
 def _unpickle_result(answer: bytes) -> Any:
     """Return the result in an answer, or raise the error in it."""
     try:
-        done, found = pickle.loads(answer)  # noqa: S301 - from a process of our own
+        done, result = pickle.loads(answer)  # noqa: S301 - from a process of our own
     except Exception as error:
         raise WorkerError(f"the result of a task cannot be read: {error_text(error)}") from error
     if not done:
-        raise found
-    return found
+        raise result
+    return result
 
 
 _ENDED: Final = object()  # item in the queue of answers after the child has closed its end of the pipe

@@ -29,16 +29,16 @@ _PARTS: Final = 2  # of shared work for each thread: one that takes longer than 
 
 def compiled(work: _Work) -> _Work:
     """The function compiled on its first call, and cached on disk where a folder is writable."""
-    made = compiled_if_needed(work)
-    _MADE.append(made)
-    return made
+    dispatcher = compiled_if_needed(work)
+    _MADE.append(dispatcher)
+    return dispatcher
 
 
 def compiled_in_any_order(work: _Work) -> _Work:
     """As `compiled`, for a function without nan whose result does not depend on the order of its terms."""
-    made = _made(work, fastmath=_ANY_ORDER)
-    _MADE.append(made)
-    return made
+    dispatcher = _made(work, fastmath=_ANY_ORDER)
+    _MADE.append(dispatcher)
+    return dispatcher
 
 
 def compiled_if_needed(work: _Work, *, in_any_order: bool = False) -> _Work:
@@ -47,15 +47,15 @@ def compiled_if_needed(work: _Work, *, in_any_order: bool = False) -> _Work:
 
 
 def _made(work: _Work, *, fastmath: bool | set[str]) -> _Work:
-    made: Any = numba.njit(error_model="numpy", nogil=True, fastmath=fastmath)(work)
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True, fastmath=fastmath)(work)
     with suppress(RuntimeError):  # no folder is writable
-        made.enable_caching()
-    return cast("_Work", made)
+        dispatcher.enable_caching()
+    return cast("_Work", dispatcher)
 
 
 def is_all_compiled() -> bool:
     """Whether each function of `compiled` is cached on disk where possible: it then only has to be loaded."""
-    _KEPT.update(made for made in _MADE if made not in _KEPT and _is_cached(made))
+    _KEPT.update(dispatcher for dispatcher in _MADE if dispatcher not in _KEPT and _is_cached(dispatcher))
     return len(_KEPT) == len(_MADE)
 
 
@@ -64,9 +64,9 @@ def cache_folder() -> Path:
     return Path(_MADE[0].stats.cache_path)
 
 
-def _is_cached(made: Any) -> bool:
+def _is_cached(dispatcher: Any) -> bool:
     """Whether there is an index of compiled code for the function (`*.nbi`, named after its first line)."""
-    code, folder = made.py_func.__code__, made.stats.cache_path
+    code, folder = dispatcher.py_func.__code__, dispatcher.stats.cache_path
     named = f"*.{code.co_name}-{code.co_firstlineno}.*.nbi"
     return folder is None or any(Path(folder).glob(named))
 
@@ -100,8 +100,8 @@ class Crew:
 
         others = [self._others.submit(work_on) for _ in range(min(self._count, len(parts)) - 1)]
         work_on()
-        for each in others:
-            each.result()
+        for helper in others:
+            helper.result()
 
 
 @contextmanager

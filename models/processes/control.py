@@ -119,11 +119,11 @@ def _answer(task: bytes) -> bytes:
         message = f"a process cannot import the function of its task or read its data: {error_text(error)}"
         return pickle.dumps((False, _with_traceback(WorkerError(message))))
     try:
-        found = work()
+        result = work()
     except Exception as error:  # noqa: BLE001 - the parent raises it where the task came from
         return _pickle_error(error)
     try:
-        return pickle.dumps((True, found))
+        return pickle.dumps((True, result))
     except Exception as error:  # noqa: BLE001 - pickling calls methods of any class
         message = f"the result of a task cannot be sent back: {error_text(error)}"
         return pickle.dumps((False, _with_traceback(WorkerError(message))))
@@ -154,14 +154,14 @@ def _output_to(log: Path | None) -> Iterator[None]:
     if log is None:
         yield
         return
-    kept = os.dup(1), os.dup(2)
+    originals = os.dup(1), os.dup(2)
     target = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
     try:
         _redirect(target, target)
         yield
     finally:
-        _redirect(*kept)
-        for descriptor in (*kept, target):
+        _redirect(*originals)
+        for descriptor in (*originals, target):
             os.close(descriptor)
 
 

@@ -52,9 +52,9 @@ class Limits:
         check_jobs(self.threads, "threads", least=0)
 
     @classmethod
-    def bounded(cls, given: Limits | None) -> Limits:
+    def bounded(cls, limits: Limits | None) -> Limits:
         """The limits of work that needs a time limit; the defaults for None. Raises InputError for none."""
-        limits = given or cls()
+        limits = limits or cls()
         if limits.time_limit == math.inf:
             raise InputError("this work needs a finite time limit; give a number of seconds")
         return limits

@@ -18,17 +18,17 @@ from ..errors import InputError
 from .child import Child
 
 Task = TypeVar("Task")
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 P = ParamSpec("P")
 
 MOST: Final = max(16, 2 * (os.cpu_count() or 1))
 """Most threads or processes: beyond twice the cores there is no gain, and each takes memory."""
 
 
-def check_jobs(count: int, what: str = "jobs", *, least: int = 1) -> int:
+def check_jobs(count: int, name: str = "jobs", *, least: int = 1) -> int:
     """The number of threads or processes. Raises InputError if it is out of range."""
     if not least <= count <= MOST:
-        raise InputError(f"{what} must be between {least} and {MOST}, got {count}")
+        raise InputError(f"{name} must be between {least} and {MOST}, got {count}")
     return count
 
 
@@ -38,7 +38,7 @@ def cores() -> int:
 
 
 @contextmanager
-def parallel_map(work: Callable[[Task], Found], jobs: int) -> Iterator[Callable[[list[Task]], list[Found]]]:
+def parallel_map(work: Callable[[Task], Result], jobs: int) -> Iterator[Callable[[list[Task]], list[Result]]]:
     """A function that does the work on tasks in that many processes; results in the tasks' order.
 
     work: a function of a module, not of the user's program. Raises the exceptions of the work and of
@@ -66,8 +66,8 @@ def process_pool(jobs: int) -> Iterator[Executor]:
 class _InProcess(Executor):
     """Executor that runs a task in this process when it is submitted."""
 
-    def submit(self, fn: Callable[P, Found], /, *args: P.args, **kwargs: P.kwargs) -> Future[Found]:
-        future: Future[Found] = Future()
+    def submit(self, fn: Callable[P, Result], /, *args: P.args, **kwargs: P.kwargs) -> Future[Result]:
+        future: Future[Result] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
         except Exception as error:  # noqa: BLE001 - the future raises it, as with several jobs
@@ -85,7 +85,7 @@ class _Processes(Executor):
         for child in reversed(self._children):
             self._idle.put(child)
 
-    def submit(self, fn: Callable[P, Found], /, *args: P.args, **kwargs: P.kwargs) -> Future[Found]:
+    def submit(self, fn: Callable[P, Result], /, *args: P.args, **kwargs: P.kwargs) -> Future[Result]:
         return self._threads.submit(self._ask, partial(fn, *args, **kwargs))
 
     def __exit__(self, *_: object) -> None:
@@ -94,10 +94,10 @@ class _Processes(Executor):
             child.close()
         self._threads.shutdown(cancel_futures=True)
 
-    def _ask(self, work: Callable[[], Found]) -> Found:
+    def _ask(self, work: Callable[[], Result]) -> Result:
         child = self._idle.get()
         try:
-            found: Found = child.call(work).value
+            result: Result = child.call(work).value
         finally:
             self._idle.put(child)
-        return found
+        return result

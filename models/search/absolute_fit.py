@@ -138,8 +138,8 @@ def _solve_program(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats)
     """The angles and the multipliers that solve the program, with a size t >= |r| for each absolute value."""
     import clarabel
 
-    n, given = len(lower), terms.weight > 0
-    rows, squares = np.flatnonzero(given & ~terms.squared), np.flatnonzero(given & terms.squared)
+    n, weighted = len(lower), terms.weight > 0
+    rows, squares = np.flatnonzero(weighted & ~terms.squared), np.flatnonzero(weighted & terms.squared)
     m, inside = len(rows), sparse.eye_array(n)
     matrix, constant, weight = terms.matrix[rows], terms.constant[rows], terms.weight[rows]
     square, goal, force = terms.matrix[squares], terms.constant[squares], 2 * terms.weight[squares]
@@ -155,12 +155,12 @@ def _solve_program(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats)
         [clarabel.NonnegativeConeT(2 * (m + n))],
         _clarabel_settings(),
     )
-    found = program.solve()
-    if not np.isfinite([*found.x, *found.z]).all():
-        raise CrossfieldError(f"Clarabel found no angles for given jumps: {found.status}")
+    solution = program.solve()
+    if not np.isfinite([*solution.x, *solution.z]).all():
+        raise CrossfieldError(f"Clarabel found no angles for given jumps: {solution.status}")
     # Extreme weights may end it early. The numbers are then worse, but any of them are valid.
-    angles = np.clip(np.array(found.x)[:n], lower, upper)
-    above, below = np.split(np.array(found.z)[: 2 * m], 2)
+    angles = np.clip(np.array(solution.x)[:n], lower, upper)
+    above, below = np.split(np.array(solution.z)[: 2 * m], 2)
     multipliers = 2 * (terms.matrix @ angles + terms.constant)
     multipliers[rows] = (above - below) / weight
     return angles, multipliers
@@ -170,10 +170,10 @@ def _clarabel_settings() -> clarabel.DefaultSettings:
     """One thread, and more digits than usual, for they are the proof's."""
     import clarabel
 
-    found = clarabel.DefaultSettings()
-    found.verbose, found.max_threads = False, 1
-    found.tol_gap_abs = found.tol_gap_rel = found.tol_feas = _TOLERANCE
-    return found
+    settings = clarabel.DefaultSettings()
+    settings.verbose, settings.max_threads = False, 1
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
+    return settings
 
 
 @one_thread()
@@ -183,8 +183,8 @@ def fit_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, Flo
     fit = absolute_fit(instance, field.p, norm, *within)
     # Rounding makes equal angles equal, which the solver returns with its error.
     rounded = np.clip(np.round(fit.x, _DECIMALS), *within)
-    found = [field_at(instance, x, field.p) for x in (rounded, fit.x)]
-    best = min(*found, field, key=lambda each: each.energy(norm).total)
+    fields = [field_at(instance, x, field.p) for x in (rounded, fit.x)]
+    best = min(*fields, field, key=lambda candidate: candidate.energy(norm).total)
     return best, fit.multipliers[2 * m : 2 * m + len(instance.theta)]
 
 
@@ -194,9 +194,9 @@ def alternate_absolute(field: CrossField, norm: AbsoluteNorm, over: Over = never
     best, least = field, field.energy(norm).total
     while not over():
         jumps = best_jumps(field.instance, best.alpha, best.beta, absolute=True)
-        found, _ = fit_absolute(CrossField(field.instance, best.alpha, best.beta, jumps), norm)
-        energy = found.energy(norm).total
+        fitted, _ = fit_absolute(CrossField(field.instance, best.alpha, best.beta, jumps), norm)
+        energy = fitted.energy(norm).total
         if energy >= least * (1 - _BETTER):
             break
-        best, least = found, energy
+        best, least = fitted, energy
     return best

@@ -37,15 +37,15 @@ def halve_resolution(instance: Instance) -> Instance | None:
     parent = (instance.stroke_pixels[:, 0] // 2) * mask.shape[1] + instance.stroke_pixels[:, 1] // 2
     weight = np.bincount(parent, instance.w, mask.size)
     turn = [np.bincount(parent, instance.w * f(2 * instance.theta), mask.size) for f in (np.cos, np.sin)]
-    kept = np.nonzero(np.hypot(*turn) > _ALIGNED * weight)[0]
-    if not len(kept):
+    aligned = np.nonzero(np.hypot(*turn) > _ALIGNED * weight)[0]
+    if not len(aligned):
         return None
     return replace(
         instance,
         mask=mask,
-        stroke_pixels=np.stack(np.divmod(kept, mask.shape[1]), axis=1),
-        theta=np.arctan2(turn[1][kept], turn[0][kept]) / 2,
-        w=weight[kept] / 4,
+        stroke_pixels=np.stack(np.divmod(aligned, mask.shape[1]), axis=1),
+        theta=np.arctan2(turn[1][aligned], turn[0][aligned]) / 2,
+        w=weight[aligned] / 4,
         stroke_coefficient=min(4 * instance.stroke_coefficient, MOST_WEIGHT),
         skew_coefficient=min(4 * instance.skew_coefficient, MOST_WEIGHT),
         pixel_size=2 * instance.pixel_size,

@@ -59,8 +59,8 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
     settle(state, solver, over)
     if field.instance.gauge == "strokes":
         _exchange_families(state, solver, over)
-    found = state.fit_in_bounds(over)
-    return found if found.energy().total < field.energy().total else field
+    improved = state.fit_in_bounds(over)
+    return improved if improved.energy().total < field.energy().total else field
 
 
 def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough: float = FALL) -> None:
@@ -69,7 +69,7 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough
     Singularities move by a pixel per round, on fine grids for a hundred rounds.
     """
     bounds = stroke_bounds(state.instance)
-    kept, least = (state.x, state.p), np.inf
+    lowest, least = (state.x, state.p), np.inf
     for _ in range(_ROUNDS):
         if over():
             break
@@ -78,12 +78,12 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough
         reached = state.energy
         fall = (least - reached) / (1 + reached)
         if fall >= FALL:
-            kept, least = (state.x, state.p), reached
+            lowest, least = (state.x, state.p), reached
         if fall < enough:
             break
         _swap_lines(state)
         state.p = free_jumps(state.instance, state.alpha, state.beta)[0]
-    state.x, state.p = kept
+    state.x, state.p = lowest
 
 
 def _swap_lines(state: FreeField) -> None:
@@ -109,15 +109,15 @@ def _exchange_families(state: FreeField, solver: LinearSolver, over: Over) -> No
     for number in worst:
         if over():
             return
-        own = (of_pixel == number).astype(np.int32)
-        if (own[grid.first] != own[grid.second]).any():
-            _turn_if_better(state, own, solver, over)
+        quarters = (of_pixel == number).astype(np.int32)
+        if (quarters[grid.first] != quarters[grid.second]).any():
+            _turn_if_better(state, quarters, solver, over)
 
 
-def _turn_if_better(state: FreeField, own: Ints, solver: LinearSolver, over: Over) -> None:
+def _turn_if_better(state: FreeField, curve_quarters: Ints, solver: LinearSolver, over: Over) -> None:
     """Turn the crosses round a curve (own = 1) by a quarter either way, and keep the largest decrease."""
     enough = state.energy * (1 - 1e-6) - 1e-9
-    trials = [_turn_trial(state, quarters, solver) for quarters in (own, -own)]
+    trials = [_turn_trial(state, quarters, solver) for quarters in (curve_quarters, -curve_quarters)]
     best = min(trials, key=lambda trial: round(trial.energy, 9))
     if best.energy < enough:
         settle(best, solver, over)

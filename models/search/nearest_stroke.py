@@ -34,8 +34,8 @@ def chamfer_distances(grid: Grid) -> Any:
     squares = [(number[1:, :-1], number[:-1, 1:], number[:-1, :-1], number[1:, 1:])]
     squares.append((squares[0][2], squares[0][3], squares[0][0], squares[0][1]))
     first, second = [grid.first], [grid.second]
-    for start, end, one, other in squares:
-        passable = (start >= 0) & (end >= 0) & ((one >= 0) | (other >= 0))
+    for start, end, one, another in squares:
+        passable = (start >= 0) & (end >= 0) & ((one >= 0) | (another >= 0))
         first.append(start[passable])
         second.append(end[passable])
     length = np.full(sum(map(len, first)), 4.0)

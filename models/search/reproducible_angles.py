@@ -78,7 +78,7 @@ def _slope(energy: QuadraticForm, x: Floats, rest: Floats) -> Floats:
 def _two_product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Products and their rounding errors, whose sums are exact (Dekker, Numer. Math. 18, 1971)."""
     product = a * b
-    a_high, b_high = (_SPLITTER * each - (_SPLITTER * each - each) for each in (a, b))
+    a_high, b_high = (_SPLITTER * factor - (_SPLITTER * factor - factor) for factor in (a, b))
     a_low, b_low = a - a_high, b - b_high
     error = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
     return product, error

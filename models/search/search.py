@@ -199,9 +199,9 @@ def _fields_from_coarse(
         yield prolong_field(field, instance, ends.over)
 
 
-def _starts(instance: Instance, given: CrossField | None, ends: _Ends) -> list[CrossField]:
+def _starts(instance: Instance, start: CrossField | None, ends: _Ends) -> list[CrossField]:
     """All starts, the lowest first."""
-    return start_fields(instance, given, ends.over, polyvector_start, _power_start)
+    return start_fields(instance, start, ends.over, polyvector_start, _power_start)
 
 
 def _power_start(instance: Instance, _: Over) -> CrossField:
@@ -211,9 +211,9 @@ def _power_start(instance: Instance, _: Over) -> CrossField:
 class _Hunt:
     """The present field of a search, and its next trials."""
 
-    def __init__(self, instance: Instance, seed: int, found: list[CrossField]) -> None:
+    def __init__(self, instance: Instance, seed: int, starts: list[CrossField]) -> None:
         """Begin at the first of the starts; on a small grid, explore from the others, too."""
-        start, self._apart = found[0], [FreeField.of(field) for field in found]
+        start, self._apart = starts[0], [FreeField.of(field) for field in starts]
         self.round = 0
         self.fruitless = 0
         self.energies = [(0, start.energy().total)]
@@ -263,9 +263,9 @@ class _Hunt:
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
             tasks = self.tasks(ends.deadline)
-            found = explorers(tasks)
-            self._adopt_results(tasks, [each.better for each in found], ends.over)
-            if all(each.whole for each in found) and not ends.over():
+            results = explorers(tasks)
+            self._adopt_results(tasks, [result.better for result in results], ends.over)
+            if all(result.complete for result in results) and not ends.over():
                 self.round += 1
             progress(f"energy {self.energies[-1][1]:.5g} after {self.round} rounds")
         return ended
@@ -299,25 +299,25 @@ class _Hunt:
             away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
             yield (away <= np.partition(away, _PATCH)[_PATCH]) & self._reached
 
-    def _adopt_results(self, tasks: list[PatchTask], found: list[FieldPoint | None], over: Over) -> None:
+    def _adopt_results(self, tasks: list[PatchTask], points: list[FieldPoint | None], over: Over) -> None:
         """Adopt lower points, the lowest first, and update the whole grid now and then."""
         self.fruitless += _KICKS * len(tasks)
         if self._explores_starts:
-            self._adopt_in_starts(found)
+            self._adopt_in_starts(points)
         else:
-            lower = [(task, better) for task, better in zip(tasks, found, strict=True) if better is not None]
+            lower = [(task, better) for task, better in zip(tasks, points, strict=True) if better is not None]
             for task, better in sorted(lower, key=lambda pair: pair[1].energy):
                 self._adopt(task, better, over)
-        if any(found) and self._unsettled:
+        if any(points) and self._unsettled:
             self._latest.append(self._state.field)
         if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.large):
             self._settle(over)
         if self.large and (self.round + 1) % _IMPROVE == 0:
             self.offer(improved_field(self.best(over), stop=over))
 
-    def _adopt_in_starts(self, found: list[FieldPoint | None]) -> None:
+    def _adopt_in_starts(self, points: list[FieldPoint | None]) -> None:
         """Adopt lower points in the fields that were explored, and the lowest of these."""
-        for at, better in zip(self._states_to_explore(), found, strict=True):
+        for at, better in zip(self._states_to_explore(), points, strict=True):
             if better is not None and better.energy < at.energy:
                 at.x, at.p = np.clip(better.x, *self._bounds), better.p
         best = min(self._apart, key=lambda at: at.energy)

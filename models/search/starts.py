@@ -50,30 +50,38 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
 
 
 def best_start(
-    instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
+    instance: Instance,
+    start: CrossField | None,
+    over: Over,
+    *strategies: Callable[[Instance, Over], CrossField],
 ) -> CrossField:
     """The lowest-energy field that `start_fields` returns."""
-    return start_fields(instance, given, over, *others)[0]
+    return start_fields(instance, start, over, *strategies)[0]
 
 
 def start_fields(
-    instance: Instance, given: CrossField | None, over: Over, *others: Callable[[Instance, Over], CrossField]
+    instance: Instance,
+    start: CrossField | None,
+    over: Over,
+    *strategies: Callable[[Instance, Over], CrossField],
 ) -> list[CrossField]:
     """The first field, the given one and, in time, the others, each improved.
 
     The lowest comes first, and of fields of equal energy only one is returned.
     """
     fields = [first_field(instance, over)]
-    if given is not None:
-        fields.append(improved_field(given, stop=over))
-    fields.extend(improved_field(other(instance, over), stop=over) for other in others if not over())
+    if start is not None:
+        fields.append(improved_field(start, stop=over))
+    fields.extend(
+        improved_field(strategy(instance, over), stop=over) for strategy in strategies if not over()
+    )
     return distinct_by_energy(fields)
 
 
 def distinct_by_energy(fields: list[CrossField]) -> list[CrossField]:
     """The first field of each energy, the lowest energy first."""
-    found = {rounded_energy(field): field for field in reversed(fields)}
-    return [found[energy] for energy in sorted(found)]
+    by_energy = {rounded_energy(field): field for field in reversed(fields)}
+    return [by_energy[energy] for energy in sorted(by_energy)]
 
 
 @one_thread()
@@ -144,10 +152,10 @@ def _settle_roughly(state: FreeField) -> None:
 def _fuse_states(states: list[FreeField], over: Over) -> FreeField:
     """The first and lowest field, settled, with the regions of others that lower it."""
     best = states[0].field
-    for other in states[1:]:
+    for candidate in states[1:]:
         if over():
             break
-        best = fuse_fields(best, other.field)
+        best = fuse_fields(best, candidate.field)
     state = FreeField.of(best)
     settle(state, LinearSolver(), over, enough=CREEP)
     return min(state, states[0], key=_state_energy)

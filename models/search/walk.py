@@ -57,18 +57,18 @@ class PatchTask:
 class PatchResult(NamedTuple):
     """The point of least energy, with the task's values outside the patch; None if none was 1e-7 lower.
 
-    whole: whether all perturbations were tried; if not, the point depends on the clock.
+    complete: whether all perturbations were tried; if not, the point depends on the clock.
     """
 
     better: FieldPoint | None
-    whole: bool
+    complete: bool
 
 
 def explore(task: PatchTask) -> PatchResult:
     """Explore a patch on one thread: the same task gives the same point unless its deadline cuts it off."""
     with one_thread(), suppress(np.linalg.LinAlgError):
         return _explore(task, task.deadline.passed)
-    return PatchResult(None, whole=True)
+    return PatchResult(None, complete=True)
 
 
 def _explore(task: PatchTask, over: Over) -> PatchResult:
@@ -76,9 +76,9 @@ def _explore(task: PatchTask, over: Over) -> PatchResult:
     patch = Patch.of(task.instance, task.free)
     land = Landscape(patch, task.x, task.p)
     home, perturbations = land.save_state(), Perturbations(patch, task.curve)
-    given = field_at(task.instance, task.x, task.p).energy().total
+    energy_before = field_at(task.instance, task.x, task.p).energy().total
     # Solved in the patch alone, the angles may be lower already; jumps have to improve on that.
-    least = min(given, land.point.energy)
+    least = min(energy_before, land.point.energy)
     best: FieldPoint | None = None
     for number in range(task.perturbations if len(patch.pairs) else 0):
         trials = [partial(_walk_from_perturbation, perturbations.draw(rng, land.p), rng)]
@@ -90,10 +90,10 @@ def _explore(task: PatchTask, over: Over) -> PatchResult:
                 land, home, best = lower, lower.save_state(), lower.point
                 least = best.energy
             elif over():
-                return PatchResult(best, whole=False)
+                return PatchResult(best, complete=False)
             else:
                 land.restore(home)
-    return PatchResult(best, whole=not over())
+    return PatchResult(best, complete=not over())
 
 
 Trial = Callable[[Landscape, float, Over], Ints | None]
@@ -128,7 +128,7 @@ def _walk(
 ) -> Ints | None:
     """The jumps (m,) of the lowest point below `goal` of a walk from the landscape's present state."""
     resting = np.zeros(len(land.patch.strokes if turning else land.patch.pairs), dtype=np.int64)
-    low, found = land.energy, None
+    low, jumps = land.energy, None
     fruitless = 0
     for now in range(1, _MOST_STEPS + 1):
         gains = land.turn_gains()[None] if turning else land.gains()
@@ -146,10 +146,10 @@ def _walk(
         if land.energy < low - LOWER:
             low, fruitless = land.energy, 0
         if land.energy < goal:
-            goal, found = land.energy - LOWER, land.p.copy()
+            goal, jumps = land.energy - LOWER, land.p.copy()
         if fruitless == (_FRUITLESS_TURNS if turning else _FRUITLESS):
             break
-    return found
+    return jumps
 
 
 class Perturbations:
@@ -210,8 +210,8 @@ class Perturbations:
                 break
             if rng.random() < 0.3:
                 side = int(rng.integers(4))
-        kept = {pair: step for pair, step in steps.items() if step}
-        return np.array(list(kept), dtype=np.int32), np.array(list(kept.values()), dtype=np.int32)
+        nonzero = {pair: step for pair, step in steps.items() if step}
+        return np.array(list(nonzero), dtype=np.int32), np.array(list(nonzero.values()), dtype=np.int32)
 
     def turn(self, rng: np.random.Generator) -> Change:
         """The jumps round the strokes of a disc, of one curve or of all."""

@@ -133,12 +133,12 @@ class _Round:
         if not past:
             return self.x - self.step
         x, slope, step = (
-            np.array([getattr(each, part) for each in past]) - getattr(self, part)
+            np.array([getattr(earlier, part) for earlier in past]) - getattr(self, part)
             for part in ("x", "slope", "step")
         )
         share = np.linalg.lstsq(step @ slope.T, -(step @ self.slope), rcond=_DEPENDENT)[0]
-        found: Floats = self.x + share @ x - (self.step + share @ step)
-        return found
+        accelerated: Floats = self.x + share @ x - (self.step + share @ step)
+        return accelerated
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +208,8 @@ class _Bend:
 
         def product(v: Floats) -> Floats:
             bend = self.difference.T @ (along.T @ (along @ (self.difference @ v)))
-            found: Floats = bend + self.rows.T @ (self.rows @ v)
-            return found
+            total: Floats = bend + self.rows.T @ (self.rows @ v)
+            return total
 
         return solver.solve(matrix, product, slope)
 
@@ -238,13 +238,13 @@ def _differences(field: CrossField) -> tuple[Any, Floats]:
 def _quadrants(field: CrossField) -> tuple[_Places, _Places, _Places]:
     """Across, sideways and upward of each quadrant, as in `_Bend`."""
     upright = field.instance.grid.upward
-    found = []
+    quadrants = []
     for beside in _rows_of(field, ~upright):
         for above in _rows_of(field, upright):
             at = np.nonzero((beside >= 0) & (above >= 0))[0]
             across = (at + field.instance.grid.size) % len(beside)
-            found.append((across, beside[at], above[at]))
-    across, sideways, upward = (np.concatenate(parts) for parts in zip(*found, strict=True))
+            quadrants.append((across, beside[at], above[at]))
+    across, sideways, upward = (np.concatenate(parts) for parts in zip(*quadrants, strict=True))
     return across, sideways, upward
 
 

@@ -68,8 +68,8 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float 
     check_positive("hold", hold)
     if tolerance is not None:
         check_positive("tolerance", tolerance)
-    found = _polynomials(instance, hold, tolerance)
-    u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*found))
+    coefficients = _polynomials(instance, hold, tolerance)
+    u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*coefficients))
     alpha, beta = label_of(u, v)
     start = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
     return start.with_best_jumps()

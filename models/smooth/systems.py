@@ -71,8 +71,8 @@ def factor_matrix(matrix: Any, order: Ints | None = None) -> Solve:
     def solve(right: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         with one_thread():
             if order is None:
-                found: np.ndarray[Any, Any] = factors.solve(right)
-                return found
+                unordered: np.ndarray[Any, Any] = factors.solve(right)
+                return unordered
             solution = np.empty_like(right)
             solution[order] = factors.solve(right[order])
         return solution
@@ -142,7 +142,7 @@ class SimilarSystems:
         if self._factors is not None and len(right) > self._few:
             shape = (len(right), len(right))
             times, inverse = (
-                LinearOperator(shape, each, dtype=right.dtype) for each in (product, self._factors)
+                LinearOperator(shape, function, dtype=right.dtype) for function in (product, self._factors)
             )
             with one_thread():
                 solution, late = cg(

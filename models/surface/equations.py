@@ -88,10 +88,10 @@ class Equations:
         u, v = self.crosses.averaged(mean).lines
         return sparse.vstack([self._second(u, v), self._second(v, u)])
 
-    def _second(self, line: Floats, other: Floats) -> Any:
+    def _second(self, line: Floats, along: Floats) -> Any:
         """The matrix (b, N) of line . d_other g."""
         return sum(
-            scale_rows(_along(self.stencils.changes, other) @ slope, line[:, axis])
+            scale_rows(_along(self.stencils.changes, along) @ slope, line[:, axis])
             for axis, slope in enumerate(self.stencils.slopes)
         )
 
@@ -170,10 +170,10 @@ class Equations:
         grid, uneven = self.stencils.grid, self.stencils.unevenness
         normals, change = normals_of(self.stencils, z), changes_of_normals(self.stencils, z)
         weight = self.weights.even * grid.size
-        own = np.einsum("cak,cbk->abk", weight * uneven.diagonal() * change, change)
+        diagonal = np.einsum("cak,cbk->abk", weight * uneven.diagonal() * change, change)
         beside = np.einsum("cak,cbk->abk", -weight * change[:, :, grid.first], change[:, :, grid.second])
         slope = np.einsum("cak,ck->ak", change, weight * (uneven @ normals.T).T)
-        return slope, np.concatenate([own, beside, beside.swapaxes(0, 1)], axis=2)
+        return slope, np.concatenate([diagonal, beside, beside.swapaxes(0, 1)], axis=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,28 +192,31 @@ class BlockSum:
         """Plan the sum of a matrix and of blocks of pixels with these corners, (4, k) each."""
         size, across, (row, column) = constant.shape[0], 2 * _MEETING + 1, np.nonzero(used)
 
-        def key(one: Ints, other: Ints) -> NDArray[np.intp]:
+        def key(first_corner: Ints, second_corner: Ints) -> NDArray[np.intp]:
             """Numbers of pairs of corners, in the order of the entries."""
-            down, right = row[other] - row[one] + _MEETING, column[other] - column[one] + _MEETING
-            return np.asarray(across * (across * one.astype(np.intp) + down) + right)
+            down, right = (
+                row[second_corner] - row[first_corner] + _MEETING,
+                column[second_corner] - column[first_corner] + _MEETING,
+            )
+            return np.asarray(across * (across * first_corner.astype(np.intp) + down) + right)
 
         old = constant.tocoo()
         whose = np.full(across**2 * size, -1, dtype=np.int32)
-        places, kept = key(first[:, None], second), key(*old.coords)
+        places, kept_places = key(first[:, None], second), key(*old.coords)
         whose[places] = second
-        whose[kept] = old.coords[1]
+        whose[kept_places] = old.coords[1]
         there = whose >= 0
         entry = np.cumsum(there) - 1
         data = np.zeros(entry[-1] + 1)
-        data[entry[kept]] = old.data
+        data[entry[kept_places]] = old.data
         begin = np.concatenate([[0], entry[across**2 - 1 :: across**2] + 1])
-        whole = sparse.csr_array((data, whose[there], begin), shape=constant.shape)
-        return cls(whole, entry[places].ravel())
+        matrix = sparse.csr_array((data, whose[there], begin), shape=constant.shape)
+        return cls(matrix, entry[places].ravel())
 
     def matrix(self, blocks: Floats) -> Any:
         """The matrix for blocks (2, 2, k)."""
-        each = np.kron(SLOPES, SLOPES).T @ blocks.reshape(4, -1)
-        data = self.constant.data + np.bincount(self.places, each.ravel(), len(self.constant.data))
+        entries = np.kron(SLOPES, SLOPES).T @ blocks.reshape(4, -1)
+        data = self.constant.data + np.bincount(self.places, entries.ravel(), len(self.constant.data))
         return sparse.csr_array((data, self.constant.indices, self.constant.indptr), self.constant.shape)
 
 

@@ -57,8 +57,10 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
     for hint in hints:
         place = f"the hint at row {hint.row}, column {hint.column}"
         at = (hint.row, hint.column)
-        whole = all(isinstance(each, (int, np.integer)) for each in at)
-        inside = whole and all(0 <= each < size for each, size in zip(at, mask.shape, strict=True))
+        whole_numbers = all(isinstance(coordinate, (int, np.integer)) for coordinate in at)
+        inside = whole_numbers and all(
+            0 <= coordinate < size for coordinate, size in zip(at, mask.shape, strict=True)
+        )
         if not inside or not mask[at]:
             raise InputError(
                 f"{place} lies outside the mask of {instance.name}, which has {mask.shape[0]} rows and "

@@ -74,26 +74,26 @@ def surface(
         For a hint outside the mask, or with angles that no normal has.
 
     """
-    instance, given, cut = field.instance, tuple(hints), TimeLimit(stop_function(stop))
-    check_hints(given, instance)
+    instance, all_hints, cut = field.instance, tuple(hints), TimeLimit(stop_function(stop))
+    check_hints(all_hints, instance)
     part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
     heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)
-    found = []
+    parts_done = []
     for number in range(1, parts + 1):
         progress("surface" if parts == 1 else f"surface, part {number} of {parts}")
         mask = part_of == number
         window = ndimage.find_objects(mask.astype(np.int8))[0]
         stencils, crosses = Stencils(Grid(mask[window])), Crosses.of(field).at(mask[instance.mask])
         level = GridLevel(stencils, crosses, (window[0].start, window[1].start))
-        own = [hint for hint in given if part_of[hint.row, hint.column] == number]
-        z = _solve_part(level, own, cut, flip=flip)
+        part_hints = [hint for hint in all_hints if part_of[hint.row, hint.column] == number]
+        z = _solve_part(level, part_hints, cut, flip=flip)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
-        found.append((level.grid.size, level, z, own))
-    _, level, z, own = max(found, key=itemgetter(0))
-    firm = firmness(level, z, [hint_rows(hint, level) for hint in own])
+        parts_done.append((level.grid.size, level, z, part_hints))
+    _, level, z, part_hints = max(parts_done, key=itemgetter(0))
+    firm = firmness(level, z, [hint_rows(hint, level) for hint in part_hints])
     off = right_angle_deviation(field, heights)
-    freedom = freedom_of(firm, hinted=_decide_side(own))
+    freedom = freedom_of(firm, hinted=_decide_side(part_hints))
     lifted = Surface(field, heights, confidence_of(field, off), (), freedom, firm)
     slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
     late = ("time was over before it had settled",) if cut.off else ()
@@ -117,8 +117,8 @@ def _solve_part(part: GridLevel, hints: Sequence[Hint], over: Over, *, flip: boo
     """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
     coarse, *finer = levels_of(part)
     dome, *planes = ([*_from_start(coarse, z, hints, over, flip=flip)] for z in coarse.starts)
-    found = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
-    _, z = min(found, key=itemgetter(0))
+    candidates = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
+    _, z = min(candidates, key=itemgetter(0))
     for level in finer:
         z = _descend_with_hints(level, level.refined(coarse, z), hints, over)[1]
         coarse = level

@@ -189,7 +189,7 @@ class GridLevel:
 
 def levels_of(level: GridLevel) -> list[GridLevel]:
     """The level and coarser ones, the coarsest first."""
-    found = [level]
-    while found[0].grid.size > SMALL:
-        found.insert(0, found[0].coarser())
-    return found
+    levels = [level]
+    while levels[0].grid.size > SMALL:
+        levels.insert(0, levels[0].coarser())
+    return levels

@@ -46,7 +46,7 @@ def confidence_of(field: CrossField, off: Floats) -> Floats:
 def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
     """Sentences with reasons not to trust a surface. slant: of its normals, radians (n,)."""
     unfit, spots = float(np.mean(off > OFF)), len(field.singularities.index)
-    found = {
+    conditions = {
         f"{unfit:.0%} of the crosses are more than {np.degrees(OFF):g} degrees off right angles on it: "
         "no one surface has all these curvature lines. Probably some strokes are not curvature lines; "
         "otherwise hidden lines are drawn": unfit > UNFIT,
@@ -54,18 +54,18 @@ def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
         f"it is nearly flat, {np.degrees(slant.mean()):.1f} degrees on average: "
         "lines that cross at right angles everywhere do not determine a shape": slant.mean() < FLAT,
     }
-    return tuple(doubt for doubt, holds in found.items() if holds)
+    return tuple(doubt for doubt, holds in conditions.items() if holds)
 
 
 def freedom_of(firm: float, *, hinted: bool) -> tuple[str, ...]:
     """Sentences that describe other surfaces with the same crosses."""
-    found = [] if hinted else ["inside out it has the same crosses: see whether it bulges the right way"]
+    sentences = [] if hinted else ["inside out it has the same crosses: see whether it bulges the right way"]
     if firm < LOOSE:
-        found.append(
+        sentences.append(
             "other surfaces fit as well, steeper or leaning otherwise: "
             f"{describe_firmness(firm)}; a hint settles it"
         )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def describe_firmness(firm: float) -> str:

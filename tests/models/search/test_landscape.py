@@ -98,8 +98,8 @@ def explored(instance, seed, perturbations):
     tasks = _Hunt(instance, seed, [first_field(instance)]).tasks(Deadline(np.inf))
     lower, upper = stroke_bounds(instance)
     for task in tasks:
-        better, whole = explore(replace(task, perturbations=perturbations))
-        assert whole
+        better, complete = explore(replace(task, perturbations=perturbations))
+        assert complete
         if better is not None:
             assert 0 <= better.energy < definition(instance, task.x, task.p)
             assert better.energy == pytest.approx(
