@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import subprocess
 from importlib.util import find_spec
@@ -13,9 +12,7 @@ import crossfield as cf
 import pytest
 from cases import make_instance
 from crossfield.export.bundle.manifest import read_manifest, write_all
-from crossfield.export.bundle.starts import LAYOUTS, STARTS
 from crossfield.export.cli.tables import tables
-from crossfield.export.formats.registry import FORMATS
 from crossfield.export.licence import licence_error
 from crossfield.export.solvers_table import BUNDLED, PROGRAMS, SOLVERS, Refusal, Solver, StartFile
 from crossfield.models.errors import MissingSolverError
@@ -23,29 +20,9 @@ from crossfield.models.formulations.catalogue import FORMULATIONS
 
 pytestmark = pytest.mark.smoke
 
-ROOT = Path(cf.__file__).parent
 TOY = Solver(
     "toy", "Toy", ("lp",), "cbc", {"quadratic rows": Refusal("read", "Toy reads no products, at no price")}
 )
-
-
-def test_what_the_table_names_is_there():
-    for solver in SOLVERS.values():
-        assert solver.formats[0] in PROGRAMS[solver.program].formats
-        assert set(solver.formats) <= set(FORMATS)
-        assert (solver.proves == "global") == all(each.stage != "local" for each in solver.refusals.values())
-        assert solver.start is None or solver.start.layout in LAYOUTS
-    for program in PROGRAMS.values():
-        module = (ROOT / "export" / "programs" / f"{program.name}.py").read_text()
-        wanted = {
-            "version": True,
-            "read": program.algebra,
-            "evaluate": program.behaviour,
-            "solve": program.solvers,
-        }
-        for function, needed in wanted.items():
-            assert not needed or re.search(rf"^def {function}\(", module, re.MULTILINE), program.name
-    assert {layout for start in STARTS.values() for layout in [start.layout]} == set(LAYOUTS)
 
 
 def test_a_solver_that_others_run_is_one_entry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -20,9 +20,8 @@ from crossfield.models.errors import (
     UnsupportedByFormatError,
 )
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.problem import formulate, with_integers_fixed, with_products_lifted
+from crossfield.models.formulations.problem import with_integers_fixed, with_products_lifted
 from crossfield.models.instance.file import read_instance, write_instance
-from crossfield.models.instance.instance import Instance
 from loops import for_each
 
 OPTIONS = [
@@ -127,14 +126,6 @@ def test_the_instance_is_written_once_and_replaced_when_it_is_another(tmp_path):
     path.write_text("rubbish")
     write_all(make_instance(), tmp_path, formulations=["milp-mccormick"], formats=["lp"])
     assert read_instance(path).sha256 == make_instance().sha256
-
-
-def test_large_instances_are_written_as_arrays(tmp_path):
-    instance = Instance("large", np.ones((257, 256), bool), np.array([[0, 0]]), np.array([0.3]), np.ones(1))
-    problem = formulate(instance, "qp-fixed", p=np.zeros(len(instance.grid.first)))
-    manifest = write_problem(problem, tmp_path, formats=["mps"])
-    assert manifest.document["instance"]["file"] == "large.instance.npz"
-    assert read_manifest(manifest.path).problem().sha256 == problem.sha256
 
 
 # determinism

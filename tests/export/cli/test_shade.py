@@ -81,14 +81,6 @@ def test_the_report_places_the_pictures_on_the_drawing(tmp_path):
     assert np.abs(found - [(360, -30), (540, 150)]).max() <= 1.5 * grid["pixel_size"]
 
 
-def test_firmness_is_explained_in_words(saved, tmp_path, capsys):
-    assert invoke(["shade", saved, "-o", str(tmp_path / "out")]) == 0
-    shown = " ".join(capsys.readouterr().out.split())
-    degrees = 10 * report(tmp_path / "out")["firmness"]
-    words = f"the angles between its lines change by {degrees:.2f} degrees or more"
-    assert f"firmness: when its normals turn by 10 degrees, {words}" in shown
-
-
 def test_a_rawfield_and_an_instance_are_taken(field, tmp_path):
     cf.write_field(field, tmp_path / "f.rawfield")
     cf.write_instance(field.instance, tmp_path / "i.json")

@@ -29,10 +29,3 @@ def test_words_stay_whole_within_80_columns(capsys, columns, row, header):
     for cell in row:
         for word in cell.split():
             assert shown.split().count(word) >= 2, word
-
-
-def test_numbers_are_aligned_at_the_right(capsys):
-    show_table("title", ("name", "size", "note"), [["a", "5", "x"], ["bb", "1234", "yy"]], numbers=["size"])
-    assert capsys.readouterr().out == (
-        "title\nname  size  note\n----  ----  ----\na        5  x\nbb    1234  yy\n\n"
-    )

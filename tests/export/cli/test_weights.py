@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InstanceError
-from crossfield.models.instance.instance import MOST_WEIGHT, STROKE_WEIGHT
+from crossfield.models.instance.instance import MOST_WEIGHT
 from crossfield.models.sketch.samples import sample_svg
 
 GIVEN = ["--stroke-weight", "10", "--skew-weight", "1e-4"]
@@ -36,22 +36,6 @@ def test_a_sketch_a_sample_and_an_instance_file_get_the_weights(tmp_path, drawin
     kept = cf.sample("mouse", 8, skew_weight=1e-3).with_weights(stroke_weight=10)
     assert (kept.stroke_weight, kept.skew_weight) == (10.0, 1e-3)
     assert len({kept.sha256, instance.sha256, cf.read_instance(file).sha256}) == 3
-
-
-def test_every_command_that_reads_a_sketch_takes_them(tmp_path, capsys):
-    """`run` too: tests/export/solving/test_run_truth.py."""
-    sketch, wanted = ["skew", "--size", "4", *GIVEN], cf.sample("skew", 4, **WEIGHTS).sha256
-    commands = {
-        "export": ["-f", "qp-fixed", "-F", "nl"],
-        "solve": ["-m", "greedy"],
-        "prove": ["--time-limit", "30"],
-    }
-    for command, options in commands.items():
-        assert invoke([command, *sketch, *options, "-o", str(tmp_path / command)]) == 0
-        assert "stroke weight 10, skew weight 0.0001" in capsys.readouterr().out
-    assert cf.read_instance(tmp_path / "export" / "skew.instance.json").sha256 == wanted
-    for field in ("solve/skew.greedy.field.npz", "prove/skew.proof.field.npz"):
-        assert cf.read_field(tmp_path / field).instance.sha256 == wanted
 
 
 def test_weights_out_of_range_are_refused(tmp_path, capsys, drawing):
@@ -115,10 +99,3 @@ def test_a_start_under_other_weights_is_refused_with_both(tmp_path, capsys):
     printed = capsys.readouterr().err
     assert "stroke weight 10" in printed
     assert "size, gauge and weights" in printed
-
-
-def test_the_summary_names_weights_that_are_not_the_defaults():
-    assert "w_" not in cf.sample("skew", 4).summary
-    assert cf.sample("skew", 4, stroke_weight=STROKE_WEIGHT, skew_weight=1.0).summary.endswith(
-        ", skew weight 1"
-    )

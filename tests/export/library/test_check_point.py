@@ -110,22 +110,6 @@ def test_energies_of_an_instance_are_those_of_its_field(gauge, shape, tmp_path):
         assert found.worst < 1e-15
 
 
-@pytest.mark.parametrize(
-    "block, by, kind",
-    [("alpha", 2.0, "bounds"), ("beta", 2.0, "bounds"), ("p1", 0.25, "integers"), ("p2", 5.0, "bounds")],
-)
-def test_what_breaks_an_instance_is_found_there(block, by, kind, tmp_path):
-    field = make_field(make_instance("full"))
-    problem = formulate(field.instance, "minlp-quartic")
-    write_instance(field.instance, tmp_path / "i.json")
-    point = problem.point(field)
-    point[problem.blocks[block].offset] += by
-    found = check(str(tmp_path / "i.json"), save_point(tmp_path / "p.sol", problem, point))
-    worst, place = found.violations[kind]
-    assert worst > 0.1
-    assert place.endswith(names_of(column_names(problem))[problem.blocks[block].offset].split("_", 1)[1])
-
-
 def test_integers_that_are_not_quite_whole_count_as_they_are(tmp_path):
     field = make_field(make_instance("full"))
     problem = formulate(field.instance, "miqp-exact")
@@ -319,13 +303,6 @@ def test_nothing_is_lost_to_rounding(tmp_path):
     assert Fraction(found.violations["rows"][0]) == Fraction(1, 10**40)
 
 
-def test_the_tolerance_is_met_exactly(tmp_path, capsys):
-    (tmp_path / "m.mps").write_text(linear())
-    for value, code in (("1.00000001", 0), ("1.0000000100000000000000000001", 1)):
-        (tmp_path / "p").write_text(f"x {value}\n")
-        assert called(capsys, tmp_path / "m.mps", tmp_path / "p")[0] == code
-
-
 def test_columns_left_out_are_zero_or_what_they_are_fixed_to_and_those_that_solvers_add_are_passed_over(
     tmp_path,
 ):
@@ -476,15 +453,6 @@ def test_wrong_usage_is_one_line(arguments, tmp_path, capsys, monkeypatch):
     (tmp_path / "m").write_text(linear())
     (tmp_path / "p").write_text(GOOD_POINT)
     refused(capsys, *arguments)
-
-
-@pytest.mark.parametrize("place", [0.5, 0.99])
-def test_a_packed_file_that_is_cut_off_is_refused(place, tmp_path, capsys):
-    write(problem_of("milp-mccormick gauge=strokes"), tmp_path / "m.mps.gz")
-    data = (tmp_path / "m.mps.gz").read_bytes()
-    (tmp_path / "m.mps.gz").write_bytes(data[: int(len(data) * place)])
-    (tmp_path / "p").write_text("x 0\n")
-    assert "damaged or cut off" in refused(capsys, tmp_path / "m.mps.gz", tmp_path / "p")
 
 
 def test_a_packed_file_that_grows_without_end_is_refused_before_it_is_unpacked(tmp_path, capsys):

@@ -8,9 +8,7 @@ import pytest
 from crossfield.export.library.building.build import build
 from crossfield.export.library.ledger import points as points_made
 from crossfield.export.library.plan.recipe import plan
-from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec, spec_of
-from crossfield.export.library.plan.splits import seeds_document
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import read_field
 from loops import for_each
@@ -59,12 +57,6 @@ def content(folder):
 # The specification
 
 
-def test_a_range_of_seeds_is_every_seed_in_it(tmp_path):
-    (sketch,) = read_spec(written(tmp_path)).sketches
-    assert sketch.seeds == (1, 2, 3, 4, 5)
-    assert sketch.splits == ("train", "train", "train", "validation", "test")
-
-
 @for_each(
     "old, new",
     [
@@ -79,15 +71,6 @@ def test_the_document_of_a_specification_is_that_specification(tmp_path, old, ne
     spec = read_spec(written(tmp_path, SPEC.replace(old, new)))
     again = spec_of(json.loads(json.dumps(spec.document())), tmp_path / "library.json")
     assert again == spec
-
-
-def test_a_run_of_seeds_is_written_as_a_range():
-    assert [seeds_document(each) for each in ((1, 2, 3), (1, 2, 3, 4), (4, 3, 2, 1), (None,))] == [
-        [1, 2, 3],
-        "1-4",
-        [4, 3, 2, 1],
-        [None],
-    ]
 
 
 SAMPLES = '[[sketches]]\nname = "{}"\nsample = "mouse"\nsplit = "{}"\n'
@@ -154,14 +137,6 @@ def test_a_family_that_states_nothing_more_has_the_recipes_of_before():
     assert sketch.keys() <= tomllib.loads(SPEC)["sketches"][0].keys() | {
         *("title", "rungs", "sizes", "author", "license", "source", "added")
     } - {"share", "points", "split"}
-
-
-def test_options_of_a_family_reach_its_instances(tmp_path):
-    text = SPEC.replace("share = 0.3", 'share = 0.5\nstrokes = "straight"\nnoise = 0.2\nstroke_weight = 3.0')
-    instance = instance_from(plan(read_spec(written(tmp_path, text)))[0].recipe)
-    assert instance.source.endswith("seed 1, strokes straight, share 0.5, noise 0.2")
-    assert instance.stroke_weight == 3.0
-    assert instance.skew_coefficient == 1e-6
 
 
 # The build

@@ -11,9 +11,7 @@ from crossfield.export.library.building.build import build
 from crossfield.export.library.building.named import SHIPPED, write_entries
 from crossfield.export.library.building.table import COLUMNS, TABLE, read_table
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.ledger.given import read_points
 from crossfield.export.library.ledger.points import complete_point
-from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.errors import InputError
 from loops import for_each
@@ -41,14 +39,6 @@ def set_of(sidecar):
 
 
 # The table
-
-
-def test_the_table_that_ships_lists_the_entries_of_the_specification():
-    spec = default_spec()
-    points = read_points(spec.points)
-    planned = [(entry, points(each.recipe.name)) for each in plan(spec) for entry in each.entries]
-    wanted = [entry.name for entry, given in planned if not entry.lacks(given.about)]
-    assert [each.name for each in cf.entries()] == wanted, REMEDY
 
 
 def test_the_table_that_ships_has_the_rows_of_a_build(built):
@@ -123,19 +113,6 @@ def test_an_entry_has_the_certificate_of_its_norm(name, norm):
     assert (proven.certificate.norm, proven.certificate.status) == (norm, "optimal")
     assert proven.certificate.bound <= proven.objective
     assert proven.objective == pytest.approx(proven.certificate.energy, rel=1e-6)
-
-
-@pytest.mark.parametrize("name", ["qp", "printed_milp", "box_exact"])
-def test_entries_that_minimise_no_energy_of_a_norm_have_no_certificate(name):
-    assert cf.entry(f"cf_cyl_n005_{name}").certificate is None
-
-
-def test_an_entry_is_written_in_any_format_that_carries_it(built, tmp_path):
-    written = cf.entry("cf_cyl_n005_milp").write(tmp_path / "mine.mps")
-    assert list(written.files) == ["mine.mps"]
-    assert (tmp_path / "mine.mps").read_bytes() == (built.folder / "cf_cyl_n005_milp.mps").read_bytes()
-    with pytest.raises(cf.UnsupportedByFormatError):
-        cf.entry("cf_cyl_n005_parity").write(tmp_path / "mine.lp")
 
 
 @pytest.mark.slow

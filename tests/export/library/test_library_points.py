@@ -205,18 +205,6 @@ def test_the_points_that_ship_are_about_the_shipped_instances():
             assert tuple(found.norm for found in certificates) == each.recipe.prove
 
 
-@pytest.mark.slow
-def test_there_is_something_to_extrapolate_on_every_rung():
-    shares = {"tiny": [], "small": [], "medium": [], "large": []}
-    for each in plan(default_spec()):
-        instance = instance_from(each.recipe)
-        shares[each.recipe.rung].append(len(instance.theta) / instance.grid.size)
-    assert max(map(max, shares.values())) <= 0.5
-    means = {rung: sum(found) / len(found) for rung, found in shares.items()}
-    assert max(means.values()) < 0.35
-    assert means["large"] < 0.25
-
-
 # Grades
 
 
@@ -252,19 +240,3 @@ def test_sidecars_tell_density_and_difficulty(searched):
     assert entry["difficulty"] == "hard"
     assert read_library(searched).entry(f"{STEM}_qp")["difficulty"] == "easy"
     assert read_library(searched).entry(f"{STEM}_printed_milp")["difficulty"] == "open"
-
-
-@pytest.mark.slow
-def test_two_processes_have_the_findings_of_one(searched, tmp_path):
-    lib = shutil.copytree(searched, tmp_path / "lib")
-    (lib / f"{STEM}_milp.sol").unlink()
-    (lib / f"{SADDLE}_exact.json").write_text("{}")
-    path = lib / f"{STEM}_cubic.json"
-    path.write_text(path.read_text().replace('"difficulty": "hard"', '"difficulty": "easy"'))
-    one, two = [], []
-    found = verify_library(lib, progress=one.append)
-    assert verify_library(lib, jobs=2, progress=two.append) == found
-    assert one == two
-    stated = {(finding.file, finding.what) for finding in found}
-    words = "states another difficulty than follows from its instance and the ledger"
-    assert (f"{STEM}_cubic.json", words) in stated

@@ -5,7 +5,6 @@ import pytest
 from crossfield.export.pictures.streamlines import CLOSEST, combed, streamlines
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField, field_in_windows
-from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.instance import Instance
 from scipy.spatial import cKDTree
 
@@ -108,17 +107,6 @@ def test_concentric_field_gives_circles_and_rays(size):
     assert rays > 40
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("index", [0.0, 0.25, -0.25])
-def test_placement_does_not_depend_on_labels(index):
-    field = waves(square(24)) if index == 0 else quarter(24, index, 1.2, 0.4)
-    first, second = streamlines(field, 1.1), streamlines(random_labels(field, 11), 1.1)
-    assert len(first) == len(second) > 20
-    for line, same in zip(first, second, strict=True):
-        np.testing.assert_allclose(same.points, line.points, atol=1e-6)
-        np.testing.assert_array_equal(same.families, line.families)
-
-
 def test_lines_stay_inside_the_mask_and_reach_every_part():
     down, across = np.mgrid[0:40, 0:44]
     mask = (np.hypot(down - 15, across - 14) < 13) & ~(np.hypot(down - 13, across - 16) < 4)
@@ -215,27 +203,12 @@ def test_cut_joins_two_singularities_that_are_close():
     assert (np.abs(field.instance.grid.columns[field.instance.grid.first[cut]] - 19.5) < 6).all()
 
 
-def test_combing_gives_u_the_strokes():
-    for u in np.radians([10.0, 80.0, 130.0]):
-        field = combed(random_labels(field_of(square(6), lambda x, _, u=u: u + 0 * x, zero, stroke=7), 4))
-        assert line_difference(field.alpha + field.beta, u).max() < 1e-9
-
-
 @pytest.mark.parametrize("shape", [(1, 1), (1, 6), (5, 1)])
 def test_tiny_grids(shape):
     field = field_of(np.ones(shape), lambda x, _: 0.6 + 0 * x, zero)
     lines = streamlines(field, 0.3)
     assert {int(line.families[0]) for line in lines} == {0, 1}
     pixels_under(field, all_points(lines))
-
-
-def test_noise_ends():
-    rng = np.random.default_rng(1)
-    mask = rng.random((16, 16)) < 0.8
-    angles, skews = rng.uniform(0, np.pi, mask.sum()), rng.uniform(-0.78, 0.78, mask.sum())
-    field = field_of(mask, lambda x, _: angles + 0 * x, lambda x, _: skews + 0 * x)
-    row, column = pixels_under(field, all_points(streamlines(field, 0.4)))
-    assert mask[row, column].all()
 
 
 @pytest.mark.parametrize("separation", [0.0, -1.0, float("nan"), float("inf"), 1e-6])

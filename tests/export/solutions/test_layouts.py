@@ -4,10 +4,8 @@ import json
 import re
 from dataclasses import replace
 
-import crossfield as cf
 import pytest
 from answers import GOOD, TINY, problem, problem_of
-from crossfield.export.cli.app import invoke
 from crossfield.export.solutions.readers.grammar import plain_text
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw, recognised
 from crossfield.export.solutions.solution import read_solution
@@ -198,12 +196,6 @@ def test_a_damaged_line_inside_a_text_is_an_error_with_its_place():
             parse_raw(damaged + words)
 
 
-def test_answers_of_two_kinds_in_one_text_are_refused():
-    data = text("scip-10.0_milp_optimal_log.txt") + b"\n" + text("lp_solve-5.5.2.5_milp_optimal.txt")
-    with pytest.raises(SolutionError, match=r"answers of several kinds: SCIP \.sol and lp_solve"):
-        parse_raw(data)
-
-
 # pools
 
 
@@ -244,25 +236,6 @@ def test_the_pool_of_gurobi():
     data = re.sub(rb'"PoolNX": \[ \S+ 0\]', b'"PoolNX": [ 1]', path.read_bytes(), count=1)
     with pytest.raises(SolutionError, match="not every column has 2 values"):
         parse_raw(data)
-
-
-def test_read_takes_the_number_of_a_solution(tmp_path, capsys):
-    instance = tmp_path / "tiny.json"
-    cf.write_instance(problem("milp").instance, instance)
-    files = ["-f", "milp-mccormick", "-F", "mps", "-o", str(tmp_path), "-q"]
-    assert invoke(["export", str(instance), *files]) == 0
-    (manifest,) = tmp_path.glob("*.manifest.json")
-    arguments = ["read", str(POOL), "--manifest", str(manifest), "-o", str(tmp_path / "field.npz"), "--json"]
-    capsys.readouterr()
-    for chosen in ([], ["--solution", "3"]):
-        assert invoke([*arguments, *chosen]) == 0
-        field = cf.read_field(tmp_path / "field.npz")
-        number = int(chosen[1]) if chosen else 1
-        expected = read_solution(POOL, problem("milp"), solution=number).field
-        assert (field.p == expected.p).all()
-        assert f"solution {number} of 3" in capsys.readouterr().out
-    assert invoke([*arguments, "--solution", "4"]) == 1
-    assert "there is no solution 4 in it; choose one of 1 to 3" in capsys.readouterr().err
 
 
 # identity

@@ -10,12 +10,10 @@ from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.grammar import Form
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.text import (
-    RawSolution,
     entries,
     values_for,
     values_in_order,
 )
-from crossfield.export.statuses import Status
 from crossfield.models.errors import OutputError, SolutionError
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -54,11 +52,6 @@ def ampl(
     return ("\n".join(map(str, lines)) + "\n" + tail).encode()
 
 
-def named(**values):
-    names = np.array([name.encode() for name in values])
-    return RawSolution(Status.FEASIBLE, "", None, names, np.array(list(values.values()), dtype=float))
-
-
 # what real solvers write
 
 
@@ -92,13 +85,6 @@ def test_files_of_real_solvers(file, reader, status, values, rows):
     assert raw.has_point == bool(values)
     assert (raw.names is None) == reader.startswith("ampl")
     assert raw.omits_zeros == (reader == "highs" and "style4" in file and bool(values))
-
-
-def test_the_bound_of_highs_is_read_where_the_file_has_one():
-    bounds = [
-        read_raw(HERE / f"highs-{version}_optimal_style0.sol").bound for version in ("1.15.1", "1.16.0")
-    ]
-    assert bounds == [None, -14.4]
 
 
 def test_files_are_told_by_content_and_may_be_packed(tmp_path):
@@ -313,14 +299,6 @@ def test_numbers_come_back_bit_by_bit(values):
 # by name
 
 
-def test_values_come_in_the_order_asked_for():
-    raw = named(a=1, b=2, c=3)
-    for order in ("abc", "cab", "ba"):
-        values, missing, unknown = values_for(np.array([name.encode() for name in order]), raw)
-        assert values.tolist() == [float("abc".index(name) + 1) for name in order]
-        assert (missing, unknown) == (0, 3 - len(order))
-
-
 def test_missing_names_are_zero_only_where_zeros_are_omitted():
     dense, sparse = (parse_raw(data) for data in (highs(["x 1", "y 2"]), highs(["x 1 0", "y 2 1"], count=-2)))
     values, missing, _ = values_for(NAMES, dense)
@@ -387,13 +365,6 @@ def test_what_is_written_is_read_back(tmp_path_factory, values, message, rows, c
     assert (raw.rows, raw.reader) == (rows, "ampl-text")
     if code > 99:
         assert raw.status == parse_raw(ampl(tail=f"objno 0 {code}\n")).status
-
-
-def test_a_file_without_point_says_how_many_columns_there_are(tmp_path):
-    path = write_ampl_sol(tmp_path / "a.sol", "no luck", np.empty(0), 3, 200, columns=7)
-    raw = read_raw(path)
-    assert (raw.status, raw.message, raw.rows, raw.has_point) == ("infeasible", "no luck", 3, False)
-    assert b"\n3\n0\n7\n0\n" in path.read_bytes()
 
 
 def test_pyomo_reads_what_is_written(tmp_path):

@@ -29,8 +29,6 @@ from answers import (
     C,
     G,
     K,
-    R,
-    S,
     X,
     problem,
     problem_of,
@@ -178,16 +176,6 @@ def test_a_stopped_simplex_claims_a_point_only_when_it_is_feasible():
     assert (raw.status, raw.has_point) == (NOTHING, True)
 
 
-def test_escaped_names_of_cplex():
-    raw = parse_raw(swapped(f"{C}_qp_optimal.sol", b'"ONE"', b'"a&lt;b&amp;c"'))
-    assert raw.names[0] == b"a<b&c"
-
-
-def test_infinite_values_of_scip():
-    raw = read_raw(TINY / f"{S}_other_infinite.sol")
-    assert raw.values.tolist() == [np.inf, -np.inf]
-
-
 @for_each("words, status, without_point", [
         ("optimal solution found", GLOBAL, ERROR), ("gap limit reached", LIMIT, NOTHING),
         ("node limit reached", LIMIT, NOTHING), ("user interrupt", LIMIT, NOTHING),
@@ -209,16 +197,6 @@ def test_cbc_with_rows_and_marks_gives_the_same_columns():
     marked = re.sub(rb"\n(?= +\d+ (?:alpha|p1|c14))", rb"\n**", text(f"{B}_milp_optimal_all.sol"))
     assert marked.count(b"\n**") == 12
     assert parse_raw(marked).values.tolist() == plain.values.tolist()
-
-
-def test_cbc_omits_zeros_when_none_is_written():
-    data = text(f"{B}_milp_optimal.sol")
-    dense = parse_raw(data)
-    sparse = parse_raw(re.sub(rb"\n +\d+ \S+ +0 +\S+(?=\n)", b"", data))
-    assert (dense.omits_zeros, sparse.omits_zeros) == (False, True)
-    assert len(sparse.values) == np.count_nonzero(dense.values)
-    name = names_of("milp")
-    assert (values_for(name, sparse).values == values_for(name, dense).values).all()
 
 
 @for_each("words, status", [
@@ -303,8 +281,3 @@ def test_states_of_gams(model, solver, status):
     )
     raw = parse_raw(data)
     assert (raw.status, raw.has_point) == (status, status in WITH_POINT)
-
-
-def test_a_huge_objective_of_baron_is_unbounded():
-    raw = parse_raw(text(f"{R}_other_unbounded_res.lst").split(b"The above solution was found along")[0])
-    assert (raw.status, raw.has_point) == (UNBOUNDED, False)

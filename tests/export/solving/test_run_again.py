@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import crossfield as cf
 import pytest
@@ -124,15 +123,6 @@ def test_ctrl_c_while_it_draws_leaves_no_picture_of_the_earlier_run(earlier, tmp
     assert_whole(folder, old)
 
 
-@pytest.mark.slow
-def test_two_times_ctrl_c_leaves_whole_files(earlier, tmp_path):
-    source, old = earlier
-    folder = shutil.copytree(source, tmp_path / "run")
-    end_at(folder, "search: energy", signal.SIGINT, times=2)
-    assert_whole(folder, old)
-    assert list(folder.rglob(".*.part")) == []
-
-
 def test_a_failing_certificate_leaves_field_and_report(tmp_path, capsys):
     from crossfield.export.cli.app import invoke
 
@@ -145,13 +135,3 @@ def test_a_failing_certificate_leaves_field_and_report(tmp_path, capsys):
     assert (report["status"], report["bound"], report["ended"]) == ("unproven", 0.0, "optimal")
     assert "cannot be written" in report["reason"]
     assert cf.read_field(tmp_path / "mouse.proof.field.npz").energy().total == report["energy"]
-
-
-@pytest.mark.slow
-def test_a_failing_certificate_leaves_the_rest_of_a_run(tmp_path):
-    (tmp_path / "certificate.npz").mkdir()
-    report = cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(20.0))
-    assert report.proven is None
-    assert "certificate.npz: cannot be written" in report.failures["certificate"]
-    assert Path(tmp_path / "field.npz").exists()
-    assert json.loads((tmp_path / "report.json").read_text())["failures"] == report.failures

@@ -13,13 +13,12 @@ from functools import cache
 import crossfield as cf
 import numpy as np
 import pytest
-from children import command_lines, complaints
+from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
 from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.local import solver_for
 from crossfield.export.solving.methods import Request
-from crossfield.export.solving.run import plan
 from crossfield.export.statuses import Status
 from crossfield.models.errors import (
     InputError,
@@ -512,22 +511,3 @@ def test_ctrl_c_during_the_milp_of_a_run_goes_on_with_its_best_point(tmp_path):
     assert "two-stage" in out
     assert "interrupted: two-stage; report.json lists the results so far" in err
     assert (tmp_path / "report.json").exists()
-
-
-@pytest.mark.slow
-def test_ctrl_c_elsewhere_leaves_whole_files_only(tmp_path):
-    code, out, err = interrupted(tmp_path, "*.instance.json", ["run", "mouse", "--size", "100"], "}$")
-    assert (code, out.splitlines()) == (1, [plan(cf.Limits())])
-    assert err == "crossfield: interrupted; all written files are complete\n"
-    # Models appear together, once all are written.
-    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("solver", ["highs", "bonmin"])
-def test_when_asked_to_end_it_ends_with_its_child(tmp_path, solver):
-    code, out, err = interrupted(
-        tmp_path, f"*.{solver}.log", CTRL_C[solver], AT_WORK[solver], number=signal.SIGTERM
-    )
-    assert (code, out, err) == (128 + signal.SIGTERM, "", "")
-    assert [line for line in command_lines().values() if str(tmp_path).encode() in line] == []

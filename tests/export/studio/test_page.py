@@ -177,15 +177,6 @@ def test_every_edit_is_undone_and_done_again(empty, tmp_path):
     assert document(settled(browser)) == states[1]
 
 
-def test_a_lasso_selects_the_strokes_inside_of_it(empty, tmp_path):
-    browser = pebble(empty, tmp_path)
-    tool(browser, "select")
-    drag(browser, [(20, 290), (460, 290), (460, 400), (20, 400)])
-    assert find(browser, "#selected").text == "1 selected"
-    find(browser, "#delete").click()
-    assert len(document(settled(browser))["strokes"]) == 2
-
-
 def test_it_works_with_the_keyboard_alone(empty):
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
@@ -294,13 +285,6 @@ def test_a_lost_server_gets_a_message_and_nothing_is_lost(browser, tmp_path):
             opened(browser, another.address)
             assert document(browser) == kept
         assert json.loads(saved.read_text()) == kept
-
-
-def test_a_page_that_is_loaded_again_keeps_its_drawing(empty, tmp_path):
-    browser = pebble(empty, tmp_path)
-    browser.refresh()
-    assert document(settled(browser)) == PEBBLE
-    assert pixels(browser) > 0
 
 
 def in_space(browser, folder):

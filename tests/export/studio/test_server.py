@@ -66,11 +66,6 @@ def test_the_drawing_of_the_command_line_is_the_first(page):
     assert json.loads(page.ask("sample/bottle")[2])["name"] == "bottle"
 
 
-def test_an_edit_returns_its_field_and_surface(page):
-    found = page.steps("compute?page=a&edit=1&size=16&lines=1", changed())
-    assert [step["stage"] for step in found] == ["field", "lines", "surface", "done"]
-
-
 def test_a_coarse_field_comes_before_a_fine_one(page):
     found = page.steps("compute?page=b&edit=1&size=72", changed(size=72))
     steps = [(step["stage"], step.get("size")) for step in found]
@@ -117,16 +112,6 @@ def test_files_are_opened_and_refused(page):
     assert (status, len(json.loads(body)["strokes"])) == (200, 2)
     status, _, body = page.ask("open?name=a.png", b"\x89PNG")
     assert (status, "picture" in json.loads(body)["message"]) == (422, True)
-
-
-def test_downloads_have_a_name(page):
-    status, headers, body = page.ask("download?what=instance", changed())
-    assert (status, headers["content-disposition"]) == (200, 'attachment; filename="pebble.json"')
-    assert json.loads(body)["name"] == "pebble"
-    status, _, body = page.ask("download?what=solver&formulation=minlp-parity&format=mps", changed(size=8))
-    assert status == 422
-    assert "quartic" in json.loads(body)["message"]
-    assert page.ask("download?what=everything", changed())[0] == 422
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.studio.document import Document
 from crossfield.export.studio.files import download
 from crossfield.export.studio.opening import opened
-from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, drawn, field_of, hints_of
+from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, drawn, hints_of
 from crossfield.export.studio.views import field_step
 from crossfield.models.sketch.samples import sample_svg
 from PIL import Image, ImageDraw
@@ -70,12 +70,6 @@ def test_the_instance_is_that_of_the_downloaded_drawing(tmp_path):
     assert cf.read_sketch(tmp_path / name, size=16).sha256 == drawn(document()).instance.sha256
 
 
-def test_ignored_strokes_are_not_read():
-    more = {"points": [20, 20, 100, 80], "mark": "ignored", "weight": 1}
-    same = document(strokes=[*PEBBLE["strokes"], more])
-    assert drawn(same).instance.sha256 == drawn(document()).instance.sha256
-
-
 def test_the_weight_of_a_stroke_scales_its_reliability():
     light = [stroke | {"weight": 0.5} for stroke in PEBBLE["strokes"]]
     before, after = drawn(document()).instance, drawn(document(strokes=light)).instance
@@ -106,11 +100,6 @@ def test_a_click_excludes_an_area_between_strokes_and_includes_it_again():
     assert (without.kinds[gone] == LEFT_OUT).mean() > 0.9  # the rest is a stroke's corner
     assert (before.kinds[gone] == IN).all()
     assert drawn(document(mask=click(30, 25) * 2)).instance.sha256 == before.instance.sha256
-
-
-def test_a_click_outside_changes_nothing():
-    for x, y in ((2, 2), (-50, 500), (10, 50)):
-        assert drawn(document(mask=click(x, y))).instance.sha256 == drawn(document()).instance.sha256
 
 
 def test_an_enclosed_area_that_was_left_out_is_included_by_a_click():
@@ -220,14 +209,6 @@ def test_the_python_lines_of_the_menu_compute_the_same(tmp_path, monkeypatch):
     exec("\n".join(field_step(data)[0]["python"]), {})
     archive = zipfile.ZipFile(tmp_path / "pebble.surface.zip")
     assert archive.read("surface.obj") == (tmp_path / "surface" / "surface.obj").read_bytes()
-
-
-def test_a_sample_has_the_same_field_on_the_page():
-    found = opened(sample_svg("bottle").encode(), "bottle.svg")
-    given = Document.of(PEBBLE | {key: found[key] for key in ("name", "page", "strokes")} | {"size": 24})
-    own, other = field_of(given)[1], cf.sample("bottle", 24)
-    assert (own.instance.mask == other.mask).mean() > 0.98
-    assert {stroke["mark"] for stroke in found["strokes"]} == {"line", "cut"}
 
 
 def picture():

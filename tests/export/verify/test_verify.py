@@ -353,15 +353,3 @@ def proves(solvers: Solvers, held: Problem, path: Path, solver: str, optimum: fl
     return (
         found.claimed.startswith("optimal") and found.reported is not None and same(found.reported, optimum)
     )
-
-
-def test_takes_says_which_format():
-    instance = on_grid(2, 3)
-    assert takes(formulate(instance, "milp-mccormick"), "gurobi") == ("yes", "mps", "")
-    assert takes(formulate(instance, "minlp-parity"), "scip")[:2] == ("yes", "nl")
-    assert takes(formulate(instance, "minlp-parity"), "gurobi").answer == "no"
-    assert "minlp-quartic" in takes(formulate(instance, "minlp-parity"), "gurobi").reason
-    assert takes(formulate(instance, "miqcp-bilinear"), "cplex").answer == "no"
-    assert "5002" in takes(formulate(instance, "miqcp-bilinear"), "cplex").reason
-    assert takes(formulate(instance, "minlp-quartic"), "bonmin")[:2] == ("local", "nl")
-    assert takes(formulate(instance, "miqp-exact"), "highs").answer == "no"

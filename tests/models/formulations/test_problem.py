@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from cases import CASES, LOW_DEGREE, MASKS, make_field, make_instance, make_problem, points_of, problem_of
 from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.models.errors import FormulationError, InstanceError
+from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate, with_integers_fixed, with_products_lifted
@@ -56,13 +56,6 @@ def test_merged_objective_gives_its_value(label):
         for point in points_of(problem, 5):
             value = sum(np.prod(point[index], axis=1) @ coefficient for index, coefficient in merged)
             assert value == pytest.approx(problem.objective_value(point), rel=1e-10, abs=1e-10)
-
-
-def test_parity_is_no_polynomial():
-    problem = problem_of("minlp-parity gauge=strokes")
-    assert [family.degree for family in problem.objective] == [99, 2, 2]
-    assert problem.objective[0].terms is None
-    assert problem_of("minlp-parity shape=pixel").objective_degree == 2
 
 
 # columns
@@ -213,19 +206,6 @@ def test_fixed_integers_are_continuous_columns_with_equal_bounds(name):
     assert (pinned.lower[problem.integer] == problem.point(field)[problem.integer]).all()
     assert pinned.objective_value(pinned.point(field)) == problem.objective_value(problem.point(field))
     assert pinned.sha256 != problem.sha256
-
-
-def test_jumps_belong_to_qp_fixed_alone():
-    instance = make_instance("row")
-    with pytest.raises(FormulationError, match="qp-fixed takes the jumps of all pairs as data"):
-        formulate(instance, "qp-fixed")
-    with pytest.raises(FormulationError, match="milp-mccormick has the jumps as variables"):
-        formulate(instance, "milp-mccormick", p=np.zeros(4))
-    with pytest.raises(FormulationError, match=r"shape \(3,\), but the grid has 4 pairs"):
-        formulate(instance, "qp-fixed", p=np.zeros(3))
-    problem = formulate(instance, "qp-fixed", p=[3, -2, 0, -1])
-    assert problem.data["p1"].tolist() == [1, 0, 0, 1]
-    assert problem.data["p2"].tolist() == [1, -1, 0, -1]
 
 
 def test_fields_of_another_instance_are_refused():

@@ -29,12 +29,6 @@ def test_two_by_two():
     assert grid.quads.tolist() == [[2, 3, 0, 1]]
 
 
-def test_three_by_three_without_a_hole_has_four_quads_row_by_row():
-    grid = Grid(np.ones((3, 3), bool))
-    corner = grid.first[grid.quads[:, 0]]
-    assert corner.tolist() == [3, 4, 6, 7]
-
-
 def test_pixels_that_meet_in_a_corner_are_two_parts():
     assert Grid(np.eye(3, dtype=bool)).parts == 3
     assert Grid(RING).parts == 1

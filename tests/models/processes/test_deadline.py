@@ -45,13 +45,6 @@ def test_a_step_that_would_end_late_is_not_begun():
     assert over()
 
 
-def test_without_a_limit_there_is_no_end():
-    deadline = Deadline(math.inf)
-    assert deadline.left() == deadline.share(0.5).left() == deadline.later(-1e9).left() == math.inf
-    assert not deadline.passed()
-    assert Deadline(math.inf, clock := Clock()).within(2.0) == Deadline(clock.now + 2.0, clock)
-
-
 @given(SECONDS, st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1), SECONDS, SECONDS)))
 def test_the_parts_of_a_budget_are_no_more_than_the_whole(seconds, steps):
     """For any use of their shares, all parts end by the deadline of the whole."""

@@ -12,7 +12,7 @@ import pytest
 from children import all_end, complaints, descendants, running
 from crossfield.export.cli.app import invoke
 from crossfield.export.solving.methods import METHODS
-from crossfield.export.solving.run import PICTURES, plan
+from crossfield.export.solving.run import plan
 from crossfield.models.processes.process_pool import MOST
 
 FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj", "field.sings"}
@@ -90,17 +90,6 @@ print(len(pressed), proof.ended)
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["1", "interrupted"]
-
-
-@pytest.mark.slow
-def test_ctrl_c_while_it_draws_keeps_the_report(tmp_path):
-    with started([sys.executable, "-c", RUN, tmp_path, "1"], "drawing field") as process:
-        assert press(process) == (0, "")
-    report = json.loads((tmp_path / "report.json").read_text())
-    assert report["interrupted"] == "drawing"
-    assert "two-stage" in {row["method"] for row in report["methods"]}
-    assert {"overview"} <= pictures(tmp_path) < set(PICTURES)
-    assert not list(tmp_path.rglob(".*.part"))
 
 
 @pytest.mark.slow

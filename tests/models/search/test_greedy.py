@@ -184,22 +184,6 @@ def test_parts_do_not_know_of_each_other():
     assert both == pytest.approx(sum(apart), rel=1e-3)
 
 
-@SOLVERS
-def test_same_instance_gives_the_same_bits(solve):
-    instance = some_curves()
-    one, two = solve(instance), solve(instance)
-    for name in ("alpha", "beta", "p"):
-        assert getattr(one, name).tobytes() == getattr(two, name).tobytes()
-
-
-def test_progress_counts_up_to_all_jumps():
-    seen = []
-    field = greedy_field(some_curves(), progress=seen.append)
-    known = [int(line.split()[0]) for line in seen]
-    assert known == sorted(set(known))
-    assert seen[-1] == f"{len(field.p)} of {len(field.p)} jumps"
-
-
 @pytest.mark.parametrize("gauge", ["strokes", "box"])
 def test_answer_is_the_optimum_for_its_jumps(gauge):
     field = greedy_field(some_curves().with_gauge(gauge))
@@ -220,15 +204,6 @@ def test_mostly_equal_to_the_optimum_over_all_jumps():
     ratio = np.array(ratio)
     assert (ratio > 1 - 1e-6).all()
     assert (ratio < 1 + 1e-3).sum() >= 10, ratio
-
-
-def test_power_field_is_orthogonal():
-    assert (power_field(some_curves()).beta == 0).all()
-
-
-def test_power_field_of_one_stroke_among_two_pixels():
-    field = power_field(Instance("two", [[True, True]], [[0, 0]], [0.4], [1.0]))
-    assert field.alpha == pytest.approx([0.4, 0.4])
 
 
 def test_cells_go_round_the_hole_of_a_mask():

@@ -6,7 +6,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.solving.methods import METHODS, Request
-from crossfield.models.instance.angles import HALF, QUARTER, line_difference
+from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, bend_field, tremble
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
 from exhaustive import random_instance, sketch
@@ -153,27 +153,6 @@ def test_fields_are_as_smooth_as_the_strokes_tremble():
     starts = [polyvector_field(noisy(clean, 3, seed), hold=max(HOLDS)) for seed in range(4)]
     found = [tremble(bend_field(start, harmonic=HARMONIC)) for start in starts]
     assert np.mean(found) == pytest.approx(TREMBLE, rel=0.15)
-
-
-def test_a_heavier_hold_keeps_the_strokes():
-    start = polyvector_field(cf.sample("mouse", 20))
-    off = [bend_field(start, hold=hold).stroke_deviation.mean() for hold in (0.1, 1, 100)]
-    assert off[0] > off[1] > off[2]
-    assert off[2] < np.radians(1)
-
-
-def test_a_heavy_weight_of_skew_makes_right_angles():
-    instance = cf.sample("mouse", 16, skew_weight=1e4)
-    assert line_difference(*lines(bend_field(cf.greedy_field(instance)))) == pytest.approx(HALF, abs=1e-2)
-
-
-def test_the_method_bends_a_given_start_too(tmp_path):
-    instance = cf.sample("saddle", 12)
-    start = cf.power_field(instance)
-    own, given = METHODS["bend"].find(Request(instance, tmp_path, start=start))
-    assert [own.method, given.method] == ["bend", "start + bend"]
-    assert (given.field.alpha == bend_field(start).alpha).all()
-    assert (given.field.p == bend_field(start).p).all()
 
 
 def test_rounds_end_when_the_time_is_over():

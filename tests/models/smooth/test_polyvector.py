@@ -63,16 +63,6 @@ def test_a_hard_hold_keeps_the_strokes():
     assert off[2] < np.radians(0.5)
 
 
-def test_the_start_is_the_best_of_the_holds():
-    instance = sample("cylinder_bend", 16)
-    start = polyvector_start(instance).energy().total
-    assert (
-        start
-        <= min(improved_field(polyvector_field(instance, hold=hold)).energy().total for hold in HOLDS) * 1.05
-    )
-    assert polyvector_start(instance, lambda: True).energy().total >= start
-
-
 def test_the_search_begins_where_the_polyvector_field_leads():
     """The improved greedy and power fields of the saddle have the wrong jumps."""
     instance = sample("saddle", 24)

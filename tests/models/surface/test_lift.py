@@ -60,16 +60,6 @@ def test_exact_crosses_lead_to_the_surface(name, most):
 @pytest.mark.slow
 @for_each(
     "name, size, most",
-    [("tilted_cylinder", 48, 2), ("torus_patch", 48, 5), ("vase", 32, 2), ("spheroid", 32, 3)],
-)
-def test_exact_crosses_lead_to_the_surface_on_finer_grids(name, size, most):
-    true, field = exact(name, size)
-    assert error(cf.surface(field), true) <= most
-
-
-@pytest.mark.slow
-@for_each(
-    "name, size, most",
     [("tilted_cylinder", 48, 2), ("torus_patch", 48, 10), ("vase", 32, 5), ("spheroid", 32, 3)],
 )
 def test_strokes_lead_near_it(name, size, most):
@@ -148,13 +138,6 @@ def test_the_surface_moves_with_the_sketch(name):
     assert moved == pytest.approx(move(cf.surface(field).heights), abs=0.05, nan_ok=True)
 
 
-def test_the_same_field_gives_the_same_bytes():
-    field = bent(cf.sample("bottle", 12))
-    first, second = cf.surface(field), cf.surface(field)
-    assert first.heights.tobytes() == second.heights.tobytes()
-    assert first.firmness == second.firmness
-
-
 def constant(mask, u=0.3, v=1.3):
     """A field of the same skew cross everywhere."""
     mask = np.array(mask, dtype=bool)
@@ -201,12 +184,6 @@ def test_an_end_in_time_leaves_the_best_so_far():
         errors.append(error(found, true))
     assert errors[2] < errors[0] / 5
     assert found.heights.tobytes() == cf.surface(field).heights.tobytes()
-
-
-def test_progress_tells_of_every_part():
-    messages = []
-    cf.surface(constant([[1, 0, 0, 1]]), progress=messages.append)
-    assert messages == ["surface, part 1 of 2", "surface, part 2 of 2"]
 
 
 def test_crosses_at_right_angles_give_a_flat_sheet_and_the_doubt():
