@@ -64,17 +64,10 @@ def _find_candidates(walls: Bools, outside: Bools, ends: Floats, frame: Frame) -
     longest = np.minimum(LONGEST * max(walls.shape), _stroke_extents(walls, row, column))[open_there]
     on_grid = (ends[open_there] - [(frame.x, frame.y), (0.0, 0.0)]) / frame.pixel
     first = slice(_MOST_BRIDGES)
-    to_strokes = _lines_to_next_stroke(walls, on_grid[first], longest[first]) * frame.pixel + (
-        frame.x,
-        frame.y,
-    )
+    to_strokes = _lines_to_next_stroke(walls, on_grid[first], longest[first])
+    to_ends = _lines_between_ends(ends[open_there], longest * frame.pixel)
     # Of two equivalent lines the later one is kept, which is between two ends.
-    return np.concatenate(
-        [
-            to_strokes * frame.pixel + (frame.x, frame.y),
-            _lines_between_ends(ends[open_there], longest * frame.pixel),
-        ]
-    )
+    return np.concatenate([to_strokes * frame.pixel + (frame.x, frame.y), to_ends])
 
 
 def _lines_between_ends(ends: Floats, longest: Floats) -> Floats:
