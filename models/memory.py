@@ -6,6 +6,22 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Final
+
+from .errors import InputError
+
+BYTES_PER_PIXEL: Final = 5000
+"""Memory that a pixel of a grid needs while its problem is written."""
+
+
+def check_memory(pixels: int) -> None:
+    """Raise InputError if a grid needs more memory than is available; do nothing where that is unknown."""
+    needed, available = pixels * BYTES_PER_PIXEL, available_memory()
+    if available is not None and needed > available:
+        raise InputError(
+            f"a grid of {pixels} pixels needs about {needed / 1e9:.1f} GB to be written, "
+            f"but {available / 1e9:.1f} GB are free; choose a smaller size"
+        )
 
 
 def available_memory(root: Path = Path("/")) -> int | None:

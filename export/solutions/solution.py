@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -306,6 +307,33 @@ class Solution:
                 f"there is no point in the solution ({self.status}): {self.message or 'no message'}"
             )
         return self.problem.field(self.point)
+
+    def facts(self) -> dict[str, Any]:
+        """Claims of the file and recomputed values, as reports list them; None for an infinity."""
+        violation = self.violation
+        facts = {
+            "formulation": self.problem.name,
+            "lifted": self.problem.formulation.lifted,
+            "status": str(self.status),
+            "claimed": str(self.claimed),
+            "contradictions": list(self.contradictions),
+            "claims": self.caveat,
+            "message": self.message,
+            "objective_reported": self.reported,
+            "objective_recomputed": self.objective,
+            "objective_of_field": self.objective_of_field,
+            "dual_bound": self.bound,
+            "gap": self.gap,
+            "start_returned": self.start_returned,
+            "worst_violation": None if violation is None else violation.worst,
+            "worst_family": None if violation is None else violation.worst_family,
+            "furthest_rounding": self.rounded,
+            "unknown_names": self.unknown,
+            "interrupted": self.interrupted,
+            "seconds": None if self.seconds is None else round(self.seconds, 3),
+        }
+        infinite = {key for key, value in facts.items() if isinstance(value, float) and not isfinite(value)}
+        return facts | dict.fromkeys(infinite)
 
 
 @check_arguments

@@ -15,8 +15,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.formulations.arrays import row_sides
-from ...models.formulations.families import Block, Coefficient, Monomial
+from ...models.formulations.families import Block, Coefficient, Monomial, row_sides
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
 from .names import Names

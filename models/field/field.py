@@ -285,6 +285,21 @@ class CrossField(Pictured):
             narrow_pixels=float(np.mean(self.angle_between < NARROW - _EQUAL)),
         )
 
+    def facts(self) -> dict[str, float | int]:
+        """Measures of the field by name, as reports list them: energies, shape, singularities, skew."""
+        shape = self.shape
+        return {
+            "energy_2_norm": self.energy(2).total,
+            "energy_1_norm": self.energy(1).total,
+            "stroke_deviation_mean_degrees": float(np.degrees(shape.mean_deviation)),
+            "stroke_deviation_90_percent_degrees": float(np.degrees(shape.most_deviation)),
+            "strokes_beyond_10_degrees": shape.far_strokes,
+            "lines_under_45_degrees": shape.narrow_pixels,
+            "singularities": len(self.singularities.index),
+            "degenerate_pixels": int(self.degenerate.sum()),
+            "mean_abs_beta_degrees": float(np.degrees(np.abs(self.beta).mean())),
+        }
+
     def cross_error(self, u_angle: Floats, v_angle: Floats) -> Floats:
         """Angle between the crosses of the field and others.
 

@@ -12,7 +12,7 @@ from scipy import sparse
 
 from ..errors import SolverError, UnsupportedBySolverError
 from ..instance.grid import Bools, Floats, Ints
-from .families import ANY_DEGREE, PlacedFamily
+from .families import ANY_DEGREE, PlacedFamily, row_sides
 from .names import Bytes, column_names, row_names
 
 if TYPE_CHECKING:
@@ -157,16 +157,6 @@ def row_terms(
             values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,)))
         start += family.count
     return np.concatenate(at), np.concatenate(values)
-
-
-def row_sides(families: Iterable[PlacedFamily]) -> tuple[Floats, Floats]:
-    """Left and right sides of all rows, constants moved there; -inf and inf without a side."""
-    lower, upper = [np.zeros(0)], [np.zeros(0)]
-    for family in families:
-        sense, nothing = family.family.sense, np.full(family.count, np.inf)
-        lower.append(-nothing if sense == "<=" else family.limit)
-        upper.append(nothing if sense == ">=" else family.limit)
-    return np.concatenate(lower) + 0.0, np.concatenate(upper) + 0.0
 
 
 def _rows_by_tag(families: Iterable[PlacedFamily]) -> dict[str, slice]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, cached_property, reduce
 from typing import TYPE_CHECKING, Any, Final
@@ -170,6 +171,16 @@ class PlacedFamily:
         values = self.values(point)
         by_sense: dict[str, Floats] = {"==": np.abs(values), "<=": values, ">=": -values}
         return by_sense[self.family.sense]
+
+
+def row_sides(families: Iterable[PlacedFamily]) -> tuple[Floats, Floats]:
+    """Left and right sides of all rows, constants moved there; -inf and inf without a side."""
+    lower, upper = [np.zeros(0)], [np.zeros(0)]
+    for family in families:
+        sense, nothing = family.family.sense, np.full(family.count, np.inf)
+        lower.append(-nothing if sense == "<=" else family.limit)
+        upper.append(nothing if sense == ">=" else family.limit)
+    return np.concatenate(lower) + 0.0, np.concatenate(upper) + 0.0
 
 
 @cache

@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import sympy as sp
@@ -23,12 +23,14 @@ from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance, whole_numbers
 from ..previews import table_of
-from .arrays import ProblemArrays, build_highs, check_highs, problem_arrays
 from .catalogue import declare, lift_products, norm_of
 from .declaration import Family, Formulation
 from .families import ANY_DEGREE, Block, PlacedFamily, merge_monomials, sort_factors
 from .symbols import NARROWED, SLOTS, VARIABLES, Variable, count_elements, index_map, numpy_function
 from .windows import Windows
+
+if TYPE_CHECKING:
+    from .arrays import ProblemArrays
 
 STAMP_DIGITS: Final = 11
 """Digits of a hash in names: `ONE_` and these have 15 characters, the most that every program takes."""
@@ -115,16 +117,6 @@ class Problem:
             "rows": ", ".join(f"{family.count} {family.family.tag}" for family in self.rows) or "none",
         }
         return table_of(f"Problem {self.summary}", facts)
-
-    def complete(self) -> None:
-        """Compute every array that the problem keeps.
-
-        Call it before several threads share the problem: `cached_property` takes no lock since Python 3.12,
-        so each thread would compute its own array.
-        """
-        for name, attribute in vars(Problem).items():
-            if isinstance(attribute, cached_property):
-                getattr(self, name)
 
     @property
     def summary(self) -> str:
@@ -312,6 +304,8 @@ class Problem:
             Costs, matrices, bounds and names. `nonlinear` lists the parts that the arrays do not contain.
 
         """
+        from .arrays import problem_arrays  # it loads SciPy, which files do not need
+
         return problem_arrays(self, names=names)
 
     def to_highs(self) -> Any:
@@ -325,6 +319,8 @@ class Problem:
             When the problem is neither an LP or MILP nor a convex QP.
 
         """
+        from .arrays import build_highs, check_highs
+
         check_highs(self.problem_class, convex=self.convex)
         return build_highs(self.to_arrays(), self.instance.name)
 

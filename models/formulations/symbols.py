@@ -178,5 +178,8 @@ def numpy_function(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[
 
 @cache
 def _compile_expression(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
-    """The compiled expression; declarations are few and fixed, so each is compiled once."""
-    return sp.lambdify(arguments, expression, modules="numpy", cse=True)  # type: ignore[no-any-return]
+    """The compiled expression; declarations are few and fixed, so each is compiled once.
+
+    The module itself, not its name: for the name SymPy imports all of NumPy, f2py and testing too.
+    """
+    return sp.lambdify(arguments, expression, modules=np, cse=True)  # type: ignore[no-any-return]

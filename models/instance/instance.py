@@ -388,6 +388,26 @@ class Instance(Pictured):
             reading=None,
         )
 
+    def facts(self) -> dict[str, Any]:
+        """Name, origin, sizes and weights, as reports list them."""
+        return {
+            "name": self.name,
+            "source": self.source,
+            "gauge": self.gauge,
+            "sha256": self.sha256,
+            "height": self.grid.height,
+            "width": self.grid.width,
+            "pixels": self.grid.size,
+            "pairs": len(self.grid.first),
+            "stroke_pixels": len(self.theta),
+            "parts": self.grid.parts,
+            "pixel_size": self.pixel_size,
+            "w_strokes": self.stroke_coefficient,
+            "w_beta": self.skew_coefficient,
+            "stroke_weight": self.stroke_weight,
+            "skew_weight": self.skew_weight,
+        }
+
     @property
     def summary(self) -> str:
         """Name, grid, pixels, strokes, parts of the mask, gauge, and weights unless they are defaults."""

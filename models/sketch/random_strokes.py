@@ -15,11 +15,11 @@ from ..errors import InputError, NoStrokeError
 from ..instance.angles import line_of
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
-from ..memory import available_memory
+from ..memory import check_memory
 from .cover import LEAST_WEIGHT, Cover, Frame
 from .curves import Curves, lines_as_cubics
 from .outline import largest_part
-from .read import DEFAULT_SIZE, check_memory, check_size
+from .read import DEFAULT_SIZE, check_size
 
 Strokes = Literal["pixels", "straight", "curved"]
 STROKES: Final[tuple[Strokes, ...]] = get_args(Strokes)
@@ -92,7 +92,7 @@ def random_instance(
     """
     check_size(size)
     _check_options(seed, share, mask_share, strokes, noise)
-    check_memory(size * size, available_memory())
+    check_memory(size * size)
     rng = np.random.Generator(np.random.PCG64(seed))
     mask = np.ones((size, size), dtype=bool)
     if mask_share < 1:

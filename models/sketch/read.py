@@ -20,7 +20,7 @@ from ..errors import InputError, NoStrokeError, naming, printable, shortened
 from ..instance.angles import line_of
 from ..instance.grid import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading
-from ..memory import available_memory
+from ..memory import check_memory
 from .bitmap import read_white_pixels
 from .bridges import close_outline
 from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
@@ -38,7 +38,6 @@ from .outline import find_inside, find_strokes_along_outline, keep_parts_with_st
 
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
-BYTES_PER_PIXEL: Final = 5000  # while its problem is written
 
 Silhouette = Literal["none", "outer"]
 
@@ -169,7 +168,7 @@ def frame_around(box: Box, size: int, *, margin: bool) -> Frame:
     if max(box[2] - box[0], box[3] - box[1]) <= 0:
         raise InputError("draws no stroke: everything is one point")
     frame = fit_frame(box, size, margin=margin)
-    check_memory(frame.height * frame.width, available_memory())
+    check_memory(frame.height * frame.width)
     return frame
 
 
@@ -281,16 +280,6 @@ def name_from_text(text: str) -> str:
     """An instance name made from any text, at most 32 long; runs of other characters become `_`."""
     name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
     return (name if re.match(r"[a-z]", name) else f"sketch_{name}".strip("_"))[:32].rstrip("_")
-
-
-def check_memory(pixels: int, available: int | None) -> None:
-    """Raise InputError if a grid needs more bytes than available (None: unknown)."""
-    needed = pixels * BYTES_PER_PIXEL
-    if available is not None and needed > available:
-        raise InputError(
-            f"a grid of {pixels} pixels needs about {needed / 1e9:.1f} GB to be written, "
-            f"but {available / 1e9:.1f} GB are free; choose a smaller size"
-        )
 
 
 def check_size(size: int) -> None:

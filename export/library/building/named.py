@@ -18,7 +18,7 @@ from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.storage import make_folder
-from ...bundle.manifest import record_set
+from ...bundle.manifest import write_manifest
 from ...formats.registry import Written, write
 from ..documents.documents import about_file, tightened_by
 from ..ledger.given import ROLES, Given, read_point
@@ -139,7 +139,7 @@ class LibraryEntry:
         OutputError.
         """
         written, refused = write_models(self.problem, self._recipe, folder)
-        manifest = record_set(self.problem, written, refused, folder, self.name)
+        manifest = write_manifest(self.problem, written, refused, folder, self.name)
         models = [name for each in written for name in each.files]
         return [*models, manifest.path.name, manifest.document["instance"]["file"]]
 

@@ -21,7 +21,7 @@ from ....models.formulations.problem import Problem, formulate, with_windows
 from ....models.instance.file import read_document, read_instance
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.proof.tightening import windows_left
-from ....models.storage import sha256_of
+from ....models.storage import read_bytes, sha256_of
 from ..plan.spec import Spec, spec_of
 
 FORMAT: Final = "crossfield-library-entry"
@@ -84,6 +84,15 @@ def read_library(folder: str | Path) -> Library:
 def read_sidecar(path: str | Path) -> dict[str, Any]:
     """Read the sidecar in a file. Raises InputError, or InstanceError if it breaks its schema."""
     return _read(Path(path), FORMAT, "library-entry")
+
+
+def is_sidecar(path: Path) -> bool:
+    """Whether a JSON file states the format of sidecars; False for other content."""
+    try:
+        document = json.loads(read_bytes(path))
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(document, dict) and document.get("format") == FORMAT
 
 
 def read_about(path: str | Path) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from crossfield.models.sketch.bitmap import read_bitmap
 from crossfield.models.sketch.cover import Frame, cover_by_segments
 from crossfield.models.sketch.curves import flatten
 from crossfield.models.sketch.pen_strokes import read_scap
-from crossfield.models.sketch.read import check_memory, name_from_text, read_sketch
+from crossfield.models.sketch.read import name_from_text, read_sketch
 from crossfield.models.sketch.svg import read_svg
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -664,15 +664,6 @@ def test_missing_files_and_folders_are_refused(tmp_path):
 def test_sizes_out_of_range_are_refused_before_the_file_is_opened(size):
     with pytest.raises(InputError, match=f"size is {size}; choose 1 to 4096"):
         read_sketch("there is no such file", size=size)
-
-
-def test_grids_larger_than_memory_are_refused_with_the_estimate():
-    with pytest.raises(
-        InputError, match=r"a grid of 16777216 pixels needs about 83.9 GB to be written, but 8.0 GB are free"
-    ):
-        check_memory(4096 * 4096, 8_000_000_000)
-    check_memory(128 * 128, 8_000_000_000)
-    check_memory(4096 * 4096, None)
 
 
 @settings(max_examples=60, deadline=None)
