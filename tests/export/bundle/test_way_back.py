@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 from cases import make_field, make_instance, make_problem
-from crossfield.export.bundle.manifest import read_manifest, write_problem
+from crossfield.export.bundle.manifest import read_manifest
+from crossfield.export.bundle.problem_files import write_problem
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.writing.canonical import Canonical
 from crossfield.models.errors import InstanceError, SolutionError

@@ -5,7 +5,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.bundle.manifest import write_all
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.solving.local import solver_for
 from crossfield.export.verify.checks import Verdict

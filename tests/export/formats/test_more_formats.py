@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import CASES, make_field, make_instance, make_problem, names_of, points_of, problem_of
-from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
+from crossfield.export.bundle.manifest import read_manifest
+from crossfield.export.bundle.problem_files import write_all, write_problem
 from crossfield.export.formats.registry import DEFAULTS, FORMATS, carried, write
 from crossfield.export.programs import glpk as glpk_program
 from crossfield.export.programs import scip as scip_program

@@ -5,7 +5,7 @@ import re
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.bundle.manifest import write_all
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.models.errors import CrossfieldError
 
 ALL = ["nl", "gms", "lp", "mps", "mod", "osil", "qplib", "bar"]

@@ -6,7 +6,8 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.bundle.manifest import is_recordable, read_manifest, write_all
+from crossfield.export.bundle.manifest import read_manifest
+from crossfield.export.bundle.problem_files import is_recordable, write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.solvers_table import PROGRAMS

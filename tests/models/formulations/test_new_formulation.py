@@ -9,7 +9,8 @@ import crossfield as cf
 import numpy as np
 import pytest
 from additions import additions
-from crossfield.export.bundle.manifest import read_manifest, write_all
+from crossfield.export.bundle.manifest import read_manifest
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.library.checking.check_library import verify_library

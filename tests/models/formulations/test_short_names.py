@@ -2,7 +2,7 @@
 
 import crossfield as cf
 import pytest
-from crossfield.export.bundle.manifest import fixed_jumps
+from crossfield.export.bundle.problem_files import fixed_jumps
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.documents.documents import Library
 from crossfield.export.library.plan.spec import read_spec

@@ -1,0 +1,225 @@
+"""Sets of files: problems in several formats, each with instance, starting points and manifest.
+
+    bottle_n024.instance.json (or .npz)              the instance, once per folder
+    bottle_n024.milp-mccormick.{nl,row,col,gms,lp,mps}
+    bottle_n024.milp-mccormick.manifest.json         describes them; reads a solution, with the instance
+
+Names come only from the instance and the formulation, so that a later export replaces an earlier one.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ...models.arguments import check_arguments
+from ...models.errors import InputError, UnsupportedByFormatError
+from ...models.field.field import CrossField
+from ...models.formulations.catalogue import FORMULATIONS, declaration_of, declare
+from ...models.formulations.declaration import Declaration, Formulation, Options
+from ...models.formulations.problem import Problem, formulate
+from ...models.formulations.windows import Windows
+from ...models.instance.grid import Ints
+from ...models.instance.instance import Instance
+from ...models.processes.deadline import Progress, silent
+from ...models.storage import make_folder
+from ..formats.registry import DEFAULTS, FORMATS, carried, write
+from ..solvers_table import smallest
+from .manifest import LARGE, Manifest, narrowed, stem_of, write_manifest
+from .starts import write_starts
+
+
+@check_arguments
+def write_problem(
+    problem: Problem,
+    folder: str | Path,
+    *,
+    formats: Iterable[str] = DEFAULTS,
+    start: CrossField | None = None,
+    dialects: dict[str, str] | None = None,
+    compress: bool = False,
+) -> Manifest:
+    """Write one problem in several formats, with its instance and manifest.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    folder
+        Folder to write to; created if it does not exist.
+    formats
+        Names of formats. Those that cannot carry the problem are listed in the manifest as refused.
+    start, dialects, compress
+        As for `write_all`.
+
+    Returns
+    -------
+    Manifest
+        The manifest.
+
+    Raises
+    ------
+    UnsupportedByFormatError
+        If no file can be written because the formats hold none of the problems.
+    InputError
+        For an unknown format, and for a problem that no manifest records: with columns fixed one by one, or
+        with products lifted beforehand.
+    OutputError
+        If a file cannot be written.
+
+    """
+    if not is_recordable(problem):
+        what = f"{problem.name} with columns fixed or products lifted"
+        raise InputError(f"a manifest cannot record {what}; write it as a single file")
+    formats = tuple(formats)
+    _check_formats(formats, dialects or {}, [problem.formulation])
+    return _write_set(problem, make_folder(folder), formats, start, dialects or {}, compress=compress)
+
+
+@check_arguments
+def write_all(
+    instance: Instance,
+    folder: str | Path,
+    *,
+    formulations: Iterable[str] = tuple(FORMULATIONS),
+    formats: Iterable[str] = DEFAULTS,
+    start: CrossField | None = None,
+    jumps_of: CrossField | None = None,
+    windows: Windows | None = None,
+    options: dict[str, Any] | None = None,
+    dialects: dict[str, str] | None = None,
+    compress: bool = False,
+    progress: Progress = silent,
+) -> list[Manifest]:
+    """Write formulations of an instance in every format that carries them.
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    folder
+        Folder to write to; created if it does not exist.
+    formulations
+        Names of formulations; all by default.
+    formats
+        Names of formats; nl, gms, lp and mps by default.
+    start
+        A field for starting points, also in separate files, and for the jumps of `qp-fixed`.
+    jumps_of
+        A field for the jumps of `qp-fixed` only.
+    windows
+        Narrower windows of alpha and beta and ranges of jumps, for all formulations.
+    options
+        `facet`, `stroke_norm`, `beta_norm` and `relax`, each used where a formulation has it.
+    dialects
+        By format: `text` or `binary` for nl.
+    compress
+        Whether to write model files as .gz.
+    progress
+        Receives the name of each formulation.
+
+    Returns
+    -------
+    list of Manifest
+        One manifest per formulation.
+
+    Raises
+    ------
+    UnsupportedByFormatError
+        If no file can be written because the formats hold none of the problems.
+    InputError
+        For an unknown format.
+    FormulationError
+        For an unknown formulation.
+    InstanceError
+        For a start on another instance.
+    OutputError
+        If a file cannot be written.
+
+    """
+    options = options or {}
+    declarations = [declaration_of(name) for name in formulations]
+
+    def chosen(declaration: Declaration) -> dict[str, Any]:
+        unfit = {*Options.__dataclass_fields__} - declaration.settable
+        return {key: value for key, value in options.items() if key not in unfit}
+
+    formats = tuple(formats)
+    _check_formats(formats, dialects or {}, [declare(each.name, **chosen(each)) for each in declarations])
+    folder, manifests = make_folder(folder), []
+    for declaration in declarations:
+        progress(declaration.name)
+        jumps = fixed_jumps(instance, declaration.name, jumps_of or start)
+        problem = narrowed(formulate(instance, declaration.name, p=jumps, **chosen(declaration)), windows)
+        manifests.append(_write_set(problem, folder, formats, start, dialects or {}, compress=compress))
+        del problem
+        if instance.grid.size > LARGE:  # a problem is in a cycle with its families, and the collector counts
+            gc.collect()  # objects, not their bytes
+    return manifests
+
+
+def _check_formats(
+    formats: tuple[str, ...], dialects: dict[str, str], formulations: list[Formulation]
+) -> None:
+    """Check the names of formats, and that one of them holds one of the formulations."""
+    for name in (*formats, *dialects):
+        if name not in FORMATS:
+            raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
+    reasons = []
+    for problem in map(smallest, formulations):
+        for name in formats:
+            try:
+                carried(problem, FORMATS[name])
+            except UnsupportedByFormatError as error:
+                reasons.append(str(error))
+            else:
+                return
+    if reasons:
+        raise UnsupportedByFormatError(f"nothing can be written: {', and '.join(reasons)}")
+
+
+def _write_set(
+    problem: Problem,
+    folder: Path,
+    formats: tuple[str, ...],
+    start: CrossField | None,
+    dialects: dict[str, str],
+    *,
+    compress: bool,
+) -> Manifest:
+    """Write the files of a problem, its starting points and its manifest."""
+    stem, written, refused = stem_of(problem), [], {}
+    for name in dict.fromkeys(formats):
+        entry = FORMATS[name]
+        path = folder / f"{stem}{entry.suffix}{'.gz' if compress else ''}"
+        try:
+            file = write(problem, path, dialect=dialects.get(name), start=start if entry.starts else None)
+        except UnsupportedByFormatError as error:
+            refused[name] = str(error)
+        else:
+            written.append(file)
+    if start is not None:
+        write_starts(problem, start, folder, stem)
+    return write_manifest(problem, written, refused, folder, stem)
+
+
+def is_recordable(problem: Problem) -> bool:
+    """Whether formulation, options, jumps and windows determine a problem; nothing is fixed or lifted."""
+    plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
+    return narrowed(plain, problem.windows).sha256 == problem.sha256
+
+
+def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
+    """The jumps that a formulation takes as data; None if they are variables. Raises FormulationError.
+
+    They come from `start`, by default from the first field. All code that writes or solves a formulation by
+    its name calls this function, so that its files and its solutions belong to one problem.
+    """
+    if not declaration_of(name).fixed:
+        return None
+    from ...models.search.starts import first_field
+
+    return (start or first_field(instance)).p
