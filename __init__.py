@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from .export.bundle.manifest import read_manifest as read_manifest
-    from .export.bundle.manifest import write_all as write_all
-    from .export.bundle.manifest import write_problem as write_problem
+    from .export.bundle.problem_files import write_all as write_all
+    from .export.bundle.problem_files import write_problem as write_problem
     from .export.formats.pyomo_model import to_pyomo as to_pyomo
     from .export.formats.registry import write as write
     from .export.library.building.named import LibraryEntry as LibraryEntry
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.local import solve as solve
-    from .export.solving.run import Report as Report
+    from .export.solving.report import Report as Report
     from .export.solving.run import run as run
     from .export.solving.two_stage import TwoStage as TwoStage
     from .export.solving.two_stage import fit_angles as fit_angles
@@ -104,7 +104,7 @@ _HOME: Final = {
     "Problem": ".models.formulations.problem",
     "ProblemArrays": ".models.formulations.arrays",
     "Proof": ".models.proof.record",
-    "Report": ".export.solving.run",
+    "Report": ".export.solving.report",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",
     "SolutionError": ".models.errors",
@@ -143,12 +143,12 @@ _HOME: Final = {
     "two_stage": ".export.solving.two_stage",
     "with_integers_fixed": ".models.formulations.problem",
     "write": ".export.formats.registry",
-    "write_all": ".export.bundle.manifest",
+    "write_all": ".export.bundle.problem_files",
     "write_certificate": ".models.proof.certificate",
     "write_field": ".models.field.file",
     "write_instance": ".models.instance.file",
     "write_mask": ".export.pictures.mask",
-    "write_problem": ".export.bundle.manifest",
+    "write_problem": ".export.bundle.problem_files",
     "write_surface": ".export.surfaces.files",
 }
 """Every public name and the module it comes from."""

@@ -34,7 +34,8 @@ from ...models.processes.control import WorkerError
 from ...models.processes.deadline import Deadline, Stop, stop_function
 from ...models.processes.limits import Limits
 from ...models.storage import make_folder
-from ..bundle.manifest import is_recordable, write_manifest
+from ..bundle.manifest import add_to_manifest
+from ..bundle.problem_files import is_recordable
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, carried, write
 from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError, call, part_of
@@ -241,7 +242,7 @@ class Solvers:
             files = Files.for_model(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
             written = write(problem, files.model, start=start if FORMATS[taking.format].starts else None)
             if folder is not None and is_recordable(problem):
-                write_manifest(problem, written, place)
+                add_to_manifest(problem, written, place)
             # Reading the answer takes about as long as writing the problem did.
             search = deadline.later(deadline.left() - limits.time_limit)
             return self.solve_file(written.problem, solver, files, limits, search, start=start, stop=stop)

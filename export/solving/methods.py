@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from ...models.field.field import CrossField, field_in_windows
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock, Deadline, Over, Progress, never, silent
@@ -49,49 +47,12 @@ class Candidate:
         """Facts for a report: the facts of the field, seconds, and claims with recomputed values."""
         facts: dict[str, Any] = {
             "method": self.method,
-            **field_facts(self.field),
+            **self.field.facts(),
             "seconds": round(self.seconds, 3),
             "interrupted": self.interrupted,
             **dict(self.counts),
         }
-        return facts if self.solution is None else facts | solution_facts(self.solution)
-
-
-def instance_facts(instance: Instance) -> dict[str, Any]:
-    """Facts about an instance in every report."""
-    return {
-        "name": instance.name,
-        "source": instance.source,
-        "gauge": instance.gauge,
-        "sha256": instance.sha256,
-        "height": instance.grid.height,
-        "width": instance.grid.width,
-        "pixels": instance.grid.size,
-        "pairs": len(instance.grid.first),
-        "stroke_pixels": len(instance.theta),
-        "parts": instance.grid.parts,
-        "pixel_size": instance.pixel_size,
-        "w_strokes": instance.stroke_coefficient,
-        "w_beta": instance.skew_coefficient,
-        "stroke_weight": instance.stroke_weight,
-        "skew_weight": instance.skew_weight,
-    }
-
-
-def field_facts(field: CrossField) -> dict[str, Any]:
-    """Facts about a field in every report: energies, singularities, skew, and its shape."""
-    shape = field.shape
-    return {
-        "energy_2_norm": field.energy(2).total,
-        "energy_1_norm": field.energy(1).total,
-        "stroke_deviation_mean_degrees": float(np.degrees(shape.mean_deviation)),
-        "stroke_deviation_90_percent_degrees": float(np.degrees(shape.most_deviation)),
-        "strokes_beyond_10_degrees": shape.far_strokes,
-        "lines_under_45_degrees": shape.narrow_pixels,
-        "singularities": len(field.singularities.index),
-        "degenerate_pixels": int(field.degenerate.sum()),
-        "mean_abs_beta_degrees": float(np.degrees(np.abs(field.beta).mean())),
-    }
+        return facts if self.solution is None else facts | self.solution.facts()
 
 
 def shown(facts: dict[str, Any]) -> list[str]:
@@ -110,41 +71,9 @@ def shown(facts: dict[str, Any]) -> list[str]:
     ]
 
 
-def solution_facts(solution: Solution) -> dict[str, Any]:
-    """Claims of a solution file, with the values recomputed from the instance."""
-    violation = solution.violation
-    facts = {
-        "formulation": solution.problem.name,
-        "lifted": solution.problem.formulation.lifted,
-        "status": str(solution.status),
-        "claimed": str(solution.claimed),
-        "contradictions": list(solution.contradictions),
-        "claims": solution.caveat,
-        "message": solution.message,
-        "objective_reported": solution.reported,
-        "objective_recomputed": solution.objective,
-        "objective_of_field": solution.objective_of_field,
-        "dual_bound": solution.bound,
-        "gap": solution.gap,
-        "start_returned": solution.start_returned,
-        "worst_violation": None if violation is None else violation.worst,
-        "worst_family": None if violation is None else violation.worst_family,
-        "furthest_rounding": solution.rounded,
-        "unknown_names": solution.unknown,
-        "interrupted": solution.interrupted,
-        "seconds": None if solution.seconds is None else round(solution.seconds, 3),
-    }
-    return {key: finite(value) for key, value in facts.items()}
-
-
-def finite(value: Any) -> Any:
-    """The value; None for an infinity, which JSON cannot hold."""
-    return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
 @dataclass(frozen=True, eq=False)
 class Request:
-    """Input of a method: instance, folder for files of solvers, limits of the whole, and options.
+    """Input of a method: instance, folder for files of solvers, and limits of the whole.
 
     start: a field to go on from, for methods that start from one; None: their own, the greedy field. stop:
     says whether to end early. clock: measures the time limit.
@@ -153,7 +82,6 @@ class Request:
     instance: Instance
     folder: Path
     limits: Limits = field(default_factory=Limits)
-    options: dict[str, Any] = field(default_factory=dict)
     start: CrossField | None = None
     progress: Progress = silent
     stop: Over = never
@@ -299,7 +227,6 @@ def _two_stage(request: Request) -> Iterator[Candidate]:
         limits=limits,
         start=start,
         stop=request.stop,
-        **request.options,
     )
     yield _of("MILP", milp)
     files = time.perf_counter() - begin - (milp.seconds or 0.0)

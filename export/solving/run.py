@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import json
-import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from ...models.arguments import check_arguments
 from ...models.errors import CrossfieldError, SolverError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Clock, Deadline, Over, Progress, Stop, never, silent, stop_function
+from ...models.processes.deadline import Deadline, Over, Progress, Stop, silent, stop_function
 from ...models.processes.groups import catch_interrupts
 from ...models.processes.limits import Limits
 from ...models.search.starts import first_field
 from ...models.storage import make_folder, remove_file, replacing_files, write_bytes
 from ...models.surface.lift import surface
-from ...models.surface.surface import Surface
-from ..bundle.manifest import Manifest, write_all
-from ..formats.registry import FORMATS, generator
+from ..bundle.manifest import Manifest
+from ..bundle.problem_files import write_all
 from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.mask import has_mask, write_mask
-from ..surfaces.files import SHADED, surface_facts, write_shaded
-from .methods import METHODS, Candidate, Request, instance_facts
+from ..surfaces.files import SHADED, write_shaded
+from .methods import METHODS, Candidate, Request
 from .proven import Proven
+from .report import Report, Stopwatch
 from .run_page import REPORT, write_page
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
@@ -35,128 +34,12 @@ OVERLAY: Final = ("overlay.svg", "overlay.png")
 LONGEST_LIFT: Final = 10.0
 """Seconds after which the surface's present heights are kept; grids up to 64 pixels take a few."""
 MASK: Final = "mask.png"
-KEPT: Final = "bend"
-"""The method whose field is kept; docs/evidence.md has the measurements."""
 LOWEST: Final = "lowest.npz"
 """The field of least 2-norm energy."""
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """Name of the field from which the methods of a run start: `first_field`, or the given one."""
 COMPILING: Final = "compiling"
-
-
-@dataclass(frozen=True, eq=False)
-class Report:
-    """Results of a run.
-
-    Parameters
-    ----------
-    instance
-        The instance.
-    candidates
-        Every field that was found, lowest 2-norm energy first.
-    manifests
-        The sets of model files that were written.
-    failures
-        Reasons by name of the method that failed.
-    interrupted
-        The method, `compiling`, `certificate`, `drawing` or `surface` during which the run was interrupted;
-        else empty.
-    proven
-        Proven bound of the 2-norm energy of all fields, or None.
-    stages
-        Seconds of each stage, in order.
-    surface
-        Surface over the kept field; None if the run stopped earlier.
-
-    """
-
-    instance: Instance
-    candidates: tuple[Candidate, ...]
-    manifests: tuple[Manifest, ...]
-    failures: dict[str, str] = field(default_factory=dict)
-    interrupted: str = ""
-    proven: Proven | None = None
-    stages: dict[str, float] = field(default_factory=dict)
-    surface: Surface | None = None
-
-    @property
-    def best(self) -> Candidate:
-        """The field of least 2-norm energy."""
-        return self.candidates[0]
-
-    @property
-    def kept(self) -> Candidate:
-        """The field that is kept and drawn: the bend field, or the best one without it."""
-        return next((each for each in self.candidates if each.method == KEPT), self.best)
-
-    @property
-    def field(self) -> CrossField:
-        """The field that is kept."""
-        return self.kept.field
-
-    @property
-    def shaded(self) -> bool:
-        """Whether there is no doubt about the surface, which is therefore drawn."""
-        return self.surface is not None and not self.surface.doubts
-
-    def facts(self, candidate: Candidate) -> dict[str, Any]:
-        """Facts of a field in the report: its own, and bound and gap if they are proven."""
-        facts = candidate.facts()
-        return facts if self.proven is None else facts | self.proven.facts(facts["energy_2_norm"])
-
-    @property
-    def files(self) -> int:
-        """Number of model files, lists of names and data beside them not counted."""
-        files = [entry for manifest in self.manifests for entry in manifest.document["files"]]
-        return sum(FORMATS[entry["format"]].is_model(entry["name"]) for entry in files)
-
-    @property
-    def seconds(self) -> float:
-        """All seconds of the run until its report was written: the sum of the stages."""
-        return round(sum(self.stages.values()), 3)
-
-    def document(self) -> dict[str, Any]:
-        """The report as JSON: instance, methods, files."""
-        instance = self.instance
-        return {
-            "format": "crossfield-report",
-            "version": 1,
-            "generator": generator(),
-            "instance": instance_facts(instance),
-            "warnings": list(instance.reading.warnings if instance.reading else ()),
-            "kept": self.kept.method,
-            "best": self.best.method,
-            "proof": self.proven and self.proven.document(self.best.field.energy(2).total),
-            "methods": [self.facts(candidate) for candidate in self.candidates],
-            "surface": self.surface
-            and surface_facts(self.surface) | {"picture": SHADED if self.shaded else None},
-            "seconds": self.seconds,
-            "stages": self.stages,
-            "failures": self.failures,
-            "interrupted": self.interrupted or None,
-            "files": self.files,
-            "refused": {
-                m.formulation: m.document["refused"] for m in self.manifests if m.document["refused"]
-            },
-        }
-
-
-@dataclass
-class Stopwatch:
-    """The seconds of consecutive stages, to 3 decimals: their sum is the whole time until the last lap."""
-
-    clock: Clock = time.perf_counter
-    stages: dict[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Begin the first stage."""
-        self._begin = self.clock()
-
-    def lap(self, stage: str) -> None:
-        """End a stage and begin the next one; the rounding error goes to the next one too."""
-        passed = self.clock() - self._begin - sum(self.stages.values())
-        self.stages[stage] = round(self.stages.get(stage, 0.0) + max(passed, 0.0), 3)
 
 
 def plan(limits: Limits) -> str:
@@ -172,10 +55,7 @@ def run(
     folder: str | Path,
     *,
     limits: Limits | None = None,
-    options: dict[str, Any] | None = None,
-    dialects: dict[str, str] | None = None,
     drawing: str | Path | None = None,
-    jobs: int = 1,
     progress: Progress = silent,
     stop: Stop | None = None,
 ) -> Report:
@@ -210,10 +90,6 @@ def run(
     limits
         Limits of each method that searches; `Limits()` by default. The first line of `progress` states the
         total.
-    options
-        Options as for `formulate`.
-    dialects, jobs
-        As for `write_all`.
     drawing
         The file or sample from which the instance was read; it is read first.
     progress
@@ -235,8 +111,8 @@ def run(
         When a file cannot be written.
 
     """
-    over = stop_function(stop)
-    below = None if drawing is None else read_drawing(drawing, on=instance)
+    should_stop = stop_function(stop)
+    drawn = None if drawing is None else read_drawing(drawing, on=instance)
     limits, folder = Limits.bounded(limits), make_folder(folder)
     progress(plan(limits))
     watch = Stopwatch()
@@ -246,47 +122,34 @@ def run(
     from ...models.proof.compiling import compiling  # it loads Numba
 
     with compiling():
-        with replacing_files(folder / "models") as new:
-            sets = write_all(
-                instance,
-                new,
-                start=start,
-                options=options,
-                dialects=dialects,
-                jobs=jobs,
-                progress=lambda name: progress(f"writing {name}"),
-            )
-        manifests = tuple(replace(each, path=folder / "models" / each.path.name) for each in sets)
+        manifests = _write_models(instance, folder, start, progress)
         watch.lap("models")
-        request = Request(
-            instance, folder / "solve", limits, options or {}, start, progress=progress, stop=over
-        )
-        found = _Found([Candidate(START, start, watch.stages[START])], interrupted=_compiled(request))
+        request = Request(instance, folder / "solve", limits, start, progress=progress, stop=should_stop)
+        results = _Results([Candidate(START, start, watch.stages[START])])
+        results.interrupted = _wait_for_compilation(request)
         watch.lap(COMPILING)
-    if not found.interrupted:
-        _find(found, request, watch)
-    report = Report(instance, found.ranked, manifests, found.failures, found.interrupted)
-    fresh = _write_fields(report, folder)
+    if not results.interrupted:
+        _find_fields(results, request, watch)
+    report = Report(instance, results.ranked, manifests, results.failures, results.interrupted)
+    names = _write_fields(report, folder)
     watch.lap("fields")
-    report = _certified(report, folder / CERTIFICATE)
-    fresh |= {CERTIFICATE} if report.proven else set()
+    report = _write_certificate(report, folder / CERTIFICATE)
     watch.lap("certificate")
-    # An exception at Ctrl-C could be raised in a callback, where Python discards it.
-    with catch_interrupts() as pressed, replacing_files(folder) as new:
-        if not report.interrupted:
-            report = _drawn(report, new, below, progress, lambda: over() or pressed())
-            watch.lap("pictures")
-        if not report.interrupted:
-            report = _shaded(report, new, progress, lambda: over() or pressed())
-            watch.lap("surface")
-        fresh |= {path.name for path in new.iterdir()}
+    report, pictures = _draw_all(report, folder, drawn, request, watch)
     report = replace(report, stages=watch.stages)
-    document = report.document()
-    write_page(folder, document, report.manifests, fresh)
-    for name in {CERTIFICATE, MASK, SHADED, *OVERLAY, *map(_picture, PICTURES)} - fresh:
-        remove_file(folder / name)
-    write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+    names |= pictures | ({CERTIFICATE} if report.proven else set())
+    _write_report(report, folder, names)
     return report
+
+
+def _write_models(
+    instance: Instance, folder: Path, start: CrossField, progress: Progress
+) -> tuple[Manifest, ...]:
+    """Write every formulation in every format to DIR/models; return the manifests."""
+    models = folder / "models"
+    with replacing_files(models) as new:
+        manifests = write_all(instance, new, start=start, progress=lambda name: progress(f"writing {name}"))
+    return tuple(replace(manifest, path=models / manifest.path.name) for manifest in manifests)
 
 
 def _write_fields(report: Report, folder: Path) -> set[str]:
@@ -301,7 +164,7 @@ def _write_fields(report: Report, folder: Path) -> set[str]:
 
 
 @dataclass
-class _Found:
+class _Results:
     """The fields found so far, the reasons of methods that failed, and the method that Ctrl-C ended."""
 
     candidates: list[Candidate] = field(default_factory=list)
@@ -314,7 +177,7 @@ class _Found:
         return tuple(sorted(self.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}")))
 
 
-def _compiled(request: Request) -> str:
+def _wait_for_compilation(request: Request) -> str:
     """Compile what methods need, so that a first run finds what later ones find; the stage if interrupted."""
     from ...models.proof.compiling import compile_proofs
 
@@ -327,27 +190,27 @@ def _compiled(request: Request) -> str:
     return ""
 
 
-def _find(found: _Found, request: Request, watch: Stopwatch) -> None:
+def _find_fields(results: _Results, request: Request, watch: Stopwatch) -> None:
     """Add the fields that the methods of a run find in turn, until one is interrupted."""
     for method in METHODS.values():
         try:
             for candidate in method.find(request):
-                found.candidates.append(candidate)
-                found.interrupted = found.interrupted or (method.name if candidate.interrupted else "")
+                results.candidates.append(candidate)
+                results.interrupted = results.interrupted or (method.name if candidate.interrupted else "")
         except CrossfieldError as error:
-            found.failures[method.name] = str(error)
+            results.failures[method.name] = str(error)
         except KeyboardInterrupt:
-            found.interrupted = method.name
+            results.interrupted = method.name
         if request.stop():
-            found.interrupted = found.interrupted or method.name
+            results.interrupted = results.interrupted or method.name
         watch.lap(method.name)
-        if found.interrupted:
+        if results.interrupted:
             break
 
 
-def _certified(report: Report, path: Path) -> Report:
-    """The report with the proven bound, whose certificate is at the path; a failure or Ctrl-C is recorded."""
-    proof = next((each.proof for each in report.candidates if each.proof is not None), None)
+def _write_certificate(report: Report, path: Path) -> Report:
+    """Write the certificate of the proven bound; return the report with the bound, a failure or Ctrl-C."""
+    proof = next((candidate.proof for candidate in report.candidates if candidate.proof is not None), None)
     if proof is None:
         return report
     try:
@@ -359,8 +222,32 @@ def _certified(report: Report, path: Path) -> Report:
     return report
 
 
-def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progress, stop: Over) -> Report:
-    """The report, its pictures drawn, or marked where Ctrl-C or the caller ended that."""
+def _draw_all(
+    report: Report, folder: Path, drawn: Drawing | None, request: Request, watch: Stopwatch
+) -> tuple[Report, set[str]]:
+    """Draw the kept field and its surface, unless the run was interrupted; return the names of the pictures.
+
+    The report says whether Ctrl-C or the caller ended that.
+    """
+    # An exception at Ctrl-C could be raised in a callback, where Python discards it.
+    with catch_interrupts() as pressed, replacing_files(folder) as new:
+
+        def stop() -> bool:
+            return request.stop() or pressed()
+
+        if not report.interrupted:
+            report = _draw_field(report, new, drawn, request.progress, stop)
+            watch.lap("pictures")
+        if not report.interrupted:
+            report = _draw_surface(report, new, request.progress, stop)
+            watch.lap("surface")
+        return report, {path.name for path in new.iterdir()}
+
+
+def _draw_field(
+    report: Report, folder: Path, drawn: Drawing | None, progress: Progress, stop: Over
+) -> Report:
+    """Draw the kept field; return the report, marked where Ctrl-C or the caller ended that."""
     from ..pictures.draw import LAYERS, draw
 
     ended = replace(report, interrupted="drawing")
@@ -370,24 +257,24 @@ def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progre
                 return ended
             progress(f"drawing {kind}")
             subject = report.instance if kind == "instance" else report.kept.field
-            draw(subject, folder / _picture(kind), kind=kind)
+            draw(subject, folder / picture_name(kind), kind=kind)
         for name in OVERLAY:
             if stop():
                 return ended
             progress(f"drawing {name}")
-            draw(report.kept.field, folder / name, kind=LAYERS, underlay=below)
+            draw(report.kept.field, folder / name, kind=LAYERS, underlay=drawn)
     except KeyboardInterrupt:
         return ended
     return report
 
 
-def _shaded(report: Report, folder: Path, progress: Progress, stop: Over = never) -> Report:
-    """The report with the surface over its field, which is drawn if nothing speaks against it."""
+def _draw_surface(report: Report, folder: Path, progress: Progress, stop: Over) -> Report:
+    """Lift the kept field to a surface, and draw it if nothing speaks against it; return the report."""
     deadline = Deadline.after(LONGEST_LIFT)
     try:
         progress("surface over the kept field")
-        found = surface(report.kept.field, stop=lambda: deadline.passed() or stop(), progress=progress)
-        report = replace(report, surface=found, interrupted="surface" if stop() else "")
+        lifted = surface(report.kept.field, stop=lambda: deadline.passed() or stop(), progress=progress)
+        report = replace(report, surface=lifted, interrupted="surface" if stop() else "")
         if report.surface is not None and report.shaded:
             write_shaded(report.surface, folder / SHADED)
     except CrossfieldError as error:
@@ -397,5 +284,15 @@ def _shaded(report: Report, folder: Path, progress: Progress, stop: Over = never
     return report
 
 
-def _picture(kind: str) -> str:
+def _write_report(report: Report, folder: Path, names: set[str]) -> None:
+    """Write page and report, and remove files of an earlier run that this one did not replace."""
+    document = report.document()
+    write_page(folder, document, report.manifests, names)
+    for name in {CERTIFICATE, MASK, SHADED, *OVERLAY, *map(picture_name, PICTURES)} - names:
+        remove_file(folder / name)
+    write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+
+
+def picture_name(kind: str) -> str:
+    """The name of the file of a picture."""
     return f"{kind}.png"

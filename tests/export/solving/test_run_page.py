@@ -9,7 +9,7 @@ from functools import partial
 import crossfield as cf
 import pytest
 from browsing import CONTRAST, find, served, show, sideways
-from crossfield.export.bundle.manifest import write_all
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import DEFAULTS, FORMATS, Format
 from crossfield.export.solving import run

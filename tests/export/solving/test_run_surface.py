@@ -7,8 +7,9 @@ import crossfield as cf
 import pytest
 from crossfield.export.cli.output import show_report
 from crossfield.export.solving.methods import Candidate
-from crossfield.export.solving.run import Report, _shaded
-from crossfield.models.processes.deadline import silent
+from crossfield.export.solving.report import Report
+from crossfield.export.solving.run import _draw_surface
+from crossfield.models.processes.deadline import never, silent
 from PIL import Image
 from shapes import ball
 
@@ -21,7 +22,7 @@ def report():
 
 
 def test_a_surface_without_doubts_is_drawn_and_one_with_is_not(report, tmp_path, capsys):
-    found = _shaded(report, tmp_path, silent)
+    found = _draw_surface(report, tmp_path, silent, never)
     trusted = not found.surface.doubts
     assert found.shaded == trusted == (tmp_path / "shaded.png").exists()
     for surface, doubt in ((ball(8), ""), (replace(ball(8), doubts=("it is flat",)), "it is flat")):
@@ -40,7 +41,7 @@ def test_ctrl_c_before_the_surface_leaves_the_rest(report, tmp_path):
         assert "surface" in line
         raise KeyboardInterrupt
 
-    ended = _shaded(report, tmp_path, pressed)
+    ended = _draw_surface(report, tmp_path, pressed, never)
     assert ended.interrupted == "surface"
     assert ended.surface is None
     assert ended.document()["surface"] is None

@@ -9,7 +9,7 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.output import show_report
 from crossfield.export.solving.methods import METHODS, Candidate
-from crossfield.export.solving.run import Report, Stopwatch
+from crossfield.export.solving.report import Report, Stopwatch
 from crossfield.export.statuses import Status
 from crossfield.models.search.starts import first_field
 
