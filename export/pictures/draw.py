@@ -121,7 +121,6 @@ def draw(
     *,
     kind: str | None = None,
     underlay: str | Path | Drawing | None = None,
-    title: str | None = None,
 ) -> Path:
     """Draw an instance, a field or a surface into a file.
 
@@ -138,8 +137,6 @@ def draw(
     underlay
         The drawing (SVG, bitmap, .scap) or sample from which the instance was read. Its strokes become the
         bottom of `layers`; nothing else of the file is copied.
-    title
-        Title above the picture; for `layers` among the facts of the file.
 
     Returns
     -------
@@ -164,11 +161,11 @@ def draw(
     kind = kind or _fitting(what, suffix, underlaid=underlay is not None)
     chosen = _kind(kind, what)
     if kind == LAYERS and isinstance(what, CrossField):
-        return write_bytes(path, _layers(what, suffix, underlay, title))
+        return write_bytes(path, _layers(what, suffix, underlay))
     if underlay is not None:
         raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}, or leave it out")
     with own_settings():
-        return write_bytes(path, _saved(_page(what, chosen, title), suffix))
+        return write_bytes(path, _saved(_page(what, chosen), suffix))
 
 
 @check_arguments
@@ -188,7 +185,7 @@ def preview(what: CrossField | Instance | Surface) -> bytes:
     """
     kind = _kind(_fitting(what, ".png", underlaid=False), what)
     with own_settings():
-        return _saved(_page(what, kind, None), ".png", dots=_PREVIEW_DOTS)
+        return _saved(_page(what, kind), ".png", dots=_PREVIEW_DOTS)
 
 
 def _fitting(what: Subject, suffix: str, *, underlaid: bool) -> str:
@@ -200,16 +197,14 @@ def _fitting(what: Subject, suffix: str, *, underlaid: bool) -> str:
     return LAYERS if suffix == ".svg" or underlaid else "field"
 
 
-def _layers(
-    field: CrossField, suffix: str, underlay: str | Path | Drawing | None, title: str | None
-) -> bytes:
+def _layers(field: CrossField, suffix: str, underlay: str | Path | Drawing | None) -> bytes:
     if isinstance(underlay, str | Path):
         underlay = read_drawing(underlay, on=field.instance)
     layers = sheet(field, underlay)
     if suffix == ".svg":
-        return svg_of(layers, title)
+        return svg_of(layers)
     with own_settings():
-        return _saved(page_of(layers), suffix, title=title)
+        return _saved(page_of(layers), suffix)
 
 
 @contextmanager
@@ -223,10 +218,9 @@ def own_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
         yield
 
 
-def _saved(figure: Any, suffix: str, *, dots: int = _DOTS, title: str | None = None) -> bytes:
-    metadata = SUFFIXES[suffix] | ({} if title is None else {"Title": title})
+def _saved(figure: Any, suffix: str, *, dots: int = _DOTS) -> bytes:
     stream = io.BytesIO()
-    figure.savefig(stream, format=suffix[1:], dpi=dots, metadata=metadata)
+    figure.savefig(stream, format=suffix[1:], dpi=dots, metadata=SUFFIXES[suffix])
     return stream.getvalue()
 
 
@@ -246,7 +240,7 @@ def _kind(kind: str, what: Subject) -> Kind:
     return table[kind]
 
 
-def _page(what: Subject, kind: Kind, title: str | None) -> Any:
+def _page(what: Subject, kind: Kind) -> Any:
     """The figure: panels in a row, headings above, legend and caption below; every length in points."""
     from matplotlib.figure import Figure
 
@@ -254,7 +248,7 @@ def _page(what: Subject, kind: Kind, title: str | None) -> Any:
     field = what if isinstance(what, CrossField) else None
     picture = panels.Picture(instance, field, kind.size, what if isinstance(what, Surface) else None)
     height, width = (side * picture.unit for side in picture.instance.mask.shape)
-    above = _EDGE + _LINE * (any(heading for heading, _ in kind.panels) + (title is not None) * 1.3)
+    above = _EDGE + _LINE * any(heading for heading, _ in kind.panels)
     below = _EDGE + _LINE * (1 + kind.legend)
     pitch, count = max(width, _NARROWEST) + _GAP, len(kind.panels)
     row = count * pitch - _GAP + kind.bar
@@ -269,9 +263,6 @@ def _page(what: Subject, kind: Kind, title: str | None) -> Any:
         cover(axes, 0.0, 0.0, width, height)
         axes.set_title(heading, fontsize=8, pad=4)
         panel(axes, picture)
-    if title is not None:
-        size = min(9.5, 1.6 * page[0] / max(len(title), 1))
-        figure.text(0.5, 1 - _EDGE / page[1], title, ha="center", va="top", fontsize=size, parse_math=False)
     figure.text(0.5, _EDGE / page[1], caption, ha="center", va="bottom", color="#444444")
     if keys:
         place = (0.5, (_EDGE + _LINE - 3) / page[1])

@@ -29,11 +29,10 @@ _SPACES: Final = (
 _FONT: Final = 'font-family="system-ui,sans-serif" font-size="10"'
 
 
-def svg_of(sheet: Sheet, title: str | None = None) -> bytes:
-    """The file of a sheet, its layers as layers of a drawing program. title: among the facts of the file."""
+def svg_of(sheet: Sheet) -> bytes:
+    """The file of a sheet, its layers as layers of a drawing program."""
     size = size_in_units(sheet.page) if sheet.drawing is None else sheet.drawing.size
-    named = [] if title is None else [f"<title>{escape(title)}</title>"]
-    return _document(_SPACES, sheet, size, [*named, *_body(sheet, _FINENESS)])
+    return _document(_SPACES, sheet, size, [*_body(sheet, _FINENESS)])
 
 
 def web_svg_of(sheet: Sheet, dark: dict[str, str]) -> bytes:

@@ -61,14 +61,14 @@ def place(found, picture):
 )
 def test_every_kind_and_suffix_is_written_the_same_twice(tmp_path, kind, suffix):
     field = singular(5)
-    first = draw(field, tmp_path / f"first{suffix}", kind=kind, title="A sketch")
+    first = draw(field, tmp_path / f"first{suffix}", kind=kind)
     assert first == tmp_path / f"first{suffix}"
     data = first.read_bytes()
     assert data.startswith(MAGIC[suffix])
     with mpl.rc_context(
         {"lines.linewidth": 9.0, "svg.hashsalt": "other", "font.size": 30.0, "savefig.bbox": "tight"}
     ):
-        assert draw(field, tmp_path / f"second{suffix}", kind=kind, title="A sketch").read_bytes() == data
+        assert draw(field, tmp_path / f"second{suffix}", kind=kind).read_bytes() == data
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"first{suffix}", f"second{suffix}"]
 
 

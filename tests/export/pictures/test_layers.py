@@ -29,8 +29,8 @@ def level(height=6, width=10, pixel_size=5.0, origin=(20.0, 30.0)):
 
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
-    """A file of layers of the level field, with a title."""
-    return draw(level(), tmp_path_factory.mktemp("drawn") / "a.svg", title="A <b> & c")
+    """A file of layers of the level field."""
+    return draw(level(), tmp_path_factory.mktemp("drawn") / "a.svg")
 
 
 def test_lines_and_strokes_are_where_they_are_on_the_drawing(drawn):
@@ -53,7 +53,6 @@ def test_lines_and_strokes_are_where_they_are_on_the_drawing(drawn):
 
 def test_crosses_are_there_but_not_shown_and_ends_are_round(drawn):
     root, layers = layers_of(drawn)
-    assert root.findtext(f"{SVG}title") == "A <b> & c"
     shown = [name for name, group in layers.items() if group.get("style") == "display:inline"]
     assert shown == [name for name in NAMES if name != "crosses"]
     crosses = lines_in(layers["crosses"])
@@ -74,9 +73,9 @@ def test_the_page_begins_at_zero_unless_the_field_reaches_beyond_it():
     "field", [level(2, 12), pytest.param(power_field(sample("mouse", 8)), marks=pytest.mark.slow)]
 )
 def test_the_same_bytes_come_twice(tmp_path, field):
-    first = draw(field, tmp_path / "a.svg", title="A title").read_bytes()
+    first = draw(field, tmp_path / "a.svg").read_bytes()
     again = CrossField(field.instance, field.alpha, field.beta, field.p)
-    assert draw(again, tmp_path / "b.svg", title="A title").read_bytes() == first
+    assert draw(again, tmp_path / "b.svg").read_bytes() == first
     assert len(first) < 40_000
 
 
