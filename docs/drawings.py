@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.bundle.manifest import write_all
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.verify.checks import Check
 from crossfield.export.verify.verify import verify
 from crossfield.models.field.field import CrossField

@@ -119,12 +119,12 @@ ERRATA = (
     (
         "(26) reads z >= -pi/4",
         "z >= -(pi/4) p1, a facet; the MILP is then exact for the 1-norm",
-        "`--facet printed`",
+        "`export --facet printed`",
     ),
     (
         "(1) restricts alpha to [0, pi/2]: a stroke at 120 degrees forces a skew of 30 degrees",
         "the window of alpha is centred on the stroke's direction",
-        "`--gauge box`",
+        "`instance --gauge box`",
     ),
     ("w_beta is in (6) and in the total, and missing in (21)", "it counts once", ""),
     ("gamma rows for all pixels", "gamma rows for stroke pixels, where theta exists", ""),

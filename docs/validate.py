@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.bundle.manifest import write_all
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.bundle.starts import STARTS
 from crossfield.export.cli.tables import smallest_problems
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
@@ -264,7 +264,7 @@ def main() -> None:
 - Objectives are recomputed from the declaration at the solver's point. Optima must agree to 1e-6.
 - Solvers are listed for the formulations that they [take](#solvers-and-formulations).
 
-`crossfield verify DIR --solve` makes the same checks for any folder, and writes `verify.json` there.""",
+`crossfield verify DIR --solve SECONDS` makes the same checks for any folder. It writes `verify.json`.""",
         "## Reading",
         readings(runs),
         "## Licences",

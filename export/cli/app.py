@@ -7,6 +7,7 @@ result to keep, the exit code is 1. Heavy libraries are imported inside the comm
 
 from __future__ import annotations
 
+import gc
 import logging
 import signal
 import sys
@@ -41,11 +42,10 @@ from .output import (
     show_lists,
     show_manifests,
     show_report,
-    show_table,
 )
 from .prove_command import prove_command
 from .shade_command import shade_command
-from .sketch_options import SketchOptions
+from .sketch_options import Size, SketchOptions
 from .solve_command import print_solution, solve_command
 from .studio_command import studio_command
 from .verify_command import verify_command
@@ -62,6 +62,7 @@ app = typer.Typer(
 )
 
 _STOPPED: Final = 130  # exit code of typer after a Ctrl-C that no command handled
+_OBJECTS: Final = 100_000  # new objects before a search for cycles, which slows down the imports of SymPy
 
 
 command = partial(command_of, app)
@@ -89,12 +90,8 @@ def run_command(
     output: options.Folder,
     *,
     sketch: SketchOptions,
-    facet: options.Facet = None,
     time_limit: options.SecondsPerMethod = 60.0,
-    gap: options.Gap = 1e-6,
     threads: options.Threads = 0,
-    jobs: options.Jobs = 1,
-    nl_form: options.NlForm = None,
     printing: options.PrintOptions,
 ) -> None:
     """Do all steps for one sketch: write the solver files, try the methods, keep a field and draw it.
@@ -105,23 +102,14 @@ def run_command(
     from ...models.processes.limits import Limits
     from ..solving.run import plan, run
 
-    limits = Limits(time_limit, gap, threads)
+    limits = Limits(time_limit, threads=threads)
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
         instance = sketch.instance(source, quiet=printing.quiet)
     if not (printing.quiet or printing.as_json):
         print_line(plan(limits))
     with progress(quiet=printing.quiet) as show:
-        report = run(
-            instance,
-            output,
-            limits=limits,
-            options={"facet": facet},
-            dialects={"nl": nl_form} if nl_form else {},
-            drawing=drawing_of(source),
-            jobs=jobs,
-            progress=show,
-        )
+        report = run(instance, output, limits=limits, drawing=drawing_of(source), progress=show)
     printing.show(report.document(), lambda: show_report(report, output))
     if report.interrupted:
         print_notice(f"interrupted: {report.interrupted}; report.json lists the results so far")
@@ -129,9 +117,16 @@ def run_command(
 
 @command("instance")
 def instance_command(
-    source: options.Input, output: options.Output, *, sketch: SketchOptions, quiet: options.Quiet = False
+    source: options.Input,
+    output: options.Output,
+    *,
+    sketch: SketchOptions,
+    gauge: options.Gauge = None,
+    skew_weight: options.SkewWeight = None,
 ) -> None:
     """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels.
+
+    Every command takes this file in place of a sketch.
 
     With the suffix .png, write the mask of the instance: white where the field is wanted. Edit it in a paint
     program and pass it to --mask.
@@ -140,12 +135,12 @@ def instance_command(
     from ..pictures.mask import write_mask
 
     require_suffix(output, (".json", ".npz", ".png"))
-    with progress(quiet=quiet) as show:
+    with progress() as show:
         show("reading the sketch")
-        instance = sketch.instance(source, quiet=quiet)
+        instance = sketch.instance(source).with_weights(skew_weight=skew_weight)
+        instance = instance if gauge is None else instance.with_gauge(gauge)
         (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
-    if not quiet:
-        print_line(f"{output}: {instance.summary}")
+    print_line(f"{output}: {instance.summary}")
 
 
 @command("export")
@@ -155,49 +150,57 @@ def export_command(
     *,
     formulation: options.FormulationNames = None,
     file_format: options.FormatNames = None,
-    sketch: SketchOptions,
-    formulating: options.FormulationOptions,
+    size: Size = None,
+    facet: options.Facet = None,
+    stroke_norm: options.StrokeNorm = None,
+    beta_norm: options.BetaNorm = None,
+    relax: options.Relax = False,
     start: options.Start = None,
     tightened: options.Tightened = None,
     nl_form: options.NlForm = None,
     compress: options.Gzip = False,
-    jobs: options.Jobs = 1,
     printing: options.PrintOptions,
 ) -> None:
     """Write an instance as files for solvers, in every formulation and format.
 
     Each formulation also has a manifest (.manifest.json), which `crossfield read` needs.
     """
-    from ...models.proof.certificate import read_certificate
-    from ...models.proof.tightening import windows_left
-    from ..bundle.manifest import write_all
+    from ..bundle.problem_files import write_all
     from ..formats.registry import DEFAULTS, FORMATS
 
     formulations = formulations_of(formulation)
     formats = known(file_format or list(DEFAULTS), FORMATS, "format")
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = sketch.instance(source, quiet=printing.quiet)
-        field, proof = read_start(start, instance), None
+        instance = SketchOptions(size).instance(source, quiet=printing.quiet)
+        field, jumps_of, windows = read_start(start, instance), None, None
         if tightened is not None:
+            from ...models.proof.certificate import read_certificate
+            from ...models.proof.tightening import windows_left
+
             show("checking the certificate")
-            proof = read_certificate(tightened, on=instance)
+            certificate = read_certificate(tightened, on=instance)
+            jumps_of, windows = certificate.field, windows_left(certificate)
         manifests = write_all(
             instance,
             output,
             formulations=formulations,
             formats=formats,
             start=field,
-            jumps_of=None if proof is None else proof.field,
-            windows=None if proof is None else windows_left(proof),
-            options=formulating.chosen(),
+            jumps_of=jumps_of,
+            windows=windows,
+            options={
+                "facet": facet,
+                "stroke_norm": stroke_norm,
+                "beta_norm": beta_norm,
+                "relax": relax or None,
+            },
             dialects={"nl": nl_form} if nl_form else {},
             compress=compress,
-            jobs=jobs,
             progress=show,
         )
     documents = [manifest.document for manifest in manifests]
-    printing.show(documents, lambda: show_manifests(manifests, output))
+    printing.show(documents, lambda: show_manifests(instance, documents, output))
 
 
 command("solve")(solve_command)
@@ -250,8 +253,6 @@ def draw_command(
     on: options.On = None,
     kind: options.Kind = None,
     underlay: options.Underlay = None,
-    title: options.Title = None,
-    quiet: options.Quiet = False,
 ) -> None:
     """Draw a field or an instance as PNG, SVG or PDF.
 
@@ -260,13 +261,12 @@ def draw_command(
     from ..pictures.draw import SUFFIXES, draw
 
     require_suffix(output, tuple(SUFFIXES))
-    with progress(quiet=quiet) as show:
+    with progress() as show:
         show("reading")
         subject = field_or_instance(source, on)
         show("drawing")
-        draw(subject, output, kind=kind, underlay=underlay, title=title)
-    if not quiet:
-        print_line(str(output))
+        draw(subject, output, kind=kind, underlay=underlay)
+    print_line(str(output))
 
 
 command("shade")(shade_command)
@@ -276,7 +276,7 @@ command("verify")(verify_command)
 
 @command("list")
 def list_command(*, as_json: options.Json = False) -> None:
-    """List formulations, formats, solvers and methods, and their combinations."""
+    """List samples, formulations, formats, solvers and methods, and their combinations."""
     from .tables import tables
 
     found = tables()
@@ -286,20 +286,6 @@ def list_command(*, as_json: options.Json = False) -> None:
         show_lists(found)
 
 
-@command("samples")
-def samples_command(*, as_json: options.Json = False) -> None:
-    """List the built-in samples."""
-    from .tables import sample_rows
-
-    rows = sample_rows()
-    if as_json:
-        print_json(rows)
-    else:
-        columns = ("name", "grid", "pixels", "strokes", "description")
-        cells = [[str(row[column]) for column in columns] for row in rows]
-        show_table("samples", columns, cells, numbers=("pixels", "strokes"))
-
-
 app.add_typer(library, name="library")
 
 
@@ -307,6 +293,7 @@ def main() -> NoReturn:
     """Run the command line and exit with its exit code; SIGTERM too removes files that are not complete."""
     escape_unencodable()
     logging.getLogger("PIL").addHandler(logging.NullHandler())  # every error is one line, printed by `invoke`
+    gc.set_threshold(_OBJECTS)
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         sys.exit(invoke(sys.argv[1:]))

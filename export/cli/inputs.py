@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from ...models.errors import CrossfieldError, InputError
-from ...models.storage import read_bytes
+from ...models.errors import CrossfieldError, InputError, InstanceError
 
 if TYPE_CHECKING:
     from ...models.field.field import CrossField
@@ -33,17 +30,17 @@ def described_problem(path: Path) -> tuple[Problem, Mapping[str, Problem] | None
     Raises InputError, InstanceError for a missing or damaged file.
     """
     from ..bundle.manifest import read_manifest
-    from ..library.documents.documents import FORMAT, problem_of, read_sidecar
 
-    kind = None
-    # What is no JSON object is left to read_manifest, which names the error.
-    with suppress(CrossfieldError, ValueError, AttributeError, RecursionError):
-        kind = json.loads(read_bytes(path)).get("format")
-    if kind == FORMAT:
-        return problem_of(path.parent, read_sidecar(path)), None
-    described = read_manifest(path)
-    problem = described.problem()
-    return problem, described.held(problem)
+    try:
+        manifest = read_manifest(path)
+    except InstanceError:
+        from ..library.documents.documents import is_sidecar, problem_of, read_sidecar
+
+        if is_sidecar(path):
+            return problem_of(path.parent, read_sidecar(path)), None
+        raise
+    problem = manifest.problem()
+    return problem, manifest.held(problem)
 
 
 def field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:

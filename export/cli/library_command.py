@@ -10,7 +10,7 @@ import typer
 
 from .help_texts import FACTS, Group
 from .option_groups import command as command_of
-from .options import Folder, PrintOptions, Processes, Quiet, Seconds
+from .options import Folder, PrintOptions, Processes, Seconds
 from .output import print_line, print_notice, progress, show_table
 
 if TYPE_CHECKING:
@@ -282,11 +282,10 @@ def _row(result: Submission) -> list[str]:
 
 
 @command("site")
-def site_command(folder: Library, output: Folder, *, quiet: Quiet = False) -> None:
+def site_command(folder: Library, output: Folder) -> None:
     """Write a static site about a library: a table of all entries and a page for each."""
     from ..library.site.site import write_site
 
-    with progress(quiet=quiet) as show:
+    with progress() as show:
         pages = write_site(folder, output, progress=show)
-    if not quiet:
-        print_line(f"{output}: {len(pages)} pages; open index.html")
+    print_line(f"{output}: {len(pages)} pages; open index.html")

@@ -135,30 +135,14 @@ Facet = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class FormulationOptions:
-    """Options of the formulations."""
-
-    facet: Facet = None
-    stroke_norm: Annotated[int | None, _norm("--stroke-norm", "Distance from the strokes")] = None
-    beta_norm: Annotated[int | None, _norm("--beta-norm", "Skew beta")] = None
-    relax: Annotated[
-        bool,
-        typer.Option(
-            "--relax", help="Let integers take any value within their bounds, which gives a lower bound."
-        ),
-    ] = False
-
-    def chosen(self) -> dict[str, Any]:
-        """Value of each option by its name in Python; None if it is not given."""
-        return {
-            "facet": self.facet,
-            "stroke_norm": self.stroke_norm,
-            "beta_norm": self.beta_norm,
-            "relax": self.relax or None,
-        }
-
-
+StrokeNorm = Annotated[int | None, _norm("--stroke-norm", "Distance from the strokes")]
+BetaNorm = Annotated[int | None, _norm("--beta-norm", "Skew beta")]
+Relax = Annotated[
+    bool,
+    typer.Option(
+        "--relax", help="Let integers take any value within their bounds, which gives a lower bound."
+    ),
+]
 FormulationName = Annotated[
     str | None, _formulation(help="Solve this formulation: {formulations}; in short {short names}.")
 ]
@@ -182,9 +166,6 @@ Gzip = Annotated[bool, typer.Option("--gzip", help="Compress the model files (.g
 MethodName = Annotated[
     str | None,
     _method(help="Compute the field with this method: {methods}; `crossfield list` describes them."),
-]
-ShadedMethod = Annotated[
-    str | None, _method(help="Method that computes the field: {methods}; {kept method} by default.")
 ]
 SolverName = Annotated[
     str | None,
@@ -225,9 +206,6 @@ SecondsOfProof = Annotated[
         " when the sketch has been read and, once on a machine, the functions of proofs are compiled."
     ),
 ]
-Gap = Annotated[
-    float, _gap(help="Relative distance between best point and proven bound at which a solver may stop.")
-]
 ProofGap = Annotated[
     float,
     _gap(
@@ -263,8 +241,32 @@ Pick = Annotated[
         " the first.",
     ),
 ]
-Solve = Annotated[bool, typer.Option("--solve", help="Solve every problem too, and compare the optima.")]
-Jobs = Annotated[int, _jobs(help="Number of solver files that are written in parallel.")]
+SolveSeconds = Annotated[
+    float | None,
+    typer.Option(
+        "--solve",
+        min=0.1,
+        metavar="SECONDS",
+        help="Solve every problem too, within this time each, and compare the optima.",
+    ),
+]
+Gauge = Annotated[
+    Literal["strokes", "box"] | None,
+    typer.Option(
+        "--gauge",
+        help="Range of 90 degrees for the angle alpha: around the stroke in each pixel (strokes, exact),"
+        " or 0 to 90 as in the paper (box).",
+    ),
+]
+SkewWeight = Annotated[
+    float | None,
+    typer.Option(
+        "--skew-weight",
+        metavar="X",
+        help="Weight of the skew beta, 0 to {most weight}, the same on every grid; by default"
+        " {skew weight}, or the weight in the instance file.",
+    ),
+]
 Processes = Annotated[int, _jobs(help="Number of processes that work in parallel.")]
 Threads = Annotated[
     int,
@@ -291,7 +293,6 @@ Underlay = Annotated[
         " shown from the view that the instance records.",
     ),
 ]
-Title = Annotated[str | None, typer.Option("--title", help="Line of text above the picture.")]
 Flip = Annotated[
     bool,
     typer.Option(

@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
     from ...models.instance.instance import Instance
     from ...models.surface.surface import Surface
-    from ..bundle.manifest import Manifest
-    from ..solving.run import Report
+    from ..solving.report import Report
 
 WIDTH: Final = 80
 """Columns of the tables where the output is no terminal."""
@@ -44,7 +43,7 @@ class InterruptedRunError(CrossfieldError):
 
 
 @contextmanager
-def progress(*, quiet: bool) -> Iterator[Progress]:
+def progress(*, quiet: bool = False) -> Iterator[Progress]:
     """Function that shows the current step on standard error, unless quiet.
 
     A terminal shows it next to a spinner and the time; elsewhere it is a line every few seconds. Raises
@@ -263,9 +262,8 @@ def _bound(facts: dict[str, Any]) -> str:
     return f"{how or 'did not close its gap'}: {words}, gap {facts['gap']:.0%}"
 
 
-def show_manifests(manifests: list[Manifest], folder: Path) -> None:
-    """Print the files of an export, and the reasons for files that were refused."""
-    documents = [manifest.document for manifest in manifests]
+def show_manifests(instance: Instance, documents: list[dict[str, Any]], folder: Path) -> None:
+    """Print the files of an export by their manifests, and the reasons for files that were refused."""
     names = list(dict.fromkeys(name for document in documents for name in _sizes(document)))
     columns = ("formulation", "class", "columns", "rows", *names)
     rows = []
@@ -274,7 +272,7 @@ def show_manifests(manifests: list[Manifest], folder: Path) -> None:
         written = [f"{sizes[name] / 1e3:.0f}" if name in sizes else "-" for name in names]
         size = [str(counts["columns"]), str(counts["rows"])]
         rows.append([document["formulation"], document["class"], *size, *written])
-    show_table(f"{manifests[0].instance().summary}; files in kB", columns, rows, numbers=columns[2:])
+    show_table(f"{instance.summary}; files in kB", columns, rows, numbers=columns[2:])
     for document in documents:
         for reason in document["refused"].values():
             print_line(f"not written: {reason}")
@@ -340,7 +338,7 @@ def _text(value: object) -> str:
 
 
 def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) -> None:
-    """Print the tables of formulations, formats, solvers, methods and readers, and their combinations."""
+    """Print all tables, from samples to readers of solution files."""
 
     def show(title: str, name: str, columns: Sequence[str] = ()) -> None:
         of_table, rows = tables[name]
@@ -348,6 +346,7 @@ def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) 
             title, columns or of_table, [[str(row[key]) for key in columns or of_table] for row in rows]
         )
 
+    show("samples", "samples")
     show("formulations", "formulations", ("name", "short", "paper", "class", "summary"))
     names = [row["name"] for row in tables["formats"][1]]
     carried = [

@@ -12,7 +12,7 @@ from ...models.errors import CrossfieldError
 from . import options
 from .inputs import read_start
 from .output import print_line, print_notice, progress, show_facts
-from .sketch_options import SketchOptions
+from .sketch_options import Size, SketchOptions
 
 if TYPE_CHECKING:
     from ...models.field.field import Norm as NormOfField
@@ -31,7 +31,7 @@ def prove_command(
     output: options.ProofFolder = None,
     *,
     norm: options.Norm = "2",
-    sketch: SketchOptions,
+    size: Size = None,
     start: options.Start = None,
     time_limit: options.SecondsOfProof = 60.0,
     gap: options.ProofGap = 0.0,
@@ -56,7 +56,7 @@ def prove_command(
 
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = sketch.instance(source, quiet=printing.quiet)
+        instance = SketchOptions(size).instance(source, quiet=printing.quiet)
         proof = prove(
             instance,
             norm=NORMS[norm],

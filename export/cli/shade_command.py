@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 from ...models.errors import InputError, shortened
 from ...models.processes.deadline import Progress
 from . import options
-from .inputs import SAVED, drawing_of, field_or_instance, known
-from .output import print_notice, progress, show_surface
+from .inputs import SAVED, drawing_of, field_or_instance
+from .output import progress, show_surface
 from .sketch_options import SketchOptions
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ...models.instance.instance import Instance
     from ...models.surface.hints import Hint
     from ..shading.colours import Light
-    from ..solving.methods import Candidate
 
 FIELD: Final = "field.npz"
 """File of the field that was computed from a sketch, which can be shaded again with other hints."""
@@ -32,11 +31,9 @@ def shade_command(
     hint: options.Hints = None,
     light: options.Lamp = None,
     scale: options.Scale = None,
-    method: options.ShadedMethod = None,
     on: options.On = None,
     underlay: options.Underlay = None,
     sketch: SketchOptions,
-    time_limit: options.SecondsInAll = 60.0,
     printing: options.PrintOptions,
 ) -> None:
     """Compute the surface whose curvature lines are the crosses: normals, shaded pictures, heights, mesh.
@@ -52,48 +49,44 @@ def shade_command(
     hints, lamp = hints_of(hint), light_of(light)
     with progress(quiet=printing.quiet) as show:
         show("reading")
-        field, candidate = _saved(source, on), None
-        if field is None:
-            instance = sketch.instance(source, quiet=printing.quiet)
-            candidate = _made(instance, method, output, time_limit, show)
-            field, underlay = candidate.field, underlay or drawing_of(source)
-        elif sketch.given or method is not None:
+        saved = _saved_field(source, on)
+        if saved is not None and sketch != SketchOptions():
             raise InputError(
-                "is a field, which has its own grid, strokes and weights; omit --method and the options that"
-                " read a sketch",
+                "is a field, which has its own grid and strokes; omit the options that read a sketch",
                 file=source,
             )
-        found = surface(field, hints, flip=flip, progress=show)
-        about = _about(candidate, hints, lamp, flip=flip)
+        if saved is None:
+            field = _bend_field(sketch.instance(source, quiet=printing.quiet), show)
+            underlay = underlay or drawing_of(source)
+        else:
+            field = saved
+        solid = surface(field, hints, flip=flip, progress=show)
+        about = _about("bend" if saved is None else None, hints, lamp, flip=flip)
         show("drawing and writing")
-        write_surface(found, output, drawing=underlay, light=lamp, scale=scale, about=about)
-        if candidate is not None:
+        write_surface(solid, output, drawing=underlay, light=lamp, scale=scale, about=about)
+        if saved is None:
             write_field(field, output / FIELD)
-    printing.show(surface_document(found, about), lambda: show_surface(found, output))
-    if candidate is not None and candidate.interrupted:
-        print_notice("interrupted; the surface belongs to the best field so far")
+    printing.show(surface_document(solid, about), lambda: show_surface(solid, output))
 
 
-def _saved(source: str, on: Path | None) -> CrossField | None:
+def _saved_field(source: str, on: Path | None) -> CrossField | None:
     """Field in a file; None for a sketch, sample or instance. Raises InputError."""
     from ...models.field.field import CrossField
 
     path = Path(source)
     if on is None and not (path.is_file() and path.suffix.lower() in SAVED):
         return None
-    found = field_or_instance(path, on)
-    return found if isinstance(found, CrossField) else None
+    content = field_or_instance(path, on)
+    return content if isinstance(content, CrossField) else None
 
 
-def _made(instance: Instance, method: str | None, folder: Path, seconds: float, show: Progress) -> Candidate:
-    """Final field of a method. Raises InputError for an unknown method."""
-    from ...models.processes.limits import Limits
-    from ..solving.methods import METHODS, Request
-    from ..solving.run import KEPT
+def _bend_field(instance: Instance, show: Progress) -> CrossField:
+    """The field of the method bend."""
+    from ...models.smooth.bend import bend_field
+    from ...models.smooth.polyvector import HOLDS, polyvector_field
 
-    (name,) = known([method or KEPT], METHODS, "method")
-    *_, candidate = METHODS[name].find(Request(instance, folder / "solve", Limits(seconds), progress=show))
-    return candidate
+    show("bend field")
+    return bend_field(polyvector_field(instance, hold=max(HOLDS)))
 
 
 def hints_of(texts: list[str] | None) -> tuple[Hint, ...]:
@@ -132,12 +125,10 @@ def _numbers(text: str, option: str, example: str) -> list[float]:
     return numbers
 
 
-def _about(
-    candidate: Candidate | None, hints: tuple[Hint, ...], lamp: Light, *, flip: bool
-) -> dict[str, Any]:
+def _about(method: str | None, hints: tuple[Hint, ...], lamp: Light, *, flip: bool) -> dict[str, Any]:
     """Method, hints and light of a surface, for its report; angles in degrees."""
     return {
-        "method": None if candidate is None else candidate.method,
+        "method": method,
         "flipped": flip,
         "hints": [
             {"row": hint.row, "column": hint.column}

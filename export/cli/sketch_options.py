@@ -1,4 +1,8 @@
-"""Options of every command that reads a sketch, a sample or an instance."""
+"""Options that read a sketch, a sample or an instance file.
+
+`run`, `shade` and `instance` have all of them. The other commands have --size, and take the file that
+`instance` wrote for everything else.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +18,16 @@ from .output import print_warnings
 if TYPE_CHECKING:
     from ...models.instance.instance import Instance
 
+Size = Annotated[
+    int | None, typer.Option("--size", help="Pixels on the longer side of the grid; {size} by default.")
+]
+
 
 @dataclass(frozen=True)
 class SketchOptions:
-    """Grid, curvature lines, gauge and weights with which a sketch is read as an instance."""
+    """Grid, curvature lines and weight of the strokes with which a sketch is read as an instance."""
 
-    size: Annotated[
-        int | None, typer.Option("--size", help="Pixels on the longer side of the grid; {size} by default.")
-    ] = None
+    size: Size = None
     mask: Annotated[
         Path | None,
         typer.Option(
@@ -57,14 +63,6 @@ class SketchOptions:
             " 30,25; by default the view in which the strokes extend furthest.",
         ),
     ] = None
-    gauge: Annotated[
-        Literal["strokes", "box"] | None,
-        typer.Option(
-            "--gauge",
-            help="Range of 90 degrees for the angle alpha: around the stroke in each pixel (strokes, exact),"
-            " or 0 to 90 as in the paper (box).",
-        ),
-    ] = None
     stroke_weight: Annotated[
         float | None,
         typer.Option(
@@ -74,63 +72,39 @@ class SketchOptions:
             " default {stroke weight}, or the weight in the instance file.",
         ),
     ] = None
-    skew_weight: Annotated[
-        float | None,
-        typer.Option(
-            "--skew-weight",
-            metavar="X",
-            help="Weight of the skew beta, 0 to {most weight}, the same on every grid; by default"
-            " {skew weight}, or the weight in the instance file.",
-        ),
-    ] = None
-
-    @property
-    def given(self) -> bool:
-        """Whether any of the options is given."""
-        values = (self.size, self.mask, self.gauge, self.stroke_weight, self.skew_weight)
-        return self._chooses_strokes or any(value is not None for value in values)
 
     @property
     def _chooses_strokes(self) -> bool:
         """Whether an option decides which strokes of a drawing are curvature lines."""
         return self.silhouette != "none" or bool(self.curvature) or self.view is not None
 
-    def instance(self, what: str, *, quiet: bool) -> Instance:
+    def instance(self, what: str, *, quiet: bool = False) -> Instance:
         """Instance of a sketch file, a built-in sample or an instance file, small enough for the memory.
 
         Prints the warnings of the reader unless quiet. Raises InputError, and InstanceError for a weight that
         is out of range.
         """
-        import numpy as np
-
-        from ...models.memory import available_memory
-        from ...models.sketch.read import check_memory
-
-        instance = self._read(what).with_weights(
-            stroke_weight=self.stroke_weight, skew_weight=self.skew_weight
-        )
-        check_memory(int(np.count_nonzero(instance.mask)), available_memory())
+        path = Path(what)
+        is_saved = path.is_file() and path.suffix.lower() in {".json", ".npz"}
+        instance = self._saved(path) if is_saved else self._read(path)
+        instance = instance.with_weights(stroke_weight=self.stroke_weight)
         print_warnings(instance, quiet=quiet)
         return instance
 
-    def _read(self, what: str) -> Instance:
+    def _read(self, path: Path) -> Instance:
         from ...models.sketch.read import DEFAULT_SIZE, read_sketch
         from ...models.sketch.samples import SAMPLES
 
-        path = Path(what)
-        if not path.is_file() and what in SAMPLES:
-            return self._sample(what)
+        if not path.is_file() and str(path) in SAMPLES:
+            return self._sample(str(path))
         if not path.exists():
             raise InputError(
-                "there is no such file and no such sample; `crossfield samples` lists the samples", file=what
+                "there is no such file and no such sample; `crossfield list` lists the samples", file=path
             )
-        if path.suffix.lower() in {".json", ".npz"}:
-            return self._saved(path)
         return read_sketch(
             path,
             size=DEFAULT_SIZE if self.size is None else self.size,
             mask=self.mask,
-            gauge=self.gauge or "strokes",
             silhouette=self.silhouette,
             curvature=self.curvature or (),
             view=self.view,
@@ -147,10 +121,11 @@ class SketchOptions:
                 f"the sample {name} has its own curvature lines; leave --curvature and --view out"
             )
         size = DEFAULT_SIZE if self.size is None else self.size
-        return sample(name, size, gauge=self.gauge or "strokes", silhouette=self.silhouette)
+        return sample(name, size, silhouette=self.silhouette)
 
     def _saved(self, path: Path) -> Instance:
         from ...models.instance.file import read_instance
+        from ...models.memory import check_memory
 
         if self.size is not None or self.mask is not None:
             raise InputError(
@@ -163,4 +138,5 @@ class SketchOptions:
                 file=path,
             )
         instance = read_instance(path)
-        return instance if self.gauge is None else instance.with_gauge(self.gauge)
+        check_memory(instance.grid.size)
+        return instance

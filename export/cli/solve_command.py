@@ -12,7 +12,7 @@ from ...models.processes.deadline import Deadline
 from . import options
 from .inputs import formulations_of, known, read_start
 from .output import print_notice, progress
-from .sketch_options import SketchOptions
+from .sketch_options import Size, SketchOptions
 
 if TYPE_CHECKING:
     from ..solutions.solution import Solution
@@ -27,11 +27,10 @@ def solve_command(
     formulation: options.FormulationName = None,
     method: options.MethodName = None,
     solver: options.SolverName = None,
-    sketch: SketchOptions,
-    formulating: options.FormulationOptions,
+    size: Size = None,
+    relax: options.Relax = False,
     start: options.Start = None,
     time_limit: options.SecondsInAll = 60.0,
-    gap: options.Gap = 1e-6,
     threads: options.Threads = 0,
     printing: options.PrintOptions,
 ) -> None:
@@ -48,20 +47,19 @@ def solve_command(
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = sketch.instance(source, quiet=printing.quiet)
+        instance = SketchOptions(size).instance(source, quiet=printing.quiet)
         request = Request(
             instance,
             output,
-            options=formulating.chosen(),
             start=read_start(start, instance),
             progress=show,
-            limits=Limits(time_limit, gap, threads).until(deadline),
+            limits=Limits(time_limit, threads=threads).until(deadline),
         )
         if method is not None:
-            _check_method(method, solver, relax=formulating.relax)
+            _check_method(method, solver, relax=relax)
             candidate, proven, reason, target = _by_method(method, request)
         else:
-            solution, target = _by_solver(str(formulation), solver, request)
+            solution, target = _by_solver(str(formulation), solver, request, relax=relax)
     if method is not None:
         _print_candidate(candidate, proven, target, printing)
         if reason:
@@ -112,18 +110,18 @@ def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, s
         return candidate, None, str(error), target
 
 
-def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solution, Path]:
+def _by_solver(name: str, solver: str | None, request: Request, *, relax: bool) -> tuple[Solution, Path]:
     """Solution of one formulation, and the path of its field, which exists if the solution has a point."""
     from ...models.field.file import write_field
     from ...models.formulations.problem import formulate
-    from ..bundle.manifest import fixed_jumps
+    from ..bundle.problem_files import fixed_jumps
     from ..solving.local import solve
 
     (name,) = formulations_of([name])
     instance, deadline = request.instance, Deadline.after(request.limits.time_limit)
     request.progress("greedy start")
     start = request.begin(deadline)
-    problem = formulate(instance, name, p=fixed_jumps(instance, name, start), **request.options)
+    problem = formulate(instance, name, p=fixed_jumps(instance, name, start), relax=relax)
     limits = request.limits.until(deadline)
     request.progress(f"solving {name}, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far")
     solution = solve(problem, solver, folder=request.folder, limits=limits, start=start)
@@ -151,11 +149,9 @@ def _print_candidate(
 
 def print_solution(solution: Solution, field: Path, printing: options.PrintOptions) -> None:
     """Print the facts of a solution, and the path of its field, which exists unless there is a doubt."""
-    from ..solving.methods import field_facts, finite, solution_facts
-
-    facts = solution_facts(solution)
+    facts = solution.facts()
     if solution.point is not None:
-        facts |= {key: finite(value) for key, value in field_facts(solution.field).items()}
+        facts |= solution.field.facts()
     written = solution.point is not None and not solution.doubt
 
     lines = [f"field: {field}"] if written else []

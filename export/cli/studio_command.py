@@ -43,7 +43,7 @@ def studio_command(
         raise InputError(
             f"studio needs the package {error.name}; pip install 'crossfield[studio]'"
         ) from error
-    with progress(quiet=False) as show:
+    with progress() as show:
         show("reading the drawing")
         first = None if drawing is None else _opened(drawing)
     token = secrets.token_urlsafe(24)

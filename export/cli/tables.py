@@ -7,7 +7,7 @@ from typing import Any
 from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.catalogue import FORMULATIONS, declare
 from ...models.formulations.problem import Problem
-from ...models.sketch.samples import sample, samples
+from ...models.sketch.samples import samples
 from ..formats.registry import FORMATS, carried
 from ..solutions.readers.registry import READERS
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, smallest, takers
@@ -21,6 +21,10 @@ Tables = dict[str, tuple[tuple[str, ...], list[Row]]]
 def tables() -> Tables:
     """Columns and rows of each table, computed from the code."""
     return {
+        "samples": (
+            ("name", "kind", "description"),
+            [{"name": each.name, "kind": each.kind, "description": each.description} for each in samples()],
+        ),
         "formulations": (
             ("name", "short", "paper", "class", "summary", *FORMATS),
             [_formulation_row(problem) for problem in smallest_problems()],
@@ -43,25 +47,6 @@ def tables() -> Tables:
             [{"name": reader.name, "description": reader.description} for reader in READERS],
         ),
     }
-
-
-def sample_rows() -> list[Row]:
-    """Name, kind, grid, share of stroke pixels and description of each sample, at the default size."""
-    rows = []
-    for entry in samples():
-        instance = sample(entry.name)
-        grid = instance.grid
-        rows.append(
-            {
-                "name": entry.name,
-                "kind": entry.kind,
-                "grid": f"{grid.width} x {grid.height}",
-                "pixels": grid.size,
-                "strokes": f"{len(instance.theta) / grid.size:.0%}",
-                "description": entry.description,
-            }
-        )
-    return rows
 
 
 def smallest_problems() -> list[Problem]:

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 def verify_command(
     folder: options.Exported,
     *,
-    solve: options.Solve = False,
-    time_limit: options.Seconds = 10.0,
+    solve: options.SolveSeconds = None,
     program: options.ProgramNames = None,
     printing: options.PrintOptions,
 ) -> None:
@@ -32,7 +31,7 @@ def verify_command(
 
     programs = known(program, PROGRAMS, "program")
     with progress(quiet=printing.quiet) as show:
-        found = verify(folder, seconds=time_limit if solve else None, programs=programs, progress=show)
+        found = verify(folder, seconds=solve, programs=programs, progress=show)
     printing.show(found.document(), lambda: _show(found))
     for check in found.bad:
         print_notice(f"{check.file}: {check.program}: {check.verdict}: {check.reason}")

@@ -13,7 +13,7 @@ from typing import Any, Final
 from ...models.errors import InputError, shortened
 from ...models.field.file import write_field
 from ...models.instance.file import write_instance
-from ..bundle.manifest import write_all
+from ..bundle.problem_files import write_all
 from ..pictures.draw import draw
 from ..shading.colours import normal_map
 from ..surfaces.files import png_of, write_surface

@@ -11,7 +11,8 @@ from pathlib import Path
 import crossfield as cf
 import pytest
 from cases import make_instance
-from crossfield.export.bundle.manifest import read_manifest, write_all
+from crossfield.export.bundle.manifest import read_manifest
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.licence import licence_error
 from crossfield.export.solvers_table import BUNDLED, PROGRAMS, SOLVERS, Refusal, Solver, StartFile

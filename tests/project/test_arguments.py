@@ -108,7 +108,6 @@ instance.with_weights(stroke_weight="1")                 | stroke_weight is '1';
 instance.with_strokes([True])                            | kept needs 8 values True or False
 cf.draw(3, folder / "a.png")                             | what is 3; give a CrossField or an Instance
 cf.draw(field, 3)                                        | path is 3; give text or a path
-cf.draw(field, folder / "a.png", title=3)                | title is 3; give text or None
 cf.preview(None)                                         | what is None; give a CrossField
 cf.entry(3)                                              | name is 3; give text
 cf.entries(where=3)                                      | where is 3; give text or None
@@ -128,7 +127,6 @@ cf.write(problem, folder / "a.lp", start=instance)       | start is an Instance
 cf.write_all(instance, folder, formats="lp")             | formats is 'lp'; give a list of texts
 cf.write_all(instance, folder, formulations="qp")        | formulations is 'qp'; give a list of texts
 cf.write_all(instance, folder, compress="no")            | compress is 'no'; give True or False
-cf.write_all(instance, folder, jobs="2")                 | jobs is '2'; give a whole number
 cf.write_all(instance, folder, options=3)                | options is 3; give a dictionary or None
 cf.write_all(instance, folder, windows=3)                | windows is 3; give a Windows or None
 cf.write_problem(instance, folder)                       | problem is an Instance
@@ -146,7 +144,6 @@ cf.read_solution(3, problem)                             | path is 3
 cf.read_solution("a.sol", instance)                      | problem is an Instance
 cf.run(instance, folder, limits=3)                       | limits is 3; give a Limits or None
 cf.run(instance, folder, drawing=3)                      | drawing is 3; give text or a path or None
-cf.run(instance, folder, options={"relax": "no"})        | relax is 'no'; give True or False
 """
 
 

@@ -121,7 +121,7 @@ REFUSED = [
     ("run sketch.png --mask black.png", "", "black all over"),
     ("run mouse --mask black.png", "", "leave --mask out"),
     ("run tiny.json --size 30", "", "leave --size and --mask out"),
-    ("run missing.svg", "", "crossfield samples"),
+    ("run missing.svg", "", "crossfield list"),
     ("run .", "", "is not a file"),
     ("draw field.npz -o out.png", "", "no such file"),
     ("export tiny.json -f milp-mccormick -f milp-mcormick", "", re.escape(NO_SUCH_FORMULATION)),

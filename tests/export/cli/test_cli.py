@@ -86,7 +86,7 @@ def test_a_tour_of_the_commands(tmp_path, crossfield):
         crossfield(f"draw field.json -o {picture}")
         assert Path(picture).read_bytes().startswith(head)
     crossfield("draw skew.json -o instance.png")
-    crossfield("draw field.json --kind overview --title [bold]x[/] -o o.png")
+    crossfield("draw field.json --kind overview -o o.png")
 
 
 RUN_FILES = {
@@ -170,7 +170,8 @@ def test_a_folder_with_the_name_of_a_sample_does_not_hide_it(crossfield):
 
 
 def test_options_of_the_formulation_reach_the_files(crossfield, instance_file):
-    options = "--facet printed --stroke-norm 2 --relax --gauge box --nl-form binary"
+    crossfield("instance tiny.json --gauge box -o tiny.json")
+    options = "--facet printed --stroke-norm 2 --relax --nl-form binary"
     crossfield(f"export tiny.json -f milp-mccormick {options} --gzip -o out")
     document = json.loads(Path("out/tiny.milp-mccormick.manifest.json").read_text())
     assert document["options"] == {"facet": "printed", "stroke_norm": 2, "beta_norm": 1, "relax": True}
@@ -217,7 +218,7 @@ def test_a_search_without_a_point_removes_the_field_of_an_earlier_call(tmp_path,
         ["run", "mouse"],
         ["run", "mouse", "-o", "x", "--wings"],
         ["run", "mouse", "-o", "x", "--size", "large"],
-        ["run", "mouse", "-o", "x", "--gauge", "none"],
+        ["instance", "mouse", "-o", "x.json", "--gauge", "none"],
         ["run", "mouse", "-o", "x", "--time-limit", "0"],
         ["solve", "mouse", "-o", "x"],
         ["export", "mouse", "-o", "x", "--stroke-norm", "3"],
@@ -290,11 +291,9 @@ def test_an_internal_error_is_one_line_too(tmp_path, instance_file):
 def test_quiet_prints_nothing(crossfield, instance_file):
     solution, manifest = (f"set/tiny.milp-mccormick.{suffix}" for suffix in ("highs.sol", "manifest.json"))
     for line in (
-        "instance skew --size 6 -o i.npz",
         "export tiny.json -f milp-mccormick -o set",
         "solve tiny.json -f milp-mccormick -o set",
         f"read {solution} --manifest {manifest} -o f.npz",
-        "draw f.npz -o f.png",
         "run tiny.json --time-limit 1 --threads 1 -o run",
     ):
         assert crossfield(f"{line} -q") == ""
@@ -314,16 +313,8 @@ def test_list_shows_all_tables(crossfield):
     assert all(set(BUNDLED) < set(row) for row in listed["solvers"])
     assert [row["name"] for row in listed["methods"]] == list(METHODS)
     text = crossfield("list")
-    for name in (*FORMULATIONS, *FORMATS, *BUNDLED, *(row["name"] for row in listed["readers"])):
+    for name in (*SAMPLES, *FORMULATIONS, *FORMATS, *BUNDLED, *(row["name"] for row in listed["readers"])):
         assert name in text
-
-
-def test_samples_are_listed(crossfield):
-    listed = json.loads(crossfield("samples --json"))
-    assert [row["name"] for row in listed] == list(SAMPLES)
-    text = crossfield("samples")
-    assert all(name in text for name in SAMPLES)
-    assert_fits(text)
 
 
 def assert_fits(text, *, but=()):

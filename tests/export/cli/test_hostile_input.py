@@ -478,7 +478,7 @@ def test_only_files_of_killed_processes_are_removed(tmp_path):
         assert (
             len(list(tmp_path.iterdir())) == 4
         )  # the file of the dead process was removed, a file of the running one was added
-        assert invoke(["instance", "mouse", "--size", "6", "-q", "-o", str(target)]) == 0
+        assert invoke(["instance", "mouse", "--size", "6", "-o", str(target)]) == 0
         assert target.read_bytes() != b"half"
         other.communicate()
     assert other.returncode == 0

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 
+import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
@@ -11,14 +12,18 @@ from crossfield.models.array_archive import pack_arrays
 from crossfield.models.field.file import read_field
 from crossfield.models.proof import check_certificate
 
-SKETCH = ["mouse", "--size", "8", "--stroke-weight", "0.3"]
+
+def write_instance(folder, size, weight):
+    """The path of an instance of the mouse."""
+    return str(cf.write_instance(cf.sample("mouse", size, stroke_weight=weight), folder / "mouse.json"))
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Folder that `prove` wrote for a small sample, and its report."""
     folder = tmp_path_factory.mktemp("proof")
-    command = ["prove", *SKETCH, "-o", str(folder), "--time-limit", "100", "-q"]
+    instance = write_instance(tmp_path_factory.mktemp("instance"), 8, 0.3)
+    command = ["prove", instance, "-o", str(folder), "--time-limit", "100", "-q"]
     assert invoke(command) == 0
     (report,) = folder.glob("*.proof.json")
     return folder, json.loads(report.read_text())
@@ -46,8 +51,8 @@ def test_field_certificate_and_report_agree(folder):
 
 
 def test_a_proof_in_the_1_norm_is_of_the_optimum_of_the_milp(tmp_path, capsys):
-    sketch = ["mouse", "--size", "4", "--stroke-weight", "0.2"]
-    given = ["prove", *sketch, "--norm", "1", "--time-limit", "100", "--json"]
+    instance = write_instance(tmp_path, 4, 0.2)
+    given = ["prove", instance, "--norm", "1", "--time-limit", "100", "--json"]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
     report = json.loads(capsys.readouterr().out)
     assert invoke(["prove", "--check", str(of(tmp_path, "certificate.npz")), "--json"]) == 0
@@ -55,7 +60,7 @@ def test_a_proof_in_the_1_norm_is_of_the_optimum_of_the_milp(tmp_path, capsys):
     field = read_field(of(tmp_path, "field.npz"))
     assert (report["norm"], report["status"]) == (1, "optimal")
     assert report["energy"] == pytest.approx(field.energy(1).total, abs=1e-12)
-    solved = ["solve", *sketch, "-f", "milp-mccormick", "--time-limit", "100", "--json"]
+    solved = ["solve", instance, "-f", "milp-mccormick", "--time-limit", "100", "--json"]
     assert invoke([*solved, "-o", str(tmp_path / "milp")]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["status"] == "optimal-global"
@@ -85,7 +90,8 @@ def test_certificates_are_checked(folder, capsys, tmp_path):
 
 def test_tightened_files_of_a_proof(folder, tmp_path):
     folder, _ = folder
-    command = ["export", *SKETCH, "-o", str(tmp_path), "-f", "miqp-exact", "-F", "lp", "-q"]
+    instance = write_instance(tmp_path, 8, 0.3)
+    command = ["export", instance, "-o", str(tmp_path), "-f", "miqp-exact", "-F", "lp", "-q"]
     assert invoke([*command, "--tightened", str(of(folder, "certificate.npz"))]) == 0
     (manifest,) = tmp_path.glob("*.manifest.json")
     windows = json.loads(manifest.read_text())["windows"]

@@ -88,9 +88,9 @@ def test_a_rawfield_and_an_instance_are_taken(field, tmp_path):
     given = ["-q", "--scale", "2", "-o"]
     raw = ["shade", str(tmp_path / "f.rawfield"), "--on", instance, *given, str(tmp_path / "raw")]
     assert invoke(raw) == 0
-    made = ["shade", instance, "--method", "greedy", *given, str(tmp_path / "made")]
+    made = ["shade", instance, *given, str(tmp_path / "made")]
     assert invoke(made) == 0
-    assert report(tmp_path / "made")["method"] == "greedy"
+    assert report(tmp_path / "made")["method"] == "bend"
     assert report(tmp_path / "raw")["instance"] == report(tmp_path / "made")["instance"]
 
 
@@ -105,7 +105,6 @@ REFUSED = [
     (["--light", "30,-20"], "elevation is between 0 and 90"),
     (["--scale", "100000"], "choose another scale"),
     (["--size", "12"], "is a field, which has its own grid"),
-    (["--method", "greedy"], "is a field, which has its own grid"),
     (["--underlay", "nothing.svg"], "cannot be read"),
 ]
 
@@ -119,8 +118,6 @@ def test_bad_options_are_refused_in_one_line_and_no_file_is_written(saved, tmp_p
         assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())
     assert invoke(["shade", "nothing", "-o", str(tmp_path / "out")]) == 1
     assert "no such file and no such sample" in capsys.readouterr().err
-    assert invoke(["shade", "mouse", "--method", "wings", "-o", str(tmp_path / "out")]) == 1
-    assert "there is no method 'wings'" in capsys.readouterr().err
     (tmp_path / "bad.npz").write_bytes(b"no archive")
     assert invoke(["shade", str(tmp_path / "bad.npz"), "-o", str(tmp_path / "out")]) == 1
     assert "is neither a field" in capsys.readouterr().err

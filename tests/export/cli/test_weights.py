@@ -1,4 +1,4 @@
-"""The weights of strokes and skew, in every command that reads a sketch, and in Python."""
+"""The weights of strokes and skew, on the command line and in Python."""
 
 import crossfield as cf
 import numpy as np
@@ -29,7 +29,7 @@ def test_a_sketch_a_sample_and_an_instance_file_get_the_weights(tmp_path, drawin
         (file, [], cf.sample("mouse", 8, **WEIGHTS)),
     ):
         made = tmp_path / "made.npz"
-        assert invoke(["instance", str(what), *size, *GIVEN, "-q", "-o", str(made)]) == 0
+        assert invoke(["instance", str(what), *size, *GIVEN, "-o", str(made)]) == 0
         instance = cf.read_instance(made)
         assert instance.sha256 == wanted.sha256
         assert (instance.stroke_weight, instance.skew_weight) == (10.0, 1e-4)
@@ -43,11 +43,11 @@ def test_weights_out_of_range_are_refused(tmp_path, capsys, drawing):
     for option, value in (("--stroke-weight", "-1"), ("--skew-weight", "nan"), ("--stroke-weight", "1e7")):
         name = option[2:].replace("-", "_")
         for what in ("skew", drawing, file):
-            assert invoke(["export", str(what), option, value, "-o", str(tmp_path / "out")]) == 1
+            assert invoke(["instance", str(what), option, value, "-o", str(tmp_path / "out.npz")]) == 1
             assert f"crossfield: {name} is {float(value)}; it must be between 0" in capsys.readouterr().err
         with pytest.raises(InstanceError, match=f"{name} is"):
             cf.read_sketch(drawing, size=8, **{name: float(value)})
-    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "out.npz").exists()
     for given in ({"stroke_weight": MOST_WEIGHT}, {"skew_weight": MOST_WEIGHT}):
         with pytest.raises(InstanceError, match="must be between"):  # on so coarse a grid
             cf.sample("skew", 4, **given)
@@ -94,8 +94,9 @@ def test_an_instance_of_its_own_has_the_coefficients_of_the_paper():
 
 def test_a_start_under_other_weights_is_refused_with_both(tmp_path, capsys):
     cf.write_field(cf.greedy_field(cf.sample("skew", 4)), tmp_path / "field.npz")
+    heavy = str(cf.write_instance(cf.sample("skew", 4, stroke_weight=10), tmp_path / "heavy.json"))
     start = ["--start", str(tmp_path / "field.npz"), "-o", str(tmp_path / "out")]
-    assert invoke(["solve", "skew", "--size", "4", "--stroke-weight", "10", "-m", "search", *start]) == 1
+    assert invoke(["solve", heavy, "-m", "search", *start]) == 1
     printed = capsys.readouterr().err
     assert "stroke weight 10" in printed
     assert "size, gauge and weights" in printed

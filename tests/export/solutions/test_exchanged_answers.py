@@ -236,20 +236,9 @@ def test_the_column_fixed_to_1_has_the_value_1(solved, tmp_path):
 def test_read_passes_on_no_proof_of_another_gauge(tmp_path, capsys):
     """The optimum with the gauge `box` is 2.93, and 0.699 with the other: nothing else differs."""
     for gauge in ("box", "strokes"):
-        arguments = [
-            "--size",
-            "4",
-            "--gauge",
-            gauge,
-            "-f",
-            MILP,
-            "-F",
-            "mps",
-            "-o",
-            str(tmp_path / gauge),
-            "-q",
-        ]
-        assert invoke(["export", "skew", *arguments]) == 0
+        instance = str(tmp_path / f"{gauge}.json")
+        assert invoke(["instance", "skew", "--size", "4", "--gauge", gauge, "-o", instance]) == 0
+        assert invoke(["export", instance, "-f", MILP, "-F", "mps", "-o", str(tmp_path / gauge), "-q"]) == 0
     (model,) = (tmp_path / "box").glob("*.mps")
     by_highs(model, tmp_path / "answer.sol", 0)
 

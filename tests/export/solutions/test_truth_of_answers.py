@@ -34,8 +34,9 @@ def skew(tmp_path_factory):
     folder = tmp_path_factory.mktemp("skew")
     formats = ["--format", "lp", "--format", "mps", "--format", "mod"]
     weights = ["--stroke-weight", "0.17", "--skew-weight", "2.8e-8"]
-    arguments = ["export", "skew", "--size", "4", "-f", MILP, *formats, *weights]
-    assert invoke([*arguments, "-o", str(folder), "--quiet"]) == 0
+    instance = str(folder / "skew.json")
+    assert invoke(["instance", "skew", "--size", "4", *weights, "-o", instance]) == 0
+    assert invoke(["export", instance, "-f", MILP, *formats, "-o", str(folder), "--quiet"]) == 0
     return folder
 
 

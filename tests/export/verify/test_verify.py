@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import make_field, make_instance
-from crossfield.export.bundle.manifest import read_manifest, write_all
+from crossfield.export.bundle.manifest import read_manifest
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.solutions.solution import Solution
@@ -269,7 +270,7 @@ def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 @pytest.mark.slow
 def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     write_all(on_grid(1, 2), tmp_path, formulations=["qp-fixed"], formats=["lp"])
-    assert invoke(["verify", str(tmp_path), "--solve", "-p", "highs", "--json"]) == 0
+    assert invoke(["verify", str(tmp_path), "--solve", "10", "-p", "highs", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["ok"] is True
     assert invoke(["verify", str(tmp_path), "-p", "highs"]) == 0
     assert "verify.json" in capsys.readouterr().out

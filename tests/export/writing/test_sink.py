@@ -12,7 +12,7 @@ import zlib
 import numpy as np
 import pytest
 from cases import make_instance, make_problem
-from crossfield.export.bundle.manifest import write_all
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.formats.registry import write
 from crossfield.export.writing import sink
 from crossfield.export.writing.sink import gzipped, joined, save

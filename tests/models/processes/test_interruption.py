@@ -117,8 +117,6 @@ def test_the_plan_names_each_method_that_searches_and_the_sum():
     [
         ["run", "skew", "--size", "4", "--threads"],
         ["solve", "skew", "--size", "4", "-m", "search", "--threads"],
-        ["run", "skew", "--size", "4", "--jobs"],
-        ["export", "skew", "--size", "4", "--jobs"],
         ["library", "build", "default", "--jobs"],
     ],
 )

@@ -228,7 +228,7 @@ def test_commands_read_what_python_reads(tmp_path, capsys):
     assert invoke(["instance", file, *options, "-o", instance]) == 1
     assert "has no stroke of id=a; it has colour=#000000" in capsys.readouterr().err
     options = ["--curvature", "class=flow", "--silhouette", "outer"]
-    assert invoke(["instance", file, *options, "--size", "20", "-o", instance, "-q"]) == 0
+    assert invoke(["instance", file, *options, "--size", "20", "-o", instance]) == 0
     expected = cf.read_sketch(file, size=20, curvature=["class=flow"], silhouette="outer")
     assert cf.read_instance(instance).sha256 == expected.sha256
     for wrong in (options, ["--view", "top"]):

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.solving.methods import Candidate
-from crossfield.export.solving.run import START, Report
+from crossfield.export.solving.report import Report
+from crossfield.export.solving.run import START
 from crossfield.models.errors import InputError
 from crossfield.models.sketch.samples import sample_svg, samples
 from PIL import Image, ImageDraw
@@ -100,7 +101,7 @@ def test_warnings_reach_standard_error_and_the_report_once(tmp_path, capsys):
     for output in ("a.json", "mask.png"):
         assert invoke(["instance", str(drawing), "-o", str(tmp_path / output), "--size", "48"]) == 0
         assert capsys.readouterr().err == f"crossfield: warning: open.svg: {warning}\n"
-    assert invoke(["instance", str(drawing), "-o", str(tmp_path / "b.json"), "--size", "48", "-q"]) == 0
+    assert invoke(["instance", str(drawing), "-o", str(tmp_path / "b.json"), "--size", "48"]) == 0
     assert capsys.readouterr().err == ""
     assert (tmp_path / "mask.png").read_bytes() == cf.write_mask(instance, tmp_path / "m.png").read_bytes()
     report = Report(instance, (Candidate(START, cf.greedy_field(instance), 0.0),), ())
