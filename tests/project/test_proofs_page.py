@@ -32,24 +32,3 @@ def test_no_solver_contradicts_what_is_proven(proofs):
             found, bound = row[what]["objective"], row[what]["bound"]
             assert found is None or found >= row["proof"] - proofs.WITHIN, (name, what)
             assert bound is None or bound <= row["energy"] + proofs.WITHIN, (name, what)
-
-
-def test_layers_of_a_drawing_are_named_by_it_and_masks_by_their_layer(docs_module, proofs, tmp_path):
-    public = docs_module("public_drawings")
-    root = tmp_path / "emmanueliarussi.github.io" / "papers" / "supplemental_material" / "Sketches"
-    layers = ("bag/input_layers/l1", "bag/input_layers/l1_mask", "bag/normals/normals_l1")
-    whole = ("jug/clean/input_layers/input_all", "jug/clean/input_layers/mask_all")
-    for path in (f"{each}.png" for each in (*layers, *whole)):
-        (root / path).parent.mkdir(parents=True, exist_ok=True)
-        (root / path).write_text(path)
-    public.collect(tmp_path, tmp_path / "drawings")
-    folder = tmp_path / "drawings" / "BendFields"
-    assert {path.name: path.read_text() for path in folder.iterdir()} == {
-        "bag_l1.png": "bag/input_layers/l1.png",
-        "bag_l1_mask.png": "bag/input_layers/l1_mask.png",
-        "jug_all.png": "jug/clean/input_layers/input_all.png",
-        "jug_all_mask.png": "jug/clean/input_layers/mask_all.png",
-    }
-    (drawing, other) = proofs.drawings_of(folder)
-    assert (drawing.name, drawing.mask) == ("bag_l1.png", folder / "bag_l1_mask.png")
-    assert other.mask == folder / "jug_all_mask.png"

@@ -1,20 +1,16 @@
-"""The study of solvers: real runs that continue after a kill, its rule on load, and its statistics."""
+"""The study of solvers: its rule on load, its statistics, and its reading of logs."""
 
 from __future__ import annotations
 
 import math
 import os
-import signal
 import subprocess
 import sys
 import time
 from types import SimpleNamespace
 
 import numpy as np
-import places
 import pytest
-
-DOCS = places.ROOT / "docs"
 
 
 @pytest.fixture(scope="module")
@@ -22,38 +18,6 @@ def study(docs_module):
     """The modules of the study."""
     names = ("logs", "measure", "plan", "statistics")
     return SimpleNamespace(**{name: docs_module(f"studying.solvers.{name}") for name in names})
-
-
-@pytest.mark.slow
-def test_a_quick_study_that_is_killed_goes_on_and_repeats_no_run(study, tmp_path):
-    command = [sys.executable, str(DOCS / "solver_study.py"), "--quick", "--data", str(tmp_path)]
-    file = tmp_path / study.plan.DATA.name
-    child = subprocess.Popen(command, start_new_session=True)
-    while not file.exists() or file.read_text().count("\n") < 4:
-        assert child.poll() is None
-        time.sleep(0.05)
-    os.killpg(child.pid, signal.SIGKILL)
-    child.wait()
-    before = file.read_text().rpartition("\n")[0]
-    with file.open("a") as stream:
-        stream.write("pixels 3 70")  # what a kill may leave of a line
-    subprocess.run(command, check=True)
-    assert file.read_text().startswith(f"{before}\n")
-    rows = study.plan.table(file).rows
-    planned = list(study.plan.QUICK.first())
-    planned += study.plan.QUICK.last(study.statistics.best_pairs(rows, study.plan.QUICK.limit))
-    keys = [study.plan.run_of(row) for row in rows]
-    assert len(keys) == len(set(keys))
-    assert set(keys) <= set(planned)
-    for formulation in study.plan.PROBLEMS:
-        mine = [row for row in rows if row["formulation"] == formulation]
-        solved = [row["objective"] for row in mine if study.statistics.is_solved(row)]
-        assert np.ptp(solved) < 1e-5
-    assert {row["start"] for row in rows} == set(study.plan.STARTS)
-    assert {row["turns"] for row in rows} == {0, 1, 2}
-    done = file.read_bytes()
-    subprocess.run(command, check=True)
-    assert file.read_bytes() == done
 
 
 def test_a_run_beside_other_work_on_its_core_is_to_be_repeated(study):

@@ -1,12 +1,10 @@
-"""The study continues after a kill, each run with one row; its page is made from its rows."""
+"""The rows of the study are of one run each; its page is made from its rows."""
 
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
-import time
 from types import SimpleNamespace
 
 import places
@@ -15,50 +13,11 @@ import pytest
 DOCS = places.ROOT / "docs"
 DATA = DOCS / "studying" / "data"
 
-SMALL = """
-import sys
-from pathlib import Path
-sys.path.insert(0, {docs!r})
-from studying import work
-from studying.plan import Stage
-from studying.rows import Run
-
-HANDFUL = [Run("practice", "skew", 6 + n, way) for n in range(6) for way in ("greedy", "power")]
-work.stages = lambda plan, folder: [Stage("a handful", tuple(HANDFUL))]
-work.carry_out(None, Path({data!r}), jobs=1, progress=lambda line: None)
-"""
-
 
 @pytest.fixture(scope="module")
 def study(docs_module):
     """The modules of the study."""
     return SimpleNamespace(**{name: docs_module(f"studying.{name}") for name in ("page", "plan", "rows")})
-
-
-def lines_of(path):
-    return path.read_text().splitlines(keepends=True) if path.exists() else []
-
-
-@pytest.mark.slow
-def test_a_study_that_is_killed_goes_on_and_every_run_has_one_row(study, tmp_path):
-    program = SMALL.format(docs=str(DOCS), data=str(tmp_path))
-    file = tmp_path / "practice.csv"
-    child = subprocess.Popen([sys.executable, "-c", program])
-    while len(lines_of(file)) < 4:
-        assert child.poll() is None
-        time.sleep(0.01)
-    child.send_signal(signal.SIGKILL)
-    child.wait()
-    before = [line for line in lines_of(file) if line.endswith("\n")]
-    with file.open("a") as stream:
-        stream.write("practice,skew,1")  # what a kill may leave of a line
-    subprocess.run([sys.executable, "-c", program], check=True)
-    after = lines_of(file)
-    assert after[: len(before)] == before
-    rows = list(study.rows.read(file))
-    keys = [study.rows.key_of(row) for row in rows]
-    assert len(keys) == len(set(keys)) == 12
-    assert {row["status"] for row in rows} == {"field"}
 
 
 def test_a_second_row_of_a_run_and_a_file_of_another_study_are_refused(study, tmp_path):
