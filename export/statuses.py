@@ -282,6 +282,29 @@ def of_ampl(code: int | None, message: str, *, with_point: bool) -> Status:
     return status if with_point else status.without_point
 
 
+CASADI: Final = {
+    "Solve_Succeeded": 0,
+    "Solved_To_Acceptable_Level": 100,
+    "Feasible_Point_Found": 100,
+    "Infeasible_Problem_Detected": 200,
+    "Diverging_Iterates": 300,
+    "User_Requested_Stop": 400,
+    "Maximum_Iterations_Exceeded": 400,
+    "Maximum_CpuTime_Exceeded": 400,
+    "Maximum_WallTime_Exceeded": 400,
+    "Search_Direction_Becomes_Too_Small": 100,
+    "SUCCESS": 0,
+    "INFEASIBLE": 220,
+    "CONTINUOUS_UNBOUNDED": 300,
+    "LIMIT_EXCEEDED": 400,
+    "USER_INTERRUPT": 400,
+}
+"""CasADi's words for the end of Ipopt and Bonmin, as AMPL's solve codes.
+
+0: solved; 100: solved?; 200: infeasible; 300: unbounded; 400: limit with a point.
+"""
+
+
 def of_log(starts: Mapping[str, Status], words: str) -> Status:
     """The status in the words of a log, by their start; the first that fits counts, and others are limits."""
     known = (status for start, status in starts.items() if words.startswith(start))

@@ -22,6 +22,7 @@ with warnings.catch_warnings(action="ignore"):  # its import warns on newer Pyth
 from ...models.instance.grid import Bools, Floats
 from ...models.processes.control import is_stopped, on_stop
 from ..solutions.readers.ampl import write_ampl_sol
+from ..statuses import CASADI
 from .protocol import Job, Outcome, RefusedError, file_names, interrupt_self
 from .reading import Evaluation, Points
 
@@ -77,24 +78,6 @@ def read_nl(path: Path) -> NlModel:
     return NlModel(problem, lower, upper, row_lower, row_upper, start, discrete)
 
 
-# AMPL's solve codes: 0 solved, 100 solved?, 200 infeasible, 300 unbounded, 400 limit with point, 500 failure.
-_CODES: Final = {
-    "Solve_Succeeded": 0,
-    "Solved_To_Acceptable_Level": 100,
-    "Feasible_Point_Found": 100,
-    "Infeasible_Problem_Detected": 200,
-    "Diverging_Iterates": 300,
-    "User_Requested_Stop": 400,
-    "Maximum_Iterations_Exceeded": 400,
-    "Maximum_CpuTime_Exceeded": 400,
-    "Maximum_WallTime_Exceeded": 400,
-    "Search_Direction_Becomes_Too_Small": 100,
-    "SUCCESS": 0,
-    "INFEASIBLE": 220,
-    "CONTINUOUS_UNBOUNDED": 300,
-    "LIMIT_EXCEEDED": 400,
-    "USER_INTERRUPT": 400,
-}
 _FAILURE: Final = 500
 _LIMIT: Final = 400
 _STOPPED: Final = {"User_Requested_Stop", "USER_INTERRUPT"}
@@ -243,7 +226,7 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
         why = str(error).rpartition(": ")[2]
         raise RefusedError(f"{solver.title()} ended with an error, {why!r}") from error
     words = str(run.stats()["return_status"])
-    code = _CODES.get(words, _FAILURE)
+    code = CASADI.get(words, _FAILURE)
     words += " (at the limit, or by Ctrl-C)" if words in _STOPPED else ""
     point, value = np.array(answer["x"]).ravel(), float(answer["f"])
     if solver == "bonmin" and value >= _NO_POINT:
