@@ -13,7 +13,6 @@ import gc
 import json
 import os
 import platform
-import re
 import subprocess
 import sys
 import tempfile
@@ -28,6 +27,7 @@ from crossfield.export.formats.registry import FORMATS, carried, write
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.instance import Instance
+from machine import processor_name
 from make import markdown
 
 PAGE: Final = Path(__file__).with_suffix(".md")
@@ -249,8 +249,6 @@ def formulations_table(measure: Callable[..., Row | None], names: Sequence[str],
 
 def machine() -> str:
     """Facts about the machine that the numbers depend on, without the name of the host."""
-    info = Path("/proc/cpuinfo")
-    model = re.search(r"model name\s*:\s*(.+)", info.read_text()) if info.exists() else None
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     packages = []
     for package in PACKAGES:
@@ -258,9 +256,8 @@ def machine() -> str:
             packages.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             packages.append(f"{package} not installed")
-    processor = model[1] if model else platform.machine()
     return (
-        f"{os.cpu_count()} cores, {processor}, {memory:.0f} GB, {platform.system()}. "
+        f"{os.cpu_count()} cores, {processor_name()}, {memory:.0f} GB, {platform.system()}. "
         f"Python {platform.python_version()}, {', '.join(packages)}."
     )
 

@@ -15,8 +15,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import re
 import subprocess
 import sys
@@ -39,8 +37,10 @@ from crossfield.models.proof.descent import MOST_LABELS
 from crossfield.models.proof.prove import prove
 from crossfield.models.sketch.samples import SAMPLES, sample
 from drawings import PROVERS, SUFFIXES, Sketch, answered, drawings_of, optimum, sketches, tiny
+from machine import machine_facts
 from make import generated, markdown
 from public_drawings import COLLECTIONS
+from studying.wording import percent
 
 DOCS: Final = Path(__file__).resolve().parent
 KEPT: Final = DOCS / "proofs.json"
@@ -189,24 +189,12 @@ PARTS: Final[dict[str, Measurement]] = {
 }
 
 
-def machine() -> Facts:
-    """Processor, cores and load of a measurement."""
-    info = Path("/proc/cpuinfo")
-    model = re.search(r"model name\s*:\s*(.+)", info.read_text()) if info.exists() else None
-    return {
-        "processor": model[1] if model else platform.machine(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "python": platform.python_version(),
-        "load": os.getloadavg()[0],
-    }
-
-
 def measure(part: str, request: Request) -> None:
     """Write the rows of a part to docs/proofs.json as they come."""
     request.work.mkdir(parents=True, exist_ok=True)
     for name, facts in PARTS[part](request):
         kept = read()
-        kept.setdefault(part, {})[name] = facts | {"machine": machine()}
+        kept.setdefault(part, {})[name] = facts | {"machine": machine_facts()}
         print(part, name, facts, file=sys.stderr, flush=True)
         KEPT.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n")
 
@@ -287,11 +275,6 @@ def open_drawings(rows: dict[str, Facts]) -> str:
     """The drawings that are left open, and their gaps."""
     left = sorted((row["gap"], name) for name, row in rows.items() if row["status"] == "gap")
     return ", ".join(f"{name.partition('/')[2]} {percent(gap)}" for gap, name in left)
-
-
-def percent(share: float) -> str:
-    """A share in percent, two digits."""
-    return f"{100 * share:.2g} %"
 
 
 def optima_table(rows: dict[str, Facts]) -> str:

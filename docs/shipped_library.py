@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,7 @@ from typing import Any, Final
 
 import crossfield as cf
 from crossfield.export.library.plan.spec import DEFAULT, RUNGS, default_spec
+from machine import processor_name
 from make import markdown, replace_between
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -44,8 +44,7 @@ def measure() -> None:
         subprocess.run([*command, f"{folder}/library"], check=True)
         after = os.times()
     spent = sum(after[2:4]) - sum(before[2:4])
-    model = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
-    facts = {"processor_seconds": round(spent), "processor": model[1] if model else ""}
+    facts = {"processor_seconds": round(spent), "processor": processor_name()}
     MEASURED.write_text(json.dumps(facts, indent=1) + "\n")
 
 

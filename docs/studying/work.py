@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from crossfield.export.library.building.executor import Tasks, ahead, executor
 from crossfield.export.library.documents.lock import locked
+from machine import machine_facts
 
 from .fields import fielded
 from .plan import Plan, stages
@@ -32,9 +33,7 @@ def perform(task: tuple[Run, Path | None]) -> dict[str, Any]:
 
 
 def _machine() -> dict[str, Any]:
-    from proofs import machine  # it loads the drawing library
-
-    facts = machine()
+    facts = machine_facts()
     return {"machine": f"{facts['processor']}, {facts['cores']} cores", "load": round(facts["load"], 2)}
 
 

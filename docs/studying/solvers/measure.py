@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import platform
 import re
 import resource
 import tempfile
@@ -25,6 +24,7 @@ from crossfield.models.proof.certificate import read_certificate
 from crossfield.models.proof.compiling import compile_all
 from crossfield.models.proof.tightening import windows_left
 from crossfield.models.storage import replacing
+from machine import processor_name
 
 from ..rows import Row
 from .logs import progress, root_bound
@@ -63,8 +63,7 @@ def measured(run: Run, core: int, left: float, certificates: Path, slack: float 
 
 
 def _machine() -> str:
-    model = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
-    return f"{model[1] if model else platform.machine()}, {os.cpu_count()} cores"
+    return f"{processor_name()}, {os.cpu_count()} cores"
 
 
 @dataclass
