@@ -1,6 +1,6 @@
 """Reader of SVG drawings: the outlines of everything that is painted, as cubic Beziers.
 
-svgelements parses path data, transforms, lengths and colours, tinycss2 parses style sheets. Each element is
+svgelements parses path data, transforms and lengths, tinycss2 style sheets and colours. Each element is
 parsed once, for any number of uses, and the work is bounded by the limits of `input_limits`. The bytes first
 pass defusedxml, which refuses entities. Pictures and `use` of other files are never loaded. Clip paths,
 masks, dashes and text are ignored. Shapes that are only filled count as strokes, because drawing programs
@@ -269,16 +269,16 @@ def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
 @lru_cache(maxsize=1024)
 def _colour_on_paper(colour: str) -> tuple[float, float, float]:
     """The colour on white paper; black for gradients and for unreadable colours."""
-    from svgelements import Color
+    from tinycss2.color4 import parse_color
 
-    if len(colour) > MAX_LENGTH:
+    parsed = parse_color(colour) if len(colour) <= MAX_LENGTH else None
+    if parsed is None or isinstance(parsed, str):
         return 0.0, 0.0, 0.0
     try:
-        parsed = Color(colour)
-        alpha, channels = parsed.alpha / 255, (parsed.red, parsed.green, parsed.blue)
-        red, green, blue = (1 - alpha * (1 - channel / 255) for channel in channels)
-    except (ValueError, TypeError):
+        channels = parsed.to("srgb").coordinates
+    except NotImplementedError:  # of Lab and its kin
         return 0.0, 0.0, 0.0
+    red, green, blue = (1 - parsed.alpha * (1 - min(max(channel, 0.0), 1.0)) for channel in channels)
     return red, green, blue
 
 

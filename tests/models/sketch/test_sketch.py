@@ -400,6 +400,35 @@ def test_a_sketch_in_one_colour_is_all_curvature_lines(colour):
     assert_same(read(svg(body.replace("black", colour))), read(svg(body)))
 
 
+@for_each(
+    "colour",
+    [
+        "RED",
+        "#f00",
+        "#ff000080",
+        "rgb(300, 0, 0)",
+        "rgb(255 0 0 / 50%)",
+        "rgba(255, 0, 0, 0.5)",
+        "hsl(0deg 100% 50%)",
+        "hsl(0, 100%, 50%)",
+        "crimson",
+    ],
+)
+def test_red_is_red_in_every_notation_of_css(colour):
+    line, outline = (
+        '<path d="M20 50H80M50 20V80" fill="none" style="stroke:{}"/>',
+        TWO_COLOURS.partition("<path")[0],
+    )
+    red, other = (read(svg(outline + line.format(each))) for each in ("red", colour))
+    assert_same(red, other)
+    assert red.theta.tolist() == other.theta.tolist()
+
+
+@for_each("colour", ["lab(50% 60 30)", "rgb(none 0 0)", "no colour", "var(--pen)"])
+def test_colours_that_cannot_be_read_draw_in_black(colour):
+    assert_same(read(svg(TWO_COLOURS.replace("black", colour))), read(svg(TWO_COLOURS)))
+
+
 def test_a_part_without_a_curvature_line_is_left_out():
     ring = (
         f'<circle cx="50" cy="50" r="40" {BLACK}/><circle cx="50" cy="50" r="15" {BLACK}/>'
