@@ -4,6 +4,7 @@ a second opinion on greedy fields and searches.
 
 import numpy as np
 from crossfield.models.field.field import CrossField
+from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
 from crossfield.models.search.box_qp import fit_in_box
@@ -34,6 +35,15 @@ def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
         skew_coefficient=1e-3,
         gauge=gauge,
     )
+
+
+def random_field(instance, seed, beyond=-1e-3):
+    """Crosses anywhere inside their windows, with the best jumps; beyond: share of those at either end."""
+    rng = np.random.default_rng(seed)
+    at_alpha, at_beta = np.clip(rng.uniform(-beyond, 1 + beyond, (2, instance.grid.size)), 0, 1)
+    alpha = np.clip(instance.alpha_lower + HALF * at_alpha, instance.alpha_lower, instance.alpha_upper)
+    beta = HALF * at_beta - QUARTER
+    return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
 
 def assert_feasible(field):

@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.array_archive import pack_arrays
-from crossfield.models.errors import CrossfieldError, InputError, InstanceError
+from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.file import read_field, write_field
-from crossfield.models.field.jumps import best_jumps
-from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import power_field
 from damage import change, full_instance, refused, same_instance, without
+from exhaustive import random_field
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -35,13 +35,6 @@ def instance():
 @pytest.fixture
 def field(instance):
     return random_field(instance, 1)
-
-
-def random_field(instance, seed):
-    rng = np.random.default_rng(seed)
-    alpha = rng.uniform(-7, 7, instance.grid.size)
-    beta = rng.uniform(-QUARTER, QUARTER, instance.grid.size)
-    return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
 
 def same_field(one, other):
@@ -254,15 +247,6 @@ def test_junk_in_one_array_gives_named_errors(instance, tmp_path, name, junk, wh
         for member, content in entries.items():
             archive.writestr(member, content)
     only_named_errors(read_instance, path)
-
-
-def test_every_truncation_of_an_npz_is_refused(field, tmp_path):
-    path = write_field(field, tmp_path / "cut.npz")
-    content = path.read_bytes()
-    for length in range(0, len(content), 7):
-        path.write_bytes(content[:length])
-        with pytest.raises(InstanceError):
-            read_field(path)
 
 
 @given(seed=st.integers(0, 2**32 - 1), suffix=st.sampled_from(["json", "npz"]))

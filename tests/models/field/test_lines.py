@@ -5,9 +5,9 @@ import pytest
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
-from crossfield.models.instance.angles import HALF, QUARTER, line_difference
+from crossfield.models.instance.angles import HALF, line_difference
 from crossfield.models.instance.instance import Instance
-from exhaustive import random_instance
+from exhaustive import assert_feasible, random_field, random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -19,26 +19,15 @@ SEEDS = st.integers(0, 2**32 - 1)
 GAUGE = st.sampled_from(["strokes", "box"])
 
 
-def random_field(instance, rng):
-    """A field inside all bounds, some of its labels on the ends of their windows, some of its lines one."""
-    size = instance.grid.size
-    alpha = instance.alpha_lower + HALF * np.clip(rng.uniform(-0.2, 1.2, size), 0, 1)
-    beta = np.clip(rng.uniform(-1, 1, size), -QUARTER, QUARTER)
-    return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
-
-
 def assert_inside(field):
-    instance = field.instance
-    assert (field.alpha >= instance.alpha_lower).all()
-    assert (field.alpha <= instance.alpha_upper).all()
-    assert (np.abs(field.beta) <= QUARTER).all()
-    assert (field.p == best_jumps(instance, field.alpha, field.beta)).all()
+    assert_feasible(field)
+    assert (field.p == best_jumps(field.instance, field.alpha, field.beta)).all()
 
 
 @given(seed=SEEDS, gauge=GAUGE)
 @settings(deadline=None)
 def test_own_lines_give_back_the_crosses_with_no_more_energy(seed, gauge):
-    field = random_field(random_instance(seed, gauge=gauge), np.random.default_rng(seed))
+    field = random_field(random_instance(seed, gauge=gauge), seed, beyond=0.2)
     back = CrossField.from_lines(field.instance, *lines(field))
     assert_inside(back)
     assert back.cross_error(*lines(field)) == pytest.approx(np.zeros(len(field.alpha)), abs=1e-9)

@@ -3,23 +3,14 @@
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError, InstanceError
-from crossfield.models.field.field import CrossField
 from crossfield.models.field.file import read_field, write_field
-from crossfield.models.field.jumps import best_jumps
-from crossfield.models.instance.angles import HALF, QUARTER
-from exhaustive import random_instance
+from crossfield.models.instance.angles import HALF
+from exhaustive import random_field, random_instance
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from loops import for_each
 
 pytestmark = pytest.mark.numeric
-
-
-def some_field(seed=1, gauge="strokes"):
-    instance, rng = random_instance(seed, gauge=gauge), np.random.default_rng(seed)
-    alpha = instance.alpha_lower + HALF * rng.random(instance.grid.size)
-    beta = rng.uniform(-QUARTER, QUARTER, instance.grid.size)
-    return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
 
 def assert_same_crosses(one, other):
@@ -30,7 +21,7 @@ def assert_same_crosses(one, other):
 @given(seed=st.integers(0, 2**32 - 1), gauge=st.sampled_from(["strokes", "box"]))
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
 def test_a_written_field_comes_back(tmp_path, seed, gauge):
-    field = some_field(seed, gauge)
+    field = random_field(random_instance(seed, gauge=gauge), seed)
     back = read_field(write_field(field, tmp_path / "field.rawfield"), on=field.instance)
     assert_same_crosses(field, back)
     assert back.energy().total == pytest.approx(field.energy().total, rel=1e-9, abs=1e-9)
@@ -48,7 +39,7 @@ def written(field, tmp_path):
 
 @for_each("scale", [1e-300, 1e-3, 1.0, 1e300])
 def test_length_and_order_of_the_vectors_do_not_matter(scale, tmp_path):
-    field = some_field()
+    field = random_field(random_instance(1), 1)
     rng = np.random.default_rng(5)
     for vectors in (ours := written(field, tmp_path), ours[::2]):
         theirs = np.stack([row[rng.permutation(4)] for row in vectors]) * scale
@@ -59,7 +50,7 @@ def test_length_and_order_of_the_vectors_do_not_matter(scale, tmp_path):
 
 
 def test_a_pixel_gets_the_lines_between_those_of_its_triangles(tmp_path):
-    field = some_field()
+    field = random_field(random_instance(1), 1)
     vectors = written(field, tmp_path)
     for side, turn in enumerate((0.1, -0.1)):
         matrix = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
@@ -107,7 +98,7 @@ def row(*, number=3, text=None, change=None):
     ],
 )
 def test_damage_is_named_with_its_line(damage, message, tmp_path):
-    field = some_field()
+    field = random_field(random_instance(1), 1)
     path = write_field(field, tmp_path / "field.rawfield")
     path.write_text("\n".join(damage(path.read_text().splitlines())))
     with pytest.raises(InstanceError) as caught:
@@ -117,13 +108,13 @@ def test_damage_is_named_with_its_line(damage, message, tmp_path):
 
 
 def test_without_an_instance_the_remedy_is_named(tmp_path):
-    path = write_field(some_field(), tmp_path / "field.rawfield")
+    path = write_field(random_field(random_instance(1), 1), tmp_path / "field.rawfield")
     with pytest.raises(InputError, match=r"holds no instance.*on=instance"):
         read_field(path)
 
 
 def test_no_more_is_read_than_the_instance_has_rows_for(tmp_path):
-    field = some_field()
+    field = random_field(random_instance(1), 1)
     path = tmp_path / "field.rawfield"
     path.write_bytes(b" " * 1_000_000)
     with pytest.raises(InputError, match=r"has 1000000 bytes; at most \d+ are read"):
@@ -135,7 +126,7 @@ def test_no_more_is_read_than_the_instance_has_rows_for(tmp_path):
 )
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_whatever_the_bytes_the_error_is_ours(data, lines, tmp_path):
-    instance = some_field().instance
+    instance = random_field(random_instance(1), 1).instance
     path = tmp_path / "any.rawfield"
     text = "\n".join([f"4 {instance.grid.size}", *lines]).encode()
     for content in (data, text, f"4 {instance.grid.size}\n".encode() + data):

@@ -61,23 +61,6 @@ def test_merged_objective_gives_its_value(label):
 # columns
 
 
-@for_each("label", CASES)
-def test_columns_and_rows_are_counted(label):
-    problem = problem_of(label)
-    instance = problem.instance
-    sizes = {"pixels": instance.mask.sum(), "strokes": len(instance.theta), "pairs": len(instance.grid.first)}
-    end = 0
-    for block in problem.blocks.values():
-        assert (block.offset, block.count) == (end, sizes[block.over])
-        end += block.count
-    assert problem.n_columns == end == len(problem.lower) == len(problem.upper) == len(problem.integer)
-    assert problem.n_rows == sum(family.count for family in problem.rows)
-    assert (problem.lower <= problem.upper).all()
-    for name, block in problem.blocks.items():
-        whole = name in {"p", "p1", "p2"} and not problem.formulation.options.relax
-        assert block.integer == (whole and problem.pinned is None)
-
-
 @for_each("gauge", ["strokes", "box"])
 @for_each("shape", MASKS)
 def test_p1_and_p2_reach_every_useful_jump_and_no_other(shape, gauge):

@@ -11,8 +11,6 @@ import crossfield as cf
 import pytest
 from children import all_end, complaints, descendants, running
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.methods import METHODS
-from crossfield.export.solving.run import plan
 from crossfield.models.processes.process_pool import MOST
 
 FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj", "field.sings"}
@@ -103,13 +101,6 @@ def test_ctrl_c_twice_ends_at_once_and_leaves_whole_files(tmp_path):
         assert json.loads((tmp_path / "report.json").read_text())["interrupted"] == "search"
     else:
         assert "KeyboardInterrupt" in err
-
-
-def test_the_plan_names_each_method_that_searches_and_the_sum():
-    sentence = plan(cf.Limits(20))
-    assert sentence.startswith("at most 60 s: search 20, two-stage 20, prove 20;")
-    timed = [method.name for method in METHODS.values() if method.timed]
-    assert timed == ["search", "two-stage", "prove"]
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,10 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.solving.methods import METHODS, Request
-from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.angles import HALF
 from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, bend_field, tremble
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
-from exhaustive import random_instance, sketch
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from exhaustive import sketch
 from loops import for_each
 from moves import MOVES, lines
 
@@ -103,29 +101,6 @@ def test_labels_do_not_matter():
     boxed = bend_field(cf.CrossField.from_lines(instance.with_gauge("box"), *lines(start)))
     assert (boxed.p != field.p).any()
     assert field.cross_error(*lines(boxed)) == pytest.approx(0, abs=1e-6)
-
-
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    gauge=st.sampled_from(["strokes", "box"]),
-    skew_coefficient=st.sampled_from([0, 1e-6, 1]),
-    stroke_coefficient=st.sampled_from([0, 1e-6, 1, 100, 1e6]),
-)
-@settings(max_examples=30, deadline=None)
-def test_any_weights_will_do(seed, gauge, skew_coefficient, stroke_coefficient):
-    instance = replace(
-        random_instance(seed, gauge=gauge),
-        skew_coefficient=skew_coefficient,
-        stroke_coefficient=stroke_coefficient,
-    )
-    start = polyvector_field(instance)
-    for field in (start, bend_field(start)):
-        assert (field.alpha >= instance.alpha_lower).all()
-        assert (field.alpha <= instance.alpha_upper).all()
-        assert (np.abs(field.beta) <= QUARTER).all()
-        assert (field.p >= instance.p_min).all()
-        assert (field.p <= instance.p_max).all()
-        assert 0 <= field.energy().total < np.inf
 
 
 @for_each(

@@ -16,16 +16,6 @@ from moves import lines
 pytestmark = pytest.mark.numeric
 
 
-@for_each("degrees", [0, 20, 45, 90, 120, 135, 179])
-def test_parallel_strokes_give_right_angles_along_them(degrees):
-    theta = np.full((6, 7), np.nan)
-    theta[[1, 4], 1:5] = np.radians(degrees)
-    for hold in HOLDS:
-        field = polyvector_field(sketch(np.ones((6, 7), bool), theta), hold=hold)
-        assert field.energy().total < 1e-9
-        assert np.abs(field.beta).max() < 1e-4
-
-
 @for_each("degrees", [10, 35, 60, 90])
 def test_two_families_at_any_angle_are_exact(degrees):
     theta = np.full((8, 8), np.nan)
@@ -35,19 +25,6 @@ def test_two_families_at_any_angle_are_exact(degrees):
     assert field.cross_error(
         np.full(64, np.radians(100)), np.full(64, np.radians(100 - degrees))
     ) == pytest.approx(np.zeros(64), abs=1e-4)
-
-
-def test_parts_without_strokes_are_constant_and_cost_nothing():
-    mask = np.ones((5, 9), bool)
-    mask[:, 4] = False
-    theta = np.full(mask.shape, np.nan)
-    theta[:, 1] = 0.3
-    instance = sketch(mask, theta)
-    field = polyvector_field(instance)
-    far = instance.grid.columns > 4
-    assert (field.alpha[far] == 0).all()
-    assert (field.beta[far] == 0).all()
-    assert field.energy().total < 1e-9
 
 
 def test_a_hard_hold_keeps_the_strokes():
