@@ -20,7 +20,7 @@ ORDER: Final = (
     "models", "models/processes", "models/instance", "models/sketch", "models/field",
     "models/smooth", "models/surface", "models/formulations",
     "models/search", "models/proof", "templates",
-    "export/writing", "export/formats", "export", "export/solutions/logs", "export/solutions/readers",
+    "export/writing", "export/formats", "export", "export/solutions/readers",
     "export/solutions",
     "export/bundle", "export/shading", "export/pictures", "export/surfaces", "export/programs",
     "export/solving", "export/verify", "export/studio",

@@ -1,13 +1,12 @@
 """Claims of solvers about their answers, and the words and codes by which each program states them.
 
-One table per program, for readers of solution files, readers of logs and drivers. Nothing heavy is imported:
+One table per program, for readers of solution files and drivers. Nothing heavy is imported:
 the child processes of solvers load this module.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from enum import StrEnum
 from typing import Final
 
@@ -94,12 +93,6 @@ GUROBI: Final = {
 }
 """Gurobi's status codes, and their words."""
 
-GUROBI_LOG: Final = {
-    "Optimal solution found": Status.OPTIMAL_GLOBAL,
-    "Interrupt request received": Status.LIMIT_WITH_POINT,
-}
-"""The line in which Gurobi states the end of a search in a log, limits left out."""
-
 XPRESS: Final = {
     "NOTFOUND": Status.LIMIT_WITHOUT_POINT,
     "OPTIMAL": Status.OPTIMAL_GLOBAL,
@@ -108,9 +101,6 @@ XPRESS: Final = {
     "UNBOUNDED": Status.UNBOUNDED,
 }
 """Xpress's names of a solution status (SolStatus)."""
-
-XPRESS_LOG: Final = {"completed": Status.OPTIMAL_GLOBAL, "unfinished": Status.LIMIT_WITH_POINT}
-"""How a search of Xpress ended, by its log."""
 
 _CPLEX_CODES: Final = {
     Status.OPTIMAL_GLOBAL: (1, 101, 102, 129, 130),
@@ -124,13 +114,6 @@ _CPLEX_CODES: Final = {
 }
 CPLEX: Final = {code: status for status, codes in _CPLEX_CODES.items() for code in codes}
 """CPLEX's codes of CPXgetstat: 1 to 25 for continuous problems, from 101 for integer ones."""
-
-CPLEX_LOG: Final = {
-    "MIP - Integer optimal": Status.OPTIMAL_GLOBAL,
-    "Proven optimal solution": Status.OPTIMAL_GLOBAL,
-    "MIP - ": Status.LIMIT_WITH_POINT,
-}
-"""The start of the line in which CPLEX, or its link in GAMS, states the end of a search in a log."""
 
 CPLEX_STOPPED: Final = {10, 11, 12, 13, 21, 22, 25}
 """CPLEX's codes of a continuous problem that was stopped: its header states whether the point is feasible."""
@@ -303,13 +286,6 @@ CASADI: Final = {
 
 0: solved; 100: solved?; 200: infeasible; 300: unbounded; 400: limit with a point.
 """
-
-
-def of_log(starts: Mapping[str, Status], words: str) -> Status:
-    """The status in the words of a log, by their start; the first that fits counts, and others are limits."""
-    known = (status for start, status in starts.items() if words.startswith(start))
-    return next(known, Status.LIMIT_WITH_POINT)
-
 
 BARON_NORMAL: Final = "Normal completion"
 """BARON's banner when its search ended by itself."""

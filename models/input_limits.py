@@ -42,4 +42,3 @@ MAX_NUMBER: Final = 40  # characters of a number in a .rawfield, on average; a d
 MAX_SOLUTION: Final = 1 << 31  # bytes of a solution file, packed and unpacked: 50 per column of 40 million
 
 # Logs of solvers
-MAX_LOG: Final = 50_000_000  # bytes of a log: one line per second for years

@@ -28,9 +28,6 @@ NAMES: Final = {
     "kept method": _of("..solving.report", "KEPT", lambda name: [name]),
     "bundled solvers": _of("..solvers_table", "BUNDLED"),
     "all solvers": _of("..solvers_table", "SOLVERS"),
-    "logs": _of(
-        "..solutions.logs.registry", "LOG_READERS", lambda readers: sorted(each.title for each in readers)
-    ),
     "programs": _of("..solvers_table", "PROGRAMS"),
     "answers": _of(  # a description begins with the name of the program
         "..solutions.readers.registry",

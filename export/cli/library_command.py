@@ -238,11 +238,8 @@ def submit_command(
 ) -> None:
     """Check files against a library, keep what improves it, and rebuild what depends on them once.
 
-    Accepted are solution files of {answers}; logs of {logs}; fields; and certificates of `crossfield prove`.
-    Their kind is detected from their content.
-
-    A solution and a log whose names differ in the suffix alone are one run. The exit code is 1 if a file is
-    refused; the others are kept.
+    Accepted are solution files of {answers}; fields; and certificates of `crossfield prove`.
+    Their kind is detected from their content. The exit code is 1 if a file is refused; the others are kept.
     """
     from ..library.contributions.submit import RunFacts, submit
 
@@ -265,7 +262,7 @@ def _submitted(result: Submission) -> dict[str, object]:
     from dataclasses import asdict
 
     return asdict(result) | {
-        "files": [str(path) for path in result.files],
+        "file": str(result.file),
         "error": None if result.error is None else str(result.error),
     }
 
@@ -274,7 +271,7 @@ def _row(result: Submission) -> list[str]:
     """A row of the table of results, which leaves numbers to JSON so that it fits 80 columns."""
     more = f" +{len(result.entries) - 1}" if result.entries[1:] else ""
     return [
-        " ".join(path.name for path in result.files),
+        result.file.name,
         result.outcome,
         f"{result.entries[0]}{more}" if result.entries else "",
         result.status or "",

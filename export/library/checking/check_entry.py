@@ -20,18 +20,16 @@ from ....models.errors import CrossfieldError
 from ....models.formulations.problem import Problem
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS, generator
-from ...solutions.logs.registry import parse_log
 from ...solutions.solution import Solution, read_solution
-from ...solvers_table import SOLVERS
 from ..building.entry_task import Entry, make_entry
 from ..building.instance_task import Files, Preparation, files_of
 from ..documents.check_point import BadInputError, check
 from ..documents.documents import about_file, problem_of
 from ..ledger.given import given_of
 from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import Ledger, Record
+from ..ledger.ledger import Ledger
 from ..ledger.points import METHOD, Provenance, complete_point, ours
-from ..ledger.standing import FEASIBLE, MAKERS, close
+from ..ledger.standing import FEASIBLE, close
 from ..plan.sources import instance_from
 
 BUILD: Final = "build the library again"
@@ -155,25 +153,6 @@ def _kept(entry: str, problem: Problem, ledger: Ledger) -> Iterator[Finding]:
     with suppress(CrossfieldError):  # reported with the ledger
         if not close(problem.objective_value(complete_point(problem, ledger.field(record))), record.primal):
             yield Finding(LEDGER, f"states another objective of {record.point} than it has", _AGAIN)
-
-
-def run_findings(ledger: Ledger, record: Record) -> Iterator[Finding]:
-    """Yield findings about a run: its log is missing, damaged or contradicts the record."""
-    if record.log is None:
-        return
-    try:
-        stated = parse_log(ledger.content(record.log, record.log_sha256))
-    except CrossfieldError as error:
-        yield of_error(error, record.log)
-        return
-    if MAKERS.get(record.solver) != SOLVERS[stated.solver].maker:
-        yield Finding(LEDGER, f"states that {record.log} is of {record.solver}, and it is not", _AGAIN)
-    if record.bound != stated.bound:
-        yield Finding(LEDGER, f"states another bound than {record.log} does", _AGAIN)
-    if record.status == "optimal" and stated.ended == "limit":
-        yield Finding(
-            LEDGER, f"states that the run of {record.log} proved an optimum, and it did not", _AGAIN
-        )
 
 
 def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:

@@ -35,7 +35,7 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import InstancePlan, plan, without
 from ..plan.sources import instance_from
-from .check_entry import BUILD, Finding, instance_findings, of_error, run_findings, verify_entry
+from .check_entry import BUILD, Finding, instance_findings, of_error, verify_entry
 
 FETCH: Final = "fetch it again, or build the library again"
 REMOVE: Final = "remove it"
@@ -280,9 +280,6 @@ class _Verification:
                     ledger.field(record)
                 except CrossfieldError as error:
                     yield of_error(error, record.point)
-            if record.log is not None:
-                self.known.add(record.log)
-            yield from run_findings(ledger, record)
         instances = {entry.rpartition("_")[0] for entry in library.document["entries"]}
         for each in ledger.certificates:
             self.known.add(each.file)

@@ -113,7 +113,7 @@ def drop_refuted(library: Library) -> None:
     dropped: dict[Record, Record] = {}
     for document in library.entries:
         records = ledger.of(document["name"], document["problem_sha256"])
-        measured = [each for each in records if each.bound is not None and each.log is None]
+        measured = [each for each in records if each.bound is not None]
         best = _best(library, document, ledger) if measured else 0.0
         dropped |= {
             each: replace(each, bound=None) for each in measured if contradicts(each.bound or 0.0, best)

@@ -1,60 +1,42 @@
-"""Submitted files by kind, each solution with the log of its run."""
+"""Submitted files and their kinds."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from ....models.array_archive import ArrayArchive, ExpectedArray
 from ....models.errors import CrossfieldError, InputError, InstanceError
 from ....models.field import file as fields
-from ....models.input_limits import MAX_HEAD, MAX_LOG
+from ....models.input_limits import MAX_HEAD
 from ....models.proof import check_certificate
 from ....models.storage import read_bytes
-from ...solutions.logs.registry import LOG_READERS, read_log
-from ...solutions.readers.registry import head_of, read_raw, recognised
+from ...solutions.readers.registry import head_of, recognised
 
-Kind = Literal["solution", "log", "field", "certificate"]
+Kind = Literal["solution", "field", "certificate", ""]
+"""Kind of a file; empty if unknown."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """A submitted file, or the solution and the log of one run.
+    """A submitted file. listed: named by itself, not only found in a folder; error: why it cannot be read."""
 
-    kind: empty if unknown. path: None for a log alone. listed: not only found in a folder.
-    """
-
-    kind: Kind | Literal[""]
-    path: Path | None = None
-    log: Path | None = None
+    path: Path
+    kind: Kind
     listed: bool = True
     error: CrossfieldError | None = None
 
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """The solution and the log, or the one file."""
-        return tuple(dict.fromkeys(each for each in (self.path, self.log) if each is not None))
-
 
 def sources_of(files: Sequence[str | Path]) -> list[Source]:
-    """Return files by kind, solutions with their logs. Raises InputError if there are none."""
-    found = [_source(path, listed) for path, listed in _expanded(files)]
-    logs = {each.log.with_suffix(""): each.log for each in found if each.log and not each.path}
-    paired = [
-        replace(each, log=logs.get(each.path.with_suffix("")))
-        if each.kind == "solution" and each.path and not each.log
-        else each
-        for each in found
-    ]
-    used = {each.log for each in paired if each.path}
-    left = [each for each in paired if each.path or each.log not in used]
-    if not left:
+    """Return files and the files in folders with their kinds. Raises InputError if there are none."""
+    sources = [_source(path, listed) for path, listed in _expanded(files)]
+    if not sources:
         raise InputError("there is nothing to submit; give files")
-    return left
+    return sources
 
 
 def _expanded(files: Iterable[str | Path]) -> Iterator[tuple[Path, bool]]:
@@ -69,35 +51,22 @@ def _expanded(files: Iterable[str | Path]) -> Iterator[tuple[Path, bool]]:
 
 def _source(path: Path, listed: bool) -> Source:
     try:
-        kinds = kinds_of(path)
+        return Source(path, kind_of(path), listed)
     except CrossfieldError as error:
-        return Source("", path, error=error)
-    if kinds == {"solution", "log"}:  # BARON's: which of both it is, depends on its content
-        has_log = has_point = False
-        with suppress(CrossfieldError):
-            has_log = bool(read_log(path))
-        with suppress(CrossfieldError):
-            has_point = read_raw(path).has_point
-        if has_point or not has_log:
-            return Source("solution", path, path if has_log else None, listed)
-        kinds = {"log"}
-    kind: Kind | Literal[""] = next(iter(kinds), "")
-    return Source("log", log=path, listed=listed) if kind == "log" else Source(kind, path, listed=listed)
+        return Source(path, "", error=error)
 
 
-def kinds_of(path: Path) -> set[Kind]:
-    """Return the kinds of a file: none for an unknown kind, and two for BARON's, a solution and a log."""
+def kind_of(path: Path) -> Kind:
+    """Return the kind of a file, from its content."""
     data = read_bytes(path)
     if path.suffix.lower() == ".rawfield":
-        return {"field"}
+        return "field"
     if data.startswith(b"PK"):
-        return {"certificate" if _is_certificate(data) else "field"}
+        return "certificate" if _is_certificate(data) else "field"
     head = head_of(data)
     if head.lstrip().startswith(b"{"):
-        return {"field"} if _is_field(data) else set()
-    found: set[Kind] = {"solution"} if recognised(head) else set()
-    text = data[:MAX_LOG].decode("utf-8-sig", "replace").replace("\r\n", "\n")
-    return found | ({"log"} if any(each.start.search(text) for each in LOG_READERS) else set())
+        return "field" if _is_field(data) else ""
+    return "solution" if recognised(head) else ""
 
 
 def _is_certificate(data: bytes) -> bool:

@@ -28,7 +28,7 @@ FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
 FILE: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
-_LATER: Final = ("machine", "date", "log", "log_sha256")  # absent if empty
+_LATER: Final = ("machine", "date")  # absent if empty
 _LONGEST: Final = 200  # characters of a text
 _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 
@@ -37,8 +37,8 @@ _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 class Record:
     """One run of a solver on an entry, or one submitted point.
 
-    primal: recomputed objective of its point; bound: dual bound; by: who ran it; point, log: names of files;
-    date: as YYYY-MM-DD; log: None for a run that `library solve` measured.
+    primal: recomputed objective of its point; bound: dual bound; by: who ran it; point: name of a
+    file; date: as YYYY-MM-DD.
     """
 
     entry: str
@@ -56,8 +56,6 @@ class Record:
     point_sha256: str | None = None
     machine: str | None = None
     date: str | None = None
-    log: str | None = None
-    log_sha256: str | None = None
 
     @property
     def rank(self) -> tuple[Any, ...]:
@@ -122,8 +120,8 @@ class Ledger:
     @property
     def files(self) -> list[str]:
         """Names of all files of records and certificates."""
-        names = [name for each in self.records for name in (each.point, each.log)]
-        return [name for name in [*names, *(each.file for each in self.certificates)] if name is not None]
+        points = [each.point for each in self.records if each.point is not None]
+        return [*points, *(each.file for each in self.certificates)]
 
     def content(self, name: str, sha256: str | None) -> bytes:
         """Return the content of a file. Raises InputError if it is missing, InstanceError if it differs."""
@@ -141,18 +139,14 @@ class Ledger:
         with naming(self.folder / str(record.point)):
             return field_of_json(data)
 
-    def added(
-        self, record: Record, field: CrossField | None = None, log: bytes | None = None
-    ) -> tuple[Ledger, Record]:
-        """Return the ledger with one more record, and that record with its files.
+    def added(self, record: Record, field: CrossField | None = None) -> tuple[Ledger, Record]:
+        """Return the ledger with one more record, and that record with its file.
 
-        field: replaces the kept field of the entry if it is better. log: content of the log that the record
-        names. Raises InputError for a record that a ledger cannot hold.
+        field: replaces the kept field of the entry if it is better. Raises InputError for a record that a
+        ledger cannot hold.
         """
         record.check()
         records, unwritten = list(self.records), dict(self.unwritten)
-        if log is not None:
-            unwritten[str(record.log)] = log
         if field is not None and _is_better(record, self.with_point(record.entry)):
             name, data = f"{record.entry}.field.json", field_to_json(field)
             unwritten[name] = data
@@ -195,11 +189,6 @@ def check_text(name: str, text: str | None) -> None:
 
 def _document(record: Record) -> dict[str, Any]:
     return {key: value for key, value in asdict(record).items() if key not in _LATER or value}
-
-
-def log_file(entry: str, solver: str, sha256: str) -> str:
-    """Return the name of the file of a log. solver: its name in the table of solvers."""
-    return f"{entry}.{solver}.{sha256[:12]}.log"
 
 
 def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
@@ -265,8 +254,6 @@ def merged(folder: Path, other: Ledger, entries: Iterable[str], instances: Itera
             fresh.append(record)
         else:
             fresh.append(_without_point(record))
-        if record.log is not None:
-            unwritten[record.log] = other.content(record.log, record.log_sha256)
     wanted, present = set(instances), {each.key for each in ledger.certificates}
     certificates = [
         each for each in other.certificates if each.instance in wanted and each.key not in present

@@ -3,8 +3,8 @@
 A solver's tolerances may put its bound a little above the objective of a point that is feasible to 1e-16.
 Within `slack` it is cut to that objective; a larger one contradicts the point.
 
-A bound of a program is a claim. It solves an entry if three programs of different makers report it, each in
-a run that was measured here or whose log shows it. A certificate or the tangent suffices alone.
+A bound of a program is a claim. It solves an entry if three programs of different makers report it. A
+certificate or the tangent suffices alone.
 
 Grades follow MIPLIB:
 
@@ -33,7 +33,7 @@ AGREE: Final = 3  # programs of different makers that must agree
 MAKERS: Final = {solver.title: solver.maker for solver in SOLVERS.values()}  # by title
 
 _SHOWN: Final = {"objective": "primal", "limit": "time_limit"} | {
-    name: name for name in ("bound", "seconds", "threads", "machine", "by", "date", "log")
+    name: name for name in ("bound", "seconds", "threads", "machine", "by", "date")
 }
 """Keys of a run in a sidecar, and fields of a record."""
 

@@ -94,6 +94,20 @@ SIBLINGS: Final[tuple[tuple[bytes, str], ...]] = (
 _PATTERNS: Final = tuple((re.compile(pattern, re.MULTILINE), words) for pattern, words in SIBLINGS)
 
 
+_LOGS: Final = {
+    title: re.compile(start, re.MULTILINE)
+    for title, start in (
+        ("BARON", rb"^ *BARON version \d"),
+        ("HiGHS", rb"^(?:Running HiGHS |(?:LP|QP|MIP|MIQP)\b.* has \d+ rows; \d+ cols; )"),
+        ("Gurobi", rb"^Gurobi Optimizer version "),
+        ("SCIP", rb"^(?:SCIP version |original problem has \d+ variables)"),
+        ("Xpress", rb"^FICO Xpress .*v\d"),
+        ("CPLEX", rb"^(?:Version identifier: \d|Welcome to IBM.*CPLEX|--- GAMS/CPLEX|IBM ILOG CPLEX)"),
+    )
+}
+"""Starts of logs by solver. The first match counts: BARON and GAMS name the solvers that they call."""
+
+
 def sibling_of(head: bytes) -> str:
     """Kind of a file that is known to be no answer, by its first bytes, with the remedy; else empty."""
     return next((words for pattern, words in _PATTERNS if pattern.search(head)), "")
@@ -101,11 +115,7 @@ def sibling_of(head: bytes) -> str:
 
 def log_of(head: bytes) -> str:
     """Kind of a file that is a solver's log, by its first bytes, with the remedy; else empty."""
-    # Not at the top: readers of logs are loaded only for a file that no reader recognises.
-    from ..logs.registry import LOG_READERS
-
-    text = head.decode(errors="replace")
-    title = next((reader.title for reader in LOG_READERS if reader.start.search(text)), "")
+    title = next((title for title, start in _LOGS.items() if start.search(head)), "")
     return title and (
         f"this is a log of {title}, which holds no point; give the solution file that the run wrote"
     )

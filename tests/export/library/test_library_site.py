@@ -65,7 +65,6 @@ RUNS = [
         "seconds": 0.7,
         "threads": 4,
         "limit": 60,
-        "log": f"{ENTRY}.gurobi.{12 * '0'}.log",
         "machine": "8 cores <img src=x onerror=alert(1)>",
         "by": "A. Tester",
         "date": "2026-11-22",
@@ -416,8 +415,6 @@ def test_an_entry_shows_its_runs_origin_and_citation(site, detailed):
         "8 cores &lt;img",
     ]
     wanted += [
-        "its log",
-        "a run here",
         "2026-11-22",
         "18.8",
         "hard",

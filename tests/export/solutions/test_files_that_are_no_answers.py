@@ -15,6 +15,7 @@ from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.siblings import sibling_of
 from crossfield.models.errors import SolutionError
 from loops import for_each
+from places import DATA
 
 MODELS = {
     "lp": "LP", "mps": "MPS", "nl": ".nl", "gms": "GAMS", "osil": "OSiL", "qplib": "QPLIB", "bar": ".bar",
@@ -102,6 +103,11 @@ def highs(model, tmp_path_factory):
 )
 def test_what_highs_writes_besides_its_solution(highs, file, words):
     assert re.search(words, refusal(highs / file))
+
+
+@pytest.mark.parametrize("path", sorted((DATA / "logs").glob("*.log")), ids=lambda path: path.stem)
+def test_a_log_is_called_one(path):
+    assert re.search(r"this is a log of \w+, which holds no point", refusal(path))
 
 
 @pytest.mark.needs("glpk")
