@@ -47,7 +47,6 @@ NAMES: Final = {
         lambda light: [f"{math.degrees(light.azimuth):.0f},{math.degrees(light.elevation):.0f}"],
     ),
     "rungs": _of("..library.plan.spec", "RUNGS"),
-    "facts": _of("..library.building.table", "COLUMNS"),
 }
 """Words in braces in help texts, and the function that returns the names for each."""
 

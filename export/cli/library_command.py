@@ -96,32 +96,23 @@ def get_command(
     rung: Annotated[
         str | None, typer.Option("--rung", metavar="RUNG", help="Only entries of this rung: {rungs}.")
     ] = None,
-    where: Annotated[
-        str | None,
-        typer.Option(
-            "--where",
-            metavar="EXPRESSION",
-            help="Only entries whose facts obey this, as in \"status == 'open' and pairs < 500\";"
-            " facts: {facts}.",
-        ),
-    ] = None,
     output: Folder,
     printing: PrintOptions,
 ) -> None:
     """Write model files of the library that ships, without a build: the same bytes as a build.
 
     Each entry comes with its instance and a manifest, with which `crossfield read` reads an answer back.
-    Names, --rung and --where select entries together; at least one of them is needed.
+    Names and --rung select entries together; at least one of them is needed.
     """
     from ...models.errors import InputError
     from ..library.building.named import entries, entry, write_entries
 
-    if not names and rung is None and where is None:
-        raise InputError("no entry is selected; name entries, or select them with --rung or --where")
+    if not names and rung is None:
+        raise InputError("no entry is selected; name entries, or select them with --rung")
     asked = {entry(name).name for name in names or []}
-    chosen = [each for each in entries(where=where, rung=rung) if not asked or each.name in asked]
+    chosen = [each for each in entries(rung=rung) if not asked or each.name in asked]
     if not chosen:
-        raise InputError("no entry of the library that ships is selected; relax --rung or --where")
+        raise InputError("no entry of the library that ships is selected; relax --rung")
     with progress(quiet=printing.quiet) as show:
         written = write_entries(output, chosen, progress=show)
     number = sum(map(len, written.values()))

@@ -110,7 +110,7 @@ cf.draw(3, folder / "a.png")                             | what is 3; give a Cro
 cf.draw(field, 3)                                        | path is 3; give text or a path
 cf.preview(None)                                         | what is None; give a CrossField
 cf.entry(3)                                              | name is 3; give text
-cf.entries(where=3)                                      | where is 3; give text or None
+cf.entries(rung=3)                                       | rung is 3; give text or None
 cf.fit_angles(instance)                                  | field is an Instance
 cf.solve(instance)                                       | problem is an Instance; give a Problem
 cf.solve(problem, folder=3)                              | folder is 3; give text or a path or None

@@ -28,8 +28,7 @@ from ..plan.recipe import EntryRecipe, InstancePlan, plan
 from ..plan.sources import instance_from
 from ..plan.spec import DEFAULT, RUNGS, Spec, default_spec
 from .entry_task import formulated, write_models
-from .table import COLUMNS, TABLE, read_table
-from .where import condition
+from .table import TABLE, read_table
 
 SHIPPED: Final = DEFAULT.with_name(TABLE)
 _REMEDY: Final = "make the points again with `crossfield library build --search`"
@@ -167,15 +166,11 @@ class LibraryEntry:
 
 
 @check_arguments
-def entries(*, where: str | None = None, rung: str | None = None) -> list[LibraryEntry]:
+def entries(*, rung: str | None = None) -> list[LibraryEntry]:
     """Entries of the library that ships, with their facts, in its order.
 
     Parameters
     ----------
-    where
-        Expression that selects entries by their facts, such as `status == 'open' and pairs < 500`. It may
-        have comparisons, `in` with a list, `and`, `or`, `not`, names of facts, numbers, text, True, False
-        and None.
     rung
         Only entries of this class of sizes: `tiny`, `small`, `medium` or `large`.
 
@@ -187,14 +182,12 @@ def entries(*, where: str | None = None, rung: str | None = None) -> list[Librar
     Raises
     ------
     InputError
-        For an expression that cannot be read, with the names of all facts, and for an unknown rung.
+        For an unknown rung.
 
     """
     if rung is not None and rung not in RUNGS:
         raise InputError(f"there is no rung {shortened(rung)!r}; choose one of {', '.join(RUNGS)}")
-    kinds = {name: column.kind for name, column in COLUMNS.items()}
-    obeys = condition(where, kinds) if where is not None else lambda _: True
-    return [LibraryEntry(row) for row in _rows().values() if rung in (None, row["rung"]) and obeys(row)]
+    return [LibraryEntry(row) for row in _rows().values() if rung in (None, row["rung"])]
 
 
 @check_arguments
