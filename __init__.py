@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from .export.bundle.problem_files import write_problem as write_problem
     from .export.formats.pyomo_model import to_pyomo as to_pyomo
     from .export.formats.registry import write as write
-    from .export.library.building.named import LibraryEntry as LibraryEntry
-    from .export.library.building.named import entries as entries
-    from .export.library.building.named import entry as entry
+    from .export.library.building.shipped_entries import LibraryEntry as LibraryEntry
+    from .export.library.building.shipped_entries import entries as entries
+    from .export.library.building.shipped_entries import entry as entry
     from .export.pictures.draw import draw as draw
     from .export.pictures.draw import preview as preview
     from .export.pictures.mask import write_mask as write_mask
@@ -95,7 +95,7 @@ _HOME: Final = {
     "InputError": ".models.errors",
     "Instance": ".models.instance.instance",
     "InstanceError": ".models.errors",
-    "LibraryEntry": ".export.library.building.named",
+    "LibraryEntry": ".export.library.building.shipped_entries",
     "Light": ".export.shading.colours",
     "Limits": ".models.processes.limits",
     "MissingSolverError": ".models.errors",
@@ -116,8 +116,8 @@ _HOME: Final = {
     "analytic": ".models.sketch.surfaces",
     "bend_field": ".models.smooth.bend",
     "draw": ".export.pictures.draw",
-    "entries": ".export.library.building.named",
-    "entry": ".export.library.building.named",
+    "entries": ".export.library.building.shipped_entries",
+    "entry": ".export.library.building.shipped_entries",
     "fit_angles": ".export.solving.two_stage",
     "formulate": ".models.formulations.problem",
     "greedy_field": ".models.search.greedy",

@@ -25,7 +25,7 @@ ORDER: Final = (
     "export/bundle", "export/shading", "export/pictures", "export/surfaces", "export/programs",
     "export/solving", "export/verify", "export/studio",
     "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",
-    "export/library/building", "export/library/checking", "export/library/contributions",
+    "export/library/building", "export/library/contributions",
     "export/library/site", "export/cli",
 )  # fmt: skip
 """From the ground up: a folder uses only earlier folders."""

@@ -86,7 +86,6 @@ EXAMPLES: Final = {
     "library get": "crossfield library get cf_mouse_n004_exact -o models",
     "library solve": "crossfield library solve library --solver highs --time-limit 2",
     "library verify": "crossfield library verify library",
-    "library release": "crossfield library release library -o library.tar.gz",
     "library submit": "crossfield library submit library proof",
     "library site": "crossfield library site library -o site",
 }

@@ -1,4 +1,4 @@
-"""The commands of `library`: build, get, solve, verify, release, submit, site."""
+"""The commands of `library`: build, get, solve, verify, submit, site."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def build_command(
     """
     from dataclasses import replace
 
-    from ..library.building.build import build, unmatched
+    from ..library.building.build import build, records_of_changed_problems
     from ..library.plan.spec import default_spec, read_spec
 
     with progress(quiet=printing.quiet) as show:
@@ -79,7 +79,7 @@ def build_command(
     printing.show(built.document, lambda: print_line(line))
     for name, reason in too_small.items():
         print_notice(f"{name} is skipped: {reason}")
-    if stale := sorted({record.entry for record in unmatched(built)}):
+    if stale := sorted({record.entry for record in records_of_changed_problems(built)}):
         print_notice(
             f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have"
             f" changed since: {', '.join(stale[:3])}{', ...' if stale[3:] else ''}; measure them again with"
@@ -105,12 +105,12 @@ def get_command(
     Names and --rung select entries together; at least one of them is needed.
     """
     from ...models.errors import InputError
-    from ..library.building.named import entries, entry, write_entries
+    from ..library.building.shipped_entries import entries, entry, write_entries
 
     if not names and rung is None:
         raise InputError("no entry is selected; name entries, or select them with --rung")
     asked = {entry(name).name for name in names or []}
-    chosen = [each for each in entries(rung=rung) if not asked or each.name in asked]
+    chosen = [one for one in entries(rung=rung) if not asked or one.name in asked]
     if not chosen:
         raise InputError("no entry of the library that ships is selected; relax --rung")
     with progress(quiet=printing.quiet) as show:
@@ -169,44 +169,22 @@ def verify_command(
     jobs: Processes = 1,
     printing: PrintOptions,
 ) -> None:
-    """Check a library: make every entry again and compare it, with its points, files and checksums.
+    """Check a library: build it again from its own inputs, compare every file, and check its points.
 
     The exit code is 1 if there is a defect.
     """
     from dataclasses import asdict
 
-    from ..library.checking.check_library import verify_library
+    from ..library.building.verification import verify_library
 
     with progress(quiet=printing.quiet) as show:
-        findings = verify_library(folder, jobs=jobs, progress=show)
-    result = f"defects: {len(findings)}" if findings else "no defects found"
-    printing.show([asdict(finding) for finding in findings], lambda: print_line(f"{folder}: {result}"))
-    for finding in findings:
-        print_notice(str(finding))
-    if findings:
+        defects = verify_library(folder, jobs=jobs, progress=show)
+    result = f"defects: {len(defects)}" if defects else "no defects found"
+    printing.show([asdict(defect) for defect in defects], lambda: print_line(f"{folder}: {result}"))
+    for defect in defects:
+        print_notice(str(defect))
+    if defects:
         raise typer.Exit(1)
-
-
-@command("release")
-def release_command(
-    folder: Library,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="Archive to write, a .tar.gz.")
-    ],
-    *,
-    jobs: Processes = 1,
-    printing: PrintOptions,
-) -> None:
-    """Verify a library and write it as one archive for publication, with its checksum beside it.
-
-    Version and day are those in the table [release] of its specification. The same library gives the same
-    archive.
-    """
-    from ..library.checking.release import release_library
-
-    with progress(quiet=printing.quiet) as show:
-        facts = release_library(folder, output, jobs=jobs, progress=show)
-    printing.show(facts, lambda: print_line("{file}: {files} files, SHA-256 {sha256}".format_map(facts)))
 
 
 @command("submit")
@@ -236,15 +214,15 @@ def submit_command(
 
     facts = RunFacts(solver, version, machine, by, date)
     with progress(quiet=printing.quiet) as show:
-        found = submit(folder, files, entry=entry, facts=facts, progress=show)
+        results = submit(folder, files, entry=entry, facts=facts, progress=show)
     columns = ("file", "result", "entry", "now")
     printing.show(
-        list(map(_submitted, found)), lambda: show_table(str(folder), columns, list(map(_row, found)))
+        list(map(_submitted, results)), lambda: show_table(str(folder), columns, list(map(_row, results)))
     )
-    for each in found:
-        if each.reason:
-            print_notice(each.reason)
-    if any(each.error is not None for each in found):
+    for result in results:
+        if result.reason:
+            print_notice(result.reason)
+    if any(result.error is not None for result in results):
         raise typer.Exit(1)
 
 

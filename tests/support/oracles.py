@@ -73,7 +73,6 @@ OTHERS = {
     ),
     "gzip": (shutil.which("gzip"), "gzip", "apt install gzip"),
     "distributed": (importlib.util.find_spec("distributed"), "distributed", "pip install '.[cluster]'"),
-    "pyarrow": (importlib.util.find_spec("pyarrow"), "pyarrow", "pip install '.[dataset]'"),
     "mlcroissant": (importlib.util.find_spec("mlcroissant"), "mlcroissant", "pip install mlcroissant"),
 }
 """Programs that `verify` does not know: a sign that they are here, their names,

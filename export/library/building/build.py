@@ -6,25 +6,34 @@ their files, the file that marks completion last. So an interrupted build contin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.processes.deadline import Progress, silent
-from ....models.storage import make_folder, read_bytes, sha256_of, write_bytes
-from ..documents.documents import Library, about_file, are_whole, read_about, read_library, read_sidecar
+from ....models.storage import make_folder, sha256_of, write_bytes
+from ..documents.checksums import is_intact, read_checksums
+from ..documents.documents import (
+    Library,
+    about_file,
+    files_of_entry,
+    files_of_instance,
+    read_about,
+    read_library,
+    read_sidecar,
+)
 from ..documents.lock import locked
-from ..ledger.given import NO_POINTS, Points, points_of, read_points
-from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import Ledger, Record, merged, read_ledger, write_ledger
-from ..plan.recipe import InstancePlan, plan, without
+from ..ledger.known_points import NO_POINTS, PointSource, given_points_of, read_points
+from ..ledger.ledger import LEDGER, Ledger, Record, merge_ledgers, read_ledger, write_ledger
+from ..plan.recipe import InstancePlan, plan_library, without_skipped
 from ..plan.spec import Spec
-from .entry_task import Inputs, make_entry
-from .executor import Tasks, ahead, executor
-from .index import SUMS, write_index
-from .instance_task import Files, prepared
+from .entry_files import make_entry
+from .executor import Tasks, open_executor, tasks_ahead
+from .index import write_index
+from .instance_files import make_instance_files
+from .tasks import BuildInputs, Files
 
 
 def build(
@@ -41,13 +50,16 @@ def build(
     per entry. The same specification gives the same bytes with any number of processes, and with points on
     every processor. Raises InputError, OutputError, BuildError.
     """
-    plans = plan(spec)
+    plan_library(spec)  # raises before there is a folder
     folder, is_new = Path(folder), not Path(folder).exists()
     make_folder(folder)
     try:
         with locked(folder, "a build of the library", progress):
             points = read_points(spec.points) if spec.points else NO_POINTS
-            return _built(spec, plans, folder, points, jobs=jobs, scheduler=scheduler, progress=progress)
+            ledger = read_ledger(spec.ledger.parent, spec.ledger.name) if spec.ledger else Ledger(folder)
+            return build_locked(
+                spec, folder, ledger, points, jobs=jobs, scheduler=scheduler, progress=progress
+            )
     except BaseException:
         if is_new:
             with suppress(OSError):  # it may contain complete files for the next build
@@ -55,85 +67,98 @@ def build(
         raise
 
 
-def _built(
-    spec: Spec,
-    plans: Sequence[InstancePlan],
-    folder: Path,
-    points: Points,
-    *,
-    jobs: int,
-    scheduler: str | None,
-    progress: Progress,
-) -> Library:
-    """Build it under the lock of the caller; the ledger is written last, so a refused build has none."""
-    for path in folder.glob(".*.part"):  # of a build that was killed
-        path.unlink(missing_ok=True)
-    entries = [entry.name for each in plans for entry in each.entries]
-    other = Ledger(folder) if spec.ledger is None else read_ledger(spec.ledger.parent, spec.ledger.name)
-    ledger = merged(folder, other, entries, [each.recipe.name for each in plans])
-    with executor(jobs, scheduler) as chosen:
-        tasks = Tasks(chosen, ahead(jobs, scheduler))
-        work = _Build(folder, Inputs(ledger, plans, points), tasks, progress)
-        for each in sorted(plans, key=lambda each: -each.recipe.size):
-            work.begin(each)  # the last task runs first: small ones, whose faults show at once
-        tasks.run()
-    kept = without(plans, work.skipped)
-    if not kept:
-        name, reason = next(iter(work.skipped.items()))
-        raise InputError(f"every grid is too coarse for its sketch; {name}: {reason}")
-    write_ledger(ledger)
-    progress("index and checksums")
-    write_index(folder, spec, kept, dict(sorted(work.skipped.items())))
-    return read_library(folder)
-
-
 def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
     """Bring a library up to date with its ledger; only files that the change affects are written again."""
     folder = read_library(folder).folder
     with locked(folder, "a build of the library", progress):
-        return rebuilt(folder, jobs=jobs, progress=progress)
+        return rebuild_locked(folder, jobs=jobs, progress=progress)
 
 
-def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
+def rebuild_locked(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
     """Bring a library up to date as `rebuild` does, under the lock of the caller."""
-    spec = read_library(folder).spec
-    return _built(spec, plan(spec), folder, points_of(folder), jobs=jobs, scheduler=None, progress=progress)
+    spec, ledger = read_library(folder).spec, read_ledger(folder)
+    return build_locked(spec, folder, ledger, given_points_of(folder), jobs=jobs, progress=progress)
+
+
+def build_locked(
+    spec: Spec,
+    folder: Path,
+    ledger: Ledger,
+    points: PointSource,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Progress = silent,
+) -> Library:
+    """Build a library as `build` does, with the records of another ledger, under the lock of the caller.
+
+    The ledger is written last, so a refused build has none.
+    """
+    for path in folder.glob(".*.part"):  # of a build that was killed
+        path.unlink(missing_ok=True)
+    plans = plan_library(spec)
+    entries = [entry.name for planned in plans for entry in planned.entries]
+    ledger = merge_ledgers(folder, ledger, entries, [planned.recipe.name for planned in plans])
+    with open_executor(jobs, scheduler) as chosen:
+        tasks = Tasks(chosen, tasks_ahead(jobs, scheduler))
+        work = _Build(folder, BuildInputs(ledger, plans, points), tasks, progress)
+        for planned in sorted(plans, key=lambda planned: -planned.recipe.size):
+            work.begin(planned)  # the last task runs first: small ones, whose faults show at once
+        tasks.run()
+    complete = without_skipped(plans, work.skipped)
+    if not complete:
+        name, reason = next(iter(work.skipped.items()))
+        raise InputError(f"every grid is too coarse for its sketch; {name}: {reason}")
+    write_ledger(ledger)
+    progress("index and checksums")
+    write_index(folder, spec, complete, dict(sorted(work.skipped.items())), work.sums)
+    return read_library(folder)
 
 
 def has_unbuilt_records(library: Library) -> bool:
     """Whether the ledger differs from SHA256SUMS: a change was interrupted before its rebuild."""
-    digest = sha256_of(library.folder / LEDGER)
-    sums = read_bytes(library.folder / SUMS).decode("utf-8", "replace").splitlines()
-    return f"{digest}  {LEDGER}" not in sums
+    return _known_checksums(library.folder).get(LEDGER) != sha256_of(library.folder / LEDGER)
 
 
-def unmatched(library: Library) -> list[Record]:
+def records_of_changed_problems(library: Library) -> list[Record]:
     """Return the ledger's records that no longer count because the problem of their entry has changed."""
     records = read_ledger(library.folder).records
     names = {record.entry for record in records} & set(library.document["entries"])
     problems = {name: library.entry(name)["problem_sha256"] for name in names}
-    return [each for each in records if problems.get(each.entry, each.problem_sha256) != each.problem_sha256]
+    return [
+        record
+        for record in records
+        if problems.get(record.entry, record.problem_sha256) != record.problem_sha256
+    ]
+
+
+def _known_checksums(folder: Path) -> dict[str, str]:
+    """The checksums of an earlier build; none without a list, or with a damaged one."""
+    with suppress(CrossfieldError):
+        return read_checksums(folder)
+    return {}
 
 
 class _Build:
     """A build in progress: its tasks and the number of finished entries."""
 
-    def __init__(self, folder: Path, inputs: Inputs, tasks: Tasks, progress: Progress) -> None:
+    def __init__(self, folder: Path, inputs: BuildInputs, tasks: Tasks, progress: Progress) -> None:
         self.folder, self.inputs, self.tasks, self.progress = folder, inputs, tasks, progress
-        self.total, self.done = sum(len(each.entries) for each in self.inputs.plans), 0
+        self.total, self.done = sum(len(planned.entries) for planned in self.inputs.plans), 0
         self.skipped: dict[str, str] = {}  # instances and entries that cannot be made, and the reasons
+        self.sums = _known_checksums(folder)
 
-    def begin(self, each: InstancePlan) -> None:
+    def begin(self, planned: InstancePlan) -> None:
         """Schedule an instance unless it is complete, and then its entries."""
-        task = self.inputs.preparation(each)
-        about = self._whole(about_file(task.name), task.sha256, read_about)
+        task = self.inputs.instance_task(planned)
+        about = self._complete_document(about_file(task.name), task.sha256, read_about, files_of_instance)
         if about is not None:
-            self._entries(each, about)
+            self._schedule_entries(planned, about)
             return
 
         def finish(files: Files | NoStrokeError) -> None:
             if isinstance(files, NoStrokeError):
-                self.total -= len(each.entries)
+                self.total -= len(planned.entries)
                 self.skipped[task.name] = str(files).removeprefix(f"{task.name}: ")
                 self.progress(f"skipped: {files}")
                 return
@@ -141,26 +166,36 @@ class _Build:
             about = read_about(self.folder / about_file(task.name))
             if task.given and task.given.instance != about["instance"]["sha256"]:
                 self.progress(f"{task.name}: the points given are of another instance; searched for others")
-            self._entries(each, about)
+            self._schedule_entries(planned, about)
 
-        self.tasks.add(prepared, task, finish)
+        self.tasks.add(make_instance_files, task, finish)
 
-    def _whole(self, name: str, sha256: str, read: Callable[[Path], dict[str, Any]]) -> dict[str, Any] | None:
-        """A document if it was made from the same recipe and its files are complete."""
+    def _complete_document(
+        self,
+        name: str,
+        sha256: str,
+        read: Callable[[Path], dict[str, Any]],
+        files_of: Callable[[dict[str, Any]], Iterable[str]],
+    ) -> dict[str, Any] | None:
+        """A document if it was made from the same recipe, and it and its files are complete."""
         try:
-            found = read(self.folder / name)
+            document = read(self.folder / name)
         except CrossfieldError:
             return None
-        return found if found["recipe_sha256"] == sha256 and are_whole(self.folder, found["files"]) else None
+        is_same = document["recipe_sha256"] == sha256
+        complete = is_same and all(
+            is_intact(self.folder, file, self.sums) for file in (name, *files_of(document))
+        )
+        return document if complete else None
 
-    def _entries(self, each: InstancePlan, about: dict[str, Any]) -> None:
-        for recipe in each.entries:
-            if reason := recipe.lacks(about):
+    def _schedule_entries(self, planned: InstancePlan, about: dict[str, Any]) -> None:
+        for recipe in planned.entries:
+            if reason := recipe.reason_to_skip(about):
                 self.total -= 1
                 self.skipped[recipe.name] = reason
                 self.progress(f"skipped: {recipe.name}: {reason}")
-        for task in reversed(list(self.inputs.entries(each, about, self.folder))):
-            if self._whole(f"{task.name}.json", task.sha256, read_sidecar):
+        for task in reversed(list(self.inputs.entry_tasks(planned, about, self.folder))):
+            if self._complete_document(f"{task.name}.json", task.sha256, read_sidecar, files_of_entry):
                 self.done += 1
             else:
                 self.tasks.add(make_entry, task, self._finish(task.name))

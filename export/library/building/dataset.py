@@ -1,19 +1,16 @@
-"""The table of entries for tools of machine learning: Croissant metadata, and the same rows as Parquet."""
+"""Croissant metadata of the table of entries, for tools of machine learning."""
 
 from __future__ import annotations
 
 import hashlib
-import io
-from importlib.util import find_spec
 from typing import Any, Final
 
 from ..documents.citation import LICENCES, citation_of
-from ..documents.documents import as_bytes
+from ..documents.documents import document_bytes
 from ..plan.spec import Spec
-from .table import COLUMNS, TABLE, parsed
+from .table import COLUMNS, TABLE
 
 CROISSANT: Final = "croissant.json"
-PARQUET: Final = "entries.parquet"
 _TERMS: Final = (
     "citeAs", "column", "equivalentProperty", "extract", "field", "fileProperty", "fileObject", "fileSet",
     "format", "includes", "isLiveDataset", "jsonPath", "key", "md5", "parentField", "path", "recordSet",
@@ -51,7 +48,7 @@ def croissant(spec: Spec, rows: bytes) -> bytes:
             "datePublished": release.date,
             "version": release.version,
         }
-    return as_bytes(
+    return document_bytes(
         {
             "@context": _CONTEXT,
             "@type": "sc:Dataset",
@@ -98,33 +95,7 @@ def _field(name: str) -> dict[str, Any]:
 
 def _licences(spec: Spec) -> list[str]:
     """The licences of all sketches: the address where it is known, else the identifier."""
-    stated = dict.fromkeys(each.origin.license for each in spec.sketches if each.origin.license)
-    return [f"https://spdx.org/licenses/{each}.html" if each in LICENCES else each for each in stated]
-
-
-def parquet(rows: bytes) -> bytes | None:
-    """Return the rows of a table as Parquet; None without pyarrow. Its version may change the bytes."""
-    if find_spec("pyarrow") is None:
-        return None
-    import pyarrow as pa
-    from pyarrow import parquet as pq
-
-    kinds = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
-    schema = pa.schema([(name, kinds[column.kind]) for name, column in COLUMNS.items()])
-    stream = io.BytesIO()
-    pq.write_table(pa.Table.from_pylist(parsed(rows), schema), stream)
-    return stream.getvalue()
-
-
-def same_rows(data: bytes, rows: bytes) -> bool:
-    """Whether Parquet data has the rows of a table; true without pyarrow, which would read it."""
-    if find_spec("pyarrow") is None:
-        return True
-    import pyarrow as pa
-    from pyarrow import parquet as pq
-
-    try:
-        found = pq.read_table(io.BytesIO(data)).to_pylist()
-    except pa.ArrowException:
-        return False
-    return bool(found == parsed(rows))
+    stated = dict.fromkeys(sketch.origin.license for sketch in spec.sketches if sketch.origin.license)
+    return [
+        f"https://spdx.org/licenses/{licence}.html" if licence in LICENCES else licence for licence in stated
+    ]

@@ -26,13 +26,13 @@ class BuildError(CrossfieldError):
     """Loss of workers."""
 
 
-def ahead(jobs: int, scheduler: str | None) -> int:
+def tasks_ahead(jobs: int, scheduler: str | None) -> int:
     """Return the number of tasks submitted at once; a killed build loses the unfinished ones."""
     return _AHEAD if scheduler else 1 if jobs == 1 else 2 * jobs
 
 
 @contextmanager
-def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
+def open_executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
     """Yield an executor. Raises InputError without a scheduler or dask; BuildError when workers die."""
     try:
         with _cluster(scheduler) if scheduler else process_pool(jobs) as chosen:

@@ -1,68 +1,152 @@
-"""Fields of an instance, by the work that its sketch asks for: from none to a proof."""
+"""Fields and certificates of an instance, by the work that its sketch asks for: from none to a proof.
+
+The work is limited in rounds, nodes and labels, never in time, so every build finds the same.
+"""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
-from ....models.field.field import CrossField
+from ....models.errors import SolutionError
+from ....models.field.field import CrossField, Norm
+from ....models.formulations.problem import Problem, formulate, with_integers_fixed
 from ....models.instance.angles import HALF
 from ....models.instance.instance import Instance
+from ....models.proof.certificate import write_certificate
 from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
 from ....models.search.reproducible_angles import reproducible_field
-from ..ledger.given import Given
+from ....models.search.search import search
+from ...bundle.starts import write_start
+from ...formats.registry import write
+from ...solutions.solution import read_solution
+from ..ledger.known_points import InstancePoints
 from ..ledger.points import (
-    Certified,
-    Known,
-    better_in_1norm,
+    METHOD,
+    CheckedCertificate,
+    KnownField,
+    Provenance,
     certificate_file,
-    certified,
-    ours,
-    searched_field,
+    clipped_field,
+    provenance_by,
 )
 from ..plan.recipe import NORMS, InstanceRecipe
 
-Found = tuple[Known, list[Known], list[Certified]]
+_ROUNDS: Final = 8
+_NODES: Final = {"tiny": 1000, "small": 20}  # of the branch and bound in the 1-norm, by rung
+_LP_UP_TO: Final = 1000  # pixels up to which the angles are fitted in the 1-norm
+_MOST_WORK: Final = 20_000_000  # labels, counted at each rounding, after which a proof ends: some minutes
+_MOST_BYTES: Final = 2_000_000  # of a certificate that leaves a gap; those of optima are kept
+
+InstanceFields = tuple[KnownField, list[KnownField], list[CheckedCertificate]]
 """The baseline, fields of low energy, and certificates."""
 
 
-def found_fields(instance: Instance, recipe: InstanceRecipe, sent: Sequence[Certified]) -> Found:
-    """Return the fields that the sketch of a recipe asks for. sent: certificates that replace proofs."""
+def search_fields(
+    instance: Instance, recipe: InstanceRecipe, sent: Sequence[CheckedCertificate]
+) -> InstanceFields:
+    """Find the fields that the sketch of a recipe asks for. sent: certificates that replace proofs."""
     effort = recipe.sketch.points
     if effort == "none":
         nearest = _nearest(instance)
         return nearest, [nearest], []
-    baseline = Known(reproducible_field(greedy_field(instance)), ours("greedy"))
+    baseline = KnownField(reproducible_field(greedy_field(instance)), provenance_by("greedy"))
     if effort == "greedy":
         return baseline, [baseline], []
     if effort == "proven":
-        low, proven = _proof(baseline, recipe, sent)
+        low, proven = _prove_missing(baseline, recipe, sent)
         return baseline, [baseline, *low], proven
-    searched = searched_field(instance)
-    low, proven = _proof(searched, recipe, sent)
-    found = better_in_1norm(searched.field, recipe.rung)
-    staged = [Known(reproducible_field(each.field), ours("two stages")) for each in found]
-    return baseline, [searched, *low, *found, *staged], proven
+    searched = _search(instance)
+    low, proven = _prove_missing(searched, recipe, sent)
+    fitted = improve_in_1norm(searched.field, recipe.rung)
+    staged = [KnownField(reproducible_field(known.field), provenance_by("two stages")) for known in fitted]
+    return baseline, [searched, *low, *fitted, *staged], proven
 
 
-def given_fields(given: Given, instance: Instance, recipe: InstanceRecipe) -> Found:
+def given_fields(given: InstancePoints, instance: Instance, recipe: InstanceRecipe) -> InstanceFields:
     """Return the given points, without any search; a certificate is checked."""
     low = [given.field(f"least_{norm}") for norm in NORMS]
     return given.field("baseline"), low, given.certificates(instance, recipe.prove)
 
 
-def _nearest(instance: Instance) -> Known:
+def _nearest(instance: Instance) -> KnownField:
     """Right-angled crosses along the nearest stroke, or along the first one in a part without strokes."""
     theta = instance.theta[np.maximum(nearest_strokes(instance), 0)]
-    return Known(CrossField.from_lines(instance, theta, theta + HALF), ours("nearest stroke"))
+    return KnownField(CrossField.from_lines(instance, theta, theta + HALF), provenance_by("nearest stroke"))
 
 
-def _proof(
-    start: Known, recipe: InstanceRecipe, sent: Sequence[Certified]
-) -> tuple[list[Known], list[Certified]]:
-    """The fields and certificates of proofs in the norms of the recipe that no submitted one is in."""
-    norms = [norm for norm in recipe.prove if norm not in {each.norm for each in sent}]
-    found = [certified(start.field, certificate_file(recipe.name, norm), norm) for norm in norms]
-    return [known for known, _ in found], [each for _, each in found if each is not None]
+def _prove_missing(
+    start: KnownField, recipe: InstanceRecipe, sent: Sequence[CheckedCertificate]
+) -> tuple[list[KnownField], list[CheckedCertificate]]:
+    """Prove the optima in the norms of the recipe that no submitted certificate is in."""
+    norms = [norm for norm in recipe.prove if norm not in {certificate.norm for certificate in sent}]
+    proofs = [_prove(start.field, certificate_file(recipe.name, norm), norm) for norm in norms]
+    certificates = [certificate for _, certificate in proofs if certificate is not None]
+    return [known for known, _ in proofs], certificates
+
+
+def _search(instance: Instance) -> KnownField:
+    """Find a field of low 2-norm energy."""
+    return KnownField(
+        reproducible_field(search(instance, rounds=_ROUNDS, jobs=1).field), provenance_by("search")
+    )
+
+
+def improve_in_1norm(start: CrossField, rung: str) -> list[KnownField]:
+    """Find fields of lower 1-norm energy by HiGHS: best angles for the jumps, and on low rungs a search."""
+    if start.instance.grid.size > _LP_UP_TO:
+        return []
+    problem = formulate(start.instance, "milp-mccormick")  # whose objective is the 1-norm energy
+    fitted = _solve_by_highs(with_integers_fixed(problem, start))
+    fields = [fitted]
+    if rung in _NODES:
+        fields.append(_solve_by_highs(problem, mip_max_nodes=_NODES[rung], start=fitted or start))
+    highs = Provenance("HiGHS", version("highspy"))
+    return [KnownField(field, highs) for field in fields if field is not None]
+
+
+def _solve_by_highs(problem: Problem, start: CrossField | None = None, **options: int) -> CrossField | None:
+    """The field that HiGHS finds under options, or None."""
+    from ...programs.highs import loaded, set_options, solved, write_solution
+
+    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
+        model, first, answer = (Path(folder) / name for name in ("model.mps", "start.sol", "answer.sol"))
+        write(problem, model)
+        highs = loaded(model, threads=1, parallel="off", mip_rel_gap=1e-6, mip_abs_gap=1e-9)
+        set_options(highs, **options)
+        if start is not None:
+            write_start(problem, start, first, "highs")
+            highs.readSolution(str(first), 0)
+        write_solution(solved(highs, model), answer)
+        try:
+            solution = read_solution(answer, problem)
+        except SolutionError:
+            return None
+    return None if solution.point is None else clipped_field(problem, solution.point)
+
+
+def _prove(start: CrossField, file: str, norm: Norm = 2) -> tuple[KnownField, CheckedCertificate | None]:
+    """Prove the optimum in a norm from a field; return the best field and the certificate.
+
+    file: name in a library. The certificate is None if it is large and leaves a gap.
+    """
+    from ....models.proof.prove import prove  # loads compiled functions
+
+    proof = prove(start.instance, norm=norm, start=start, work=_MOST_WORK, jobs=1)
+    field = reproducible_field(proof.field) if norm == 2 else proof.field
+    proof = replace(proof, field=field, energy=field.energy(norm).total)
+    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
+        path = Path(folder) / "a.certificate.npz"
+        claim = write_certificate(proof, path)
+        data = path.read_bytes()
+    known = KnownField(field, provenance_by(METHOD))
+    if claim.status != "optimal" and len(data) > _MOST_BYTES:
+        return known, None
+    return known, CheckedCertificate.of(claim, file, data, known.provenance)

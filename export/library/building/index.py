@@ -10,89 +10,101 @@ from typing import Any, Final
 
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.proof import check_certificate
-from ....models.storage import read_bytes, sha256_of, write_bytes
+from ....models.storage import read_bytes, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, generator
 from ...writing.records import number
 from ..documents import check_point
-from ..documents.citation import PAPER, REFERENCES, cited, terms
-from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, about_file, as_bytes, read_about, read_sidecar
-from ..documents.standalone import standalone
-from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import read_ledger
+from ..documents.checksums import is_intact, write_checksums
+from ..documents.citation import PAPER, REFERENCES, licence_terms, release_facts
+from ..documents.documents import (
+    INDEX,
+    INDEX_FORMAT,
+    VERSION,
+    about_file,
+    document_bytes,
+    files_of_entry,
+    files_of_instance,
+    read_about,
+    read_sidecar,
+)
+from ..documents.standalone import standalone_program
+from ..ledger.ledger import LEDGER, read_ledger
 from ..plan.recipe import NORMS, InstancePlan, norm_minimised
 from ..plan.spec import RUNGS, Spec
-from .dataset import CROISSANT, PARQUET, croissant, parquet
+from .dataset import CROISSANT, croissant
 from .table import TABLE, table
 
 CHECKER: Final = "check_point.py"
 CERTIFICATES: Final = "check_certificate.py"
 SOLU: Final = "library.solu"
-SUMS: Final = "SHA256SUMS"
 TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md")
 
 _OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
 
 
-def write_index(folder: Path, spec: Spec, plans: Sequence[InstancePlan], skipped: Mapping[str, str]) -> None:
+def write_index(
+    folder: Path,
+    spec: Spec,
+    plans: Sequence[InstancePlan],
+    skipped: Mapping[str, str],
+    earlier: Mapping[str, str],
+) -> None:
     """Write the files about the library as a whole and remove the files of entries that left it.
 
-    skipped: names of instances that the specification asks for and that are not in the plans, and why.
+    skipped: names of instances that the specification asks for and that are not in the plans, and why;
+    earlier: checksums of the build before.
     """
-    sidecars = [read_sidecar(folder / f"{entry.name}.json") for each in plans for entry in each.entries]
-    written = general(folder, spec, sidecars, skipped)
-    packed = parquet(written[TABLE])
-    if packed is None:
-        (folder / PARQUET).unlink(missing_ok=True)  # of an earlier build
-    else:
-        written[PARQUET] = packed
+    sidecars = [read_sidecar(folder / f"{entry.name}.json") for planned in plans for entry in planned.entries]
+    written = general_files(folder, spec, sidecars, skipped)
     for name, data in written.items():
         write_bytes(folder / name, data)
-    abouts = [about_file(each.recipe.name) for each in plans]
-    documents = sidecars + [read_about(folder / name) for name in abouts]
-    listed = {file["name"] for each in documents for file in each["files"]}
-    present = {*written, LEDGER, *abouts, *listed, *read_ledger(folder).files}
-    present |= {f"{each['name']}.json" for each in sidecars}
-    _remove_stale(folder, present)
-    sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(present))
-    write_bytes(folder / SUMS, sums.encode())
+    abouts = [about_file(planned.recipe.name) for planned in plans]
+    present = {*written, LEDGER, *read_ledger(folder).files, *abouts}
+    present |= {name for file in abouts for name in files_of_instance(read_about(folder / file))}
+    for sidecar in sidecars:
+        present |= {f"{sidecar['name']}.json", *files_of_entry(sidecar)}
+    for name in earlier.keys() - present:  # files that were added by hand stay
+        if _OURS.fullmatch(name) and is_intact(folder, name, earlier):
+            (folder / name).unlink()
+    write_checksums(folder, present)
 
 
-def general(
+def general_files(
     folder: Path, spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, str]
 ) -> dict[str, bytes]:
     """Return the files about the library as a whole, the index last. folder: holds all other files."""
     context = _context(spec, sidecars) | {"skipped": skipped}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
-    checkers = {CHECKER: standalone(Path(check_point.__file__))}
+    checkers = {CHECKER: standalone_program(Path(check_point.__file__))}
     if context["certified"]:
         checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
-    index = _index(folder, spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
+    index = _index(spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
     rows = table(folder, sidecars)
     facts = {SOLU: _optima(sidecars), TABLE: rows, CROISSANT: croissant(spec, rows)}
-    return texts | drawings | checkers | facts | {INDEX: as_bytes(index)}
+    return texts | drawings | checkers | facts | {INDEX: document_bytes(index)}
 
 
 def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    rungs = [_rung(name, [each for each in sidecars if each["rung"] == name]) for name in RUNGS]
-    written = {file["format"] for each in sidecars for file in each["files"]}
+    rungs = [_rung(name, [sidecar for sidecar in sidecars if sidecar["rung"] == name]) for name in RUNGS]
+    written = {file["format"] for sidecar in sidecars for file in sidecar["files"]}
     return {
         "spec": spec,
         "generator": generator(),
-        "release": cited(spec),
-        "terms": terms(spec.sketches),
+        "release": release_facts(spec),
+        "terms": licence_terms(spec.sketches),
         "references": REFERENCES,
         "paper": PAPER,
         "rungs": [rung for rung in rungs if rung["entries"]],
-        "instances": len({each["instance"]["sha256"] for each in sidecars}),
+        "instances": len({sidecar["instance"]["sha256"] for sidecar in sidecars}),
         "entries": len(sidecars),
         "tokens": {name: FORMULATIONS[name].short for name in spec.formulations},
-        "kinds": {each["formulation"]: each for each in reversed(sidecars)},
+        "kinds": {sidecar["formulation"]: sidecar for sidecar in reversed(sidecars)},
         "formats": [entry for name, entry in FORMATS.items() if name in written],
-        "packed": any(file["name"].endswith(".gz") for each in sidecars for file in each["files"]),
-        "tightened": sum("tightened" in each for each in sidecars),
-        "certified": any("certificate" in bound for each in sidecars for bound in each["bounds"]),
+        "packed": any(file["name"].endswith(".gz") for sidecar in sidecars for file in sidecar["files"]),
+        "tightened": sum("tightened" in sidecar for sidecar in sidecars),
+        "certified": any("certificate" in bound for sidecar in sidecars for bound in sidecar["bounds"]),
         "proven_by": _minimising(spec),
         "example": sidecars[0],
     }
@@ -100,16 +112,19 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _minimising(spec: Spec) -> list[str]:
     """The formulations of a specification by the norm that they minimise."""
-    found = {norm: [each for each in spec.formulations if norm_minimised(each) == norm] for norm in NORMS}
-    return [f"norm {norm}, {', '.join(names)}" for norm, names in found.items() if names]
+    minimising = {
+        norm: [formulation for formulation in spec.formulations if norm_minimised(formulation) == norm]
+        for norm in NORMS
+    }
+    return [f"norm {norm}, {', '.join(names)}" for norm, names in minimising.items() if names]
 
 
 def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
     """Facts about a rung: sizes, share of strokes, numbers of entries, optima and grades."""
-    sizes = sorted({each["source"]["size"] for each in sidecars})
-    proven = sum(each["status"] == "optimal" for each in sidecars)
-    density = sum(each["density"] for each in sidecars) / max(len(sidecars), 1)
-    grades = Counter(each["difficulty"] for each in sidecars)
+    sizes = sorted({sidecar["source"]["size"] for sidecar in sidecars})
+    proven = sum(sidecar["status"] == "optimal" for sidecar in sidecars)
+    density = sum(sidecar["density"] for sidecar in sidecars) / max(len(sidecars), 1)
+    grades = Counter(sidecar["difficulty"] for sidecar in sidecars)
     stated = {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven, "grades": grades}
     return stated | {"density": f"{density:.2f}"}
 
@@ -117,34 +132,20 @@ def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
 def _optima(sidecars: list[dict[str, Any]]) -> bytes:
     """The content of library.solu as MINLPLib and SCIP have it: =opt= or =best=, and =bestdual=."""
     lines = []
-    for each in sidecars:
-        tag = "=opt=" if each["status"] == "optimal" else "=best="
-        lines.append(f"{tag} {each['name']} {number(each['best']['objective'])}\n")
-        if each["status"] != "optimal" and each["bound"] is not None:
-            lines.append(f"=bestdual= {each['name']} {number(each['bound'])}\n")
+    for sidecar in sidecars:
+        tag = "=opt=" if sidecar["status"] == "optimal" else "=best="
+        lines.append(f"{tag} {sidecar['name']} {number(sidecar['best']['objective'])}\n")
+        if sidecar["status"] != "optimal" and sidecar["bound"] is not None:
+            lines.append(f"=bestdual= {sidecar['name']} {number(sidecar['bound'])}\n")
     return "".join(lines).encode()
 
 
-def _index(folder: Path, spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    names = [each["name"] for each in sidecars]
+def _index(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "format": INDEX_FORMAT,
         "version": VERSION,
         "generator": generator(),
-        "release": cited(spec),
+        "release": release_facts(spec),
         "spec": spec.document(),
-        "entries": names,
-        "sha256": {name: sha256_of(folder / f"{name}.json") for name in names},
+        "entries": [sidecar["name"] for sidecar in sidecars],
     }
-
-
-def _remove_stale(folder: Path, present: set[str]) -> None:
-    """Remove files that an earlier build listed and this one lacks; other files stay."""
-    sums = folder / SUMS
-    if not sums.is_file():
-        return
-    for line in read_bytes(sums).decode("ascii", "replace").splitlines():
-        expected, _, name = line.partition("  ")
-        path = folder / name
-        if name not in present and _OURS.fullmatch(name) and path.is_file() and sha256_of(path) == expected:
-            path.unlink()

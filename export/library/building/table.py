@@ -19,7 +19,7 @@ OPEN: Final = "open"  # the status `best known` of a sidecar, in one word
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """A column: the type of its values, its meaning, and its value from a sidecar. None: unknown."""
 
     kind: type[str | int | float | bool]
@@ -33,18 +33,18 @@ def _count(*keys: str) -> Callable[[dict[str, Any]], int]:
 
 def _at(*keys: str) -> Callable[[dict[str, Any]], Any]:
     def value(sidecar: dict[str, Any]) -> Any:
-        found: Any = sidecar
+        value: Any = sidecar
         for key in keys:
-            found = found.get(key) if isinstance(found, dict) else None
-        return found
+            value = value.get(key) if isinstance(value, dict) else None
+        return value
 
     return value
 
 
 def _proof_seconds(sidecar: dict[str, Any]) -> float | None:
     """Seconds of the fastest run on this entry that proved its optimum."""
-    runs = [each.get("seconds") for each in sidecar["runs"] if each["status"] == "optimal"]
-    return min((each for each in runs if each is not None), default=None)
+    seconds = [run.get("seconds") for run in sidecar["runs"] if run["status"] == "optimal"]
+    return min((value for value in seconds if value is not None), default=None)
 
 
 def _instance(sidecar: dict[str, Any]) -> str:
@@ -69,54 +69,62 @@ def _optimum(sidecar: dict[str, Any]) -> float | None:
     return float(sidecar["best"]["objective"]) if sidecar["status"] == "optimal" else None
 
 
-COLUMNS: Final[Mapping[str, Column]] = {
-    "name": Column(str, "Name of the entry.", _at("name")),
-    "instance": Column(str, "Name of the instance.", _instance),
-    "family": Column(str, "Short name of the sketch.", _at("family")),
-    "rung": Column(str, "Class of sizes.", _at("rung")),
-    "split": Column(str, "Set for machine learning: train, validation or test.", _at("split")),
-    "gauge": Column(str, "Window of alpha: strokes or box.", _at("source", "gauge")),
-    "formulation": Column(str, "Formulation.", _at("formulation")),
-    "facet": Column(str, "Facet (26): hull or printed.", _at("options", "facet")),
-    "tightened": Column(bool, "In the windows of a certificate.", lambda sidecar: "tightened" in sidecar),
-    "problem_class": Column(str, "Class of the problem, as MILP.", _at("class")),
-    "probtype": Column(str, "Three letters as in QPLIB.", _at("probtype")),
-    "convex": Column(bool, "Whether the continuous relaxation is convex.", _at("convex")),
-    "seed": Column(int, "Seed of a random sketch.", _at("source", "seed")),
-    "size": Column(int, "Pixels on the longer side.", _at("source", "size")),
-    "pixels": Column(int, "Pixels in the mask.", _at("instance", "pixels")),
-    "strokes": Column(int, "Pixels with a direction.", _at("instance", "strokes")),
-    "pairs": Column(int, "Pairs of neighbours.", _at("instance", "pairs")),
-    "density": Column(float, "Share of the pixels with a direction.", _at("density")),
-    "columns": Column(int, "Columns.", _count("variables")),
-    "rows": Column(int, "Rows.", _count("constraints")),
-    "integers": Column(int, "Integer columns, binary ones too.", _count("binary", "integer")),
-    "binaries": Column(int, "Binary columns.", _count("binary")),
-    "equalities": Column(int, "Rows that are equations.", _count("equalities")),
-    "nonzeros": Column(int, "Nonzeros of the rows.", _count("nonzeros")),
-    "nonlinear_nonzeros": Column(int, "Nonzeros in nonlinear terms.", _count("nonlinear_nonzeros")),
-    "quadratic_rows": Column(int, "Quadratic rows.", _count("quadratic_constraints")),
-    "nonlinear_rows": Column(
+COLUMNS: Final[Mapping[str, TableColumn]] = {
+    "name": TableColumn(str, "Name of the entry.", _at("name")),
+    "instance": TableColumn(str, "Name of the instance.", _instance),
+    "family": TableColumn(str, "Short name of the sketch.", _at("family")),
+    "rung": TableColumn(str, "Class of sizes.", _at("rung")),
+    "split": TableColumn(str, "Set for machine learning: train, validation or test.", _at("split")),
+    "gauge": TableColumn(str, "Window of alpha: strokes or box.", _at("source", "gauge")),
+    "formulation": TableColumn(str, "Formulation.", _at("formulation")),
+    "facet": TableColumn(str, "Facet (26): hull or printed.", _at("options", "facet")),
+    "tightened": TableColumn(
+        bool, "In the windows of a certificate.", lambda sidecar: "tightened" in sidecar
+    ),
+    "problem_class": TableColumn(str, "Class of the problem, as MILP.", _at("class")),
+    "probtype": TableColumn(str, "Three letters as in QPLIB.", _at("probtype")),
+    "convex": TableColumn(bool, "Whether the continuous relaxation is convex.", _at("convex")),
+    "seed": TableColumn(int, "Seed of a random sketch.", _at("source", "seed")),
+    "size": TableColumn(int, "Pixels on the longer side.", _at("source", "size")),
+    "pixels": TableColumn(int, "Pixels in the mask.", _at("instance", "pixels")),
+    "strokes": TableColumn(int, "Pixels with a direction.", _at("instance", "strokes")),
+    "pairs": TableColumn(int, "Pairs of neighbours.", _at("instance", "pairs")),
+    "density": TableColumn(float, "Share of the pixels with a direction.", _at("density")),
+    "columns": TableColumn(int, "Columns.", _count("variables")),
+    "rows": TableColumn(int, "Rows.", _count("constraints")),
+    "integers": TableColumn(int, "Integer columns, binary ones too.", _count("binary", "integer")),
+    "binaries": TableColumn(int, "Binary columns.", _count("binary")),
+    "equalities": TableColumn(int, "Rows that are equations.", _count("equalities")),
+    "nonzeros": TableColumn(int, "Nonzeros of the rows.", _count("nonzeros")),
+    "nonlinear_nonzeros": TableColumn(int, "Nonzeros in nonlinear terms.", _count("nonlinear_nonzeros")),
+    "quadratic_rows": TableColumn(int, "Quadratic rows.", _count("quadratic_constraints")),
+    "nonlinear_rows": TableColumn(
         int, "Rows beyond quadratic ones.", _count("polynomial_constraints", "general_constraints")
     ),
-    "linear_terms": Column(int, "Linear terms of the objective.", _count("objective_linear_terms")),
-    "quadratic_terms": Column(int, "Quadratic terms of the objective.", _count("objective_quadratic_terms")),
-    "nonlinear_terms": Column(
+    "linear_terms": TableColumn(int, "Linear terms of the objective.", _count("objective_linear_terms")),
+    "quadratic_terms": TableColumn(
+        int, "Quadratic terms of the objective.", _count("objective_quadratic_terms")
+    ),
+    "nonlinear_terms": TableColumn(
         int,
         "Terms of the objective beyond quadratic ones.",
         _count("objective_higher_terms", "objective_general_terms"),
     ),
-    "vortices": Column(int, "Singularities of the best known field in the entry's norm.", _at("vortices")),
-    "objective": Column(float, "Objective of the best known point.", _at("best", "objective")),
-    "optimum": Column(float, "The same if it is proven optimal.", _optimum),
-    "bound": Column(float, "Best dual bound.", _at("bound")),
-    "gap": Column(float, "Relative gap between both.", _at("gap")),
-    "status": Column(str, "Status: optimal, claimed or open.", _status),
-    "solved": Column(str, "Kind of proof: certificate, tangent or agreement.", _at("solved", "by")),
-    "difficulty": Column(str, "Grade: easy, hard or open.", _at("difficulty")),
-    "proof_seconds": Column(float, "Seconds of the fastest run that proved the optimum.", _proof_seconds),
-    "jumps_file": Column(str, "File of the field with the jumps of the best point.", _at("jumps_file")),
-    "licence": Column(str, "Licence.", _at("licence")),
+    "vortices": TableColumn(
+        int, "Singularities of the best known field in the entry's norm.", _at("vortices")
+    ),
+    "objective": TableColumn(float, "Objective of the best known point.", _at("best", "objective")),
+    "optimum": TableColumn(float, "The same if it is proven optimal.", _optimum),
+    "bound": TableColumn(float, "Best dual bound.", _at("bound")),
+    "gap": TableColumn(float, "Relative gap between both.", _at("gap")),
+    "status": TableColumn(str, "Status: optimal, claimed or open.", _status),
+    "solved": TableColumn(str, "Kind of proof: certificate, tangent or agreement.", _at("solved", "by")),
+    "difficulty": TableColumn(str, "Grade: easy, hard or open.", _at("difficulty")),
+    "proof_seconds": TableColumn(
+        float, "Seconds of the fastest run that proved the optimum.", _proof_seconds
+    ),
+    "jumps_file": TableColumn(str, "File of the field with the jumps of the best point.", _at("jumps_file")),
+    "licence": TableColumn(str, "Licence.", _at("licence")),
 }
 """The columns in order."""
 

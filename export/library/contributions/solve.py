@@ -30,6 +30,7 @@ from ...statuses import Status
 from ..building.build import has_unbuilt_records, rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
+from ..ledger.grades import contradicts, is_better
 from ..ledger.ledger import (
     Ledger,
     Record,
@@ -39,8 +40,7 @@ from ..ledger.ledger import (
     read_ledger,
     write_ledger,
 )
-from ..ledger.points import complete_point, field_of
-from ..ledger.standing import contradicts, is_better
+from ..ledger.points import clipped_field, complete_point
 from ..plan.spec import RUNGS
 
 GAP: Final = 1e-7  # relative gap of a search, smaller than the gap of a proof: points may be infeasible
@@ -68,7 +68,7 @@ def solve_library(
     for name in solvers or ():
         if missing := SOLVERS[_known(name, SOLVERS, "solver")].missing:
             raise MissingSolverError(missing)
-    chosen = dict.fromkeys(solvers or [name for name, each in SOLVERS.items() if not each.missing])
+    chosen = dict.fromkeys(solvers or [name for name, solver in SOLVERS.items() if not solver.missing])
     check_text("by", by)
     check_text("machine", machine)
     library, records = read_library(folder), []
@@ -112,21 +112,25 @@ def drop_refuted(library: Library) -> None:
     ledger = read_ledger(library.folder)
     dropped: dict[Record, Record] = {}
     for document in library.entries:
-        records = ledger.of(document["name"], document["problem_sha256"])
-        measured = [each for each in records if each.bound is not None]
+        records = ledger.records_of(document["name"], document["problem_sha256"])
+        measured = [record for record in records if record.bound is not None]
         best = _best(library, document, ledger) if measured else 0.0
         dropped |= {
-            each: replace(each, bound=None) for each in measured if contradicts(each.bound or 0.0, best)
+            record: replace(record, bound=None)
+            for record in measured
+            if contradicts(record.bound or 0.0, best)
         }
-    write_ledger(replace(ledger, records=tuple(dropped.get(each, each) for each in ledger.records)))
+    write_ledger(replace(ledger, records=tuple(dropped.get(record, record) for record in ledger.records)))
 
 
 def _best(library: Library, document: dict[str, Any], ledger: Ledger) -> float:
     """The least objective of an entry at its best point and at the ledger's fields of its instance."""
     problem, file = problem_of(library, document), document["instance"]["file"]
-    relatives = (each["name"] for each in library.entries if each["instance"]["file"] == file)
-    kept = [record for name in relatives if (record := ledger.with_point(name)) is not None]
-    fields = [field for field in map(ledger.field, kept) if field.instance.sha256 == problem.instance.sha256]
+    relatives = (sidecar["name"] for sidecar in library.entries if sidecar["instance"]["file"] == file)
+    records = [record for name in relatives if (record := ledger.record_with_field(name)) is not None]
+    fields = [
+        field for field in map(ledger.read_field, records) if field.instance.sha256 == problem.instance.sha256
+    ]
     values = [problem.objective_value(complete_point(problem, field)) for field in fields]
     return float(min([document["best"]["objective"], *values]))
 
@@ -146,10 +150,10 @@ class _Solving:
             if document["rung"] not in rungs:
                 continue
             problem = problem_of(self.library, document)
-            have = ledger.of(document["name"], problem.sha256)
+            have = ledger.records_of(document["name"], problem.sha256)
             for solver in solvers:
                 takes = format_for(problem, solver).answer == "yes"
-                if takes and not any(self._covers(each, solver) for each in have):
+                if takes and not any(self._covers(record, solver) for record in have):
                     yield document, solver
 
     def _covers(self, record: Record, solver: str) -> bool:
@@ -175,26 +179,26 @@ class _Solving:
             time_limit=self.limit,
         )
         try:
-            found = self._solve(document, problem, solver)
+            solution = self._solve(document, problem, solver)
         except UnsupportedBySolverError:
             raise
         except (SolverError, SolutionError):
             return record, None
-        if found.interrupted:
+        if solution.interrupted:
             raise KeyboardInterrupt
-        proves, bound = _proves(problem, solver, found), found.bound
-        if bound is None and found.objective is not None and proves:
-            bound = found.objective - GAP * abs(found.objective)
+        proves, bound = _proves(problem, solver, solution), solution.bound
+        if bound is None and solution.objective is not None and proves:
+            bound = solution.objective - GAP * abs(solution.objective)
         record = replace(
             record,
             bound=None if bound is None or contradicts(bound, best) else bound,
-            seconds=None if found.seconds is None else round(found.seconds, 3),
+            seconds=None if solution.seconds is None else round(solution.seconds, 3),
         )
-        if found.point is None:
+        if solution.point is None:
             return record, None
-        field = field_of(found.problem, found.point)
+        field = clipped_field(solution.problem, solution.point)
         primal = problem.objective_value(complete_point(problem, field))
-        feasible = found.status in {Status.OPTIMAL_LOCAL, Status.FEASIBLE}
+        feasible = solution.status in {Status.OPTIMAL_LOCAL, Status.FEASIBLE}
         status: RunStatus = "optimal" if proves else "feasible" if feasible else "limit"
         return replace(record, status=status, primal=primal), field if is_better(primal, best) else None
 
@@ -203,17 +207,17 @@ class _Solving:
         limits, start = Limits(self.limit, GAP, 1), None
         if SOLVERS[solver].bundled:
             known = read_solution(self.library.folder / document["best"]["point"], problem)
-            start = None if known.point is None else field_of(known.problem, known.point)
+            start = None if known.point is None else clipped_field(known.problem, known.point)
         with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-            found = self.solvers.solve(problem, solver, folder=folder, limits=limits, start=start)
-            if not found.interrupted and not list(Path(folder).glob("*.log")):
+            solution = self.solvers.solve(problem, solver, folder=folder, limits=limits, start=start)
+            if not solution.interrupted and not list(Path(folder).glob("*.log")):
                 raise SolverError(f"the time limit of {self.limit:g} s left no time to start {solver}")
-        return found
+        return solution
 
 
-def _proves(problem: Problem, solver: str, found: Solution) -> bool:
+def _proves(problem: Problem, solver: str, solution: Solution) -> bool:
     """Whether the solver ended with a proof of a global optimum."""
-    if found.problem.formulation.weakened or not (problem.convex or SOLVERS[solver].proves == "global"):
+    if solution.problem.formulation.weakened or not (problem.convex or SOLVERS[solver].proves == "global"):
         return False
-    local = problem.convex and found.status == Status.OPTIMAL_LOCAL
-    return SOLVERS[solver].proves != "local" and (found.status == Status.OPTIMAL_GLOBAL or local)
+    local = problem.convex and solution.status == Status.OPTIMAL_LOCAL
+    return SOLVERS[solver].proves != "local" and (solution.status == Status.OPTIMAL_GLOBAL or local)

@@ -27,19 +27,20 @@ from ...solutions.readers.registry import read_raw
 from ...solutions.solution import read_solution
 from ...solvers_table import SOLVERS
 from ...writing.stamps import is_stated
-from ..building.build import has_unbuilt_records, rebuilt
-from ..documents.documents import Library, about_file, folder_of, problem_of, read_about, read_library
+from ..building.build import has_unbuilt_records, rebuild_locked
+from ..documents.documents import Library, about_file, existing_folder, problem_of, read_about, read_library
 from ..documents.lock import locked
-from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import Record, read_ledger, write_ledger
-from ..ledger.points import complete_point, field_of
-from ..ledger.standing import FEASIBLE, SAME, contradicts, is_better
+from ..ledger.grades import FEASIBLE, SAME, contradicts, is_better
+from ..ledger.ledger import LEDGER, Record, read_ledger, write_ledger
+from ..ledger.points import clipped_field, complete_point
 from ..plan.recipe import norm_minimised
-from .sources import Source, sources_of
+from .submitted_files import SubmittedFile, find_submitted_files
 
 Outcome = Literal["accepted", "not better", "refused", "skipped"]
 
-_TITLES: Final = {name.lower(): each.title for each in SOLVERS.values() for name in (each.name, each.title)}
+_TITLES: Final = {
+    name.lower(): solver.title for solver in SOLVERS.values() for name in (solver.name, solver.title)
+}
 """Titles of solvers by their names and titles in lower case."""
 
 
@@ -76,9 +77,9 @@ _NOTHING_STATED: Final = RunFacts()
 class Submission:
     """Result of submitting a file.
 
-    kind: of `Source`. outcome: `skipped` for unknown files in a submitted folder. entries: those that the
-    file improves, or else all that it fits. objective, known: of its point and of the best point before, for
-    the first entry; status: of that entry afterwards.
+    kind: of `SubmittedFile`. outcome: `skipped` for unknown files in a submitted folder. entries: those that
+    the file improves, or else all that it fits. objective, known: of its point and of the best point before,
+    for the first entry; status: of that entry afterwards.
     """
 
     file: Path
@@ -120,23 +121,23 @@ def submit(
     version's library, an unknown entry, no files, and facts that a ledger cannot hold; OutputError.
     """
     facts.record({"name": "cf_none", "problem_sha256": "0" * 64}, 0.0).check()
-    library = read_library(folder_of(folder))
+    library = read_library(existing_folder(folder))
     if library.document["generator"] != generator():
-        made = library.document["generator"]
-        raise InputError(f"was built by {made}; submit with that version, or build it again", file=folder)
+        builder = library.document["generator"]
+        raise InputError(f"was built by {builder}; submit with that version, or build it again", file=folder)
     with locked(library.folder, "a submission", progress):
         if has_unbuilt_records(library):
-            library = rebuilt(library.folder, progress=progress)
+            library = rebuild_locked(library.folder, progress=progress)
         if entry is not None:
             library.entry(entry)
         session = _Session(library, entry, facts)
         results = []
-        for source in sources_of(files):
-            progress(f"checking {source.path.name}")
-            results.append(session.check(source))
+        for submitted in find_submitted_files(files):
+            progress(f"checking {submitted.path.name}")
+            results.append(session.check(submitted))
         if any(result.outcome == "accepted" for result in results):
             write_ledger(session.ledger)
-            library = rebuilt(library.folder, progress=progress)
+            library = rebuild_locked(library.folder, progress=progress)
         return [
             replace(result, status=library.entry(result.entries[0])["status"]) if result.entries else result
             for result in results
@@ -162,7 +163,7 @@ class _Session:
     def __post_init__(self) -> None:
         self.ledger = read_ledger(self.library.folder)
 
-    def check(self, source: Source) -> Submission:
+    def check(self, submitted: SubmittedFile) -> Submission:
         """Check a file and add its improvements to the ledger."""
         checks = {
             "solution": self._check_solution,
@@ -170,16 +171,16 @@ class _Session:
             "certificate": self._check_certificate,
         }
         try:
-            if source.error is not None:
-                raise source.error
-            if source.kind:
-                return checks[source.kind](source.path)
-            if source.listed:
+            if submitted.error is not None:
+                raise submitted.error
+            if submitted.kind:
+                return checks[submitted.kind](submitted.path)
+            if submitted.listed:
                 what = "is no solution, field or certificate; give one of these"
-                raise InputError(what, file=source.path)
+                raise InputError(what, file=submitted.path)
         except CrossfieldError as error:
-            return Submission(source.path, source.kind, "refused", error=error)
-        return Submission(source.path, "", "skipped")
+            return Submission(submitted.path, submitted.kind, "refused", error=error)
+        return Submission(submitted.path, "", "skipped")
 
     def _problem(self, sidecar: dict[str, Any]) -> Problem:
         """The problem of an entry, formulated once."""
@@ -244,7 +245,7 @@ class _Session:
             )
         # Every other column follows from angles and jumps, so a solver's tolerance there does not count.
         violation = problem.violation(complete_point(problem, solution.field))
-        clipped = field_of(solution.problem, solution.point)
+        clipped = clipped_field(solution.problem, solution.point)
         integrality = solution.violation.integrality
         self._check_objective(path, sidecar, clipped, replace(violation, integrality=integrality))
         return clipped
@@ -317,7 +318,7 @@ class _Session:
         )
         if improves:
             data = read_bytes(path)
-            self.ledger = self.ledger.certified(stem, norm, instance.sha256, data, self.facts.by)
+            self.ledger = self.ledger.with_certificate(stem, norm, instance.sha256, data, self.facts.by)
             self.certified[stem, norm] = certificate.bound
             self.fields.setdefault(instance.sha256, []).append(certificate.field)
             for name in names:
@@ -342,14 +343,14 @@ class _Session:
     # points
 
     def _keep_field(self, better: CrossField, sidecar: dict[str, Any], objective: float) -> None:
-        self.ledger, _ = self.ledger.added(self.facts.record(sidecar, objective), better)
+        self.ledger, _ = self.ledger.with_record(self.facts.record(sidecar, objective), better)
         self.fields.setdefault(sidecar["instance"]["sha256"], []).append(better)
 
     def _least_objective(self, sidecar: dict[str, Any]) -> float:
         """The least objective of an entry at its best point and at fields accepted in this call."""
         problem = self._problem(sidecar)
         accepted = self.fields.get(sidecar["instance"]["sha256"], [])
-        values = [problem.objective_value(complete_point(problem, each)) for each in accepted]
+        values = [problem.objective_value(complete_point(problem, field)) for field in accepted]
         return float(min([sidecar["best"]["objective"], *values]))
 
     def _check_objective(

@@ -87,10 +87,10 @@ STAMP = re.compile(r"(?:sha256_|\b(?:t_)?ONE_)([0-9a-f]{11})", re.IGNORECASE | r
 Entry = tuple[int, Decimal]
 Product = tuple[int, int, Decimal]
 Matrix = dict[tuple[int, int], Decimal]
-Place = tuple[Decimal, str]
+Excess = tuple[Decimal, str]
 Jump = tuple[Decimal, Decimal]
 Interval = tuple[Optional[Decimal], Optional[Decimal]]
-Kind = TypeVar("Kind")
+Content = TypeVar("Content")
 
 
 class BadInputError(Exception):
@@ -98,7 +98,7 @@ class BadInputError(Exception):
 
 
 @dataclass
-class Column:
+class ModelColumn:
     """A column: bounds, None where there is none, and whether it is integer."""
 
     name: str
@@ -131,7 +131,7 @@ class Row:
 class Model:
     """A model: columns and rows by name, the objective, and the stamps of problems in its names."""
 
-    columns: list[Column] = field(default_factory=list)
+    columns: list[ModelColumn] = field(default_factory=list)
     number: dict[str, int] = field(default_factory=dict)
     rows: dict[str, Row] = field(default_factory=dict)
     objective: Row | None = None
@@ -158,7 +158,7 @@ class Model:
 
 
 @dataclass
-class Finding:
+class PointReport:
     """Result of the check of a point.
 
     Objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind, and
@@ -167,7 +167,7 @@ class Finding:
 
     objective: Decimal
     lines: list[tuple[str, str]]
-    violations: dict[str, Place]
+    violations: dict[str, Excess]
     agrees: bool = True
 
     @property
@@ -240,7 +240,7 @@ class MpsReader:
         self.numbers: dict[str, Decimal] = {}  # coefficients are few, so each is converted once
         self.integer = False
         self.current: tuple[str, set[str]] = ("", set())
-        self.given: set[tuple[str, str]] = set()  # (section, row) or (end of a bound, column)
+        self.seen: set[tuple[str, str]] = set()  # (section, row) or (end of a bound, column)
         self.matrices: dict[tuple[str, str], Matrix] = {}
         self.matrix: Matrix = {}
         self.readers = {
@@ -312,7 +312,7 @@ class MpsReader:
             _require(name not in model.number, f"the entries of column {name[:40]} do not follow each other")
             model.stamps.update(stamps_in(name))
             model.number[name] = len(model.columns)
-            model.columns.append(Column(name, self.integer))
+            model.columns.append(ModelColumn(name, self.integer))
             self.current = (name, set())
         for row, value in _pairs(words, 1):
             if row in self.current[1]:
@@ -323,9 +323,9 @@ class MpsReader:
     def side(self, words: list[str]) -> None:
         """Read right sides, after the name of their set; that of the objective is minus its constant."""
         for name, value in _pairs(words, len(words) % 2):
-            if ("RHS", name) in self.given:
+            if ("RHS", name) in self.seen:
                 raise BadInputError(f"{name[:40]} is there twice")
-            self.given.add(("RHS", name))
+            self.seen.add(("RHS", name))
             self.model.row(name).side = self.value(value)
 
     def bound(self, words: list[str]) -> None:
@@ -340,9 +340,9 @@ class MpsReader:
         column = self.model.columns[self.model.column(name)]
         value = self.limit(words[3], ends) if valued else None
         for end in ends:
-            if (end, name) in self.given:
+            if (end, name) in self.seen:
                 raise BadInputError(f"{name[:40]} has two {end} bounds")
-            self.given.add((end, name))
+            self.seen.add((end, name))
         if "lower" in ends:
             column.lower = value
         if "upper" in ends:
@@ -369,7 +369,7 @@ class MpsReader:
         _require(self.model.objective is not None, "holds no objective")
         for column in self.model.columns:  # solvers differ on bounds that are left out
             for end in ("lower", "upper"):
-                _require((end, column.name) in self.given, f"{column.name[:40]} has no {end} bound")
+                _require((end, column.name) in self.seen, f"{column.name[:40]} has no {end} bound")
         for (section, name), matrix in self.matrices.items():
             held = self.model.row(name) if name else self.model.objective
             assert held is not None
@@ -395,14 +395,14 @@ def _products(section: str, matrix: Matrix) -> list[Product]:
 
 
 @dataclass
-class Point:
+class NamedPoint:
     """Values by name, the objective that the file claims, if any, and the stamps of problems in it."""
 
     values: dict[str, Decimal] = field(default_factory=dict)
     claimed: Decimal | None = None
     stamps: set[str] = field(default_factory=set)
 
-    def of(self, columns: Iterable[Column]) -> list[Decimal]:
+    def of(self, columns: Iterable[ModelColumn]) -> list[Decimal]:
         """The values of columns in order: 0 where one is left out, or what it is fixed to."""
         values = []
         for column in columns:
@@ -411,17 +411,17 @@ class Point:
             values.append(self.values.get(column.name, default))
         return values
 
-    def spelled(self, names: Iterable[str]) -> Point:
+    def spelled(self, names: Iterable[str]) -> NamedPoint:
         """The point under the names of columns that it has in another case, in quotes or with a prefix."""
         own = {name.lower(): name for name in names}
-        known, renamed = set(own.values()), Point(claimed=self.claimed, stamps=self.stamps)
+        known, renamed = set(own.values()), NamedPoint(claimed=self.claimed, stamps=self.stamps)
         for name, value in self.values.items():
             words = [word.decode() for word in spellings(name.encode())] if name not in known else []
             _keep(renamed, next((own[word] for word in words if word in own), name), value)
         return renamed
 
 
-def read_point(path: str) -> Point:
+def read_point(path: str) -> NamedPoint:
     """The point in a file."""
     data = bytearray()
     with reading(path) as stream:
@@ -442,7 +442,7 @@ def read_point(path: str) -> Point:
     except LineError as error:
         raise BadInputError(str(error)) from None
     _require(scan.has_point, "the file holds no point")
-    point = Point(claimed=_value(scan.claims["objective"]) if "objective" in scan.claims else None)
+    point = NamedPoint(claimed=_value(scan.claims["objective"]) if "objective" in scan.claims else None)
     point.stamps = stamps_in(text[:HEAD].decode("utf-8", "replace"))
     for name, value in entries[scan.first :]:
         point.stamps |= stamps_in(name.decode("utf-8", "replace"))
@@ -454,7 +454,7 @@ def _value(word: bytes) -> Decimal:
     return number(plain_numbers(word).decode("ascii", "replace"))
 
 
-def _keep(point: Point, name: str, value: Decimal) -> None:
+def _keep(point: NamedPoint, name: str, value: Decimal) -> None:
     """Keep the value of a column, which may be there twice if the values are equal."""
     _require(point.values.setdefault(name, value) == value, f"{name[:40]} has two values")
 
@@ -462,7 +462,7 @@ def _keep(point: Point, name: str, value: Decimal) -> None:
 # ------------------------------------------------------------------------------------------ MPS against point
 
 
-def check_model(model: Model, point: Point) -> Finding:
+def check_model(model: Model, point: NamedPoint) -> PointReport:
     """Check a point against a model without rounding errors."""
     others = sorted(point.stamps - model.stamps) if model.stamps else []
     _require(not others, f"the point is of another problem: it states {''.join(others[:1])}")
@@ -489,7 +489,7 @@ def check_model(model: Model, point: Point) -> Finding:
         ),
         "integers": _worst((abs(v - _nearest(v)), c.name) for c, v in integers),
     }
-    return Finding(objective, lines, violations, agrees=agrees)
+    return PointReport(objective, lines, violations, agrees=agrees)
 
 
 def _refuse_foreign(names: list[str], count: int) -> None:
@@ -515,7 +515,7 @@ def _outside(value: Decimal, interval: Interval) -> Decimal:
     return max(below, above, ZERO)
 
 
-def _worst(violations: Iterable[Place]) -> Place:
+def _worst(violations: Iterable[Excess]) -> Excess:
     """The largest violation and its place; the first of equal ones."""
     return max(violations, key=lambda violation: violation[0], default=(ZERO, ""))
 
@@ -547,7 +547,7 @@ class Pixel:
 
 
 @dataclass
-class Instance:
+class SketchInstance:
     """An instance: pixels, pairs (place, first, second), and the weights of the energy."""
 
     pixels: list[Pixel]
@@ -562,7 +562,7 @@ class Instance:
         return math.floor(-2 * high / math.pi + 1e-9), math.ceil(-2 * low / math.pi - 1e-9)
 
 
-def read_instance(path: str) -> Instance:
+def read_instance(path: str) -> SketchInstance:
     """The instance in a JSON file."""
     text, size = [], 0
     for _, line in lines_of(path):
@@ -588,10 +588,10 @@ def _no_constant(text: str) -> NoReturn:
 
 def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
     """A JSON object, each of whose keys is there once: programs differ on which one counts."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    values = dict(pairs)
+    if len(values) < len(pairs):
         raise ValueError("a key is there twice")
-    return found
+    return values
 
 
 def _real(value: object, least: float, most: float) -> float:
@@ -601,7 +601,7 @@ def _real(value: object, least: float, most: float) -> float:
     return float(value)
 
 
-def _instance(document: dict[str, object]) -> Instance:
+def _instance(document: dict[str, object]) -> SketchInstance:
     mask, strokes = document["mask"], document["strokes"]
     gauge = document.get("gauge", "strokes")
     if not (isinstance(mask, list) and isinstance(strokes, list)) or gauge not in ("strokes", "box"):
@@ -622,7 +622,7 @@ def _instance(document: dict[str, object]) -> Instance:
     weights = [
         Decimal(_real(document.get(*item), 0, MOST_WEIGHT)) for item in (("w_strokes", 1.0), ("w_beta", 1e-6))
     ]
-    return Instance(pixels, pairs, *weights)
+    return SketchInstance(pixels, pairs, *weights)
 
 
 def _held(strokes: Any) -> dict[tuple[int, int], Stroke]:
@@ -639,7 +639,7 @@ def _held(strokes: Any) -> dict[tuple[int, int], Stroke]:
 class Field:
     """The cross field of a point: angles, and the jump of each pair as p, or as p1 and p2."""
 
-    def __init__(self, instance: Instance, point: Point) -> None:
+    def __init__(self, instance: SketchInstance, point: NamedPoint) -> None:
         self.instance = instance
         get = point.values.get
         self.alpha = [get(f"alpha_{pixel.place}", ZERO) for pixel in instance.pixels]
@@ -678,7 +678,7 @@ class Field:
                 strokes += pixel.stroke[1] * size(alpha + beta - pixel.stroke[0])
         return TWO * smooth + self.instance.w_strokes * strokes + self.instance.w_beta * skew
 
-    def violations(self) -> dict[str, Place]:
+    def violations(self) -> dict[str, Excess]:
         """Windows of alpha, bounds of beta, ranges of jumps, integrality."""
         quarter = (-PI / 4, PI / 4)
         bounds = []
@@ -695,7 +695,7 @@ class Field:
         return {"bounds": _worst(bounds), "integers": _worst(integers)}
 
 
-def check_instance(instance: Instance, point: Point) -> Finding:
+def check_instance(instance: SketchInstance, point: NamedPoint) -> PointReport:
     """Check the cross field of a point on an instance."""
     places = {
         "pixels": {pixel.place for pixel in instance.pixels},
@@ -717,7 +717,7 @@ def check_instance(instance: Instance, point: Point) -> Finding:
     ]
     if not tags & {"p", "p1", "p2"}:
         lines.append(("jumps", "none in the point: taken as 0; of qp-fixed they are data, see its .mps"))
-    return Finding(energy, lines, field.violations())
+    return PointReport(energy, lines, field.violations())
 
 
 def _is_of(name: str, places: dict[str, set[str]]) -> bool:
@@ -739,7 +739,7 @@ def _brief(value: Decimal) -> str:
     return "0" if value == 0 else f"{float(value):.3g}"
 
 
-def check(model: str, point: str) -> Finding:
+def check(model: str, point: str) -> PointReport:
     """Check the point in a file against the model or the instance in another one."""
     with decimal.localcontext(EXACT):
         values = _of_file(point, read_point)
@@ -748,7 +748,7 @@ def check(model: str, point: str) -> Finding:
         return _of_file(model, lambda path: check_model(MpsReader().read(lines_of(path)), values))
 
 
-def _of_file(path: str, read: Callable[[str], Kind]) -> Kind:
+def _of_file(path: str, read: Callable[[str], Content]) -> Content:
     """Read a file, whose name begins every error."""
     try:
         return read(path)
@@ -763,20 +763,20 @@ def _is_json(path: str) -> bool:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check a point and print a report; the exit code."""
     try:
-        given = _arguments(arguments)
-        finding = check(given.model, given.point)
+        options = _arguments(arguments)
+        report = check(options.model, options.point)
     except BadInputError as error:
         print(f"check_point: {error}", file=sys.stderr)
         return 2
-    for label, text in finding.lines:
+    for label, text in report.lines:
         print(f"{label:<10}{text}")
-    for kind, (value, place) in finding.violations.items():
+    for kind, (value, place) in report.violations.items():
         print(f"{kind:<10}{_brief(value)}{f' at {place}' if value else ''}")
-    feasible = finding.worst <= given.tolerance
-    print(f"{'feasible' if feasible else 'NOT feasible'} within {_brief(given.tolerance)}")
-    if not finding.agrees:
+    feasible = report.worst <= options.tolerance
+    print(f"{'feasible' if feasible else 'NOT feasible'} within {_brief(options.tolerance)}")
+    if not report.agrees:
         print("NOT the objective that the file claims")
-    return 0 if feasible and finding.agrees else 1
+    return 0 if feasible and report.agrees else 1
 
 
 class _Parser(argparse.ArgumentParser):
@@ -793,10 +793,10 @@ def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("model", metavar="MODEL", help=".mps, .mps.gz or .instance.json")
     parser.add_argument("point", metavar="POINT", help="a solution file, or names and values; may be .gz")
     parser.add_argument("--tolerance", default="1e-8", help="greatest violation of a feasible point (1e-8)")
-    given = parser.parse_args(arguments)
-    given.tolerance = number(given.tolerance)
-    _require(given.tolerance >= 0, "the tolerance must not be negative")
-    return given
+    options = parser.parse_args(arguments)
+    options.tolerance = number(options.tolerance)
+    _require(options.tolerance >= 0, "the tolerance must not be negative")
+    return options
 
 
 if __name__ == "__main__":

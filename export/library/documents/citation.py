@@ -12,7 +12,7 @@ from ..plan.spec import Sketch, Spec
 
 LICENCES: Final = (
     "CC0-1.0",
-    *(f"CC-{each}-4.0" for each in ("BY", "BY-SA", "BY-NC", "BY-ND", "BY-NC-SA", "BY-NC-ND")),
+    *(f"CC-{kind}-4.0" for kind in ("BY", "BY-SA", "BY-NC", "BY-ND", "BY-NC-SA", "BY-NC-ND")),
     "MIT",
 )
 """SPDX identifiers of known licences."""
@@ -30,28 +30,28 @@ REFERENCES: Final = (
 )
 
 
-def cited(spec: Spec) -> dict[str, Any]:
+def release_facts(spec: Spec) -> dict[str, Any]:
     """Return the release as in library.json: title, authors, and stated version and date."""
     return {"title": spec.title, **({"authors": []} if spec.release is None else spec.release.document())}
 
 
 def citation_of(spec: Spec) -> str:
     """Return one line that cites a library."""
-    release = cited(spec)
+    release = release_facts(spec)
     authors = f"{', '.join(release['authors'])}: " if release["authors"] else ""
     version = f", version {release['version']}" if "version" in release else ""
     day = f", {release['date']}" if "date" in release else ""
     return f"{authors}{spec.title}{version}{day}"
 
 
-def terms(sketches: Sequence[Sketch]) -> dict[str, Any]:
+def licence_terms(sketches: Sequence[Sketch]) -> dict[str, Any]:
     """Return the licences of sketches for the texts of a library.
 
     licence: the known licence of all sketches, or empty; known: identifiers of all known licences; lines:
     one per sketch with its origin.
     """
-    stated = list(dict.fromkeys(each.origin.license for each in sketches))
-    known = [each for each in stated if each in LICENCES]
+    stated = list(dict.fromkeys(sketch.origin.license for sketch in sketches))
+    known = [licence for licence in stated if licence in LICENCES]
     licence = known[0] if len(stated) == len(known) == 1 else ""
     return {"licence": licence, "known": known, "lines": list(map(_line, sketches))}
 

@@ -6,7 +6,6 @@ Their schemas are the files library-*.schema.json in this folder.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -21,7 +20,7 @@ from ....models.formulations.problem import Problem, formulate, with_windows
 from ....models.instance.file import read_document, read_instance
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.proof.tightening import windows_left
-from ....models.storage import read_bytes, sha256_of
+from ....models.storage import read_bytes
 from ..plan.spec import Spec, spec_of
 
 FORMAT: Final = "crossfield-library-entry"
@@ -45,7 +44,7 @@ class Library:
 
     def entry(self, name: str) -> dict[str, Any]:
         """Read the sidecar of an entry. Raises InputError for a name that the library does not have."""
-        if name not in self.document["sha256"]:
+        if name not in self.document["entries"]:
             near = get_close_matches(name, self.document["entries"], 1)
             asked = f" (is it {near[0]}?)" if near else ""
             raise InputError(f"has no entry {name[:60]!r}{asked}; library.json lists them", file=self.folder)
@@ -62,7 +61,7 @@ class Library:
         return spec_of(self.document["spec"], self.folder / INDEX)
 
 
-def folder_of(path: str | Path) -> Path:
+def existing_folder(path: str | Path) -> Path:
     """Return the path of a folder. Raises InputError for a file, such as a release, or a missing folder."""
     if Path(path).is_file():
         raise InputError("is a file; unpack it, as with `tar -xzf`, and give the folder", file=path)
@@ -109,7 +108,7 @@ def about_file(instance: str) -> str:
     return f"{instance}.about.json"
 
 
-def as_bytes(document: dict[str, Any]) -> bytes:
+def document_bytes(document: dict[str, Any]) -> bytes:
     """Return a document as the bytes of its file."""
     return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
@@ -153,11 +152,16 @@ def listed_jumps(problem: Problem) -> list[list[int]] | None:
     if problem.jumps is None:
         return None
     at = np.nonzero(problem.jumps)[0]
-    found: list[list[int]] = np.stack([at, problem.jumps[at]], axis=1).tolist()
-    return found
+    listed: list[list[int]] = np.stack([at, problem.jumps[at]], axis=1).tolist()
+    return listed
 
 
-def are_whole(folder: Path, files: Iterable[dict[str, Any]]) -> bool:
-    """Whether every listed file is in the folder with its SHA-256."""
-    paths = ((folder / each["name"], each["sha256"]) for each in files)
-    return all(path.is_file() and sha256_of(path) == expected for path, expected in paths)
+def files_of_entry(sidecar: dict[str, Any]) -> list[str]:
+    """Return the names of the model files and points of an entry."""
+    return [file["name"] for file in sidecar["files"]]
+
+
+def files_of_instance(about: dict[str, Any]) -> list[str]:
+    """Return the names of the files of an instance: the instance itself, its fields and certificates."""
+    named = [about["instance"], *about["fields"].values(), *about.get("certificates", {}).values()]
+    return list(dict.fromkeys(facts["file"] for facts in named))

@@ -18,7 +18,7 @@ from filelock import FileLock, Timeout
 from ....models.errors import OutputError, shortened
 from ....models.processes.deadline import Progress, silent
 
-FILE: Final = ".lock"
+LOCK: Final = ".lock"
 PATIENCE: Final = 600.0  # seconds that a process waits for another one to end
 
 
@@ -28,7 +28,7 @@ def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[N
 
     action: shown to processes that wait.
     """
-    path = folder / FILE
+    path = folder / LOCK
     lock = FileLock(path, timeout=PATIENCE, poll_interval=0.1)
     try:
         try:
@@ -57,7 +57,9 @@ def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[N
         lock.release()
 
 
-def unchanged(folder: Path, action: str, progress: Progress = silent) -> AbstractContextManager[None]:
+def locked_if_writable(
+    folder: Path, action: str, progress: Progress = silent
+) -> AbstractContextManager[None]:
     """Lock a folder for reading, unless it cannot be written."""
     return locked(folder, action, progress) if os.access(folder, os.W_OK) else nullcontext()
 

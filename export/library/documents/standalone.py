@@ -13,7 +13,7 @@ _ROOT: Final = Path(__file__).parents[3]
 _WIDTH: Final = 110
 
 
-def standalone(path: Path) -> bytes:
+def standalone_program(path: Path) -> bytes:
     """The text of a module in which relative imports are replaced by what they import.
 
     An import from `models/` becomes the values that it names, any other the whole module.

@@ -6,18 +6,16 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ....models.formulations.arrays import ProblemArrays
 from ....models.formulations.families import PlacedFamily
 from ....models.formulations.problem import Problem
-from ....models.instance.grid import Bools, Floats
+from ....models.instance.grid import Floats
 from ....models.instance.instance import Instance
 from ...writing.canonical import Canonical
 from ...writing.curvature import of_objective, of_rows
 
 
-def sizes(instance: Instance) -> dict[str, int]:
+def instance_sizes(instance: Instance) -> dict[str, int]:
     """Return the numbers of pixels, stroke pixels and pairs."""
     grid = instance.grid
     return {"pixels": grid.size, "strokes": len(instance.theta), "pairs": len(grid.first)}
@@ -28,7 +26,7 @@ def density(instance: Instance) -> float:
     return round(len(instance.theta) / instance.grid.size, 4)
 
 
-def counts(problem: Problem) -> dict[str, int]:
+def problem_counts(problem: Problem) -> dict[str, int]:
     """Return the numbers of columns, rows, nonzeros and terms by kind."""
     return _columns(problem) | _rows(problem) | _terms(problem)
 
@@ -71,61 +69,6 @@ def _nonlinear_variables(family: PlacedFamily) -> int:
     return len({symbol for term in family.terms if term.degree > 1 for symbol in term.symbols})
 
 
-def row_classes(problem: Problem) -> dict[str, int]:
-    """Return the numbers of linear rows by the class that MIPLIB 2017 gives them, by name.
-
-    A row belongs to the first class that fits, with binary columns replaced by their complements if needed.
-    """
-    arrays = problem.to_arrays(names=False)
-    linear = np.zeros(problem.n_rows, dtype=bool)
-    for family in problem.rows:
-        linear[arrays.family_rows[family.family.tag]] = family.degree <= 1
-    names, numbers = np.unique(classes_of_rows(arrays)[linear], return_counts=True)
-    return dict(zip(names.tolist(), numbers.tolist(), strict=True))
-
-
-def classes_of_rows(arrays: ProblemArrays) -> NDArray[np.str_]:
-    """Return the class of each row, as if it were linear."""
-    rows, m = arrays.a.tocoo(), arrays.a.shape[0]
-    at, column = rows.coords
-    above = np.isfinite(arrays.row_upper)
-    value = rows.data * np.where(above, 1.0, -1.0)[at]  # all rows as equations or with an upper side
-    side = np.where(above, arrays.row_upper, -arrays.row_lower)
-    equal = arrays.row_lower == arrays.row_upper
-    is_binary = (arrays.integer & (arrays.lower == 0) & (arrays.upper == 1))[column]
-
-    def number(which: Bools) -> NDArray[np.intp]:
-        return np.bincount(at[which], minlength=m)
-
-    count, binary, integer = number(value != 0), number(is_binary), number(arrays.integer[column])
-    units, whole = number(np.abs(value) == 1) == count, number(value == np.round(value)) == count
-    complement = side + np.bincount(at, np.where(is_binary & (value < 0), -value, 0.0), m)
-    opposite = np.bincount(at, value, m) == 0
-    same = (binary == count) | (integer == 0) | ((integer == count) & (binary == 0))
-    largest = np.zeros(m)
-    np.maximum.at(largest, at, np.abs(value))
-    two, all_binary = count == 2, binary == count
-    sets, sums = all_binary & units, all_binary & whole
-    fits = {
-        "empty": count == 0,
-        "singleton": count == 1,
-        "aggregation": equal & two,
-        "precedence": ~equal & two & opposite & same,
-        "variable bound": ~equal & two & (binary > 0),
-        "set partitioning": sets & equal & (complement == 1),
-        "set packing": sets & ~equal & (complement == 1),
-        "set covering": sets & ~equal & (complement == count - 1),
-        "cardinality": sets & equal,
-        "invariant knapsack": sets & ~equal,
-        "equation knapsack": sums & equal,
-        "bin packing": sums & ~equal & (largest == complement),
-        "knapsack": sums & ~equal,
-        "integer knapsack": (integer == count) & ~equal & whole,
-        "mixed binary": (binary > 0) & (integer == binary),
-    }
-    return np.select(list(fits.values()), list(fits), default="general linear")
-
-
 def _terms(problem: Problem) -> dict[str, int]:
     degree = problem.objective_degree
     higher = range(3, degree + 1) if degree < 99 else range(3, 5)
@@ -133,12 +76,12 @@ def _terms(problem: Problem) -> dict[str, int]:
     return {
         "objective_linear_terms": len(problem.merged_objective(1)[1]),
         "objective_quadratic_terms": len(problem.merged_objective(2)[1]),
-        "objective_higher_terms": sum(len(problem.merged_objective(each)[1]) for each in higher),
+        "objective_higher_terms": sum(len(problem.merged_objective(power)[1]) for power in higher),
         "objective_general_terms": general,
     }
 
 
-def curvature(problem: Problem) -> dict[str, Any]:
+def problem_curvature(problem: Problem) -> dict[str, Any]:
     """Return the curvature of objective and rows, and the reason for the former."""
     objective, reason = of_objective(problem)
     return {"objective": objective, "constraints": of_rows(problem), "reason": reason}

@@ -15,20 +15,19 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from ....models.errors import InputError, InstanceError, naming, shortened
+from ....models.errors import InputError, naming, shortened
 from ....models.field.field import CrossField, Norm
 from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import read_document, schema_error
 from ....models.processes.groups import catch_interrupts
 from ....models.storage import read_bytes, write_bytes
 from .. import documents
-from ..plan.spec import day
+from ..plan.spec import check_day
 
 FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
-FILE: Final = "ledger.json"
+LEDGER: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
-_LATER: Final = ("machine", "date")  # absent if empty
 _LONGEST: Final = 200  # characters of a text
 _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 
@@ -53,7 +52,6 @@ class Record:
     time_limit: float | None = None
     by: str | None = None
     point: str | None = None
-    point_sha256: str | None = None
     machine: str | None = None
     date: str | None = None
 
@@ -71,7 +69,7 @@ class Record:
                 f"version is {shortened(self.version)!r}; give at most 60 letters, digits, blanks and "
                 ". , _ + - ( ), beginning with a letter or a digit"
             )
-        day(self.date or "", "date")
+        check_day(self.date or "", "date")
         for name in ("primal", "bound", "seconds", "threads", "time_limit"):
             value = getattr(self, name)
             least, sign = (-math.inf, "") if name in ("primal", "bound") else (0, " that is not negative")
@@ -85,13 +83,12 @@ class Record:
 
 @dataclass(frozen=True)
 class SubmittedCertificate:
-    """A submitted certificate. instance: its name; sha256: of the file; by: who submitted it."""
+    """A submitted certificate. instance: its name; by: who submitted it."""
 
     instance: str
     norm: Norm
     instance_sha256: str
     file: str
-    sha256: str
     by: str | None = None
 
     @property
@@ -109,37 +106,37 @@ class Ledger:
     certificates: tuple[SubmittedCertificate, ...] = ()
     unwritten: Mapping[str, bytes] = field(default_factory=dict)
 
-    def of(self, entry: str, problem_sha256: str) -> list[Record]:
+    def records_of(self, entry: str, problem_sha256: str) -> list[Record]:
         """Return the records of an entry about this problem."""
-        return [each for each in self.records if (each.entry, each.problem_sha256) == (entry, problem_sha256)]
+        return [
+            record
+            for record in self.records
+            if (record.entry, record.problem_sha256) == (entry, problem_sha256)
+        ]
 
-    def with_point(self, entry: str) -> Record | None:
+    def record_with_field(self, entry: str) -> Record | None:
         """Return the record whose field is kept for an entry: the last one with a field."""
-        return next((each for each in reversed(self.records) if each.entry == entry and each.point), None)
+        return next(
+            (record for record in reversed(self.records) if record.entry == entry and record.point), None
+        )
 
     @property
     def files(self) -> list[str]:
         """Names of all files of records and certificates."""
-        points = [each.point for each in self.records if each.point is not None]
-        return [*points, *(each.file for each in self.certificates)]
+        points = [record.point for record in self.records if record.point is not None]
+        return [*points, *(certificate.file for certificate in self.certificates)]
 
-    def content(self, name: str, sha256: str | None) -> bytes:
-        """Return the content of a file. Raises InputError if it is missing, InstanceError if it differs."""
-        data = self.unwritten[name] if name in self.unwritten else read_bytes(self.folder / name)
-        if hashlib.sha256(data).hexdigest() != sha256:
-            raise InstanceError(
-                "is another file than the one its ledger names; restore it, or submit it again",
-                file=self.folder / name,
-            )
-        return data
+    def read_file(self, name: str) -> bytes:
+        """Return the content of a file. Raises InputError if it is missing."""
+        return self.unwritten[name] if name in self.unwritten else read_bytes(self.folder / name)
 
-    def field(self, record: Record) -> CrossField:
-        """Return the field of a record. Raises as `content`."""
-        data = self.content(str(record.point), record.point_sha256)
+    def read_field(self, record: Record) -> CrossField:
+        """Return the field of a record. Raises InputError, InstanceError for a missing or damaged file."""
+        data = self.read_file(str(record.point))
         with naming(self.folder / str(record.point)):
             return field_of_json(data)
 
-    def added(self, record: Record, field: CrossField | None = None) -> tuple[Ledger, Record]:
+    def with_record(self, record: Record, field: CrossField | None = None) -> tuple[Ledger, Record]:
         """Return the ledger with one more record, and that record with its file.
 
         field: replaces the kept field of the entry if it is better. Raises InputError for a record that a
@@ -147,32 +144,28 @@ class Ledger:
         """
         record.check()
         records, unwritten = list(self.records), dict(self.unwritten)
-        if field is not None and _is_better(record, self.with_point(record.entry)):
+        if field is not None and _is_better(record, self.record_with_field(record.entry)):
             name, data = f"{record.entry}.field.json", field_to_json(field)
             unwritten[name] = data
-            record = replace(record, point=name, point_sha256=hashlib.sha256(data).hexdigest())
-            records = [_without_point(each) if each.entry == record.entry else each for each in records]
-        records = sorted({*records, record}, key=lambda each: each.rank)
+            record = replace(record, point=name)
+            records = [_without_point(row) if row.entry == record.entry else row for row in records]
+        records = sorted({*records, record}, key=lambda row: row.rank)
         return replace(self, records=tuple(records), unwritten=unwritten), record
 
-    def certified(
+    def with_certificate(
         self, instance: str, norm: Norm, instance_sha256: str, data: bytes, by: str | None = None
     ) -> Ledger:
         """Return the ledger with a certificate that replaces the earlier one of the instance in the norm."""
         check_text("by", by)
-        sha256 = hashlib.sha256(data).hexdigest()
-        name = f"{instance}.{sha256[:12]}.certificate.npz"
-        new = SubmittedCertificate(instance, norm, instance_sha256, name, sha256, by)
-        others = [each for each in self.certificates if each.key != new.key]
-        certificates = tuple(sorted([*others, new], key=lambda each: each.key))
+        name = f"{instance}.{hashlib.sha256(data).hexdigest()[:12]}.certificate.npz"
+        new = SubmittedCertificate(instance, norm, instance_sha256, name, by)
+        others = [certificate for certificate in self.certificates if certificate.key != new.key]
+        certificates = tuple(sorted([*others, new], key=lambda certificate: certificate.key))
         return replace(self, certificates=certificates, unwritten={**self.unwritten, name: data})
 
     def document(self) -> dict[str, Any]:
         """Return the ledger as JSON."""
-        certificates = [
-            {key: value for key, value in asdict(each).items() if value is not None}
-            for each in self.certificates
-        ]
+        certificates = list(map(_document, self.certificates))
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -187,19 +180,20 @@ def check_text(name: str, text: str | None) -> None:
         raise InputError(f"{name} must be one line of at most {_LONGEST} printable characters")
 
 
-def _document(record: Record) -> dict[str, Any]:
-    return {key: value for key, value in asdict(record).items() if key not in _LATER or value}
+def _document(row: Record | SubmittedCertificate) -> dict[str, Any]:
+    """The known facts of a row by key."""
+    return {key: value for key, value in asdict(row).items() if value is not None}
 
 
-def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
+def read_ledger(folder: str | Path, name: str = LEDGER) -> Ledger:
     """Read the ledger of a folder; an empty one without a file. Raises InputError, InstanceError."""
     path = Path(folder) / name
     if not path.exists():
         return Ledger(Path(folder))
     schema, remedy = documents.__name__, "give the ledger.json of a library"
-    given = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)
-    certificates = tuple(SubmittedCertificate(**each) for each in given.get("certificates", ()))
-    return Ledger(Path(folder), tuple(Record(**each) for each in given["records"]), certificates)
+    document = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)
+    certificates = tuple(SubmittedCertificate(**row) for row in document.get("certificates", ()))
+    return Ledger(Path(folder), tuple(Record(**row) for row in document["records"]), certificates)
 
 
 def write_ledger(ledger: Ledger) -> None:
@@ -207,7 +201,7 @@ def write_ledger(ledger: Ledger) -> None:
 
     Ctrl-C is raised at the end, because a ledger does not fit a part of its files.
     """
-    path = ledger.folder / FILE
+    path = ledger.folder / LEDGER
     data = (json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n").encode()
     with catch_interrupts() as pressed:
         for name, content in ledger.unwritten.items():
@@ -219,24 +213,24 @@ def write_ledger(ledger: Ledger) -> None:
 
 
 def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
-    """Add a record as `Ledger.added` to the ledger of a folder whose lock the caller holds, and write it."""
-    ledger, record = read_ledger(folder).added(record, field)
+    """Add a record to the ledger of a folder, whose lock the caller holds, and write the ledger."""
+    ledger, record = read_ledger(folder).with_record(record, field)
     write_ledger(ledger)
     return record
 
 
-def _is_better(record: Record, kept: Record | None) -> bool:
+def _is_better(record: Record, earlier: Record | None) -> bool:
     """Whether a record's field is better than the kept one."""
-    if kept is None or kept.problem_sha256 != record.problem_sha256 or kept.primal is None:
+    if earlier is None or earlier.problem_sha256 != record.problem_sha256 or earlier.primal is None:
         return True
-    return record.primal is None or record.primal < kept.primal
+    return record.primal is None or record.primal < earlier.primal
 
 
 def _without_point(record: Record) -> Record:
-    return replace(record, point=None, point_sha256=None)
+    return replace(record, point=None)
 
 
-def merged(folder: Path, other: Ledger, entries: Iterable[str], instances: Iterable[str]) -> Ledger:
+def merge_ledgers(folder: Path, source: Ledger, entries: Iterable[str], instances: Iterable[str]) -> Ledger:
     """Return the ledger of a folder with another's records on these entries and instances.
 
     A field or certificate that the folder has already stays; nothing is written.
@@ -245,23 +239,25 @@ def merged(folder: Path, other: Ledger, entries: Iterable[str], instances: Itera
     have = {_without_point(record) for record in ledger.records}
     fresh: list[Record] = []
     unwritten: dict[str, bytes] = {}
-    for record in other.records:
+    for record in source.records:
         if record.entry not in wanted or _without_point(record) in have:
             continue
-        if record.point is not None and ledger.with_point(record.entry) is None:
-            other.field(record)  # checked before it is taken over
-            unwritten[record.point] = other.content(record.point, record.point_sha256)
+        if record.point is not None and ledger.record_with_field(record.entry) is None:
+            source.read_field(record)  # checked before it is taken over
+            unwritten[record.point] = source.read_file(record.point)
             fresh.append(record)
         else:
             fresh.append(_without_point(record))
-    wanted, present = set(instances), {each.key for each in ledger.certificates}
+    wanted, present = set(instances), {certificate.key for certificate in ledger.certificates}
     certificates = [
-        each for each in other.certificates if each.instance in wanted and each.key not in present
+        certificate
+        for certificate in source.certificates
+        if certificate.instance in wanted and certificate.key not in present
     ]
-    unwritten |= {each.file: other.content(each.file, each.sha256) for each in certificates}
+    unwritten |= {certificate.file: source.read_file(certificate.file) for certificate in certificates}
     return replace(
         ledger,
-        records=tuple(sorted({*ledger.records, *fresh}, key=lambda each: each.rank)),
-        certificates=tuple(sorted([*ledger.certificates, *certificates], key=lambda each: each.key)),
+        records=tuple(sorted({*ledger.records, *fresh}, key=lambda row: row.rank)),
+        certificates=tuple(sorted([*ledger.certificates, *certificates], key=lambda row: row.key)),
         unwritten=unwritten,
     )

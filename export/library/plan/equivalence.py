@@ -13,32 +13,32 @@ from ...writing.canonical import Canonical
 from .recipe import EntryRecipe, entry_name
 
 
-def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
+def equivalent_entries(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
     """Return the formulations with the same optimum, and the reasons. names: entries of the library."""
     if recipe.facet == "printed":
         return []
-    found: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = []
     mine = FORMULATIONS[recipe.formulation].minimises
     if recipe.tightened:
         plain = entry_name(recipe.instance, recipe.formulation, recipe.facet)
         why = "the windows of the certificate contain every field of at most its energy; points transfer"
-        found.append({"formulation": recipe.formulation, "entry": plain, "why": why})
-    for other, declared in FORMULATIONS.items():
-        if other != recipe.formulation and declared.minimises == mine:
-            name = entry_name(recipe.instance, other, "hull")
+        entries.append({"formulation": recipe.formulation, "entry": plain, "why": why})
+    for formulation, declared in FORMULATIONS.items():
+        if formulation != recipe.formulation and declared.minimises == mine:
+            name = entry_name(recipe.instance, formulation, "hull")
             why = f"both minimise {mine}; {declared.how}; points transfer by alpha, beta and the jumps"
-            found.append({"formulation": other, "entry": name if name in names else None, "why": why})
-    return found
+            entries.append({"formulation": formulation, "entry": name if name in names else None, "why": why})
+    return entries
 
 
-def notes_of(problem: Problem, name: str) -> list[str]:
+def format_notes(problem: Problem, name: str) -> list[str]:
     """Return the changes that the file of a format makes; empty if it refuses the problem."""
     try:
         held = carried(problem, FORMATS[name])
     except UnsupportedByFormatError:
         return []
     lifting = held.formulation.lifted
-    found = [f"lifted: {lifting}; the class there is {held.problem_class}"] if lifting else []
+    notes = [f"lifted: {lifting}; the class there is {held.problem_class}"] if lifting else []
     if name in {"lp", "mps", "osil"} and Canonical(held).constant:
-        found.append("the constant of the objective is the cost of the column that is fixed to 1")
-    return found
+        notes.append("the constant of the objective is the cost of the column that is fixed to 1")
+    return notes

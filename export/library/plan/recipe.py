@@ -49,7 +49,7 @@ class InstanceRecipe:
             "origin": self.sketch.origin.document(),
             **self.sketch.settings(),
         }
-        stated = {each.name: getattr(self, each.name) for each in fields(self)} | {"sketch": sketch}
+        stated = {field.name: getattr(self, field.name) for field in fields(self)} | {"sketch": sketch}
         return {key: value for key, value in stated.items() if (key, value) != ("split", "")}
 
 
@@ -74,7 +74,7 @@ class EntryRecipe:
         """Return everything that determines its files, beyond its instance, as JSON."""
         return {key: value for key, value in asdict(self).items() if (key, value) != ("tightened", False)}
 
-    def lacks(self, about: dict[str, Any]) -> str:
+    def reason_to_skip(self, about: dict[str, Any]) -> str:
         """Return why it cannot be made from the document of its instance; empty if it can."""
         if not self.tightened or str(self.norm) in about.get("certificates", {}):
             return ""
@@ -96,30 +96,30 @@ def entry_name(instance: str, formulation: str, facet: str, *, tightened: bool =
     return f"{instance}{printed}_{FORMULATIONS[formulation].short}{'_tight' if tightened else ''}"
 
 
-def without(plans: Iterable[InstancePlan], skipped: Container[str]) -> tuple[InstancePlan, ...]:
+def without_skipped(plans: Iterable[InstancePlan], skipped: Container[str]) -> tuple[InstancePlan, ...]:
     """Return plans without the instances and entries that were skipped."""
     return tuple(
-        replace(each, entries=tuple(entry for entry in each.entries if entry.name not in skipped))
-        for each in plans
-        if each.recipe.name not in skipped
+        replace(planned, entries=tuple(entry for entry in planned.entries if entry.name not in skipped))
+        for planned in plans
+        if planned.recipe.name not in skipped
     )
 
 
-def plan(spec: Spec) -> tuple[InstancePlan, ...]:
+def plan_library(spec: Spec) -> tuple[InstancePlan, ...]:
     """Return every instance of a specification with its entries. Raises InputError for a long name."""
-    found = tuple(
+    plans = tuple(
         InstancePlan(recipe, _entries(recipe, rung, spec.formulations))
         for sketch in spec.sketches
         for rung in spec.rungs
         if rung.name in sketch.rungs
         for recipe in _instances(sketch, rung, norms_of(spec.formulations) if sketch.proves(rung) else ())
     )
-    for name in (entry.name for each in found for entry in each.entries):
+    for name in (entry.name for planned in plans for entry in planned.entries):
         if len(name) > LONGEST:
             raise InputError(
                 f"the name {name} has {len(name)} characters; shorten the sketch's name to reach {LONGEST}"
             )
-    return found
+    return plans
 
 
 def norm_minimised(formulation: str, facet: str = "hull") -> Norm | None:
@@ -132,8 +132,8 @@ def norm_minimised(formulation: str, facet: str = "hull") -> Norm | None:
 
 def norms_of(formulations: Iterable[str]) -> tuple[Norm, ...]:
     """Return the norms whose energies formulations minimise over all jumps."""
-    found = set(map(norm_minimised, formulations))
-    return tuple(norm for norm in NORMS if norm in found)
+    minimised = set(map(norm_minimised, formulations))
+    return tuple(norm for norm in NORMS if norm in minimised)
 
 
 def _instances(sketch: Sketch, rung: Rung, norms: tuple[Norm, ...]) -> list[InstanceRecipe]:

@@ -34,7 +34,7 @@ FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
 RUNGS: Final = ("tiny", "small", "medium", "large")
 PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by default: most take a second
-Kind = Literal["sample", "file", "random"]
+SketchKind = Literal["sample", "file", "random"]
 Effort = Literal["search", "none", "greedy", "proven"]
 """Work for the points of a sketch."""
 WEIGHTS: Final = ("stroke_weight", "skew_weight")
@@ -72,14 +72,14 @@ class Release:
     @classmethod
     def of(cls, table: dict[str, Any]) -> Release:
         """Return the release that a table states. Raises InputError for an invalid day."""
-        return cls(table["version"], day(table["date"], "release.date"), tuple(table["authors"]))
+        return cls(table["version"], check_day(table["date"], "release.date"), tuple(table["authors"]))
 
     def document(self) -> dict[str, Any]:
         """Return the release as a table of a specification."""
         return asdict(self) | {"authors": list(self.authors)}
 
 
-def day(text: str, place: str) -> str:
+def check_day(text: str, place: str) -> str:
     """Return a day as YYYY-MM-DD, and no text as it is. Raises InputError for an invalid day."""
     try:
         return date.fromisoformat(text).isoformat() if text else ""
@@ -121,7 +121,7 @@ class Sketch:
     """
 
     name: str
-    kind: Kind
+    kind: SketchKind
     what: str
     title: str
     rungs: tuple[str, ...]
@@ -253,18 +253,18 @@ def _check_form(document: dict[str, Any]) -> None:
 
 def _of_key(error: Any) -> str | None:
     """The message about an unknown or missing key; None if the error is about a value."""
-    given, rule, place = error.instance, error.validator_value, error.json_path[2:]
+    table, rule, place = error.instance, error.validator_value, error.json_path[2:]
     known = error.schema.get("properties", {})
     match error.validator:
         case "additionalProperties":
-            key = next(key for key in given if key not in known)
+            key = next(key for key in table if key not in known)
             words = f"is unknown; the keys here are {', '.join(known)}"
         case "required":
-            key = next(key for key in rule if key not in given)
+            key = next(key for key in rule if key not in table)
             words = f"there is none; write {known[key].get('description', 'it')}"
         case "dependentRequired":
             key, needed = next(
-                (key, need) for key, (need,) in rule.items() if key in given and need not in given
+                (key, need) for key, (need,) in rule.items() if key in table and need not in table
             )
             words = f"goes with {needed}; write both, or leave it out"
         case _:
@@ -279,14 +279,14 @@ def _of_value(error: Any) -> str:
         place = re.sub(r"\[\d+\]$", "", place)
     match error.validator:
         case "uniqueItems":
-            twice = next(each for n, each in enumerate(error.instance) if each in error.instance[:n])
+            twice = next(word for n, word in enumerate(error.instance) if word in error.instance[:n])
             words = f"{shortened(twice)!r} is listed twice; list it once"
         case "minimum" | "maximum" if {"minimum", "maximum"} <= schema.keys():
             words = f"{value} is out of range; choose {schema['minimum']} to {schema['maximum']}"
         case "enum":
             words = f"there is no {value!r}; choose from {', '.join(schema['enum'])}"
         case "oneOf":
-            words = f"needs exactly one of {', '.join(get_args(Kind))}"
+            words = f"needs exactly one of {', '.join(get_args(SketchKind))}"
         case "pattern":
             words = f"{value!r} is not allowed; write {schema['description']}"
         case _:
@@ -315,9 +315,9 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
             f"sketches[{name[0]}].name: {name[1]!r} is the name of two sketches; give each its own"
         )
     _check_entries(formulations, [rung for rung in rungs if any(rung.name in s.rungs for s in sketches)])
-    check_splits(each for sketch in sketches for each in sketch.sources())
+    check_splits(source for sketch in sketches for source in sketch.sources())
     proven = [sketch.name for sketch in sketches if sketch.points == "proven"]
-    if proven and all(FORMULATIONS[each].minimises == AT_JUMPS for each in formulations):
+    if proven and all(FORMULATIONS[formulation].minimises == AT_JUMPS for formulation in formulations):
         raise InputError(
             f"formulations: {proven[0]} has proven points, and no formulation has jumps to prove; "
             "add miqp-exact, or choose other points"
@@ -351,7 +351,7 @@ def _check_entries(formulations: tuple[str, ...], rungs: Sequence[Rung]) -> None
                 f"rungs.{rung.name}.facets: none of the formulations has the facet 'printed'; add hull"
             )
         for name in present:
-            if not any(_holds(each, name) for each in rung.formats):
+            if not any(_holds(file_format, name) for file_format in rung.formats):
                 raise InputError(
                     f"rungs.{rung.name}.formats: none of {', '.join(rung.formats)} holds {name}; "
                     "add nl or gms, or omit the formulation"
@@ -375,10 +375,10 @@ def _words(
     table: dict[str, Any], key: str, known: Collection[str], default: tuple[str, ...], place: str = ""
 ) -> tuple[str, ...]:
     """The words of a list, all of them known, or the default."""
-    found = tuple(table.get(key, default))
-    for word in found:
+    words = tuple(table.get(key, default))
+    for word in words:
         _check_known(word, known, f"{place}{key}")
-    return found
+    return words
 
 
 def _check_known(word: str, known: Collection[str], place: str, kind: str = "") -> None:
@@ -391,10 +391,10 @@ def _formulations(
 ) -> tuple[str, ...]:
     """The full names of formulations in a list, or the default."""
     named = _words(table, key, (*FORMULATIONS, *short_names()), default, place)
-    found = tuple(declaration_of(name).name for name in named)
-    if (name := _twice(found)) is not None:
+    formulations = tuple(declaration_of(name).name for name in named)
+    if (name := _twice(formulations)) is not None:
         raise InputError(f"{place}{key}: {name[1]!r} is listed twice; list it once")
-    return found
+    return formulations
 
 
 def _rung(
@@ -403,14 +403,15 @@ def _rung(
     known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
     words = {key: _words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
     compress, prove = table.get("compress", False), table.get("prove", name in PROVEN)
-    added = day(table.get("added", ""), f"rungs.{name}.added")
+    added = check_day(table.get("added", ""), f"rungs.{name}.added")
     tightened = _formulations(table, "tightened", (), f"rungs.{name}.")
-    for each in tightened:
-        if each not in formulations:
-            raise InputError(f"rungs.{name}.tightened: {each!r} is not in formulations; add it there")
-        if FORMULATIONS[each].minimises == AT_JUMPS:
+    for formulation in tightened:
+        if formulation not in formulations:
+            raise InputError(f"rungs.{name}.tightened: {formulation!r} is not in formulations; add it there")
+        if FORMULATIONS[formulation].minimises == AT_JUMPS:
             raise InputError(
-                f"rungs.{name}.tightened: {each} has fixed jumps, and no certificate is about it; omit it"
+                f"rungs.{name}.tightened: {formulation} has fixed jumps, and no certificate is about it; "
+                "omit it"
             )
     sizes = _whole(table["sizes"])
     return Rung(name, sizes, compress=compress, prove=prove, added=added, tightened=tightened, **words)
@@ -427,7 +428,7 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
     sizes = table.get("sizes", {})
     if unknown := [rung for rung in sizes if rung not in wanted]:
         raise InputError(f"{place}sizes.{unknown[0]}: is unknown; the keys here are {', '.join(wanted)}")
-    kind = next(kind for kind in get_args(Kind) if kind in table)
+    kind = next(kind for kind in get_args(SketchKind) if kind in table)
     word = table[kind]
     if kind == "file":
         what = _file(table, place, folder)
@@ -446,7 +447,7 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
         rungs=wanted,
         sizes=tuple((rung, _whole(sizes[rung])) for rung in wanted if rung in sizes),
         origin=Origin.of(table),
-        added=day(table.get("added", ""), f"{place}added"),
+        added=check_day(table.get("added", ""), f"{place}added"),
         splits=splits_of(table.get("split", ""), what.get("seeds", (None,)), f"{place}split"),
         points=table.get("points", "search"),
         **what,

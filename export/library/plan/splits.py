@@ -34,27 +34,29 @@ def splits_of(stated: str | dict[str, Any], seeds: Sequence[int | None], place: 
         return (stated,) * len(seeds)
     if seeds == (None,):
         raise InputError(f"{place}: a table of seeds goes with random; write one of {', '.join(SPLITS)}")
-    found: dict[int | None, str] = {}
-    for split in (each for each in SPLITS if each in stated):
+    split_of_seed: dict[int | None, str] = {}
+    for split in (name for name in SPLITS if name in stated):
         for seed in seeds_of(stated[split], f"{place}.{split}"):
-            if seed in found:
-                raise InputError(f"{place}: seed {seed} is in {found[seed]} and in {split}; keep it in one")
-            found[seed] = split
-    if strange := sorted(found.keys() - set(seeds), key=str):
+            if seed in split_of_seed:
+                raise InputError(
+                    f"{place}: seed {seed} is in {split_of_seed[seed]} and in {split}; keep it in one"
+                )
+            split_of_seed[seed] = split
+    if strange := sorted(split_of_seed.keys() - set(seeds), key=str):
         raise InputError(f"{place}: {strange[0]} is not in seeds; add it there, or remove it here")
-    if missing := [seed for seed in seeds if seed not in found]:
+    if missing := [seed for seed in seeds if seed not in split_of_seed]:
         raise InputError(f"{place}: seed {missing[0]} has no split; every seed needs one")
-    return tuple(found[seed] for seed in seeds)
+    return tuple(split_of_seed[seed] for seed in seeds)
 
 
 def check_splits(sources: Iterable[tuple[str, str, str]]) -> None:
     """Raise InputError for a source in two splits. sources: source, split, and the sketch that uses it."""
-    found: dict[str, tuple[str, str]] = {}
+    splits: dict[str, tuple[str, str]] = {}
     for source, split, name in sources:
-        other, first = found.setdefault(source, (split, name))
-        if other != split:
+        earlier, first = splits.setdefault(source, (split, name))
+        if earlier != split:
             raise InputError(
-                f"sketches: {source} is in {other} of {first} and in {split} of {name}; keep it in one split"
+                f"sketches: {source} is in {earlier} of {first} and in {split} of {name}; keep it in one"
             )
 
 
@@ -70,6 +72,6 @@ def split_document(seeds: Sequence[int | None], splits: Sequence[str]) -> dict[s
     if len(set(splits)) == 1:
         return {"split": splits[0]} if splits[0] else {}
     named = {
-        each: [seed for seed, split in zip(seeds, splits, strict=True) if split == each] for each in SPLITS
+        name: [seed for seed, split in zip(seeds, splits, strict=True) if split == name] for name in SPLITS
     }
     return {"split": {split: seeds_document(chosen) for split, chosen in named.items() if chosen}}

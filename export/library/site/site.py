@@ -6,7 +6,6 @@ templates, templates/site/*.html.j2, escape every text from a file.
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -22,14 +21,15 @@ from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.instance.file import read_instance
 from ....models.processes.deadline import Progress, silent
-from ....models.storage import make_folder, neighbour, read_bytes, remove_dead, sha256_of, write_bytes
+from ....models.storage import make_folder, neighbour, read_bytes, remove_dead, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS
 from ...pictures.draw import counted
 from ...pictures.web import field_picture, instance_picture, thumbnail
-from ..building.index import SOLU, SUMS
+from ..building.index import SOLU
 from ..building.table import role_of
-from ..documents.documents import Library, about_file, read_about, read_library
+from ..documents.checksums import SUMS, is_intact, read_checksums
+from ..documents.documents import Library, about_file, files_of_instance, read_about, read_library
 from ..plan.spec import RUNGS
 from .study import study
 
@@ -38,7 +38,6 @@ FOLDERS: Final = ("entry", "files", "instance", "pictures")
 PAGES: Final = ("index.html", "about.html")
 STATUSES: Final = ("optimal", "claimed", "best known")
 
-_SUM: Final = re.compile(r"([0-9a-f]{64})  ([A-Za-z0-9_][A-Za-z0-9_.]*)")
 _SHOWN: Final = {".svg", ".png"}
 _ROLES: Final = {
     "least_2": "field of least known 2-norm energy",
@@ -49,7 +48,7 @@ _ROLES: Final = {
 
 
 @dataclass(frozen=True)
-class Picture:
+class FieldPicture:
     """A displayed field. roles: keys of _ROLES; facts: provenance; singular: its singularities in words."""
 
     roles: tuple[str, ...]
@@ -60,13 +59,13 @@ class Picture:
 
 
 @dataclass
-class Shown:
+class InstancePages:
     """A displayed instance."""
 
     about: dict[str, Any]
     entries: list[dict[str, Any]]
     label: str
-    pictures: list[Picture] = field(default_factory=list)
+    pictures: list[FieldPicture] = field(default_factory=list)
     drawings: list[str] = field(default_factory=list)
 
     @property
@@ -74,9 +73,9 @@ class Shown:
         """Its name."""
         return str(self.about["name"])
 
-    def picture_of(self, entry: dict[str, Any]) -> Picture:
+    def picture_of(self, entry: dict[str, Any]) -> FieldPicture:
         """Return the field shown with an entry: the best in its norm, or the field with its jumps."""
-        return next(each for each in self.pictures if role_of(entry) in each.roles)
+        return next(picture for picture in self.pictures if role_of(entry) in picture.roles)
 
 
 def write_site(folder: str | Path, output: str | Path, progress: Progress = silent) -> list[Path]:
@@ -90,7 +89,7 @@ def write_site(folder: str | Path, output: str | Path, progress: Progress = sile
         raise OutputError(
             "lies inside the library, whose files are its own; choose another folder", file=output
         )
-    sums = _sums(library.folder / SUMS)
+    sums = read_checksums(library.folder)
     shown = _instances(library, sums)
     with _replacing_folder(Path(output)) as stage:
         for name in FOLDERS:
@@ -99,41 +98,28 @@ def write_site(folder: str | Path, output: str | Path, progress: Progress = sile
             write_bytes(stage / name, files(templates).joinpath("site", name).read_bytes())
         progress("files")
         _place(library.folder, sums, stage / "files")
-        for each in shown:
-            progress(f"pictures of {each.name}")
-            _draw(library.folder, each, stage / "pictures")
+        for instance in shown:
+            progress(f"pictures of {instance.name}")
+            _draw(library.folder, instance, stage / "pictures")
         progress("pages")
         pages = _write_pages(library, shown, sums, stage)
     return [Path(output) / page for page in pages]
 
 
-def _instances(library: Library, names: Iterable[str]) -> list[Shown]:
+def _instances(library: Library, names: Iterable[str]) -> list[InstancePages]:
     """The instances of a library with their entries, in its order."""
     grouped: dict[str, list[dict[str, Any]]] = {}
     for entry in library.entries:
         grouped.setdefault(entry["instance"]["file"].removesuffix(".instance.json"), []).append(entry)
-    found = []
+    instances = []
     for name, entries in grouped.items():
         about = read_about(library.folder / about_file(name))
-        drawings = sorted(each for each in names if each.startswith(f"cf_{entries[0]['family']}."))
+        drawings = sorted(name for name in names if name.startswith(f"cf_{entries[0]['family']}."))
         source = entries[0]["source"]
         seed = "" if source["seed"] is None else f" s{source['seed']}"
         label = f"{source['size']}{seed}{' box' if source['gauge'] == 'box' else ''}"
-        found.append(Shown(about, entries, label, drawings=drawings))
-    return found
-
-
-def _sums(path: Path) -> dict[str, str]:
-    """SHA-256 of every file of the library by name. Raises InputError for an invalid line."""
-    found = {}
-    for line in read_bytes(path).decode("ascii", "replace").splitlines():
-        fields = _SUM.fullmatch(line)
-        if fields is None:
-            raise InputError(
-                f"{line[:80]!r} is no checksum of a file of the library; build the library again", file=path
-            )
-        found[fields[2]] = fields[1]
-    return found
+        instances.append(InstancePages(about, entries, label, drawings=drawings))
+    return instances
 
 
 def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
@@ -147,8 +133,8 @@ def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
                 "is a symbolic link, and a site publishes plain files alone; put the file in its place",
                 file=folder / name,
             )
-    for name, expected in sums.items():
-        if not (folder / name).is_file() or sha256_of(folder / name) != expected:
+    for name in sums:
+        if not is_intact(folder, name, sums):
             raise InputError(
                 "is missing or differs from SHA256SUMS; build the library again", file=folder / name
             )
@@ -156,7 +142,7 @@ def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
         shutil.copyfile(folder / name, target / name)
 
 
-def _draw(folder: Path, shown: Shown, target: Path) -> None:
+def _draw(folder: Path, shown: InstancePages, target: Path) -> None:
     """Write the pictures of an instance and of each of its different fields."""
     instance = read_instance(folder / shown.about["instance"]["file"])
     write_bytes(target / f"{shown.name}.svg", instance_picture(instance))
@@ -165,28 +151,30 @@ def _draw(folder: Path, shown: Shown, target: Path) -> None:
     for role in _ROLES:
         roles_of.setdefault(shown.about["fields"][role]["file"], []).append(role)
     for file, roles in roles_of.items():
-        found = read_field(folder / file)
+        field = read_field(folder / file)
         name = f"{file.removesuffix('.json')}.svg"
-        write_bytes(target / name, field_picture(found))
+        write_bytes(target / name, field_picture(field))
         caption, facts = "; ".join(_ROLES[role] for role in roles), shown.about["fields"][roles[0]]
-        shown.pictures.append(Picture(tuple(roles), caption, facts, name, counted(found)))
+        shown.pictures.append(FieldPicture(tuple(roles), caption, facts, name, counted(field)))
 
 
-def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], stage: Path) -> list[Path]:
+def _write_pages(
+    library: Library, shown: list[InstancePages], sums: dict[str, str], stage: Path
+) -> list[Path]:
     """Write every page and return their paths inside the site."""
     environment = ENVIRONMENT.overlay()
     environment.filters = ENVIRONMENT.filters | {
-        each.__name__: each for each in (count, value, exact, percent, size)
+        function.__name__: function for function in (count, value, exact, percent, size)
     }
     environment.globals = ENVIRONMENT.globals | {"shown_types": _SHOWN}
-    families: dict[str, list[Shown]] = {}
-    for each in shown:
-        families.setdefault(each.about["family"], []).append(each)
+    families: dict[str, list[InstancePages]] = {}
+    for instance in shown:
+        families.setdefault(instance.about["family"], []).append(instance)
     common = {
         "library": library.document,
         "entries": library.entries,
         "instances": shown,
-        "instance_of": {entry["name"]: each for each in shown for entry in each.entries},
+        "instance_of": {entry["name"]: instance for instance in shown for entry in instance.entries},
         "families": families,
         "faces": {name: max(members, key=_detail) for name, members in families.items()},
         "tokens": {name: declared.short for name, declared in FORMULATIONS.items()},
@@ -207,21 +195,26 @@ def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], sta
     write(
         "about.html",
         "about",
-        formats=[each for name, each in FORMATS.items() if name in present],
+        formats=[file_format for name, file_format in FORMATS.items() if name in present],
         citation=read_bytes(library.folder / "CITATION.cff").decode(),
         licence=read_bytes(library.folder / "LICENSE").decode(),
         solu=SOLU,
         statistics={"statuses": statuses(library.entries), "solvers": solvers(library.entries)},
     )
-    for each in shown:
-        write(f"instance/{each.name}.html", "instance", shown=each)
-        for entry in each.entries:
+    for instance in shown:
+        write(
+            f"instance/{instance.name}.html",
+            "instance",
+            shown=instance,
+            files=files_of_instance(instance.about),
+        )
+        for entry in instance.entries:
             details = study(library, entry, stage / "pictures")
-            write(f"entry/{entry['name']}.html", "entry", shown=each, entry=entry, study=details)
+            write(f"entry/{entry['name']}.html", "entry", shown=instance, entry=entry, study=details)
     return written
 
 
-def _detail(shown: Shown) -> tuple[int, bool]:
+def _detail(shown: InstancePages) -> tuple[int, bool]:
     """Sort key for the picture of a sketch: the largest grid, in the gauge `strokes`."""
     source = shown.entries[0]["source"]
     return source["size"], source["gauge"] == "strokes"
@@ -230,8 +223,8 @@ def _detail(shown: Shown) -> tuple[int, bool]:
 def _choices(entries: tuple[dict[str, Any], ...]) -> dict[str, list[str]]:
     """The choices of the filters of the table."""
     keys = ("family", "rung", "formulation", "class", "difficulty", "status")
-    found = {key: list(dict.fromkeys(entry[key] for entry in entries)) for key in keys}
-    return found | {"rung": [name for name in RUNGS if name in found["rung"]]}
+    choices = {key: list(dict.fromkeys(entry[key] for entry in entries)) for key in keys}
+    return choices | {"rung": [name for name in RUNGS if name in choices["rung"]]}
 
 
 @dataclass(frozen=True)
@@ -244,9 +237,9 @@ class CrossTable:
 
 def statuses(entries: Sequence[dict[str, Any]]) -> CrossTable:
     """Return the numbers of entries by rung and status."""
-    found = Counter((entry["rung"], entry["status"]) for entry in entries)
-    shown = [rung for rung in RUNGS if any(key[0] == rung for key in found)]
-    return CrossTable(STATUSES, {rung: [str(found[rung, status]) for status in STATUSES] for rung in shown})
+    numbers = Counter((entry["rung"], entry["status"]) for entry in entries)
+    shown = [rung for rung in RUNGS if any(key[0] == rung for key in numbers)]
+    return CrossTable(STATUSES, {rung: [str(numbers[rung, status]) for status in STATUSES] for rung in shown})
 
 
 def solvers(entries: Sequence[dict[str, Any]]) -> CrossTable | None:
@@ -261,7 +254,10 @@ def solvers(entries: Sequence[dict[str, Any]]) -> CrossTable | None:
         return None
     names = tuple(sorted({solver for _, solver in tried}))
     rows = {
-        name: [f"{solved[name, each]} of {tried[name, each]}" if tried[name, each] else "" for each in names]
+        name: [
+            f"{solved[name, solver]} of {tried[name, solver]}" if tried[name, solver] else ""
+            for solver in names
+        ]
         for name in dict.fromkeys(entry["formulation"] for entry in entries)
     }
     return CrossTable(names, rows)

@@ -22,7 +22,6 @@ from ....models.formulations.problem import Problem
 from ....models.storage import write_bytes
 from ...pictures.sparsity import Parts, Pattern, Places, sparsity_picture
 from ..documents.documents import Library, problem_of
-from ..documents.statistics import row_classes
 from .formulas import lines_of
 
 _HIGHEST: Final = 4  # the greatest degree of a polynomial in any formulation
@@ -33,7 +32,7 @@ class Study:
     """Results computed from an entry.
 
     latex: its formulation; lines: the same line by line; matrix, hessian: None if empty; blocks: number and
-    sizes of the sets of columns that no entry of the Hessian joins; row_classes: numbers of linear rows.
+    sizes of the sets of columns that no entry of the Hessian joins.
     """
 
     latex: str
@@ -41,7 +40,6 @@ class Study:
     matrix: Pattern | None
     hessian: Pattern | None
     blocks: dict[str, float] | None
-    row_classes: dict[str, int]
 
 
 def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
@@ -61,7 +59,6 @@ def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
         patterns.get("matrix"),
         patterns.get("hessian"),
         blocks(patterns["hessian"]) if "hessian" in patterns else None,
-        row_classes(problem),
     )
 
 

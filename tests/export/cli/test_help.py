@@ -43,7 +43,6 @@ OTHERS = (
     "library",
     "library build",
     "library verify",
-    "library release",
     "library site",
 )
 
@@ -101,7 +100,6 @@ def test_the_help_lists_the_names_of_the_tables_within_80_columns(text):
 @pytest.mark.parametrize("markup", ["rich", None])
 def test_brackets_in_a_help_are_shown(text, markup):
     """Rich parses `[word]` as markup unless it is escaped; other modes print the escape."""
-    assert "the table [release] of its specification" in words(text("library release"))
     toy = typer.Typer(rich_markup_mode=markup)
 
     @toy.command(cls=Command)

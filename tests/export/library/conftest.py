@@ -9,10 +9,10 @@ import pytest
 @pytest.fixture(scope="session")
 def short_searches():
     """Builds use one round of search, because the quality of their fields does not matter here."""
-    from crossfield.export.library.ledger import points
+    from crossfield.export.library.building import fields
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(points, "_ROUNDS", 1)
+        patch.setattr(fields, "_ROUNDS", 1)
         yield
 
 

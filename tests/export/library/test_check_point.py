@@ -21,7 +21,7 @@ from cases import LOW_DEGREE, make_field, make_instance, names_of, points_of, pr
 from crossfield.export.formats.registry import FORMATS, carried, write
 from crossfield.export.library.documents import check_point
 from crossfield.export.library.documents.check_point import BadInputError, check
-from crossfield.export.library.documents.standalone import standalone
+from crossfield.export.library.documents.standalone import standalone_program
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import formulate
@@ -36,7 +36,7 @@ SOLUTIONS = places.SOLUTIONS / "tiny"
 def script(tmp_path_factory):
     """The checker as a library contains it."""
     path = tmp_path_factory.mktemp("library") / "check_point.py"
-    path.write_bytes(standalone(Path(check_point.__file__)))
+    path.write_bytes(standalone_program(Path(check_point.__file__)))
     return path
 
 

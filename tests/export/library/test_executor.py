@@ -4,13 +4,13 @@ import subprocess
 import sys
 
 import pytest
-from crossfield.export.library.building.executor import BuildError, Tasks, executor
+from crossfield.export.library.building.executor import BuildError, Tasks, open_executor
 
 TASKS = """import math
-from crossfield.export.library.building.executor import Tasks, executor
+from crossfield.export.library.building.executor import Tasks, open_executor
 
 print("the script runs")
-with executor(2, None) as chosen:
+with open_executor(2, None) as chosen:
     tasks = Tasks(chosen, 4)
     for number in (16, 25):
         tasks.add(math.isqrt, number, lambda root: open(f"root_{root}", "w").close())
@@ -35,7 +35,7 @@ def test_a_process_that_ends_early_ends_the_build_with_its_exit_code():
     from os import _exit
 
     def build():
-        with executor(2, None) as chosen:
+        with open_executor(2, None) as chosen:
             tasks = Tasks(chosen, 4)
             tasks.add(_exit, 3, print)
             tasks.run()

@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.documents.documents import read_library
-from crossfield.export.library.ledger.given import read_points
+from crossfield.export.library.ledger.known_points import read_points
 from crossfield.export.library.ledger.ledger import Record, read_ledger, write_ledger
 from crossfield.export.library.ledger.points import complete_point
-from crossfield.export.library.plan.recipe import plan
-from crossfield.export.library.plan.sources import instance_from
+from crossfield.export.library.plan.instances import make_instance
+from crossfield.export.library.plan.recipe import plan_library
 from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate
@@ -51,11 +51,11 @@ def test_every_shipped_record_counts_and_contradicts_nothing():
     """Each record is about a problem of today, its bound lies below its point, and its field is as stated."""
     spec = default_spec()
     ledger, points = read_ledger(spec.ledger.parent, spec.ledger.name), read_points(spec.points)
-    recipes = {entry.name: (each.recipe, entry) for each in plan(spec) for entry in each.entries}
+    recipes = {entry.name: (each.recipe, entry) for each in plan_library(spec) for entry in each.entries}
     instances = {}
     for record in ledger.records:
         recipe, entry = recipes[record.entry]
-        instance = instances.setdefault(recipe.name, instance_from(recipe))
+        instance = instances.setdefault(recipe.name, make_instance(recipe))
         declared = FORMULATIONS[entry.formulation]
         options = {"facet": entry.facet} if "facet" in declared.settable else {}
         if declared.fixed:
@@ -64,7 +64,7 @@ def test_every_shipped_record_counts_and_contradicts_nothing():
         assert problem.sha256 == record.problem_sha256, record.entry
         assert record.bound is None or record.bound <= record.primal * (1 + 1e-6) + 1e-9
         if record.point is not None:
-            point = complete_point(problem, ledger.field(record))
+            point = complete_point(problem, ledger.read_field(record))
             assert problem.violation(point).worst <= 1e-12
             assert problem.objective_value(point) == pytest.approx(record.primal, rel=1e-12)
     named = {record.point for record in ledger.records if record.point is not None}

@@ -1,4 +1,4 @@
-"""The table of entries as data that tools load: CSV, Croissant metadata and Parquet."""
+"""The table of entries as data that tools load: CSV and Croissant metadata."""
 
 import csv
 import hashlib
@@ -7,10 +7,9 @@ import json
 from dataclasses import replace
 
 import pytest
-from crossfield.export.library.building.build import build, rebuild
-from crossfield.export.library.building.dataset import CROISSANT, PARQUET, croissant, parquet, same_rows
+from crossfield.export.library.building.build import build
+from crossfield.export.library.building.dataset import CROISSANT, croissant
 from crossfield.export.library.building.table import COLUMNS, TABLE, parsed
-from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.plan.spec import default_spec, read_spec
 
 SPEC = """format = "crossfield-library-spec"
@@ -93,33 +92,3 @@ def test_mlcroissant_validates_and_loads_the_table(built):
             for key, value in record.items()
         }
         assert plain == row
-
-
-@pytest.mark.needs("pyarrow")
-def test_parquet_has_the_rows_and_the_types_of_the_table(built):
-    from pyarrow import parquet as pq
-
-    rows = (built.folder / TABLE).read_bytes()
-    found = pq.read_table(built.folder / PARQUET)
-    assert found.to_pylist() == parsed(rows)
-    assert found.column_names == list(COLUMNS)
-    assert [str(found.schema.field(name).type) for name in ("seed", "gap", "convex", "split")] == [
-        *("int64", "double", "bool", "string")
-    ]
-    assert (built.folder / PARQUET).read_bytes() == parquet(rows)
-    assert not same_rows(parquet(rows.replace(b"train", b"test", 1)), rows)
-    assert not same_rows(b"no parquet", rows)
-
-
-def test_parquet_of_an_earlier_build_goes_where_it_cannot_be_written(built, tmp_path, monkeypatch):
-    monkeypatch.setattr("crossfield.export.library.building.dataset.find_spec", lambda _: None)
-    made = build(built.spec, tmp_path / "library")
-    (made.folder / PARQUET).write_bytes(b"of an earlier build")
-    rebuild(made.folder)
-    assert not (made.folder / PARQUET).exists()
-    assert PARQUET not in (made.folder / "SHA256SUMS").read_text()
-
-
-@pytest.mark.slow
-def test_verify_makes_the_metadata_again(built):
-    assert verify_library(built.folder) == []

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
-from crossfield.export.library.building.named import SHIPPED, write_entries
+from crossfield.export.library.building.shipped_entries import SHIPPED, write_entries
 from crossfield.export.library.building.table import COLUMNS, TABLE, read_table
-from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.ledger.points import complete_point
 from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.errors import InputError
@@ -64,19 +63,6 @@ def test_the_facts_are_those_of_the_sidecars(built):
         assert (facts["optimum"] is None) == (sidecar["status"] != "optimal")
         assert (facts["status"] == "open") == (facts["difficulty"] == "open")
         assert (built.folder / facts["jumps_file"]).is_file()
-
-
-@pytest.mark.slow
-def test_verify_knows_the_table(built, tmp_path):
-    assert verify_library(built.folder) == []
-    table = built.folder / TABLE
-    data = table.read_bytes()
-    try:
-        table.write_bytes(data.replace(b"optimal", b"claimed", 1))
-        files = {finding.file for finding in verify_library(built.folder)}
-    finally:
-        table.write_bytes(data)
-    assert files == {TABLE}
 
 
 # Entries

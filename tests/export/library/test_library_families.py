@@ -5,9 +5,8 @@ import tomllib
 from dataclasses import replace
 
 import pytest
+from crossfield.export.library.building import fields
 from crossfield.export.library.building.build import build
-from crossfield.export.library.ledger import points as points_made
-from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.spec import default_spec, read_spec, spec_of
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import read_field
@@ -125,7 +124,7 @@ def test_a_bad_family_is_named_with_its_place_and_remedy(tmp_path, case):
 
 def test_a_family_that_states_nothing_more_has_the_recipes_of_before():
     """Digests of recipes are in every document, so a new key there would change files that exist."""
-    found = [each.recipe.document() for each in plan(default_spec())]
+    found = [each.recipe.document() for each in plan_library(default_spec())]
     assert {key for document in found for key in document} == {
         *("name", "sketch", "rung", "size", "seed", "gauge", "prove", "added")
     }
@@ -200,7 +199,7 @@ def test_an_interrupted_family_goes_on_where_it_was_with_the_same_bytes(built, t
 @pytest.mark.slow
 def test_a_large_certificate_of_an_optimum_is_kept(tmp_path, monkeypatch):
     """It was left out with its field, although it proved the optimum."""
-    monkeypatch.setattr(points_made, "_MOST_BYTES", 1)  # which any certificate exceeds
+    monkeypatch.setattr(fields, "_MOST_BYTES", 1)  # which any certificate exceeds
     text = SMALL.replace('"3-5"', "[524]").replace("[3]", "[5]").replace("0.3", "0.2")
     text = text.replace('"exact", "milp"', '"exact"').replace(', "box"', "").replace("split", "# split")
     (entry,) = build(read_spec(written(tmp_path, text)), tmp_path / "library").entries

@@ -9,11 +9,17 @@ from dataclasses import replace
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
-from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.documents import lock
 from crossfield.export.library.documents.documents import read_library
 from crossfield.export.library.documents.lock import locked
-from crossfield.export.library.ledger.ledger import Record, add_record, merged, read_ledger, write_ledger
+from crossfield.export.library.ledger.ledger import (
+    Record,
+    add_record,
+    merge_ledgers,
+    read_ledger,
+    write_ledger,
+)
 from crossfield.models.errors import InputError, OutputError
 from crossfield.models.field.file import read_field
 from libraries import spec_of
@@ -73,7 +79,7 @@ def test_a_verification_waits_for_changes_and_changes_for_it(lib, holder, monkey
             pass
 
     assert verify_library(lib, progress=change) == []
-    assert not (lib / lock.FILE).exists()
+    assert not (lib / lock.LOCK).exists()
 
 
 def test_a_folder_that_cannot_be_written_is_verified_without_a_lock(lib):
@@ -89,12 +95,12 @@ def test_a_folder_that_cannot_be_written_is_verified_without_a_lock(lib):
 def test_a_process_that_was_killed_locks_nobody_out(lib, holder, monkeypatch):
     os.kill(holder.pid, signal.SIGKILL)
     holder.wait()
-    assert (lib / lock.FILE).exists()
+    assert (lib / lock.LOCK).exists()
     assert verify_library(lib) == []
     monkeypatch.setattr(lock, "PATIENCE", 0.0)
     with locked(lib, "this test"):
-        assert (lib / lock.FILE).exists()
-    assert not (lib / lock.FILE).exists()
+        assert (lib / lock.LOCK).exists()
+    assert not (lib / lock.LOCK).exists()
 
 
 @pytest.fixture
@@ -136,9 +142,9 @@ def test_a_build_that_is_refused_leaves_nothing(tmp_path):
 def test_a_ledger_is_merged_before_it_is_written(lib, record, field, tmp_path):
     kept = add_record(lib, record, field)
     (tmp_path / "new").mkdir()
-    found = merged(tmp_path / "new", read_ledger(lib), [record.entry], [])
+    found = merge_ledgers(tmp_path / "new", read_ledger(lib), [record.entry], [])
     assert list((tmp_path / "new").iterdir()) == []
-    assert found.field(kept).instance.sha256 == field.instance.sha256
+    assert found.read_field(kept).instance.sha256 == field.instance.sha256
     write_ledger(found)
     assert read_ledger(tmp_path / "new").records == (kept,)
     assert (tmp_path / "new" / kept.point).read_bytes() == (lib / kept.point).read_bytes()

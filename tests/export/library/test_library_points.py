@@ -8,15 +8,15 @@ import sys
 
 import pytest
 from crossfield.export.library.building.build import build
-from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.documents.documents import read_about, read_library
-from crossfield.export.library.ledger.given import ROLES, read_points
+from crossfield.export.library.ledger.grades import EASY, difficulty
+from crossfield.export.library.ledger.known_points import ROLES, read_points
 from crossfield.export.library.ledger.ledger import Record
-from crossfield.export.library.ledger.standing import EASY, difficulty
-from crossfield.export.library.plan.recipe import NORMS, plan
-from crossfield.export.library.plan.sources import instance_from
+from crossfield.export.library.plan.instances import make_instance
+from crossfield.export.library.plan.recipe import NORMS, plan_library
 from crossfield.export.library.plan.spec import default_spec, read_spec
-from crossfield.models.errors import InputError
+from crossfield.models.errors import CrossfieldError, InputError
 from libraries import content, library_of, spec_of
 from processors import PROCESSORS
 from submitting import submit_one
@@ -118,7 +118,7 @@ def test_given_points_are_stated_and_the_models_are_those_of_a_search(searched, 
     assert all(name.endswith(".json") or name == "SHA256SUMS" for name in stated)
     about = read_about(made / f"{STEM}.about.json")
     old = read_about(searched / f"{STEM}.about.json")
-    assert all(about[key] == old[key] for key in ("fields", "certificates", "files"))
+    assert all(about[key] == old[key] for key in ("fields", "certificates"))
     assert "given" in about
     assert "given" not in old
 
@@ -176,10 +176,14 @@ def test_points_of_another_instance_are_reported_and_do_not_count(searched, tmp_
 def test_points_that_are_missing_or_damaged_are_refused(searched, tmp_path):
     with pytest.raises(InputError, match="points: there is no points"):
         spec_of(tmp_path, 'points = "points"\n' + SPEC)
-    known = shutil.copytree(searched, tmp_path / "known")
+    known = shutil.copytree(searched, tmp_path / "points")
+    spec = spec_of(tmp_path, 'points = "points"\n' + SPEC)
     (known / f"{STEM}.field.json").write_text("{}")
-    with pytest.raises(InputError, match=rf"lists {STEM}\.field\.json, which is missing or another file"):
-        read_points(known)
+    with pytest.raises(CrossfieldError, match=rf"{STEM}\.field\.json"):
+        build(spec, tmp_path / "lib")
+    (known / f"{STEM}.field.json").unlink()
+    with pytest.raises(InputError, match=rf"{STEM}\.field\.json: cannot be read"):
+        build(spec, tmp_path / "lib")
 
 
 # The library that ships
@@ -191,15 +195,15 @@ def test_the_points_that_ship_are_about_the_shipped_instances():
     spec = default_spec()
     assert sum(path.stat().st_size for path in spec.points.iterdir()) < 12_000_000
     points = read_points(spec.points)
-    for each in plan(spec):
+    for each in plan_library(spec):
         given = points(each.recipe.name)
-        assert given.instance == instance_from(each.recipe).sha256
+        assert given.instance == make_instance(each.recipe).sha256
         for role in ROLES:
             field, facts = given.field(role).field, given.about["fields"][role]
             assert field.instance.sha256 == given.instance
             for norm in NORMS:
                 assert field.energy(norm).total == facts[f"energy_{norm}norm"]
-        certificates = given.certificates(instance_from(each.recipe), NORMS)
+        certificates = given.certificates(make_instance(each.recipe), NORMS)
         assert all(found.facts["status"] == "optimal" for found in certificates)
         if each.recipe.rung in {"tiny", "small"}:
             assert tuple(found.norm for found in certificates) == each.recipe.prove

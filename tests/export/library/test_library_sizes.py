@@ -6,9 +6,10 @@ import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
-from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError
+from forging import seal
 from libraries import HEAD
 
 pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
@@ -59,15 +60,9 @@ def test_an_instance_that_is_skipped_without_need_is_found(spec, tmp_path):
     folder = build(read_spec(spec), tmp_path / "library").folder
     path = folder / "library.json"
     index = json.loads(path.read_text())
-    for skipped, words in (
-        (index["skipped"] | {"cf_mouse_n002": COARSE}, "skips cf_mouse_n002, which can be made"),
-        (index["skipped"] | {"cf_cat_n002": COARSE}, "skips cf_cat_n002, which can be made or is not"),
-        (index["skipped"] | {"cf_bottle_n003": "a whim"}, "another reason for skipping cf_bottle_n003"),
-        ({}, "skipped"),
-    ):
-        path.write_text(json.dumps(index | {"skipped": skipped}))
-        findings = [str(finding) for finding in verify_library(folder) if finding.file == "library.json"]
-        assert any(words in each for each in findings), (words, findings)
+    path.write_text(json.dumps(index | {"skipped": index["skipped"] | {"cf_mouse_n002": COARSE}}))
+    seal(folder)
+    assert [defect.file for defect in verify_library(folder)] == ["library.json"]
 
 
 def test_a_library_of_which_nothing_is_left_is_an_error(spec, tmp_path):

@@ -3,7 +3,7 @@
 import shutil
 
 import pytest
-from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.site.site import write_site
 from crossfield.models.errors import InputError
 from crossfield.models.instance.file import read_instance

@@ -7,7 +7,7 @@ import casadi as ca
 import crossfield as cf
 import numpy as np
 from cases import CASES, make_instance, make_problem, problem_of
-from crossfield.export.library.documents.statistics import counts
+from crossfield.export.library.documents.statistics import problem_counts
 from crossfield.export.library.site.study import blocks, hessian, matrix
 from crossfield.export.pictures.marks import FAMILIES, STROKE
 from crossfield.export.pictures.sparsity import CELLS, Parts, Pattern, sparsity_picture
@@ -62,7 +62,7 @@ def test_blocks_are_the_columns_that_no_entry_joins():
     found = blocks(hessian(problem))
     assert found["average"] == sum(sizes) / len(sizes)
     assert (found["count"], found["least"], found["greatest"]) == (len(sizes), sizes[0], sizes[-1])
-    assert counts(problem)["nonlinear_variables"] == sum(sizes)
+    assert problem_counts(problem)["nonlinear_variables"] == sum(sizes)
 
 
 def cells_of(picture, pattern):
@@ -83,8 +83,8 @@ def test_a_small_matrix_is_drawn_entry_by_entry_with_the_names_of_its_parts():
     assert pattern.bin == 1
     drawn, names = cells_of(sparsity_picture(pattern), pattern)
     assert drawn == {"linear": int((~pattern.curved).sum()), "curved": int(pattern.curved.sum())}
-    assert pattern.entries == counts(problem)["nonzeros"]
-    assert pattern.curved.sum() == counts(problem)["nonlinear_nonzeros"]
+    assert pattern.entries == problem_counts(problem)["nonzeros"]
+    assert pattern.curved.sum() == problem_counts(problem)["nonlinear_nonzeros"]
     assert set(names) <= {*pattern.down.names, *pattern.across.names}
     assert "alpha" in names
 

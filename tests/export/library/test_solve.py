@@ -8,18 +8,18 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.library_command import solve_command
 from crossfield.export.library.building.build import rebuild
-from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.contributions.solve import drop_refuted, solve_library
 from crossfield.export.library.documents.documents import read_library, read_sidecar
-from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
-from crossfield.export.library.ledger.standing import (
+from crossfield.export.library.ledger.grades import (
     MAKERS,
     contradicts,
-    cut,
+    cut_bound,
+    entry_status,
     is_proven,
     relative_gap,
-    standing,
 )
+from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.solvers_table import SOLVERS
 from crossfield.models.errors import CrossfieldError, InputError
 from libraries import OPEN, library_of
@@ -58,11 +58,11 @@ def record_of(lib, solver, name=MILP, **given):
 
 def test_the_rule_of_bounds():
     """A little above a feasible point a bound is cut to it; far above it is wrong."""
-    assert cut(8.4e-9, 1.3e-28) == 1.3e-28
+    assert cut_bound(8.4e-9, 1.3e-28) == 1.3e-28
     assert not contradicts(8.4e-9, 1.3e-28)
     assert contradicts(1e-3, 1.3e-28)
-    assert cut(0.4, 0.5) == 0.4
-    assert is_proven(1.3e-28, cut(8.4e-9, 1.3e-28))
+    assert cut_bound(0.4, 0.5) == 0.4
+    assert is_proven(1.3e-28, cut_bound(8.4e-9, 1.3e-28))
     assert relative_gap(1.3e-28, 1.3e-28) == 0.0
 
 
@@ -72,8 +72,8 @@ def test_agreement_needs_three_makers_whatever_the_order():
         records = [Record("cf_a", "0" * 64, each.title, "1", "optimal", bound=1.0) for each in chosen]
         different = len({each.maker for each in chosen}) == 3
         for given in (records, records[::-1]):
-            assert ("solved" in standing(1.0, [], given, "cf_a")) == different
-        assert "solved" not in standing(1.0, [], [replace(records[0], bound=0.9), *records[1:]], "cf_a")
+            assert ("solved" in entry_status(1.0, [], given, "cf_a")) == different
+        assert "solved" not in entry_status(1.0, [], [replace(records[0], bound=0.9), *records[1:]], "cf_a")
     assert MAKERS["CPLEX in GAMS"] == MAKERS["CPLEX"]
 
 

@@ -13,13 +13,13 @@ import highspy
 import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
-from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.contributions import submit as submission
-from crossfield.export.library.contributions.sources import kind_of
 from crossfield.export.library.contributions.submit import submit
+from crossfield.export.library.contributions.submitted_files import kind_of
 from crossfield.export.library.documents import check_point
 from crossfield.export.library.documents.documents import problem_of, read_sidecar
-from crossfield.export.library.ledger.given import read_points
+from crossfield.export.library.ledger.known_points import read_points
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.library.ledger.points import complete_point
 from crossfield.export.solutions.solution import read_solution
@@ -28,7 +28,7 @@ from crossfield.models.errors import CrossfieldError, InputError, InstanceError,
 from crossfield.models.field.file import write_field
 from crossfield.models.formulations.names import column_names
 from crossfield.models.proof.certificate import write_certificate
-from forging import change, seal
+from forging import change
 from libraries import OPEN, content, library_of
 from places import DATA, SOLUTIONS
 from submitting import submit_one
@@ -97,18 +97,6 @@ def test_a_certificate_makes_every_entry_of_the_2_norm_optimal(lib, sent, tmp_pa
     assert verify_library(again.folder) == []
 
 
-def test_a_damaged_or_unused_certificate_of_the_ledger_is_found(lib, sent):
-    submit_one(lib, sent / "s6.npz")
-    change(lib / "ledger.json", certificates=lambda held: [held[0] | {"instance": "cf_gone_n003"}])
-    (path,) = lib.glob("*.certificate.npz")
-    shutil.copy(sent / "s7.npz", path)
-    seal(lib)
-    found = " ".join(map(str, verify_library(lib)))
-    assert "has a certificate of cf_gone_n003, which is not in the library" in found
-    assert "is another file than the one its ledger names" in found
-    assert f"{STEM}.about.json: states another certificates than follows" in found
-
-
 @pytest.mark.parametrize("suffix", ["field.npz", "json", "rawfield"])
 def test_a_better_field_counts_for_every_entry_of_its_instance(lib, sent, suffix):
     result = submit_one(lib, sent / f"{STEM}_exact.{suffix}", solver="Own", by="A. Name")
@@ -149,8 +137,8 @@ def test_files_of_all_kinds_in_one_call_are_one_rebuild_with_the_result_of_singl
     files = [sent / name for name in names]
     single = shutil.copytree(opened, tmp_path / "single")
     expected = [submit_one(single, file) for file in files]
-    rebuilds, rebuilt = [], submission.rebuilt
-    monkeypatch.setattr(submission, "rebuilt", lambda *a, **k: rebuilds.append(1) or rebuilt(*a, **k))
+    rebuilds, rebuild = [], submission.rebuild_locked
+    monkeypatch.setattr(submission, "rebuild_locked", lambda *a, **k: rebuilds.append(1) or rebuild(*a, **k))
     found = submit(lib, files)
     assert len(rebuilds) == 1
     assert [each.kind for each in found] == ["certificate", "field", "field", "solution", "certificate"]
@@ -414,7 +402,7 @@ def test_the_best_run_of_each_solver_is_shown(lib):
     facts = {"status": "limit", "seconds": 3.0, "threads": 2, "time_limit": 60.0}
     for solver, bound in (("SCIP", 0.7), ("SCIP", 0.6), ("Own", 0.1)):
         add_record(lib, Record(MILP, sha, solver, "1", bound=bound * best, **facts))
-    submission.rebuilt(lib)
+    submission.rebuild_locked(lib)
     runs = entry_of(lib)["runs"]
     assert [(each["solver"], each["bound"] / best) for each in runs] == [
         ("Own", pytest.approx(0.1)),

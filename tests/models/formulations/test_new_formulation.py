@@ -13,7 +13,7 @@ from crossfield.export.bundle.manifest import read_manifest
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.building.verification import verify_library
 from crossfield.export.solvers_table import SOLVERS
 from crossfield.export.verify.checks import Verdict
 from crossfield.export.verify.verify import verify

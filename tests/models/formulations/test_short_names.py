@@ -44,7 +44,7 @@ def test_where_no_formulation_is_named_it_is_told_what_was_meant(tmp_path, capfd
     assert invoke(["solve", "mouse", "--size", "4", "-m", "milp", "-o", str(tmp_path)]) == 2
     assert "milp is a formulation, not a method; write -f milp" in " ".join(capfd.readouterr().err.split())
     names = ["cf_mouse_n008_milp", "cf_mouse_n008_miqp", "cf_skew_n008_milp"]
-    library = Library(tmp_path, {"entries": names, "sha256": dict.fromkeys(names, "0" * 64)})
+    library = Library(tmp_path, {"entries": names})
     with pytest.raises(InputError, match=r"'cf_mouse_n008_milp-mccormick' \(is it cf_mouse_n008_milp\?\)"):
         library.entry("cf_mouse_n008_milp-mccormick")
 

@@ -1,7 +1,7 @@
 """Status and grade of an entry, from its dual bounds and runs; the best run of each solver.
 
 A solver's tolerances may put its bound a little above the objective of a point that is feasible to 1e-16.
-Within `slack` it is cut to that objective; a larger one contradicts the point.
+Within `bound_tolerance` it is cut to that objective; a larger one contradicts the point.
 
 A bound of a program is a claim. It solves an entry if three programs of different makers report it. A
 certificate or the tangent suffices alone.
@@ -38,14 +38,14 @@ _SHOWN: Final = {"objective": "primal", "limit": "time_limit"} | {
 """Keys of a run in a sidecar, and fields of a record."""
 
 
-def slack(objective: float) -> float:
+def bound_tolerance(objective: float) -> float:
     """Return the distance by which a solver's tolerances may lift its bound above the optimum."""
     return 1e-6 * max(1.0, abs(objective))
 
 
 def contradicts(bound: float, objective: float) -> bool:
     """Whether a bound lies so far above the objective of a feasible point that it cannot be a bound."""
-    return bound - objective > slack(objective)
+    return bound - objective > bound_tolerance(objective)
 
 
 def is_better(objective: float, known: float) -> bool:
@@ -53,15 +53,7 @@ def is_better(objective: float, known: float) -> bool:
     return known - objective > SAME * max(abs(known), SAME)
 
 
-def close(first: float, second: float) -> bool:
-    """Whether two objectives are the same up to rounding."""
-    try:
-        return abs(first - second) <= SAME * max(1.0, abs(first), abs(second))
-    except OverflowError:  # JSON may hold whole numbers beyond all doubles
-        return False
-
-
-def cut(bound: float, objective: float) -> float:
+def cut_bound(bound: float, objective: float) -> float:
     """Return the bound, or the objective of the best feasible point if that is lower."""
     return min(bound, objective)
 
@@ -76,7 +68,7 @@ def relative_gap(objective: float, bound: float) -> float:
     return min(max(objective - bound, 0.0) / max(abs(objective), PROVEN[1]), 1.0)
 
 
-def best_of_each(records: Iterable[Record], entry: str) -> list[Record]:
+def best_runs(records: Iterable[Record], entry: str) -> list[Record]:
     """Return the best run of each solver by name: greatest bound, then this entry, then the fastest."""
 
     def preference(record: Record) -> tuple[Any, ...]:
@@ -87,44 +79,44 @@ def best_of_each(records: Iterable[Record], entry: str) -> list[Record]:
     chosen: dict[str, Record] = {}
     for record in sorted(records, key=preference):
         chosen.setdefault(record.solver, record)
-    return sorted(chosen.values(), key=lambda each: each.solver)
+    return sorted(chosen.values(), key=lambda record: record.solver)
 
 
-def runs_of(records: Iterable[Record], entry: str, objective: float) -> list[dict[str, Any]]:
+def shown_runs(records: Iterable[Record], entry: str, objective: float) -> list[dict[str, Any]]:
     """Return the best run of each solver on an entry for its sidecar, bounds cut to the objective."""
-    found = []
-    for each in best_of_each((record for record in records if record.entry == entry), entry):
-        shown = {key: getattr(each, name) for key, name in _SHOWN.items()}
-        if each.bound is not None:
-            shown["bound"] = cut(each.bound, objective)
+    runs = []
+    for record in best_runs((record for record in records if record.entry == entry), entry):
+        shown = {key: getattr(record, name) for key, name in _SHOWN.items()}
+        if record.bound is not None:
+            shown["bound"] = cut_bound(record.bound, objective)
         known = {key: value for key, value in shown.items() if value is not None}
-        found.append({"solver": each.solver, "version": each.version, "status": each.status} | known)
-    return found
+        runs.append({"solver": record.solver, "version": record.version, "status": record.status} | known)
+    return runs
 
 
-def standing(
+def entry_status(
     objective: float, bounds: Sequence[dict[str, Any]], records: Iterable[Record], entry: str
 ) -> dict[str, Any]:
     """Return the status of an entry, with `solved` or `claimed`. records: also of equivalent entries."""
     computed = [
-        each for each in bounds if each["status"] == "computed" and is_proven(objective, each["bound"])
+        bound for bound in bounds if bound["status"] == "computed" and is_proven(objective, bound["bound"])
     ]
-    for by, found in (
-        ("certificate", [each for each in computed if "certificate" in each]),
-        ("tangent", [each for each in computed if "certificate" not in each]),
+    for by, proofs in (
+        ("certificate", [bound for bound in computed if "certificate" in bound]),
+        ("tangent", [bound for bound in computed if "certificate" not in bound]),
     ):
-        if found:
-            return _solved(by, [{key: each[key] for key in ("solver", "version")} for each in found])
+        if proofs:
+            return _solved(by, [{key: bound[key] for key in ("solver", "version")} for bound in proofs])
     claims = [
-        each
-        for each in records
-        if each.bound is not None and is_proven(objective, cut(each.bound, objective))
+        record
+        for record in records
+        if record.bound is not None and is_proven(objective, cut_bound(record.bound, objective))
     ]
-    sound = best_of_each((each for each in claims if each.solver in MAKERS), entry)
-    if len({MAKERS[each.solver] for each in sound}) >= AGREE:
-        return _solved("agreement", [_program(each, entry) for each in sound])
+    sound = best_runs((record for record in claims if record.solver in MAKERS), entry)
+    if len({MAKERS[record.solver] for record in sound}) >= AGREE:
+        return _solved("agreement", [_program(record, entry) for record in sound])
     if claims:
-        programs = [_program(each, entry) for each in best_of_each(claims, entry)]
+        programs = [_program(record, entry) for record in best_runs(claims, entry)]
         return {"status": "claimed", "claimed": programs}
     return {"status": "best known"}
 
@@ -146,12 +138,12 @@ def difficulty(status: str, objective: float, runs: Iterable[Record], *, tangent
     if status == "best known":
         return "open"
     quick = (
-        each.status == "optimal"
-        and each.threads == 1
-        and each.seconds is not None
-        and each.seconds <= EASY
-        and each.bound is not None
-        and is_proven(objective, cut(each.bound, objective))
-        for each in runs
+        run.status == "optimal"
+        and run.threads == 1
+        and run.seconds is not None
+        and run.seconds <= EASY
+        and run.bound is not None
+        and is_proven(objective, cut_bound(run.bound, objective))
+        for run in runs
     )
     return "easy" if tangent or any(quick) else "hard"

@@ -21,13 +21,13 @@ from ....models.storage import make_folder
 from ...bundle.manifest import write_manifest
 from ...formats.registry import Written, write
 from ..documents.documents import about_file, tightened_by
-from ..ledger.given import ROLES, Given, read_point
+from ..ledger.known_points import ROLES, InstancePoints, read_instance_points
 from ..ledger.ledger import Ledger, read_ledger
-from ..ledger.points import Known, best_point, ours
-from ..plan.recipe import EntryRecipe, InstancePlan, plan
-from ..plan.sources import instance_from
+from ..ledger.points import KnownField, best_point, provenance_by
+from ..plan.instances import formulate_entry, make_instance
+from ..plan.recipe import EntryRecipe, InstancePlan, plan_library
 from ..plan.spec import DEFAULT, RUNGS, Spec, default_spec
-from .entry_task import formulated, write_models
+from .entry_files import write_models
 from .table import TABLE, read_table
 
 SHIPPED: Final = DEFAULT.with_name(TABLE)
@@ -70,28 +70,28 @@ class LibraryEntry:
     @property
     def bound(self) -> float | None:
         """Best dual bound, None without one."""
-        found: float | None = self.facts["bound"]
-        return found
+        bound: float | None = self.facts["bound"]
+        return bound
 
     @cached_property
     def instance(self) -> Instance:
         """The instance."""
-        return instance_from(_found(self.name)[0].recipe)
+        return make_instance(_plan_of(self.name)[0].recipe)
 
     @cached_property
     def problem(self) -> Problem:
         """The problem. Raises InputError, InstanceError for damaged points of a `qp` entry."""
         recipe = self._recipe
-        jumps = self._given.field("baseline").field.p if FORMULATIONS[recipe.formulation].fixed else None
-        found = formulated(self.instance, recipe.formulation, recipe.facet, jumps)
+        jumps = self._points.field("baseline").field.p if FORMULATIONS[recipe.formulation].fixed else None
+        problem = formulate_entry(self.instance, recipe.formulation, recipe.facet, jumps)
         if not recipe.tightened or self.certificate is None:
-            return found
-        return tightened_by(self.certificate, found)
+            return problem
+        return tightened_by(self.certificate, problem)
 
     @cached_property
     def field(self) -> CrossField:
         """The field of the best known point. Raises InputError, InstanceError for damaged points."""
-        known = [*(self._given.field(role) for role in ROLES), *self._submitted()]
+        known = [*(self._points.field(role) for role in ROLES), *self._submitted()]
         certified = self.certificate.field if self._recipe.tightened and self.certificate else None
         return best_point(self.problem, known, certified).known.field
 
@@ -101,10 +101,10 @@ class LibraryEntry:
 
         Raises InputError for a certificate that is refused.
         """
-        stated = self._given.about.get("certificates", {}).get(str(self._recipe.norm))
+        stated = self._points.about.get("certificates", {}).get(str(self._recipe.norm))
         if stated is None:
             return None
-        return read_certificate(_points() / stated["file"], on=self.instance)
+        return read_certificate(_points_folder() / stated["file"], on=self.instance)
 
     def write(self, path: str | Path) -> Written:
         """Write the model file, with the same bytes as in a built library.
@@ -139,30 +139,30 @@ class LibraryEntry:
         """
         written, refused = write_models(self.problem, self._recipe, folder)
         manifest = write_manifest(self.problem, written, refused, folder, self.name)
-        models = [name for each in written for name in each.files]
+        models = [name for model in written for name in model.files]
         return [*models, manifest.path.name, manifest.document["instance"]["file"]]
 
     @property
     def _recipe(self) -> EntryRecipe:
-        return _found(self.name)[1]
+        return _plan_of(self.name)[1]
 
     @cached_property
-    def _given(self) -> Given:
+    def _points(self) -> InstancePoints:
         """The points that ship for the instance. Raises InstanceError for points of another one."""
-        given = read_point(_points() / about_file(self.facts["instance"]))
-        if given.instance != self.instance.sha256:
-            raise InstanceError(f"holds points of another instance; {_REMEDY}", file=_points())
-        return given
+        points = read_instance_points(_points_folder() / about_file(self.facts["instance"]))
+        if points.instance != self.instance.sha256:
+            raise InstanceError(f"holds points of another instance; {_REMEDY}", file=_points_folder())
+        return points
 
-    def _submitted(self) -> Iterable[Known]:
+    def _submitted(self) -> Iterable[KnownField]:
         """The fields of the ledger for the entries of the instance."""
         ledger = _ledger()
-        for each in _found(self.name)[0].entries:
-            record = ledger.with_point(each.name)
+        for recipe in _plan_of(self.name)[0].entries:
+            record = ledger.record_with_field(recipe.name)
             if record is not None:
-                field = ledger.field(record)
+                field = ledger.read_field(record)
                 if field.instance.sha256 == self.instance.sha256:
-                    yield Known(field, ours("ledger"))
+                    yield KnownField(field, provenance_by("ledger"))
 
 
 @check_arguments
@@ -224,11 +224,11 @@ def write_entries(
 
     Returns the names of the files by entry. Raises OutputError.
     """
-    target, found = make_folder(folder), {}
-    for number, each in enumerate(chosen, 1):
-        progress(f"{number} of {len(chosen)} entries: {each.name}")
-        found[each.name] = each.write_set(target)
-    return found
+    target, written = make_folder(folder), {}
+    for number, one in enumerate(chosen, 1):
+        progress(f"{number} of {len(chosen)} entries: {one.name}")
+        written[one.name] = one.write_set(target)
+    return written
 
 
 @cache
@@ -243,17 +243,17 @@ def _spec() -> Spec:
 
 @cache
 def _plans() -> dict[str, tuple[InstancePlan, EntryRecipe]]:
-    return {recipe.name: (each, recipe) for each in plan(_spec()) for recipe in each.entries}
+    return {recipe.name: (planned, recipe) for planned in plan_library(_spec()) for recipe in planned.entries}
 
 
-def _found(name: str) -> tuple[InstancePlan, EntryRecipe]:
+def _plan_of(name: str) -> tuple[InstancePlan, EntryRecipe]:
     """The plan of an entry. Raises InputError where the table has entries that the specification lacks."""
     if name not in _plans():
         raise InputError(f"{name} is not in the specification; build the library again", file=SHIPPED)
     return _plans()[name]
 
 
-def _points() -> Path:
+def _points_folder() -> Path:
     points = _spec().points
     assert points is not None  # the specification that ships has points
     return points

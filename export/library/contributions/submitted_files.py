@@ -17,46 +17,46 @@ from ....models.proof import check_certificate
 from ....models.storage import read_bytes
 from ...solutions.readers.registry import head_of, recognised
 
-Kind = Literal["solution", "field", "certificate", ""]
-"""Kind of a file; empty if unknown."""
+FileKind = Literal["solution", "field", "certificate", ""]
+"""FileKind of a file; empty if unknown."""
 
 
 @dataclass(frozen=True)
-class Source:
+class SubmittedFile:
     """A submitted file. listed: named by itself, not only found in a folder; error: why it cannot be read."""
 
     path: Path
-    kind: Kind
+    kind: FileKind
     listed: bool = True
     error: CrossfieldError | None = None
 
 
-def sources_of(files: Sequence[str | Path]) -> list[Source]:
+def find_submitted_files(files: Sequence[str | Path]) -> list[SubmittedFile]:
     """Return files and the files in folders with their kinds. Raises InputError if there are none."""
-    sources = [_source(path, listed) for path, listed in _expanded(files)]
-    if not sources:
+    files_found = [_submitted_file(path, listed) for path, listed in _expanded(files)]
+    if not files_found:
         raise InputError("there is nothing to submit; give files")
-    return sources
+    return files_found
 
 
 def _expanded(files: Iterable[str | Path]) -> Iterator[tuple[Path, bool]]:
     """The files with those in folders, and whether each was listed by itself."""
     for path in map(Path, files):
         if path.is_dir():
-            inside = (each for each in sorted(path.rglob("*")) if not each.name.startswith("."))
-            yield from ((each, False) for each in inside if each.is_file())
+            inside = (file for file in sorted(path.rglob("*")) if not file.name.startswith("."))
+            yield from ((file, False) for file in inside if file.is_file())
         else:
             yield path, True
 
 
-def _source(path: Path, listed: bool) -> Source:
+def _submitted_file(path: Path, listed: bool) -> SubmittedFile:
     try:
-        return Source(path, kind_of(path), listed)
+        return SubmittedFile(path, kind_of(path), listed)
     except CrossfieldError as error:
-        return Source(path, "", error=error)
+        return SubmittedFile(path, "", error=error)
 
 
-def kind_of(path: Path) -> Kind:
+def kind_of(path: Path) -> FileKind:
     """Return the kind of a file, from its content."""
     data = read_bytes(path)
     if path.suffix.lower() == ".rawfield":

@@ -1,4 +1,4 @@
-"""Instances of recipes: samples, drawings and random strokes."""
+"""Instances of recipes, from samples, drawings and random strokes, and problems of entries."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import cast
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
+from ....models.formulations.catalogue import FORMULATIONS
+from ....models.formulations.problem import Problem, formulate
+from ....models.instance.grid import Ints
 from ....models.instance.instance import Gauge, Instance
 from ....models.sketch.drawing_file import parse_drawing
 from ....models.sketch.random_strokes import random_instance
@@ -15,14 +18,14 @@ from ....models.sketch.samples import SAMPLES, sample
 from .recipe import InstanceRecipe
 
 
-def instance_from(recipe: InstanceRecipe) -> Instance:
+def make_instance(recipe: InstanceRecipe) -> Instance:
     """Return the instance of a recipe. Raises InputError; NoStrokeError if its size leaves no strokes."""
     make = {"sample": _of_sample, "file": _of_file, "random": _of_random}[recipe.sketch.kind]
     try:
         # The coefficients of the paper, 1 and 1e-6, on every grid, so that published results apply.
         of_paper = {name: getattr(Instance, name) for name in ("stroke_coefficient", "skew_coefficient")}
-        made = replace(make(recipe), name=recipe.name, **of_paper)
-        return made.with_weights(**recipe.sketch.weights)
+        instance = replace(make(recipe), name=recipe.name, **of_paper)
+        return instance.with_weights(**recipe.sketch.weights)
     except NoStrokeError as error:
         raise NoStrokeError(f"{recipe.name}: {error}") from error
     except CrossfieldError as error:
@@ -59,3 +62,10 @@ def _of_random(recipe: InstanceRecipe) -> Instance:
         name=recipe.name,
         **recipe.sketch.drawn,
     )
+
+
+def formulate_entry(instance: Instance, formulation: str, facet: str, jumps: Ints | None) -> Problem:
+    """Return the problem of an entry in its full windows. jumps: fixed ones, which only `qp-fixed` has."""
+    declared = FORMULATIONS[formulation]
+    options = {"facet": facet} if "facet" in declared.settable else {}
+    return formulate(instance, formulation, p=jumps if declared.fixed else None, **options)

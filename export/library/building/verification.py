@@ -1,0 +1,179 @@
+"""Verification of a library: it is built again from its own inputs, and every file is compared.
+
+Inputs are the specification in library.json, the ledger, and the fields and certificates of the library,
+which replace every search. Points are also checked by the exact program that every library contains.
+"""
+
+from __future__ import annotations
+
+import gzip
+import tempfile
+import zlib
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ....models.errors import CrossfieldError, InputError
+from ....models.processes.deadline import Progress, silent
+from ....models.storage import read_bytes
+from ...formats.registry import generator
+from ..documents.check_point import BadInputError, check
+from ..documents.checksums import SUMS, is_intact, read_checksums
+from ..documents.documents import INDEX, Library, existing_folder, read_library
+from ..documents.lock import LOCK, locked_if_writable
+from ..ledger.grades import FEASIBLE
+from ..ledger.known_points import all_points_of
+from ..ledger.ledger import LEDGER, read_ledger
+from .build import build_locked, has_unbuilt_records
+from .executor import Tasks, open_executor, tasks_ahead
+
+BUILD: Final = "build the library again"
+_FETCH: Final = f"fetch it again, or {BUILD}"
+_INTERRUPTED: Final = f"after an interrupted solve or submission {BUILD}; otherwise fetch it again"
+_REMOVE: Final = "remove it"
+
+
+@dataclass(frozen=True, order=True)
+class Defect:
+    """A defect of a library: file, description and remedy."""
+
+    file: str
+    what: str
+    remedy: str = BUILD
+
+    @classmethod
+    def of(cls, error: CrossfieldError, file: str) -> Defect:
+        """Return an error about a file, whose message names defect and remedy."""
+        name = Path(error.file).name if error.file else file
+        message = str(error).removeprefix(f"{error.file}: ")
+        what, _, remedy = message.rpartition("; ")
+        return cls(name, what, remedy) if what else cls(name, message)
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.what}; {self.remedy}"
+
+
+def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> list[Defect]:
+    """Return the defects of a library in a folder, which is locked during the work.
+
+    Raises InputError without a library, OutputError if another process holds the lock for too long.
+    """
+    folder = existing_folder(folder)
+    if not (folder / INDEX).is_file() and not (folder / SUMS).is_file():
+        raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
+    with locked_if_writable(folder, "a verification of the library", progress):
+        progress("files and checksums")
+        defects = [*_misplaced(folder), *_damaged(folder)]
+        named = {defect.file for defect in defects}
+        return [*defects, *sorted(_differing(folder, named, jobs, progress))]
+
+
+def _files(folder: Path) -> set[str]:
+    """The names of the files that a library may have."""
+    return {
+        path.name
+        for path in folder.iterdir()
+        if path.is_file() and not path.is_symlink() and path.name != LOCK and path.suffix != ".part"
+    }
+
+
+def _misplaced(folder: Path) -> Iterator[Defect]:
+    """Links, folders and temporary files."""
+    for path in sorted(folder.iterdir()):
+        if path.is_symlink() or not path.is_file():
+            kind = "a link" if path.is_symlink() else "a folder, or no plain file"
+            yield Defect(path.name, f"is {kind}; a library is flat and holds files alone", _REMOVE)
+        elif path.suffix == ".part":
+            yield Defect(path.name, "was left by a build that was stopped")
+
+
+def _damaged(folder: Path) -> Iterator[Defect]:
+    """Files that are missing, differ from SHA256SUMS, or are not in it."""
+    try:
+        sums = read_checksums(folder)
+    except CrossfieldError as error:
+        yield Defect.of(error, SUMS) if (folder / SUMS).exists() else Defect(SUMS, "is missing", _FETCH)
+        return
+    present = _files(folder)
+    for name in sums:
+        if name not in present:
+            yield Defect(name, "is missing", _FETCH)
+        elif not is_intact(folder, name, sums):
+            remedy = _INTERRUPTED if name == LEDGER else _FETCH
+            yield Defect(name, "has another SHA-256 than SHA256SUMS states", remedy)
+    of_ledger: list[str] = []
+    with suppress(CrossfieldError):  # a damaged ledger is found by the build
+        of_ledger = read_ledger(folder).files
+    for name in sorted(present - sums.keys() - {SUMS}):
+        yield Defect(name, "is not in SHA256SUMS", BUILD if name in of_ledger else f"{_REMOVE}, or {BUILD}")
+
+
+def _differing(folder: Path, named: Collection[str], jobs: int, progress: Progress) -> Iterator[Defect]:
+    """Files that a build does not make or makes otherwise, and wrong points; not those named before."""
+    try:
+        library = read_library(folder)
+        stated = library.document["generator"]
+        if stated != generator():
+            what = f"was made by {stated}, so {generator()} cannot make it again to compare it"
+            yield Defect(INDEX, what, f"verify with {stated}")
+            return
+        with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
+            again = Path(temporary)
+            ledger, points = read_ledger(folder), all_points_of(library)
+            rebuilt = build_locked(library.spec, again, ledger, points, jobs=jobs, progress=progress)
+            present, built = _files(folder), _files(again)
+            remedy = BUILD if has_unbuilt_records(library) else f"{_REMOVE}, and {BUILD}"
+            for name in (present | built) - {SUMS, *named}:
+                if name not in built:
+                    yield Defect(name, "belongs to nothing in the library", _REMOVE)
+                elif name not in present:
+                    yield Defect(name, "is missing", _FETCH)
+                elif _content(folder / name) != _content(again / name):
+                    yield Defect(name, "is not what a build makes", remedy)
+            progress("points")
+            wrong = _wrong_points(folder, rebuilt, jobs)
+            yield from (defect for defect in wrong if defect.file not in named)
+    except CrossfieldError as error:
+        yield Defect.of(error, INDEX)
+
+
+def _content(path: Path) -> bytes:
+    """The bytes of a file, unpacked, because versions of zlib pack differently; as they are if damaged."""
+    data = read_bytes(path)
+    with suppress(OSError, EOFError, zlib.error):
+        return gzip.decompress(data) if path.suffix == ".gz" else data
+    return data
+
+
+def _wrong_points(folder: Path, library: Library, jobs: int) -> list[Defect]:
+    defects: list[Defect] = []
+    with open_executor(jobs, None) as chosen:
+        tasks = Tasks(chosen, tasks_ahead(jobs, None))
+        for sidecar in library.entries:
+            tasks.add(_check_point, (folder, sidecar), defects.extend)
+        tasks.run()
+    return defects
+
+
+def _check_point(task: tuple[Path, Mapping[str, Any]]) -> list[Defect]:
+    """The defects of the best known point of an entry, against its .mps and its instance."""
+    folder, sidecar = task
+    point, defects = sidecar["best"]["point"], []
+    models = [file["name"] for file in sidecar["files"] if file["format"] == "mps"]
+    if sidecar["jumps"] is None:  # an instance does not have the jumps that are data
+        models.append(sidecar["instance"]["file"])
+    for model in models:
+        try:
+            result = check(str(folder / model), str(folder / point))
+        except BadInputError as error:
+            what = str(error).replace(f"{folder}/", "")
+            defects.append(Defect(point, f"the checker refuses it: {what}"))
+            continue
+        if result.worst > FEASIBLE:
+            what = f"is not feasible against {model}: worst violation {float(result.worst):.3g}"
+            defects.append(Defect(point, what))
+        if not result.agrees:
+            defects.append(Defect(point, f"claims another objective than it has against {model}"))
+    return defects

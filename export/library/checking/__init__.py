@@ -1,1 +1,0 @@
-"""Checks of a library against its own statements."""
