@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from crossfield.export.library.building import fields
 from crossfield.export.library.building.build import build
+from crossfield.export.library.plan.recipe import plan_library
 from crossfield.export.library.plan.spec import default_spec, read_spec, spec_of
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import read_field
