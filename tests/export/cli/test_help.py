@@ -16,8 +16,6 @@ from crossfield.export.pictures.draw import KINDS
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS
 from crossfield.export.solving.methods import METHODS
 from crossfield.models.formulations.catalogue import FORMULATIONS, short_names
-from crossfield.models.formulations.declaration import FACETS
-from crossfield.models.instance.instance import GAUGES
 from crossfield.models.sketch.read import DEFAULT_SIZE
 from crossfield.models.sketch.samples import SAMPLES
 from typer.testing import CliRunner
@@ -115,12 +113,6 @@ def test_brackets_in_a_help_are_shown(text, markup):
 def test_a_flag_is_shown_without_a_value(text):
     for command in (*NAMED, *OTHERS):
         assert "bool" not in text(command).lower(), command
-
-
-def test_choices_are_those_of_the_models_and_of_the_formats(text):
-    shown = words(text("export")) + words(text("instance"))
-    for table in (GAUGES, FACETS, FORMATS["nl"].dialects):
-        assert re.search(rf"[<\[]{re.escape('|'.join(table))}[>\]]", shown), table
 
 
 def test_the_options_of_all_commands_are_counted(capsys):

@@ -8,8 +8,6 @@ import pytest
 from crossfield.export.library.building.build import build
 from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.documents.citation import REFERENCES, licence_terms
-from crossfield.export.library.plan.recipe import plan_library
-from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.errors import InputError
 from crossfield.models.sketch.samples import sample_svg
 from libraries import spec_of
@@ -150,12 +148,3 @@ def test_an_invalid_origin_or_release_is_refused(tmp_path):
     ):
         with pytest.raises(InputError, match=words):
             drawn_spec(tmp_path, RUNG, text)
-
-
-def test_the_shipped_library_states_release_and_origins():
-    spec = default_spec()
-    assert spec.release is not None
-    assert spec.release.authors == ("The crossfield authors",)
-    assert {each.origin.license for each in spec.sketches} == {"CC-BY-4.0"}
-    assert {each.origin.author for each in spec.sketches} == {"The crossfield authors"}
-    assert all(each.recipe.added for each in plan_library(spec))

@@ -656,23 +656,6 @@ def test_it_works_from_a_folder_without_any_server(browser, site):
     assert browser.get_log("browser") == []
 
 
-def test_pictures_follow_dark_mode(browser, address):
-    from io import BytesIO
-
-    from PIL import Image, ImageStat
-
-    means = []
-    for scheme in ("light", "dark"):
-        show(browser, scheme=scheme)
-        browser.get(f"{address}/instance/{INSTANCE}.html")
-        picture = Image.open(BytesIO(find(browser, "img[src$='field.svg']").screenshot_as_png)).convert("L")
-        low, high = picture.getextrema()
-        assert high - low > 100
-        means.append(ImageStat.Stat(picture).mean[0])
-    assert means[0] > 180
-    assert means[1] < 90
-
-
 @pytest.fixture(scope="module")
 def facts(detailed):
     """Address of the site whose entry has every optional fact."""

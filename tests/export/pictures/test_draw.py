@@ -1,8 +1,5 @@
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -70,21 +67,6 @@ def test_every_kind_and_suffix_is_written_the_same_twice(tmp_path, kind, suffix)
     ):
         assert draw(field, tmp_path / f"second{suffix}", kind=kind).read_bytes() == data
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"first{suffix}", f"second{suffix}"]
-
-
-def test_the_rest_of_matplotlib_is_left_alone(tmp_path):
-    before = dict(mpl.rcParams)
-    draw(singular(6), tmp_path / "a.png", kind="energy")
-    assert dict(mpl.rcParams) == before
-    code = "import sys, crossfield.export.pictures.draw; sys.exit('matplotlib' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-    code = (
-        "import sys, numpy as np; from crossfield.export.pictures.draw import draw; "
-        "from crossfield.models.instance.instance import Instance;"
-        "i = Instance('a', np.ones((2, 2)), np.array([[0, 0]]), np.zeros(1), np.ones(1));"
-        "draw(i, sys.argv[1], kind='instance'); sys.exit('matplotlib.pyplot' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "b.png")], check=False).returncode == 0
 
 
 def test_row_0_is_at_the_top_and_strokes_lie_where_they_are(tmp_path):

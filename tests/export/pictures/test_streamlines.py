@@ -172,13 +172,6 @@ def test_lines_end_where_the_two_lines_are_one():
     assert (~picture)[row, column].any()
 
 
-def test_diagonal_pixels_are_not_connected():
-    field = field_of([[1, 0], [0, 1]], lambda x, _: -np.pi / 4 + 0 * x, zero)
-    lines = streamlines(field, 0.3)
-    assert len(lines) > 8
-    assert all(np.ptp(np.rint(line.points), axis=0).max() == 0 for line in lines)
-
-
 def test_combing_keeps_the_crosses_and_cuts_only_where_it_must():
     smooth = random_labels(waves(square(20)), 2)
     calm = combed(smooth)
@@ -190,17 +183,6 @@ def test_combing_keeps_the_crosses_and_cuts_only_where_it_must():
     single = combed(quarter(24, 0.25))
     assert 8 <= (single.p % 2 == 1).sum() <= 30  # from the middle to the border
     np.testing.assert_array_equal(single.singularities.index, [0.25])
-
-
-def test_cut_joins_two_singularities_that_are_close():
-    def line(x, y):
-        return (np.arctan2(y - 0.3, x - 3.2) - np.arctan2(y - 0.3, x + 3.2)) / 4 + 0.3
-
-    field = combed(field_of(square(40), line, zero))
-    assert sorted(field.singularities.index.tolist()) == [-0.25, 0.25]
-    cut = field.p % 2 == 1
-    assert 5 <= cut.sum() <= 12
-    assert (np.abs(field.instance.grid.columns[field.instance.grid.first[cut]] - 19.5) < 6).all()
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 6), (5, 1)])

@@ -143,9 +143,3 @@ def test_a_matcap_has_one_colour_for_each_normal_and_all_are_colours():
     assert (matcap(turned) == coloured[::-1]).all()
     light = coloured[found.opacity == 1][:, :3].sum(axis=1)
     assert np.ptp(light) > 0.8
-
-
-@pytest.mark.parametrize("scale", [0, -3, 10**6])
-def test_scales_without_a_picture_are_refused(scale):
-    with pytest.raises(InputError, match="choose another scale"):
-        fine(ball(8), scale)

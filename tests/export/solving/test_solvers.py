@@ -383,25 +383,6 @@ def test_highs_takes_the_start_as_incumbent_and_a_wide_gap_ends_its_search(tmp_p
     assert solution.objective - solution.bound <= 0.97 * solution.objective + 1e-9
 
 
-def test_bonmin_improves_a_start_that_is_not(small):
-    problem = cf.formulate(small, "miqp-exact")
-    flat = cf.CrossField(small, small.alpha_lower, np.zeros(4), np.clip(0, small.p_min, small.p_max))
-    found = cf.solve(problem, "bonmin", start=flat)
-    assert found.objective == pytest.approx(by_enumeration(small, least_squares), abs=2e-5)
-    assert found.objective < flat.energy(2).total - 1e-3
-
-
-def test_threads_may_change_from_solve_to_solve(tmp_path, small):
-    problem = cf.formulate(small, "milp-mccormick")
-    found = [
-        cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(250, threads=threads)).objective
-        for threads in (1, 2, 1, 0)
-    ]
-    assert found == pytest.approx([found[0]] * 4, abs=1e-7)
-    cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(250, threads=1))
-    assert "threads" in (tmp_path / "random_1.milp-mccormick.highs.log").read_text().lower()
-
-
 @pytest.mark.parametrize(
     "given",
     [

@@ -115,13 +115,6 @@ def test_quarter_singularity_of_four_pixels(index):
     assert np.abs(field.residual_a) == pytest.approx([np.pi / 8] * 4)
 
 
-def test_half_singularity_by_its_jumps():
-    # Pairs: top, left, bottom, right side; the walk is bottom + side - top - left.
-    field = CrossField(pixels([[1, 1], [1, 1]], {(0, 0): 0}), np.zeros(4), np.zeros(4), [1, 0, 0, -1])
-    assert field.singularities.index.tolist() == [0.5]
-    assert CrossField(field.instance, np.zeros(4), np.zeros(4), [1, 0, 1, 0]).singularities.index.size == 0
-
-
 def test_singularity_is_found_at_its_quad():
     rows, columns = np.mgrid[0:5, 0:6]
     way_round = np.arctan2(-(rows - 2.5), columns - 1.5).ravel()

@@ -107,12 +107,6 @@ def test_damage_is_named_with_its_line(damage, message, tmp_path):
     assert message in str(caught.value)
 
 
-def test_without_an_instance_the_remedy_is_named(tmp_path):
-    path = write_field(random_field(random_instance(1), 1), tmp_path / "field.rawfield")
-    with pytest.raises(InputError, match=r"holds no instance.*on=instance"):
-        read_field(path)
-
-
 def test_no_more_is_read_than_the_instance_has_rows_for(tmp_path):
     field = random_field(random_instance(1), 1)
     path = tmp_path / "field.rawfield"

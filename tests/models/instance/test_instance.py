@@ -134,19 +134,6 @@ def test_box_takes_theta_between_minus_45_and_135_degrees(theta, target):
     assert np.degrees(instance.target) == pytest.approx([target])
 
 
-def test_jumps_between_boxes_are_minus_one_to_one():
-    instance = Instance(**(GOOD | {"gauge": "box"}))
-    assert (instance.p_min == -1).all()
-    assert (instance.p_max == 1).all()
-
-
-def test_jump_bounds_by_hand():
-    # Pair (0, 1): alpha_0 in [0, 90], alpha_1 in [105, 195] degrees, so d in [-195, -15], -d/90 in [0.17,
-    # 2.17].
-    instance = Instance("two", np.ones((1, 2), bool), [[0, 1]], [np.radians(150)], [1.0])
-    assert (instance.p_min.tolist(), instance.p_max.tolist()) == ([0], [3])
-
-
 @given(instances(), st.integers(0, 2**32 - 1))
 def test_best_even_and_best_odd_jump_lie_in_the_bounds(instance, seed):
     grid = instance.grid

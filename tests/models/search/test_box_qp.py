@@ -117,14 +117,6 @@ def test_same_optimum_as_ipopt_on_the_file(name, size):
     assert best.energy().total == pytest.approx(other.energy().total, rel=1e-8)
 
 
-def test_one_pixel_in_the_box_of_the_paper():
-    instance = Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0], gauge="box")
-    field = fit_in_box(CrossField(instance, [0.1], [0.2], []))
-    # beta = (theta - alpha) / (1 + skew_coefficient), and alpha leans on its bound.
-    assert field.alpha.tolist() == [HALF]
-    assert field.beta == pytest.approx([np.pi / 6 / (1 + 1e-6)], rel=1e-12)
-
-
 def test_pair_with_a_jump_between_two_strokes():
     # alpha stays at both strokes, since |A| = |0.3 - 0.3 - pi/2 + pi/2| = 0.
     instance = Instance(

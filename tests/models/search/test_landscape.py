@@ -109,15 +109,6 @@ def explored(instance, seed, perturbations):
             assert (better.x <= upper).all()
 
 
-def searched(instance, seed, rounds):
-    found = cf.search(instance, rounds=rounds, seed=seed, jobs=1)
-    assert found.rounds <= rounds
-    assert found.ended in {"rounds", "patience"}
-    energies = [energy for _, energy in found.energies]
-    assert min(energies) >= 0
-    assert found.field.energy().total <= energies[0] * (1 + 1e-9) + 1e-9
-
-
 @given(seed=SEEDS)
 @settings(deadline=None, max_examples=25)
 def test_energies_on_odd_instances_are_those_of_their_definition(seed):
@@ -154,13 +145,3 @@ def test_the_gain_of_a_turn_is_the_change_of_the_least_energy():
         land.restore(home)
     assert len(gains) == len(instance.theta)
     assert gains == pytest.approx(np.array(changes), rel=1e-6)
-
-
-@pytest.mark.slow
-@given(seed=SEEDS)
-@settings(deadline=None, max_examples=15)
-def test_searches_of_odd_instances_end(seed):
-    instance = odd_instance(seed)
-    walked(instance, seed, perturbations=12, steps=6)
-    explored(instance, seed, perturbations=20)
-    searched(instance, seed, rounds=1)

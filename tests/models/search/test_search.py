@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from children import interrupted
 from crossfield.models.errors import InstanceError
-from crossfield.models.instance.angles import HALF, QUARTER
+from crossfield.models.instance.angles import QUARTER
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.coarse import halve_resolution, prolong_field
 from crossfield.models.search.greedy import greedy_field
@@ -141,16 +141,6 @@ def test_a_start_on_another_instance_is_refused():
             cf.search(other, rounds=0, jobs=1, start=start)
 
 
-@pytest.mark.slow
-def test_search_gets_below_the_greedy_field():
-    instance = cf.sample("mouse", 24)
-    found = cf.search(instance, rounds=4)
-    assert found.field.energy().total < 0.99 * first_field(instance).energy().total
-    energies = [energy for _, energy in found.energies]
-    assert energies[-1] == pytest.approx(found.field.energy().total, rel=1e-6)
-    assert energies == sorted(energies, reverse=True)
-
-
 def test_a_small_grid_is_searched_from_several_starts():
     """From the lowest start alone, three rounds lead to an energy of 6.914."""
     found = cf.search(cf.random_instance(9, size=12), rounds=3, jobs=1).field
@@ -276,11 +266,6 @@ def test_smooth_energy_is_the_same_on_both_grids():
     assert prolong_field(above, fine).energy().total == pytest.approx(field.energy().total, rel=0.01)
 
 
-def test_crossing_strokes_leave_no_coarse_stroke():
-    theta = np.array([[0.0, HALF], [HALF, 0.0]])
-    assert halve_resolution(sketch(np.ones((2, 2), bool), theta)) is None
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("skew_coefficient", [0.0, 1e-6])
 def test_parts_without_strokes_and_free_skews_do_no_harm(skew_coefficient):
@@ -291,8 +276,3 @@ def test_parts_without_strokes_and_free_skews_do_no_harm(skew_coefficient):
     found = cf.search(sketch(mask, theta, skew_coefficient=skew_coefficient), rounds=4).field
     assert found.energy().total <= first_field(found.instance).energy().total + 1e-9
     assert found.image(found.pixel_energy)[:, 6:] == pytest.approx(np.zeros((6, 5)), abs=1e-12)
-
-
-def test_a_single_pixel_is_a_search_of_nothing():
-    found = cf.search(cf.Instance("one", [[True]], [[0, 0]], [2.0], [1.0]))
-    assert (found.ended, found.field.energy().total) == ("patience", 0)

@@ -88,20 +88,6 @@ def test_the_way_down_ends_where_the_slope_does_and_time_cuts_it_short():
     assert again <= energies[-1]
 
 
-@pytest.mark.slow
-def test_large_systems_are_solved_by_few_factorisations_as_well_as_by_many(monkeypatch):
-    field = cf.bend_field(cf.polyvector_field(cf.sample("bottle", 64), hold=100))
-    stencils = Stencils(field.instance.grid)
-    level = GridLevel(stencils, Crosses.of(field))
-    found = Equations(stencils, level.crosses, Weights(5e-6, 5e-5, 0.007))
-    energy, low = descend(found, level.starts[0], never)
-    monkeypatch.setattr("crossfield.models.surface.equations._FEW", stencils.count)
-    exact, _ = descend(found, level.starts[0], never)
-    assert stencils.count > 1000
-    assert energy == pytest.approx(exact, rel=1e-3)
-    assert descend(found, low, never)[0] == pytest.approx(energy, rel=1e-3)
-
-
 def test_a_plane_stays_a_plane_on_finer_levels():
     mask = np.ones((33, 30), dtype=bool)
     mask[:9, :13] = False

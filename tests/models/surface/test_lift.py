@@ -57,16 +57,6 @@ def test_exact_crosses_lead_to_the_surface(name, most):
     assert found.confidence.mean() > 0.9
 
 
-@pytest.mark.slow
-@for_each(
-    "name, size, most",
-    [("tilted_cylinder", 48, 2), ("torus_patch", 48, 10), ("vase", 32, 5), ("spheroid", 32, 3)],
-)
-def test_strokes_lead_near_it(name, size, most):
-    true = cf.analytic(name, size)
-    assert error(cf.surface(bent(true.instance)), true) <= most
-
-
 @pytest.mark.parametrize("size", [pytest.param(48, marks=pytest.mark.slow), 16])
 @pytest.mark.parametrize("name", ["tilted_cylinder", "wave_sheet"])
 def test_a_hint_chooses_among_surfaces_of_the_same_crosses(name, size):
