@@ -17,7 +17,7 @@ import numpy as np
 
 from ..instance.grid import Floats
 from ..processes.compiled import Crew, compiled
-from .products import add, all_taken, copy, product, share_of
+from .passes import add, all_taken, copy, product, share_of
 from .state import State
 
 _COLUMN: Final = (0, 2)  # of `State.around`: the neighbours before and after a pixel in its column

@@ -16,7 +16,7 @@ last change, by a factor that grows as in Nesterov's method (Soviet Math. Dokl. 
 where the bound falls (O'Donoghue and Candes, Found. Comput. Math. 15, 2015). This halves the number of
 passes, and any shares prove a bound.
 
-The compiled code for one pixel and one pair is models/proof/products.py.
+The compiled code for one pixel and one pair is models/proof/passes.py.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ from numpy.typing import NDArray
 
 from ..array_archive import Arrays
 from ..field.field import CrossField
-from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats, Grid
 from ..processes.compiled import Crew, compiled
 from ..processes.deadline import Over, never
@@ -43,16 +42,15 @@ from .clusters import (
     extended,
     least_of_clusters,
     prolonged_clusters,
+    quad_slacks,
     table_work,
     update_clusters,
 )
 from .combs import comb_excesses
-from .decoding import decode
 from .encoding import messages_of, tables_of
 from .lattice import Lattice, labels_at
-from .products import all_taken, ends_of, pair_minimum, pixel_pass, share_of
+from .passes import all_taken, ends_of, pair_minimum, pixel_pass, share_of
 from .pruning import RemainingCells, boxed, cells_left, prolonged_shares
-from .slack import quad_slacks
 from .state import Clusters, Ends, Indices, State, state_of
 
 Singles = NDArray[np.float32]
@@ -298,12 +296,6 @@ class Dual:
     def _excess(self, bound: float, energy: float) -> float:
         """The excess over a bound up to which labels survive."""
         return energy + _TOLERANCE * (1 + energy) + self._roundings()[1] - bound
-
-    def decoded(self, *, forwards: bool) -> tuple[Floats, Floats]:
-        """Alpha and beta (n,) of the crosses that the shares suggest; forwards after a backward pass."""
-        order = np.arange(len(self.lattice.count))[:: 1 if forwards else -1].copy()
-        alpha, beta = decode(order, self.state)
-        return alpha, np.clip(beta, -QUARTER, QUARTER)
 
     def arrays(self, quanta: tuple[float, float]) -> tuple[Arrays, Arrays]:
         """Messages and tables as whole numbers of their scales, after `quantise`."""

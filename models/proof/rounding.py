@@ -1,6 +1,7 @@
 """Fields from a dual solution: pixel by pixel the label of least estimated cost, then improved.
 
-models/proof/decoding.py estimates the costs.
+In the order of a pass, each pixel takes the label of least D + cost to the neighbours that have their label +
+shares of the neighbours that have none (Kolmogorov 2006, 5).
 """
 
 from __future__ import annotations
@@ -8,15 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+import numpy as np
+
 from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps
+from ..instance.angles import QUARTER
+from ..instance.grid import Bools, Floats
+from ..processes.compiled import compiled
 from ..processes.deadline import Over, never
 from ..search.box_qp import FreeField
 from ..search.energy import LinearSolver
 from ..search.improvement import improved_field, settle
 from .dual import Dual
+from .passes import add, least_a, share_of, sized
+from .state import Indices, State
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
+_HALF: Final = float(np.pi / 2)
 
 Improve = Callable[[CrossField, CrossField, Over], CrossField]
 """Returns the better of a rounded field and the best one so far, improved."""
@@ -41,7 +50,7 @@ class Rounding:
 
     def _rounded(self, best: CrossField, over: Over, *, forwards: bool) -> CrossField:
         instance = best.instance
-        alpha, beta = self._dual.decoded(forwards=forwards)
+        alpha, beta = decode(self._dual.state, forwards=forwards)
         found = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
         known = found.p.tobytes()
         if known in self._tried:
@@ -59,3 +68,46 @@ def improve(found: CrossField, best: CrossField, over: Over) -> CrossField:
     return min(
         best, improved_field(state.fit_in_bounds(over), stop=over), key=lambda field: field.energy().total
     )
+
+
+def decode(state: State, *, forwards: bool) -> tuple[Floats, Floats]:
+    """Alpha and beta (n,) of the crosses that the shares suggest; forwards after a backward pass."""
+    size = len(state.least)
+    order = np.arange(size)[:: 1 if forwards else -1].copy()
+    alpha, beta = np.zeros((2, size))
+    _decode(order, state, alpha, beta, np.zeros(size, dtype=bool))
+    return alpha, np.clip(beta, -QUARTER, QUARTER)
+
+
+@compiled
+def _decode(order: Indices, state: State, alpha: Floats, beta: Floats, fixed: Bools) -> None:
+    """Fill in the angles, pixel by pixel in that order. fixed: the pixels that have theirs."""
+    for i in order:
+        cost = state.unary[state.start[i] : state.start[i + 1]].copy()
+        for column in range(4):
+            pair = state.around[i, column]
+            if pair < 0:
+                continue
+            j = state.first[pair] + state.second[pair] - i
+            if fixed[j]:
+                _add_distance(i, state, alpha[j], beta[j], cost)
+            else:
+                add(cost, share_of(pair, i, state))
+        x = np.argmin(cost)
+        alpha[i] = state.alpha[i] + state.h * (x // state.beta_count[i])
+        beta[i] = state.beta[i] + state.h * (x % state.beta_count[i])
+        fixed[i] = True
+
+
+@compiled
+def _add_distance(i: int, state: State, alpha: float, beta: float, cost: Floats) -> None:
+    """Add the cost of a pair of pixel i with a fixed cross."""
+    columns = state.beta_count[i]
+    for row in range(state.alpha_count[i]):
+        even = state.alpha[i] + state.h * row - alpha
+        even, odd = least_a(even), least_a(even + _HALF)
+        for column in range(columns):
+            mine = state.beta[i] + state.h * column
+            same = sized(even, state.power) + sized(mine - beta, state.power)
+            other = sized(odd, state.power) + sized(mine + beta, state.power)
+            cost[row * columns + column] += 2 * min(same, other)

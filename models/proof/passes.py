@@ -1,7 +1,7 @@
 """The compiled code for one pixel and one pair: (min,+) products of labels with a pair's cost.
 
 For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha and one in beta. So the
-product is one over beta (models/proof/over_beta.py) and then one over alpha: O(N^3) for N^2 labels. A^2 is
+product is one over beta (models/proof/min_plus.py) and then one over alpha: O(N^3) for N^2 labels. A^2 is
 the least over all jumps of that parity: A is taken modulo pi.
 
 The first call compiles for some 20 s; cached code loads in 0.3 s. Cached code is not renewed when only
@@ -17,8 +17,7 @@ import numpy as np
 
 from ..instance.grid import Floats
 from ..processes.compiled import compiled
-from .min_plus import Terms, least_of, lower_rows
-from .over_beta import Given, betas, least_cost, over_beta
+from .min_plus import Given, Terms, betas, least_cost, least_of, lower_rows, over_beta
 from .state import Ends, State
 
 _HALF: Final = float(np.pi / 2)
