@@ -71,7 +71,7 @@ def drawings_of(folder: Path, suffixes: tuple[str, ...] = SUFFIXES) -> Iterator[
             yield Sketch(path.name, str(path), mask if path.suffix == ".png" and mask.exists() else None)
 
 
-def answered(command: list[str], folder: Path, name: str) -> dict[str, Any]:
+def run_command(command: list[str], folder: Path, name: str) -> dict[str, Any]:
     """The JSON output of a command of crossfield.
 
     With `memory`, the most bytes that its processes held, and `whole`, its wall time in seconds. The folder
@@ -108,7 +108,7 @@ def memory_of(session: int) -> int:
     return total
 
 
-def tiny() -> Iterator[Instance]:
+def tiny_instances() -> Iterator[Instance]:
     """Instances small enough for a proof: the smallest samples, and random strokes on 5 x 5 pixels."""
     for name in SAMPLES:
         for size in range(5, 12):

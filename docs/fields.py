@@ -32,7 +32,7 @@ from crossfield.models.errors import CrossfieldError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import STROKE_WEIGHT, Instance
 from studying.fields import MOST_CURVES
-from studying.instances import curves, drawing, drawings, noisy, surfaces
+from studying.instances import curves, drawing, drawings, noisy_instance, surfaces
 from studying.rows import DATA
 
 KEPT: Final = DATA / "fields.csv"
@@ -117,7 +117,7 @@ def surface(task: Task) -> Found:
     truth = cf.analytic(task.name, task.size)
     errors: dict[tuple[float, str], list[float]] = {}
     for seed in range(SEEDS if task.noise else 1):
-        for weight, name, field in fields(task, noisy(truth.instance, task.noise, seed)):
+        for weight, name, field in fields(task, noisy_instance(truth.instance, task.noise, seed)):
             error = np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean()
             errors.setdefault((weight, name), []).append(float(error))
     yield from ((weight, name, "", float(np.mean(found))) for (weight, name), found in errors.items())

@@ -25,7 +25,7 @@ COLUMNS: Final = 4
 SHOWN: Final = 6  # levels whose cells are drawn for single pixels
 
 
-def cells(level: LevelRecord, pixel: int) -> Bools:
+def allowed_cells(level: LevelRecord, pixel: int) -> Bools:
     """The cells of a pixel with four allowed vertices, (alpha, beta)."""
     begin = starts(level.alpha_count.astype(np.int64) * level.beta_count)
     shape = (level.alpha_count[pixel], level.beta_count[pixel])
@@ -33,26 +33,26 @@ def cells(level: LevelRecord, pixel: int) -> Bools:
     return found[:-1, :-1] & found[1:, :-1] & found[:-1, 1:] & found[1:, 1:]
 
 
-def shares(level: LevelRecord) -> Floats:
+def remaining_shares(level: LevelRecord) -> Floats:
     """The part of the strip that may hold a better cross of each pixel, shape (n,)."""
-    counts = [cells(level, pixel).sum() for pixel in range(len(level.alpha))]
+    counts = [allowed_cells(level, pixel).sum() for pixel in range(len(level.alpha))]
     return np.minimum(np.array(counts) * level.h**2 / STRIP, 1.0)
 
 
-def ends(proof: Proof) -> list[LevelRecord]:
+def last_levels(proof: Proof) -> list[LevelRecord]:
     """The last level of each spacing."""
     return list({level.h: level for level in proof.levels}.values())
 
 
-def of_boxes(boxes: Floats) -> Floats:
+def box_shares(boxes: Floats) -> Floats:
     """The part of the strip in the boxes (n, 4) of a certificate."""
     return (boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2]) / STRIP
 
 
-def maps(proof: Proof, boxes: Floats, path: Path) -> None:
+def draw_maps(proof: Proof, boxes: Floats, path: Path) -> None:
     """Draw the part left at every pixel for every level, and after the last; one colour scale."""
-    levels = ends(proof)
-    values = [*map(shares, levels), of_boxes(boxes)]
+    levels = last_levels(proof)
+    values = [*map(remaining_shares, levels), box_shares(boxes)]
     titles = [
         f"level {number}, {np.degrees(level.h):.2g}° apart\n"
         f"{np.count_nonzero(level.allowed):,} labels, bound {level.bound:.4f}"
@@ -79,7 +79,7 @@ def maps(proof: Proof, boxes: Floats, path: Path) -> None:
 
 def _gaps(place: Any, proof: Proof) -> None:
     """Draw the distance of every level's bound from the energy."""
-    gaps = [100 * (proof.energy - level.bound) / proof.energy for level in ends(proof)]
+    gaps = [100 * (proof.energy - level.bound) / proof.energy for level in last_levels(proof)]
     numbers = range(1, len(gaps) + 1)
     place.set_axis_on()
     place.semilogy(numbers, gaps, "o-", color=CELL, markersize=4)
@@ -106,12 +106,12 @@ def _strokes(place: Any, proof: Proof) -> None:
     place.plot(instance.grid.columns[at], instance.grid.rows[at], "o", color=V, markersize=1.8)
 
 
-def strips(proof: Proof, path: Path) -> list[int]:
+def draw_strips(proof: Proof, path: Path) -> list[int]:
     """Draw the cells that are left, level by level, for a pixel with a stroke and the last one to be decided;
     return these pixels.
     """
-    levels, instance = ends(proof)[:SHOWN], proof.field.instance
-    late = shares(levels[2])
+    levels, instance = last_levels(proof)[:SHOWN], proof.field.instance
+    late = remaining_shares(levels[2])
     drawn = instance.stroke_index
     pixels = (int(drawn[np.argsort(late[drawn])[len(drawn) // 2]]), int(np.argmax(late)))
     names = ("on a stroke", "decided last")
@@ -143,7 +143,7 @@ def _strip(place: Any, level: LevelRecord, pixel: int, proof: Proof) -> None:
     )
     centre = np.degrees(level.alpha[pixel])
     place.set_facecolor(BACKGROUND)
-    found = np.where(cells(level, pixel), 1.0, np.nan).T
+    found = np.where(allowed_cells(level, pixel), 1.0, np.nan).T
     place.pcolormesh(alpha, beta, found, cmap=mpl.colors.ListedColormap([CELL]))
     place.axvline(centre, color=U, linewidth=0.6)
     place.axhline(np.degrees(level.beta[pixel]), color=U, linewidth=0.6)
@@ -151,7 +151,7 @@ def _strip(place: Any, level: LevelRecord, pixel: int, proof: Proof) -> None:
     place.set(xlim=(left, left + 90), ylim=(-45, 45), aspect="equal")
     place.set_yticks([-45, 0, 45])
     place.tick_params(labelsize=8)
-    share = min(1.0, cells(level, pixel).sum() * level.h**2 / STRIP)
+    share = min(1.0, allowed_cells(level, pixel).sum() * level.h**2 / STRIP)
     words = f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"
     box = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
     place.text(0.05, 0.05, words, transform=place.transAxes, fontsize=9, bbox=box)

@@ -45,14 +45,14 @@ class Answer:
         return self.objective - self.bound <= PROVEN * max(1.0, abs(self.objective))
 
 
-def solved(problem: Problem, solver: str, seconds: float) -> Answer:
+def solve_file(problem: Problem, solver: str, seconds: float) -> Answer:
     """Solve the MPS file of a problem."""
     with tempfile.TemporaryDirectory() as folder:
         found = cf.solve(problem, solver, folder=folder, limits=cf.Limits(seconds, gap=1e-7, threads=THREADS))
     return Answer(found.objective, found.bound, found.seconds or seconds)
 
 
-def fits(problem: Problem, solver: str) -> bool:
+def can_take(problem: Problem, solver: str) -> bool:
     """Whether the free edition of the solver takes the problem."""
     if solver not in FREE:
         return True
@@ -61,14 +61,14 @@ def fits(problem: Problem, solver: str) -> bool:
     return max(problem.n_columns, problem.n_rows) <= most and (linear or problem.n_columns <= most_quadratic)
 
 
-def largest(name: str, size: int, formulation: str, solver: str) -> Instance:
+def largest_instance(name: str, size: int, formulation: str, solver: str) -> Instance:
     """The sample at that size, or at the greatest size below it that the solver's free edition takes."""
     for smaller in range(size, 4, -1):
         try:
             instance = Sketch(name, name).instance(smaller)
         except InstanceError:  # the outline leaves no room on so coarse a grid
             continue
-        if fits(cf.formulate(instance, formulation), solver):
+        if can_take(cf.formulate(instance, formulation), solver):
             return instance
     raise InstanceError(f"{name} has no size that {solver} takes")
 
@@ -82,7 +82,7 @@ USES: Final = (
 """Formulations for each solver."""
 
 
-def certificate(instance: Instance, seconds: float) -> Certificate:
+def certificate_of(instance: Instance, seconds: float) -> Certificate:
     """The certificate of an instance."""
     with tempfile.TemporaryDirectory() as folder:
         return write_certificate(
@@ -90,21 +90,21 @@ def certificate(instance: Instance, seconds: float) -> Certificate:
         )
 
 
-def here(instance: Instance, norm: Norm, seconds: float) -> Answer:
+def prove_here(instance: Instance, norm: Norm, seconds: float) -> Answer:
     """Result of `crossfield prove` for an instance, in the norm that a formulation minimises."""
     proof = prove(instance, norm=norm, limits=cf.Limits(seconds, gap=0))
     return Answer(proof.energy, proof.bound, proof.seconds)
 
 
-def both(name: str, size: int, seconds: float, proof_seconds: float) -> Iterator[dict[str, Any]]:
+def solver_rows(name: str, size: int, seconds: float, proof_seconds: float) -> Iterator[dict[str, Any]]:
     """Proofs of each installed solver for a sample: from the files as they are, and tightened."""
     proofs: dict[str, Certificate] = {}
     for solver, formulation in USES:
         if PROGRAMS[solver].missing:
             continue
-        instance = largest(name, size, formulation, solver)
+        instance = largest_instance(name, size, formulation, solver)
         if instance.sha256 not in proofs:
-            proofs[instance.sha256] = certificate(instance, proof_seconds)
+            proofs[instance.sha256] = certificate_of(instance, proof_seconds)
         proof = proofs[instance.sha256]
         cold = cf.formulate(instance, formulation)
         narrow = with_windows(cold, windows_left(proof))
@@ -117,9 +117,9 @@ def both(name: str, size: int, seconds: float, proof_seconds: float) -> Iterator
             "pairs": len(instance.grid.first),
         }  # fmt: skip
         answers = {
-            "cold": solved(cold, solver, seconds),
-            "tightened": solved(narrow, solver, seconds),
-            "here": here(instance, 1 if formulation == "milp-mccormick" else 2, seconds),
+            "cold": solve_file(cold, solver, seconds),
+            "tightened": solve_file(narrow, solver, seconds),
+            "here": prove_here(instance, 1 if formulation == "milp-mccormick" else 2, seconds),
         }
         row |= {what: asdict(found) | {"proven": found.proven} for what, found in answers.items()}
         yield row

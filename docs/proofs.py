@@ -36,9 +36,9 @@ from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.descent import MOST_LABELS
 from crossfield.models.proof.prove import prove
 from crossfield.models.sketch.samples import SAMPLES, sample
-from drawings import PROVERS, SUFFIXES, Sketch, answered, drawings_of, optimum, sketches, tiny
+from drawings import PROVERS, SUFFIXES, Sketch, drawings_of, optimum, run_command, sketches, tiny_instances
 from machine import machine_facts
-from make import generated, markdown
+from make import generated_line, markdown
 from public_drawings import COLLECTIONS
 from studying.wording import percent
 
@@ -84,7 +84,7 @@ class Request:
         return not self.names or name in self.names
 
 
-def proven(sketch: Sketch, size: int, request: Request, weights: Sequence[str] = ()) -> Facts:
+def prove_sketch(sketch: Sketch, size: int, request: Request, weights: Sequence[str] = ()) -> Facts:
     """Result of `crossfield prove` for a sketch, size of its certificate, and seconds of its check."""
     folder = request.work / f"{sketch.name}_{size}{'_paper' if weights else ''}_proof"
     command = [
@@ -92,7 +92,7 @@ def proven(sketch: Sketch, size: int, request: Request, weights: Sequence[str] =
         *("--time-limit", str(request.seconds)),
         *("--json", "-o", str(folder)),
     ]
-    facts = answered(command, folder, sketch.name)
+    facts = run_command(command, folder, sketch.name)
     (certificate,) = folder.glob("*.certificate.npz")
     begin = time.perf_counter()
     check = [sys.executable, str(check_certificate.__file__), str(certificate)]
@@ -113,7 +113,9 @@ def samples_at(size: int, names: Iterable[str] = tuple(SAMPLES)) -> Measurement:
     """The measurement of some samples at a size, under the default weights."""
 
     def rows(request: Request) -> Iterator[tuple[str, Facts]]:
-        return ((name, proven(Sketch(name, name), size, request)) for name in names if request.wants(name))
+        return (
+            (name, prove_sketch(Sketch(name, name), size, request)) for name in names if request.wants(name)
+        )
 
     return rows
 
@@ -123,14 +125,14 @@ def paper(request: Request) -> Iterator[tuple[str, Facts]]:
     for name in HARDEST:
         if request.wants(name):
             sketch = Sketch(name, name)
-            yield name, proven(sketch, SIZE, request, sketch.weights(SIZE))
+            yield name, prove_sketch(sketch, SIZE, request, sketch.weights(SIZE))
 
 
 def drawings(request: Request) -> Iterator[tuple[str, Facts]]:
     """The drawings of a folder at size 24."""
     for sketch in sketches(request.sketches):
         if sketch.name not in SAMPLES and request.wants(sketch.name):
-            yield sketch.name, proven(sketch, SIZE, request)
+            yield sketch.name, prove_sketch(sketch, SIZE, request)
 
 
 def collections(request: Request) -> Iterator[tuple[str, Facts]]:
@@ -139,13 +141,13 @@ def collections(request: Request) -> Iterator[tuple[str, Facts]]:
         for sketch in drawings_of(folder, (*SUFFIXES, ".curves")):
             if request.wants(name := f"{folder.name}/{sketch.name}"):
                 with tempfile.TemporaryDirectory(dir=request.work) as work:
-                    facts = proven(sketch, SIZE, replace(request, work=Path(work)))
+                    facts = prove_sketch(sketch, SIZE, replace(request, work=Path(work)))
                 yield name, {key: facts[key] for key in OF_COLLECTIONS}
 
 
 def optima(request: Request) -> Iterator[tuple[str, Facts]]:
     """Small instances, compared with the optimum that another solver proves."""
-    for instance in tiny():
+    for instance in tiny_instances():
         if not request.wants(instance.name):
             continue
         proof = prove(instance, limits=Limits(request.seconds, gap=0))
@@ -162,7 +164,7 @@ def solvers(request: Request) -> Iterator[tuple[str, Facts]]:
     """Proofs of MIP solvers for some samples, from files as they are and tightened."""
     for name in MIP_SAMPLES:
         if request.wants(name):
-            for row in proof_solvers.both(name, SIZE, request.seconds, SECONDS["samples"]):
+            for row in proof_solvers.solver_rows(name, SIZE, request.seconds, SECONDS["samples"]):
                 yield f"{name} {row['solver']}", row
 
 
@@ -170,8 +172,8 @@ def pictures(request: Request) -> Iterator[tuple[str, Facts]]:
     """The pictures of the crosses left at every level."""
     proof = prove(sample(PICTURED, SIZE), limits=Limits(request.seconds, gap=0))
     certificate = write_certificate(proof, request.work / f"{PICTURED}.certificate.npz")
-    proof_pictures.maps(proof, certificate.verdict.boxes, DOCS / "pictures" / "proof_levels.png")
-    pixels = proof_pictures.strips(proof, DOCS / "pictures" / "proof_strips.png")
+    proof_pictures.draw_maps(proof, certificate.verdict.boxes, DOCS / "pictures" / "proof_levels.png")
+    pixels = proof_pictures.draw_strips(proof, DOCS / "pictures" / "proof_strips.png")
     yield PICTURED, {"levels": len(proof.levels), "status": proof.status, "pixels": pixels}
 
 
@@ -288,7 +290,7 @@ def optima_table(rows: dict[str, Facts]) -> str:
             row["status"],
             f"{row['seconds']:.1f}",
             f"{row['other']:.9f}" if row["other"] is not None else "none in the time",
-            f"{titled(row['by'])}, {row['other_seconds']:.1f} s" if row["by"] else "",
+            f"{solver_title(row['by'])}, {row['other_seconds']:.1f} s" if row["by"] else "",
             f"{difference(row):.0e}" if row["other"] is not None else "",
         ]
         for name, row in rows.items()
@@ -307,7 +309,7 @@ def optima_table(rows: dict[str, Facts]) -> str:
     return markdown(columns, sorted(cells, key=lambda row: (row[0].startswith("random"), row[0])))
 
 
-def titled(solver: str) -> str:
+def solver_title(solver: str) -> str:
     """The title of a solver."""
     return SOLVERS[solver].title
 
@@ -321,7 +323,7 @@ def solvers_table(rows: dict[str, Facts]) -> str:
     """The table of proofs of MIP solvers."""
     cells = [
         [
-            titled(row["solver"]),
+            solver_title(row["solver"]),
             f"`{row['formulation']}`",
             row["name"],
             f"{row['width']} x {row['height']}",
@@ -349,7 +351,7 @@ def solver_cells(row: Facts, what: str) -> list[str]:
     return [best, f"**{bound}**" if answer["proven"] else bound, f"{answer['seconds']:.1f}"]
 
 
-def in_short(kept: Kept) -> str:
+def short_summary(kept: Kept) -> str:
     """Summary: the reach of proofs, agreement with other solvers, and the reach of those."""
     rows, small, mip = kept["samples"], kept["optima"], kept["solvers"]
     closed = [row for row in rows.values() if row["status"] == "optimal"]
@@ -375,12 +377,12 @@ def in_short(kept: Kept) -> str:
     )
 
 
-def where(rows: dict[str, Facts]) -> str:
+def describe_machines(rows: dict[str, Facts]) -> str:
     """The machine of most measurements, and the other ones with their rows."""
     by_machine = defaultdict[str, list[str]](list)
     for name, row in rows.items():
         facts = row["machine"]
-        machine = f"{facts['processor']}, {counted(facts['cores'])}, Python {facts['python']}, 2 threads"
+        machine = f"{facts['processor']}, {count_cores(facts['cores'])}, Python {facts['python']}, 2 threads"
         by_machine[machine].append(name)
     first, *others = sorted(by_machine, key=lambda machine: -len(by_machine[machine]))
     named = "".join(f" {', '.join(by_machine[other])}: {other}." for other in others)
@@ -391,7 +393,7 @@ def where(rows: dict[str, Facts]) -> str:
     )
 
 
-def counted(cores: int) -> str:
+def count_cores(cores: int) -> str:
     """The number of cores in words."""
     return "one core" if cores == 1 else f"{cores} cores"
 
@@ -401,8 +403,8 @@ def page(kept: Kept) -> str:
     tables = ("samples", "paper", "middle", "sketches", "fine", "large")
     parts = {part: kept[part] for part in (*tables, "collections", "solvers")}
     texts = {
-        "generated": generated("python docs/proofs.py"),
-        "short": in_short(kept),
+        "generated": generated_line("python docs/proofs.py"),
+        "short": short_summary(kept),
         "most": f"{MOST_LABELS:,}",
         "optima": optima_table(kept["optima"]),
         "solvers": solvers_table(kept["solvers"]),
@@ -417,7 +419,7 @@ def page(kept: Kept) -> str:
         "collections_open": open_drawings(kept["collections"]),
     }
     texts |= {part: proof_table(kept[part]) for part in tables}
-    texts |= {f"{part}_machine": where(rows) for part, rows in parts.items()}
+    texts |= {f"{part}_machine": describe_machines(rows) for part, rows in parts.items()}
     return re.sub(r"@(\w+)@", lambda match: texts[match[1]], TEMPLATE.read_text(encoding="utf-8"))
 
 

@@ -43,15 +43,15 @@ def first_line(root: Path, folder: str) -> str:
     return text.partition("\n")[0]
 
 
-def uses(root: Path, folder: str) -> list[str]:
+def used_folders(root: Path, folder: str) -> list[str]:
     """The other folders from which the modules of a folder import, except the ground."""
     trees = [ast.parse(path.read_text(encoding="utf-8")) for path in (root / folder).glob("*.py")]
     nodes = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-    found = {other for node in nodes if node.level for other in targets(root, folder, node)}
+    found = {other for node in nodes if node.level for other in target_folders(root, folder, node)}
     return sorted(found - {folder, GROUND})
 
 
-def targets(root: Path, folder: str, node: ast.ImportFrom) -> set[str]:
+def target_folders(root: Path, folder: str, node: ast.ImportFrom) -> set[str]:
     """The folders to which a relative import leads."""
     base = (root / folder).joinpath(*[".."] * (node.level - 1), *(node.module or "").split(".")).resolve()
     if not base.is_dir():
@@ -68,7 +68,7 @@ def table(root: Path) -> list[list[str]]:
         [
             f"`{folder}/`",
             first_line(root, folder),
-            ", ".join(f"`{each}`" for each in uses(root, folder)) or "-",
+            ", ".join(f"`{each}`" for each in used_folders(root, folder)) or "-",
         ]
         for folder in ORDER
     ]
@@ -134,7 +134,7 @@ def picture(root: Path) -> str:
         *bars(root),
         *(box(root, folder) for folder in PLACES),
         *(arrow(*step) for step in FLOW),
-        *ends(),
+        *data_at_ends(),
         "</svg>",
     ]
     return "\n".join(parts) + "\n"
@@ -152,7 +152,7 @@ def bars(root: Path) -> list[str]:
         bar(root, "export/verify", 178, 50),
         chip("programs", LEFT + WHOLE - 132, 191, 120),
         bar(root, GROUND, 875, 50),
-        written("at its top errors and storage, which every folder uses", WIDTH - LEFT - 14, 905, "end"),
+        data_label("at its top errors and storage, which every folder uses", WIDTH - LEFT - 14, 905, "end"),
     ]
 
 
@@ -204,30 +204,30 @@ def arrow(begin: str, end: str, above: str, below: str) -> str:
     if y == to_y:
         start, stop = (x + WIDE, to_x - 3) if to_x > x else (x, to_x + WIDE + 3)
         path, at = f"M{start} {level}H{stop}", (start + stop) / 2
-        words = written(above, at, level - 8) + (written(below, at, level + 18) if below else "")
+        words = data_label(above, at, level - 8) + (data_label(below, at, level + 18) if below else "")
     elif x == to_x:
         path = f"M{middle} {y + HIGH}V{to_y - 3}"
-        words = written(above, middle + 8, (y + HIGH + to_y - 3) / 2 + 4, "start")
+        words = data_label(above, middle + 8, (y + HIGH + to_y - 3) / 2 + 4, "start")
     elif to_y < y:  # up between two rows
         leave, enter, lane = x + WIDE - 30, to_x + 30, y - 26
         path = f"M{leave} {y}V{lane}H{enter}V{to_y + HIGH + 3}"
-        words = written(above, (leave + enter) / 2, lane - 6)
+        words = data_label(above, (leave + enter) / 2, lane - 6)
     else:
         path = f"M{x + WIDE} {level}H{middle}V{to_y - 3}"
-        words = written(above, (x + WIDE + middle) / 2, level - 8)
+        words = data_label(above, (x + WIDE + middle) / 2, level - 8)
     return f'<path class="flow" d="{path}"/>{words}'
 
 
-def written(text: str, x: float, y: float, anchor: str = "middle") -> str:
+def data_label(text: str, x: float, y: float, anchor: str = "middle") -> str:
     """The name of some data."""
     return f'<text class="data" text-anchor="{anchor}" x="{x}" y="{y}">{escape(text)}</text>'
 
 
-def ends() -> list[str]:
+def data_at_ends() -> list[str]:
     """The data that enter at the first folder, and those that leave at the last one."""
     middle, (x, _) = LEFT + WIDE / 2, corner("export/pictures")
-    sketch = written("a sketch: SVG, bitmap, .scap, .curves", LEFT, 270, "start")
-    answer = written("pictures, report", x - 58, 666, "end")
+    sketch = data_label("a sketch: SVG, bitmap, .scap, .curves", LEFT, 270, "start")
+    answer = data_label("pictures, report", x - 58, 666, "end")
     return [
         f'{sketch}<path class="flow" d="M{middle} 280V317"/>',
         f'<path class="flow" d="M{x} 662H{x - 50}"/>{answer}',

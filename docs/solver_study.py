@@ -31,7 +31,7 @@ os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
 
 from crossfield.export.library.documents.lock import locked
 from crossfield.export.solvers_table import SOLVERS
-from studying.solvers.measure import SLACK, busy_seconds, measured
+from studying.solvers.measure import SLACK, busy_seconds, measure_run
 from studying.solvers.plan import DATA, FULL, PROVE, QUICK, Plan, Row, Run, table
 from studying.solvers.statistics import DISCARDED, FAILED, best_pairs
 
@@ -55,7 +55,7 @@ class Study:
     def left(self) -> list[Run]:
         """The runs without a row whose solver is installed, those discarded least often first."""
         done, best = self.kept.done, best_pairs(self.kept.rows, self.plan.limit)
-        runs = [run for run in self.plan.first() if run.key not in done and _can(run)]
+        runs = [run for run in self.plan.first() if run.key not in done and _is_installed(run)]
         runs = runs or [run for run in self.plan.last(best) if run.key not in done]
         return sorted(runs, key=lambda run: self.discards[run])
 
@@ -100,7 +100,7 @@ class Study:
         return {"status": FAILED, "note": note[:_LONGEST]}
 
 
-def _can(run: Run) -> bool:
+def _is_installed(run: Run) -> bool:
     return run.solver == PROVE or not SOLVERS[run.solver].missing
 
 
@@ -109,11 +109,11 @@ def certificates(data: Path) -> Path:
     return data.parent / "certificates"
 
 
-def one(data: Path, given: list[str], *, quick: bool) -> Row:
+def row_of_run(data: Path, given: list[str], *, quick: bool) -> Row:
     """The row of a run, in the process for it."""
     run, core, left = given
     slack = float("inf") if quick else SLACK
-    return measured(Run(**json.loads(run)), int(core), float(left), certificates(data), slack)
+    return measure_run(Run(**json.loads(run)), int(core), float(left), certificates(data), slack)
 
 
 def main() -> None:
@@ -128,7 +128,7 @@ def main() -> None:
     given = parser.parse_args()
     data = given.data / DATA.name if given.data.suffix != ".csv" else given.data
     if given.one:
-        print(json.dumps(one(data, given.one, quick=given.quick)))
+        print(json.dumps(row_of_run(data, given.one, quick=given.quick)))
         return
     if given.quick and data == DATA:
         parser.error("--quick is another plan; give --data FOLDER for its rows")

@@ -25,7 +25,7 @@ PIPE: Final = "#open-menu summary|[data-sample=cylinder_bend]|input[value=angle]
 PATIENCE: Final = 120
 
 
-def shot(page: Any, name: str, *selectors: str) -> None:
+def write_shot(page: Any, name: str, *selectors: str) -> None:
     """Click these controls, wait for the surface, and write a picture."""
     for selector in selectors:
         page.find_element("css selector", selector).click()
@@ -59,8 +59,8 @@ def page_of(sample: str) -> Iterator[Any]:
 def main() -> None:
     """Draw both pictures."""
     with page_of("bottle") as page:
-        shot(page, "studio_page.png", "input[value=lines]", "input[value=matcap]")
-        shot(page, "studio_doubts.png", *PIPE.split("|"))
+        write_shot(page, "studio_page.png", "input[value=lines]", "input[value=matcap]")
+        write_shot(page, "studio_doubts.png", *PIPE.split("|"))
 
 
 if __name__ == "__main__":

@@ -24,20 +24,20 @@ return [r.x, r.y, r.width, r.height];"""
 READY: Final = "return document.documentElement.dataset.state === 'ready'"
 
 
-def settled(page: Any) -> None:
+def wait_until_ready(page: Any) -> None:
     """Wait until all answers to the last edit have arrived."""
     page.execute_async_script("setTimeout(arguments[0], 300)")
     WebDriverWait(page, PATIENCE).until(lambda each: each.execute_script(READY))
 
 
-def stroke(page: Any, number: int) -> dict[str, float]:
+def draw_stroke(page: Any, number: int) -> dict[str, float]:
     """Draw a short stroke in the middle of the drawing; the seconds that the page states."""
     box = page.execute_script(BOX)
     x, y = box[0] + box[2] / 2, box[1] + box[3] / 2 + 12 * number
     for kind, dx, buttons in (("mousePressed", -8, 1), ("mouseMoved", 0, 1), ("mouseReleased", 8, 0)):
         event = {"type": kind, "x": x + dx, "y": y, "button": "left", "buttons": buttons, "clickCount": 1}
         page.execute_cdp_cmd("Input.dispatchMouseEvent", event)
-    settled(page)
+    wait_until_ready(page)
     text = page.execute_script("return document.querySelector('#times').textContent")
     return {name: float(value) for name, value in re.findall(r"(\w+) ([\d.]+) s", text)}
 
@@ -50,8 +50,8 @@ def main() -> None:
         with page_of(sample) as page:
             for size in SIZES:
                 page.execute_script(RESIZE, size)
-                settled(page)
-                found = [stroke(page, number) for number in range(REPEATED)]
+                wait_until_ready(page)
+                found = [draw_stroke(page, number) for number in range(REPEATED)]
                 cells = [[each[part] for each in found if part in each] for part in PARTS]
                 texts = [f"{statistics.median(each):.2f}" if each else "" for each in cells]
                 print(f"| `{sample}` | {size} | {' | '.join(texts)} |", flush=True)

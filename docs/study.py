@@ -30,7 +30,7 @@ from typing import Final
 # Every run is on one thread: libraries read this when they are loaded, here and in all children.
 os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
 
-from studying.plan import FULL, QUICK, Plan, expected, stages
+from studying.plan import FULL, QUICK, Plan, expected_seconds, stages
 from studying.rows import DATA, PARTS
 from studying.work import carry_out
 
@@ -41,7 +41,7 @@ def overview(plan: Plan, folder: Path | None) -> str:
     """The stages of a plan, with their runs and the most hours on one core."""
     lines, count, seconds = [], 0, 0.0
     for stage in stages(plan, folder):
-        most = sum(map(expected, stage.runs))
+        most = sum(map(expected_seconds, stage.runs))
         lines.append(f"{stage.name:<14}{len(stage.runs):>6} runs, at most {most:>6.0f} s")
         count, seconds = count + len(stage.runs), seconds + most
     return "\n".join([*lines, f"{'all':<14}{count:>6} runs, at most {seconds / 3600:.1f} h on one core"])
@@ -71,11 +71,11 @@ def main() -> None:
             parts=given.parts, progress=lambda line: print(line, file=sys.stderr, flush=True),
         )  # fmt: skip
     from make import replace_between
-    from studying.page import in_short, read, write_page
+    from studying.page import read, short_summary, write_page
 
     write_page(given.data, DOCS if given.data == DATA else given.data, plan)
     if given.data == DATA:
-        replace_between(DOCS / "index.md", "answers", in_short(read(DATA), plan))
+        replace_between(DOCS / "index.md", "answers", short_summary(read(DATA), plan))
 
 
 if __name__ == "__main__":

@@ -202,7 +202,7 @@ def tasks(part: str, folder: Path | None) -> Iterator[tuple[Any, ...]]:
         yield from ((name, size) for name in SURFACES for size in SIZES)
 
 
-def measured(part: str, folder: Path | None, jobs: int) -> Rows:
+def measure_part(part: str, folder: Path | None, jobs: int) -> Rows:
     """The rows of a part."""
     with ProcessPoolExecutor(1 if part == "times" else jobs) as processes:
         found = [processes.submit(MEASURES[part], *given) for given in tasks(part, folder)]
@@ -276,7 +276,7 @@ def by_time(rows: Rows) -> str:
     return markdown(("drawing", "pixels", "processor seconds"), table)
 
 
-def in_short(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
+def short_summary(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
     """Summary of the errors of known surfaces and of the doubts about drawings."""
     bend = [row for row in rows if row["way"] == "bend"]
     errors = [row["mean"] for row in bend if row["size"] == max(SIZES)]
@@ -303,7 +303,7 @@ def in_short(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
 def write_page(rows: dict[str, Rows]) -> None:
     """Replace the summary and the tables of the page."""
     parts = {
-        "summary": in_short(rows["known"], rows["trust"], rows["sides"]),
+        "summary": short_summary(rows["known"], rows["trust"], rows["sides"]),
         "known": by_surface(rows["known"]),
         "hints": with_hints(rows["known"]),
         "noise": by_noise(rows["noise"], rows["known"]),
@@ -325,7 +325,7 @@ def main() -> None:
     given = parser.parse_args()
     rows = json.loads(KEPT.read_text()) if KEPT.exists() else {}
     for part in given.measure:
-        rows[part] = measured(part, given.sketches, given.jobs)
+        rows[part] = measure_part(part, given.sketches, given.jobs)
         KEPT.write_text(json.dumps(rows, indent=0, sort_keys=True) + "\n")
     write_page(rows)
 

@@ -191,7 +191,7 @@ def glpk(path: Path) -> Answer:
     """GLPK's optimum."""
     report = path.with_suffix(".txt")
     kind = "--lp" if path.suffix == ".lp" else "--freemps"
-    executed("glpsol", kind, str(path), "-o", str(report))
+    run_program("glpsol", kind, str(path), "-o", str(report))
     text = report.read_text() if report.exists() else ""
     found = re.search(r"Objective:.*= *(\S+)", text)
     return REFUSED if found is None else float(found[1]) if "OPTIMAL" in text else "infeasible"
@@ -200,13 +200,13 @@ def glpk(path: Path) -> Answer:
 def cbc(path: Path) -> Answer:
     """CBC's optimum."""
     report = path.with_suffix(".txt")
-    executed("cbc", str(path), "solve", "solution", str(report))
+    run_program("cbc", str(path), "solve", "solution", str(report))
     text = report.read_text() if report.exists() else ""
     found = re.match(r"Optimal - objective value (\S+)", text)
     return REFUSED if not text else float(found[1]) if found else "infeasible"
 
 
-def executed(*words: str) -> None:
+def run_program(*words: str) -> None:
     """Run a program without its output."""
     command = [shutil.which(words[0]) or words[0], *words[1:]]
     subprocess.run(command, capture_output=True, check=False, timeout=SECONDS)
@@ -219,7 +219,7 @@ PROGRAMS: Final[dict[str, tuple[str, Callable[[Path], Answer]]]] = {
 """Title -> its Python package or executable, and the function for its optimum."""
 
 
-def present() -> list[str]:
+def installed_programs() -> list[str]:
     """The programs that are installed."""
     return [title for title, (needs, _) in PROGRAMS.items() if shutil.which(needs) or find_spec(needs)]
 
@@ -232,23 +232,24 @@ def answer(title: str, trap: Trap) -> Answer:
         return PROGRAMS[title][1](path)
 
 
-def shown(value: Answer, trap: Trap) -> str:
+def result_cell(value: Answer, trap: Trap) -> str:
     """A cell: bold where the program neither refuses nor finds the intended optimum."""
     text = f"{value:g}" if isinstance(value, float) else value
     wrong = value not in {REFUSED, trap.meant}
     return f"**{text}**" if wrong else text
 
 
-def meaning(trap: Trap) -> str:
+def meant_cell(trap: Trap) -> str:
     """The intended optimum, as a cell."""
     return f"{trap.meant:g}" if isinstance(trap.meant, float) else trap.meant.replace(REFUSED, "unclear")
 
 
 def table() -> tuple[tuple[str, ...], list[list[str]]]:
     """Columns and rows: rule, file, intended optimum, and the result of each program."""
-    titles = present()
+    titles = installed_programs()
     rows = [
-        [trap.rule, trap.what, meaning(trap)] + [shown(answer(title, trap), trap) for title in titles]
+        [trap.rule, trap.what, meant_cell(trap)]
+        + [result_cell(answer(title, trap), trap) for title in titles]
         for trap in TRAPS
     ]
     return ("rule", "file", "meant", *titles), rows

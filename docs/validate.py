@@ -26,7 +26,7 @@ from crossfield.export.verify.checks import Check, Verdict, Verification
 from crossfield.export.verify.verify import verify
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
-from make import generated, markdown
+from make import generated_line, markdown
 
 DOCS: Final = Path(__file__).resolve().parent
 RECORD: Final = DOCS / "licensed.json"
@@ -79,7 +79,7 @@ class Run:
         return values[-1] - values[0]
 
 
-def run(gauge: Gauge, facet: str, formulations: tuple[str, ...]) -> Run:
+def verify_instance(gauge: Gauge, facet: str, formulations: tuple[str, ...]) -> Run:
     """The verification of the instance's files, solves included."""
     instance = instance_of(gauge)
     best = cf.solve(cf.formulate(instance, "milp-mccormick"), start=cf.greedy_field(instance)).field
@@ -89,7 +89,7 @@ def run(gauge: Gauge, facet: str, formulations: tuple[str, ...]) -> Run:
     return Run(gauge, facet, found)
 
 
-def route(check: Check) -> list[str]:
+def route_row(check: Check) -> list[str]:
     """A row about a solve."""
     numbers = ((check.objective, ".9f"), (check.bound, ".9f"), (check.seconds, ".1f"))
     words = {Verdict.AGREES: "optimal", Verdict.LIMIT: f"stopped after {SECONDS:g} s"}
@@ -101,7 +101,7 @@ def route(check: Check) -> list[str]:
     ]
 
 
-def routes(main: Run) -> list[str]:
+def route_tables(main: Run) -> list[str]:
     """A table for each formulation, of the solvers that take it."""
     parts = []
     for problem in smallest_problems():
@@ -114,7 +114,7 @@ def routes(main: Run) -> list[str]:
         parts += [
             f"## `{problem.name}`",
             proven,
-            markdown(ROUTES[1:], [route(f) for f in found]),
+            markdown(ROUTES[1:], [route_row(f) for f in found]),
         ]
     return parts
 
@@ -134,7 +134,7 @@ def same_problem(main: Run) -> str:
     return markdown(("problem", "formulation", "best objective", "proven"), rows)
 
 
-def in_short(main: Run, runs: list[Run]) -> str:
+def short_summary(main: Run, runs: list[Run]) -> str:
     """Numbers of files that were read as intended or not, and of formulations with a proven optimum."""
     found = [f.verdict for each in runs for f in each.result.checks if f.step == "read"]
     proven = [name for name in FORMULATIONS if main.proven(name)]
@@ -191,7 +191,7 @@ def update_record(runs: list[Run]) -> dict[str, dict[str, Any]]:
                 "date": datetime.now(UTC).date().isoformat(),
                 "files": [read.count(Verdict.AGREES), *map(read.count, (Verdict.DIFFERS, Verdict.FAILED))],
                 "routes": [
-                    [f"`{problem.name}`", *route(check)]
+                    [f"`{problem.name}`", *route_row(check)]
                     for problem in smallest_problems()
                     for check in main.solves(problem.name)
                     if check.program in entry.solvers and check.verdict != Verdict.NOT_TRIED
@@ -245,17 +245,17 @@ def main() -> None:
     """Run everything and write the page."""
     ArgumentParser(description=__doc__).parse_args()
     begin = time.perf_counter()
-    main_run = run("strokes", "hull", tuple(FORMULATIONS))
+    main_run = verify_instance("strokes", "hull", tuple(FORMULATIONS))
     others = [(gauge, facet) for gauge in GAUGES for facet in ("hull", "printed")][1:]
-    runs = [main_run, *(run(gauge, facet, VARIANTS) for gauge, facet in others)]
+    runs = [main_run, *(verify_instance(gauge, facet, VARIANTS) for gauge, facet in others)]
     parts = [
         "# One instance, all routes",
-        generated("python docs/validate.py"),
+        generated_line("python docs/validate.py"),
         (
             "Results of free programs on one small instance, in every formulation and format. "
             "A route is a written file and a solver that reads it."
         ),
-        in_short(main_run, runs),
+        short_summary(main_run, runs),
         f"""\
 - The instance has {SHAPE[0]} x {SHAPE[1]} pixels and w_beta = 0.001. {STROKES} pixels have a stroke in a
   random direction (seed {SEED}).
@@ -271,7 +271,7 @@ def main() -> None:
         *licences(update_record(runs), main_run.result.versions),
         "## The same problem in several formulations",
         same_problem(main_run),
-        *routes(main_run),
+        *route_tables(main_run),
         "## Gauge and facet",
         (
             "The effect of the two [misprints of the paper](errata.md). The printed facet (26) lowers the "

@@ -36,7 +36,7 @@ def is_default(row: Row) -> bool:
     return bool(row["w_strokes"] == STROKE_WEIGHT and row["w_beta"] == SKEW_WEIGHT)
 
 
-def usable(rows: Iterable[Row]) -> list[Row]:
+def rows_with_error(rows: Iterable[Row]) -> list[Row]:
     """The rows with a field and its error."""
     return [row for row in rows if row["error"] is not None]
 
@@ -109,7 +109,7 @@ def best_energies(rows: Iterable[Row]) -> dict[tuple[Any, ...], tuple[float, boo
 
 def gaps(rows: Iterable[Row]) -> list[tuple[Row, float]]:
     """Each field with default weights, for cases with a proven optimum, with its relative gap to it."""
-    kept = [row for row in usable(rows) if is_default(row)]
+    kept = [row for row in rows_with_error(rows) if is_default(row)]
     best = best_energies(kept)
     return [
         (row, (row["energy_2"] - best[case_of(row)][0]) / max(best[case_of(row)][0], 1e-9))

@@ -21,7 +21,7 @@ from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.smooth.polyvector import HOLDS
 
 from .hidden import HiddenCurve
-from .instances import curves, drawing, noisy
+from .instances import curves, drawing, noisy_instance
 from .rows import FAILED, Run
 
 MOST_CURVES: Final = 8
@@ -46,7 +46,7 @@ def surface(name: str, size: int) -> Any:
 def instance_of(run: Run, folder: Path | None) -> Instance:
     """The instance of a run."""
     if run.instance in SAMPLES and SAMPLES[run.instance].kind == "analytic":
-        found = noisy(surface(run.instance, run.size).instance, run.noise, run.seed)
+        found = noisy_instance(surface(run.instance, run.size).instance, run.noise, run.seed)
     else:
         found = drawing(run.instance, run.size, folder) if run.hidden < 0 else hidden(run, folder).rest
     return found.with_weights(stroke_weight=run.w_strokes, skew_weight=run.w_beta)
@@ -70,7 +70,7 @@ def energies(field: CrossField) -> dict[str, float]:
     return {"energy_2": field.energy(2).total, "energy_1": field.energy(1).total}
 
 
-def fielded(run: Run, folder: Path | None) -> dict[str, Any]:
+def field_row(run: Run, folder: Path | None) -> dict[str, Any]:
     """The row of a field."""
     instance = instance_of(run, folder)
     facts: dict[str, Any] = {"version": generator(), **sizes(instance)}
@@ -90,7 +90,7 @@ def _field(run: Run, instance: Instance) -> Found:
     if run.way == "prove" and run.part == "quality":
         return _proven(run, instance)
     if run.way.startswith(PERTURBED):
-        return perturbed(instance, float(run.way.split()[1]), run.seed), {}
+        return perturbed_field(instance, float(run.way.split()[1]), run.seed), {}
     if run.way in PLAIN:
         return PLAIN[run.way](instance), {}
     if run.way == "search":
@@ -113,7 +113,7 @@ def _by_method(run: Run, instance: Instance) -> Found:
     return found.field, {}
 
 
-def perturbed(instance: Instance, share: float, seed: int) -> CrossField:
+def perturbed_field(instance: Instance, share: float, seed: int) -> CrossField:
     """A local optimum near the greedy field: random crosses at some pixels, best jumps, then best angles."""
     field, rng = cf.greedy_field(instance), np.random.default_rng([3, seed])
     chosen = rng.random(instance.grid.size) < share

@@ -38,14 +38,14 @@ def read() -> list[Row]:
     return found
 
 
-def picked(**facts: Any) -> list[Row]:
+def rows_with(**facts: Any) -> list[Row]:
     """The rows with these facts."""
     return [row for row in read() if all(row[name] == value for name, value in facts.items())]
 
 
 def values(name: str, **facts: Any) -> list[Any]:
     """The different values of a column in the rows with these facts, in their order."""
-    return list(dict.fromkeys(row[name] for row in picked(**facts)))
+    return list(dict.fromkeys(row[name] for row in rows_with(**facts)))
 
 
 def over_drawings(rows: list[Row]) -> str:
@@ -72,7 +72,7 @@ def hidden_table() -> Table:
     heads: tuple[str, ...] = ()
     cells = []
     for method in values("method", **facts):
-        heads, line = by_origin(lambda m=method, **case: over_drawings(picked(method=m, **facts, **case)))
+        heads, line = by_origin(lambda m=method, **case: over_drawings(rows_with(method=m, **facts, **case)))
         cells.append([f"`{method}`", *line])
     return ("method", *heads), cells
 
@@ -82,7 +82,7 @@ def compared(before: str, after: str, **case: Any) -> Change | None:
     rows = [
         {"instance": r["name"], "size": r["size"], "hidden": int(r["curve"]), "way": r["method"],
          "error": r["value"]}
-        for r in picked(measure="hidden", weight=STROKE_WEIGHT, **case)
+        for r in rows_with(measure="hidden", weight=STROKE_WEIGHT, **case)
     ]  # fmt: skip
     return change(rows, lambda row: row["way"] == before, lambda row: row["way"] == after)
 
@@ -102,7 +102,7 @@ def compared_table() -> Table:
 def by_drawing_table() -> Table:
     """Error at hidden curves of every drawing: a row for each drawing, size and method."""
     found: dict[tuple[str, ...], list[float]] = {}
-    for row in picked(measure="hidden", weight=STROKE_WEIGHT):
+    for row in rows_with(measure="hidden", weight=STROKE_WEIGHT):
         key = (row["origin"], row["name"], str(row["size"]), row["method"])
         found.setdefault(key, []).append(row["value"])
     heads = ("origin", "drawing", "pixels", "method", "curves", "mean", "median")
@@ -116,7 +116,7 @@ def counts() -> dict[str, int]:
     middle = sorted(values("size", measure="hidden"))[1]
     found = {}
     for origin, name in ((OTHERS, "others"), (OWN, "own")):
-        rows = picked(measure="hidden", weight=STROKE_WEIGHT, origin=origin, method="greedy", size=middle)
+        rows = rows_with(measure="hidden", weight=STROKE_WEIGHT, origin=origin, method="greedy", size=middle)
         found |= {f"{name}_drawings": len({row["name"] for row in rows}), f"{name}_curves": len(rows)}
     return found
 
@@ -127,7 +127,7 @@ def surface_table() -> Table:
     cases = [(size, noise) for size in values("size", **facts) for noise in values("noise", **facts)]
     heads = (f"{size} pixels, noise {noise:g}" for size, noise in cases)
     cells = [
-        [f"`{m}`", *(f"{mean(picked(method=m, size=s, noise=n, **facts)):.1f}" for s, n in cases)]
+        [f"`{m}`", *(f"{mean(rows_with(method=m, size=s, noise=n, **facts)):.1f}" for s, n in cases)]
         for m in values("method", **facts)
     ]
     return ("method", *heads), cells
@@ -138,7 +138,7 @@ def by_surface_table() -> Table:
     heads = ("surface", "pixels", "noise", "weight", "method", "degrees")
     return heads, [
         [r["name"], str(r["size"]), f"{r['noise']:g}", f"{r['weight']:g}", r["method"], f"{r['value']:.2f}"]
-        for r in picked(measure="surface")
+        for r in rows_with(measure="surface")
     ]
 
 
@@ -149,10 +149,10 @@ def weight_table() -> Table:
     cells = []
     for weight in sorted(values("weight")):
         facts = {"weight": weight, "method": "greedy"}
-        hidden = [over_drawings(picked(measure="hidden", size=size, **facts)) for size in sizes]
-        off = [f"{mean(picked(measure='missed', size=size, **facts)):.1%}" for size in sizes]
+        hidden = [over_drawings(rows_with(measure="hidden", size=size, **facts)) for size in sizes]
+        off = [f"{mean(rows_with(measure='missed', size=size, **facts)):.1%}" for size in sizes]
         known = [
-            f"{mean(picked(measure='surface', size=fine, noise=noise, **facts)):.2f}" for noise in noises
+            f"{mean(rows_with(measure='surface', size=fine, noise=noise, **facts)):.2f}" for noise in noises
         ]
         cells.append([f"{weight:g}", *hidden, *off, *known])
     heads = (
@@ -168,12 +168,12 @@ def missed_sentence() -> str:
     """Sentence on the stroke pixels that the methods miss under the default weights."""
     facts: dict[str, Any] = {"measure": "missed", "weight": STROKE_WEIGHT}
     shares = {
-        (method, size): mean(picked(method=method, size=size, **facts))
+        (method, size): mean(rows_with(method=method, size=size, **facts))
         for method in values("method", **facts)
         for size in values("size", **facts)
     }
     (method, size), most = max(shares.items(), key=lambda each: each[1])
-    worst = max(picked(**facts), key=lambda row: row["value"])
+    worst = max(rows_with(**facts), key=lambda row: row["value"])
     return (
         f"Under the default weights, every method misses at most {most:.1%} of the stroke pixels by more "
         f"than 10 degrees, on average over drawings (`{method}` at {size} pixels). The worst drawing has "

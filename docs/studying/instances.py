@@ -46,7 +46,7 @@ def curves(name: str, size: int, most: int, folder: Path | None = None) -> list[
     return hidden_curves(instance, curves_of(instance, _file(name, folder)), most)
 
 
-def noisy(instance: Instance, degrees: float, seed: int) -> Instance:
+def noisy_instance(instance: Instance, degrees: float, seed: int) -> Instance:
     """The instance with an independent error of that standard deviation on each stroke pixel."""
     error = np.random.default_rng(seed).standard_normal(len(instance.theta))
     return replace(instance, theta=instance.theta + np.radians(degrees) * error)

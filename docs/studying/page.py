@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 from crossfield.export.solvers_table import PROGRAMS
-from make import generated, markdown
+from make import generated_line, markdown
 
 from . import errors, fields_page, practice_page, quality_page
 from .instances import surfaces
@@ -39,7 +39,7 @@ def read(data: Path) -> Kept:
     return kept | {SOLVERS: solvers_table(data / SOLVER_ROWS.name).rows}
 
 
-def ordered(kept: Kept, plan: Plan) -> Kept:
+def rows_in_order(kept: Kept, plan: Plan) -> Kept:
     """The rows in the order of the plan, which colours and lines of tables follow; others come last."""
     place = {run.key: number for number, run in enumerate(r for s in stages(plan, None) for r in s.runs)}
     return {
@@ -61,8 +61,8 @@ def completeness(kept: Kept, plan: Plan) -> str:
 def findings(kept: Kept) -> dict[str, list[str]]:
     """Sentences by question, the most important one first."""
     return {
-        "Which method has the smallest error?": [by_others(), *practice_page.recommendation(kept)],
-        "Do lower energies give better fields?": matters(kept),
+        "Which method has the smallest error?": [difference_by_others(), *practice_page.recommendation(kept)],
+        "Do lower energies give better fields?": effect_of_energy(kept),
         "Can solvers prove optima?": solvers_page.answer(kept[SOLVERS], FULL),
     }
 
@@ -72,7 +72,7 @@ def paragraphs(found: dict[str, list[str]], most: int | None = None) -> str:
     return "\n\n".join(f"**{question}** {' '.join(lines[:most])}" for question, lines in found.items())
 
 
-def by_others() -> str:
+def difference_by_others() -> str:
     """The difference between the two best methods on drawings by others."""
     sizes = sorted(fields_page.values("size", measure="hidden"))
     found = {
@@ -89,7 +89,7 @@ def by_others() -> str:
     )
 
 
-def matters(kept: Kept) -> list[str]:
+def effect_of_energy(kept: Kept) -> list[str]:
     """Answer on the effect of the optimum on the error."""
     own = quality_page.changes(kept["quality"], surfaces=False)["optimum"]
     sizes = fields_page.values("size", measure="hidden", method="prove")
@@ -107,7 +107,7 @@ def matters(kept: Kept) -> list[str]:
         ),
         f"A search of 5 s changes it by {search} degrees on the {search.drawings} drawings.",
         f"The energy of greedy fields is {percent(float(np.mean(before or [0.0])))} above the optimum.",
-        quality_page.harmless(kept["quality"]),
+        quality_page.harmless_gaps(kept["quality"]),
     ]
 
 
@@ -145,7 +145,7 @@ def page(kept: Kept, plan: Plan) -> str:
     counts = {part: len(rows) for part, rows in kept.items()} | {"fields": len(fields_page.read())}
     files = [f"| `{name}.csv` | {count:,} | `{MADE_BY[name]}` |" for name, count in counts.items()]
     return TEMPLATE.read_text(encoding="utf-8").format(
-        generated=generated(COMMAND),
+        generated=generated_line(COMMAND),
         findings=paragraphs(findings(kept)),
         completeness=completeness(kept, plan),
         missed=fields_page.missed_sentence(),
@@ -161,7 +161,7 @@ def page(kept: Kept, plan: Plan) -> str:
 
 def write_page(data: Path, target: Path, plan: Plan) -> None:
     """Make evidence.md in a folder, its tables in `evidence` and its plots in `pictures` there."""
-    kept = ordered(read(data), plan)
+    kept = rows_in_order(read(data), plan)
     for part in (quality_page, practice_page):
         part.draw(kept, target / "pictures")
     (target / "evidence").mkdir(exist_ok=True)
@@ -172,6 +172,6 @@ def write_page(data: Path, target: Path, plan: Plan) -> None:
     (target / "evidence.md").write_text(page(kept, plan))
 
 
-def in_short(kept: Kept, plan: Plan) -> str:
+def short_summary(kept: Kept, plan: Plan) -> str:
     """The first sentence of each answer, for the index of all pages."""
-    return paragraphs(findings(ordered(kept, plan)), most=1)
+    return paragraphs(findings(rows_in_order(kept, plan)), most=1)

@@ -60,14 +60,14 @@ def stages(plan: Plan, folder: Path | None) -> Iterator[Stage]:
     practice, quality = (dict(enumerate(each)) for each in (plan.practice, plan.quality))
     for number in range(max(len(practice), len(quality))):
         if number in practice:
-            yield Stage(f"practice {practice[number]}", tuple(ways(plan, practice[number], folder)))
+            yield Stage(f"practice {practice[number]}", tuple(practice_runs(plan, practice[number], folder)))
         if number in quality:
-            yield Stage(f"quality {quality[number]}", tuple(qualities(plan, quality[number], folder)))
+            yield Stage(f"quality {quality[number]}", tuple(quality_runs(plan, quality[number], folder)))
         if number == 1:
-            yield Stage("weights", tuple(weights(plan, plan.quality[0], folder)))
+            yield Stage("weights", tuple(weight_runs(plan, plan.quality[0], folder)))
 
 
-def ways(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
+def practice_runs(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
     """Every way to a field of every drawing, whole and without one curve after the other."""
     timed = [("search", plan.quick_search), *((name, plan.practice_limit) for name in METHODS_TIMED)]
     plain = [(name, 0.0) for name in PLAIN if name != "improved"]
@@ -78,7 +78,7 @@ def ways(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
                     yield _default("practice", name, size, way, hidden=curve, limit=limit)
 
 
-def qualities(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
+def quality_runs(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
     """Fields of all qualities, of drawings without a curve and of surfaces."""
     for name, given in _instances(plan, size, folder):
         for way in PLAIN:
@@ -92,7 +92,7 @@ def qualities(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
             yield _default("quality", name, size, PROOF, **given, norm=norm, limit=plan.quality_limit)
 
 
-def weights(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
+def weight_runs(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
     """Greedy and best fields under other weights."""
     for name, given in _instances(plan, size, folder):
         for strokes, skew in (
@@ -121,6 +121,6 @@ def _default(part: str, name: str, size: int, way: str, **given: float) -> Run:
     return Run(part, name, size, way, **{"w_strokes": STROKE_WEIGHT, "w_beta": SKEW_WEIGHT} | given)  # type: ignore[arg-type]
 
 
-def expected(run: Run) -> float:
+def expected_seconds(run: Run) -> float:
     """Most seconds of a run, without reading and writing."""
     return run.limit

@@ -39,7 +39,7 @@ Bars = tuple[list[float], list[float], list[float]]
 
 
 @contextmanager
-def drawn(path: Path, panels: int, high: float = 3.4, wide: float = 10.0) -> Iterator[Any]:
+def open_panels(path: Path, panels: int, high: float = 3.4, wide: float = 10.0) -> Iterator[Any]:
     """The axes of adjacent panels; the file is written at the end of the context."""
     with own_settings(_STYLE):
         figure = Figure(figsize=(wide, high), layout="constrained")
@@ -60,7 +60,7 @@ def styles(names: list[str]) -> dict[str, dict[str, Any]]:
 
 def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
     """Error against the gap to the optimum: points by kind of field, and medians of bins."""
-    with drawn(path, len(panels), high=3.8) as axes:
+    with open_panels(path, len(panels), high=3.8) as axes:
         names = list(dict.fromkeys(name for kinds in panels.values() for name in kinds))
         looks = styles(names)
         for axis, (title, kinds) in zip(axes, panels.items(), strict=True):
@@ -92,7 +92,7 @@ _ZERO: Final = 0.01
 
 def error_by_weight(path: Path, panels: dict[str, dict[str, Bars]]) -> None:
     """Mean error by weight, with standard errors over drawings; panels have the names of the weights."""
-    with drawn(path, len(panels), high=3.2) as axes:
+    with open_panels(path, len(panels), high=3.2) as axes:
         for axis, (title, lines) in zip(axes, panels.items(), strict=True):
             looks = styles(list(lines))
             ticks = sorted({value for x, _, _ in lines.values() for value in x})
@@ -117,7 +117,7 @@ def error_by_seconds(path: Path, panels: dict[str, dict[str, tuple[float, float,
     """Error on hidden curves against seconds, a panel for each size, a mark for each way."""
     names = list(dict.fromkeys(name for ways in panels.values() for name in ways))
     looks = styles(names)
-    with drawn(path, len(panels), high=3.6, wide=11.0) as axes:
+    with open_panels(path, len(panels), high=3.6, wide=11.0) as axes:
         for axis, (title, ways) in zip(axes, panels.items(), strict=True):
             for name, (x, y, bar) in ways.items():
                 look = looks[name] | {"linestyle": "none", "markersize": 8}

@@ -49,7 +49,7 @@ class Fare:
         return cls(
             len(rows),
             float(np.median([row["seconds"] for row in rows])),
-            errors.mean_by_drawing(errors.usable(good), lambda row: row["error"]),
+            errors.mean_by_drawing(errors.rows_with_error(good), lambda row: row["error"]),
             float(np.median(over)) if good else float("nan"),
             float(np.mean([row["off"] for row in good])) if good else float("nan"),
             len(rows) - len(good),
@@ -181,7 +181,7 @@ def _grouped(best: dict[int, str]) -> str:
 
 def _paired(rows: list[Row], after: dict[int, str], before: str, sizes: list[int]) -> str:
     """The paired difference of errors at some sizes, in words."""
-    chosen = [row for row in errors.usable(rows) if row["size"] in sizes]
+    chosen = [row for row in errors.rows_with_error(rows) if row["size"] in sizes]
     found = errors.change(
         chosen, lambda row: name_of(row) == before, lambda row: name_of(row) == after[int(row["size"])]
     )

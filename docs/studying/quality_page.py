@@ -9,7 +9,7 @@ import numpy as np
 from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 
 from . import errors, plots
-from .errors import Change, Kind, change, is_default, is_surface, usable
+from .errors import Change, Kind, change, is_default, is_surface, rows_with_error
 from .rows import Row, Table
 from .wording import percent
 
@@ -54,7 +54,7 @@ CHANGES: Final[dict[str, tuple[str, Kind, Kind]]] = {
 
 def changes(rows: list[Row], *, surfaces: bool) -> dict[str, Change | None]:
     """Effect of each change on the error, of drawings or of surfaces."""
-    chosen = [row for row in usable(rows) if is_surface(row) == surfaces]
+    chosen = [row for row in rows_with_error(rows) if is_surface(row) == surfaces]
     return {name: change(chosen, before, after) for name, (_, before, after) in CHANGES.items()}
 
 
@@ -104,7 +104,7 @@ def ways_table(rows: list[Row]) -> Table:
 
 def proven_text(rows: list[Row]) -> str:
     """Sentence on the number of instances with a known optimum."""
-    best = errors.best_energies([row for row in usable(rows) if is_default(row)])
+    best = errors.best_energies([row for row in rows_with_error(rows) if is_default(row)])
     closed = sum(proven for _, proven in best.values())
     return (
         f"`prove` closes {closed} of the {len(best)} instances to a gap of {100 * errors.CLOSE:g} %. The "
@@ -129,7 +129,7 @@ def correlation_text(rows: list[Row]) -> str:
     )
 
 
-def harmless(rows: list[Row]) -> str:
+def harmless_gaps(rows: list[Row]) -> str:
     """Sentence on the gaps between which fields of drawings become worse than the optimum."""
     found = [each for each in errors.differences(errors.gaps(rows)) if not is_surface(each[0])]
     gap, more = errors.medians([each[1] for each in found], [each[2] for each in found])
@@ -157,7 +157,9 @@ def weight_lines(rows: list[Row], which: str) -> dict[str, plots.Bars]:
     found = {}
     for surfaces, words in ((False, "hidden curves"), (True, "surfaces")):
         for way, name in (("greedy", "greedy"), ("prove", "best")):
-            mine = [r for r in usable(rows) if r["way"] == way and r["norm"] == 2 and r[other] == usual]
+            mine = [
+                r for r in rows_with_error(rows) if r["way"] == way and r["norm"] == 2 and r[other] == usual
+            ]
             mine = [r for r in mine if is_surface(r) == surfaces]
             values = sorted({row[which] for row in mine})
             have = [{errors.case_of(r) for r in mine if r[which] == value} for value in values]
@@ -202,5 +204,5 @@ def sentences(kept: Kept) -> dict[str, str]:
     return {
         "proven": proven_text(rows),
         "correlation": correlation_text(rows),
-        "harmless": harmless(rows),
+        "harmless": harmless_gaps(rows),
     }

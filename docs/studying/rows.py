@@ -114,7 +114,7 @@ class Rows:
             file.flush()
             os.fsync(file.fileno())
         self.done.add(run.key)
-        self.rows.append(typed(dict(zip(columns, line, strict=True)), self._numbers))
+        self.rows.append(row_with_numbers(dict(zip(columns, line, strict=True)), self._numbers))
 
 
 def _line(cells: tuple[str, ...] | list[str]) -> str:
@@ -130,10 +130,10 @@ def read(path: Path, columns: Names = COLUMNS, numbers: frozenset[str] = NUMBERS
     if tuple(head) != columns:
         raise ValueError(f"{path.name} has other columns than this study; move it away")
     for line in lines:
-        yield typed(dict(zip(columns, line, strict=True)), numbers)
+        yield row_with_numbers(dict(zip(columns, line, strict=True)), numbers)
 
 
-def typed(given: dict[str, str], numbers: frozenset[str]) -> Row:
+def row_with_numbers(given: dict[str, str], numbers: frozenset[str]) -> Row:
     """A row with its numbers as numbers."""
     return {name: number(value) if name in numbers else value for name, value in given.items()}
 

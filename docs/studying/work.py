@@ -12,7 +12,7 @@ from crossfield.export.library.building.executor import Tasks, open_executor, ta
 from crossfield.export.library.documents.lock import locked
 from machine import machine_facts
 
-from .fields import fielded
+from .fields import field_row
 from .plan import Plan, stages
 from .rows import FAILED, Rows, Run, tables
 
@@ -25,7 +25,7 @@ def perform(task: tuple[Run, Path | None]) -> dict[str, Any]:
     """The result of a run; an exception makes a failed run, and the study continues."""
     run, folder = task
     try:
-        found = fielded(run, folder)
+        found = field_row(run, folder)
     except Exception as error:  # noqa: BLE001 - a row records the exception
         found = {"status": FAILED, "note": f"{type(error).__name__}: {error}"}
     note = _FOLDERS.sub("", str(found.get("note") or ""))

@@ -25,7 +25,9 @@ def listed():
 
 def test_the_page_lists_every_folder_and_every_arrow(rooms, listed):
     assert sorted(listed) == rooms.folders(ROOT)
-    assert listed == {folder: (rooms.first_line(ROOT, folder), rooms.uses(ROOT, folder)) for folder in listed}
+    assert listed == {
+        folder: (rooms.first_line(ROOT, folder), rooms.used_folders(ROOT, folder)) for folder in listed
+    }
 
 
 def test_no_arrow_leads_upwards_and_so_there_is_no_circle(listed):

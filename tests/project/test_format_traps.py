@@ -21,14 +21,14 @@ def test_the_page_lists_every_trap(traps):
     rows = re.findall(
         r"^\| ([LMW]\d+) \| (.+?) \| ([\w-]+) \|", page.partition("<!-- traps:")[2], re.MULTILINE
     )
-    assert rows == [(trap.rule, trap.what, traps.meaning(trap)) for trap in traps.TRAPS]
+    assert rows == [(trap.rule, trap.what, traps.meant_cell(trap)) for trap in traps.TRAPS]
 
 
 @pytest.mark.oracles
 def test_what_our_writers_write_is_read_as_it_is_meant(traps):
-    assert {"HiGHS"} <= set(traps.present())
+    assert {"HiGHS"} <= set(traps.installed_programs())
     for trap in (trap for trap in traps.TRAPS if trap.good):
         quadratic = "^" in trap.text or "QUADOBJ" in trap.text
-        for title in traps.present():
+        for title in traps.installed_programs():
             if not (quadratic and title in {"GLPK", "CBC"}):  # they take linear models only
                 assert traps.answer(title, trap) == pytest.approx(trap.meant, abs=1e-6), (trap.what, title)

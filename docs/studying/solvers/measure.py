@@ -28,7 +28,7 @@ from machine import processor_name
 
 from ..rows import Row
 from .logs import progress, root_bound
-from .plan import PROVE, QUICK, Run, made
+from .plan import PROVE, QUICK, Run, make_instance
 from .statistics import DISCARDED, FAILED, GAP, TOO_LARGE, integral, is_solved
 
 MEMORY: Final = 8 << 30
@@ -40,7 +40,7 @@ SLACK: Final = 0.1
 _TICKS: Final = os.sysconf("SC_CLK_TCK")
 
 
-def measured(run: Run, core: int, left: float, certificates: Path, slack: float = SLACK) -> Row:
+def measure_run(run: Run, core: int, left: float, certificates: Path, slack: float = SLACK) -> Row:
     """The row of a run on a core, ended after `left` seconds.
 
     certificates: folder of those of `prove`. slack: seconds of other work that are tolerated.
@@ -50,7 +50,7 @@ def measured(run: Run, core: int, left: float, certificates: Path, slack: float 
     most = int(2 * run.limit) + 120
     resource.setrlimit(resource.RLIMIT_CPU, (most, most))
     watch = Watch(core, run.limit, time.monotonic() + left, slack, inside=run.solver == PROVE)
-    problem = cf.formulate(made(run.instance, run.turns), run.formulation)
+    problem = cf.formulate(make_instance(run.instance, run.turns), run.formulation)
     facts: Row = {
         "pairs": len(problem.instance.grid.first), "integers": int(problem.integer.sum()),
         "columns": problem.n_columns, "machine": _machine(),
@@ -144,10 +144,14 @@ def _certificate(run: Run, folder: Path) -> Path:
 def _proven(run: Run, watch: Watch, certificates: Path) -> Row:
     """The row of a proof, its certificate included."""
     compile_all()
-    cf.prove(made(*QUICK.turned), norm=_norm(run), limits=cf.Limits(gap=0), jobs=1)  # loads the functions
+    cf.prove(
+        make_instance(*QUICK.turned), norm=_norm(run), limits=cf.Limits(gap=0), jobs=1
+    )  # loads the functions
     watch.begin()
     limits = cf.Limits(run.limit, gap=0)
-    proof = cf.prove(made(run.instance, run.turns), norm=_norm(run), limits=limits, jobs=1, stop=watch.late)
+    proof = cf.prove(
+        make_instance(run.instance, run.turns), norm=_norm(run), limits=limits, jobs=1, stop=watch.late
+    )
     cf.write_certificate(proof, _certificate(run, certificates))
     facts = {"version": generator(), "status": proof.status, "note": proof.ended}
     return facts | {"objective": proof.energy, "bound": proof.bound} | watch.row()

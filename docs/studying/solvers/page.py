@@ -13,7 +13,7 @@ from crossfield.export.solvers_table import SOLVERS
 from ..rows import Row, Table
 from ..wording import series
 from . import statistics
-from .plan import COMMERCIAL, LONG, PAIRS, PROBLEMS, PROVE, STARTS, Plan, Run, made, run_of
+from .plan import COMMERCIAL, LONG, PAIRS, PROBLEMS, PROVE, STARTS, Plan, Run, make_instance, run_of
 from .statistics import (
     FAILED,
     TOO_LARGE,
@@ -34,7 +34,7 @@ KINDS: Final[tuple[Kind, ...]] = (
 MISSING: Final = "-"
 
 
-def title(solver: str) -> str:
+def solver_title(solver: str) -> str:
     """The name of a solver in a table."""
     return f"`{PROVE}`" if solver == PROVE else SOLVERS[solver].title
 
@@ -56,7 +56,7 @@ def with_interval(values: np.ndarray, statistic: statistics.Statistic, form: str
     return f"{statistic(values):{form}} [{low:{form}}, {high:{form}}]"
 
 
-def counted(rows: list[Row]) -> str:
+def count_solved(rows: list[Row]) -> str:
     """Number of solved runs."""
     return f"{sum(map(is_solved, rows))} of {len(rows)}"
 
@@ -66,10 +66,10 @@ def solved_table(rows: list[Row], plan: Plan) -> Table:
     found = groups(rows, plan)
     cells = []
     for formulation, solver, start in KINDS:
-        line = [f"`{formulation}`", title(solver), "" if solver == PROVE else start]
+        line = [f"`{formulation}`", solver_title(solver), "" if solver == PROVE else start]
         for count, names in plan.instances.items():
             mine = found[count][formulation, solver, start]
-            text = counted(mine) if mine else MISSING
+            text = count_solved(mine) if mine else MISSING
             if len(mine) == len(names):
                 text += f", {with_interval(seconds(mine), shifted_geometric_mean, '.1f')} s"
             elif mine:
@@ -82,7 +82,7 @@ def solved_table(rows: list[Row], plan: Plan) -> Table:
 
 def details_table(rows: list[Row], plan: Plan) -> Table:
     """PAR-10, primal-dual integrals and root bounds of complete groups."""
-    best = known(rows)
+    best = known_values(rows)
     cells = []
     for count, of in groups(rows, plan).items():
         for kind in KINDS:
@@ -99,7 +99,7 @@ def details_table(rows: list[Row], plan: Plan) -> Table:
             )
             cells.append(
                 [
-                    str(count), f"`{kind[0]}`", title(kind[1]), "" if kind[1] == PROVE else kind[2],
+                    str(count), f"`{kind[0]}`", solver_title(kind[1]), "" if kind[1] == PROVE else kind[2],
                     with_interval(seconds(mine, statistics.PENALTY), statistics.mean, ".0f"),
                     _some(areas, len(mine), ".1f"), _some(100 * roots, len(mine), ".0f"),
                 ]
@@ -123,7 +123,7 @@ def problem(row: Row) -> tuple[str, str]:
     return row["instance"], row["formulation"]
 
 
-def known(rows: Iterable[Row]) -> dict[tuple[str, str], tuple[float, float]]:
+def known_values(rows: Iterable[Row]) -> dict[tuple[str, str], tuple[float, float]]:
     """Least energy of any run and greatest bound of `prove`, by instance and problem."""
     best: dict[tuple[str, str], float] = defaultdict(lambda: np.inf)
     bound: dict[tuple[str, str], float] = defaultdict(float)
@@ -141,7 +141,7 @@ def instances_table(rows: list[Row], plan: Plan) -> Table:
     cells = []
     for names in plan.instances.values():
         for name in names:
-            instance = made(name)
+            instance = make_instance(name)
             problems = [cf.formulate(instance, each) for each in PROBLEMS]
             integers = {int(each.integer.sum()) for each in problems}
             line = [name, str(len(instance.grid.first)), str(len(instance.theta)), *map(str, integers)]
@@ -180,7 +180,7 @@ def turned_table(rows: list[Row], plan: Plan) -> Table:
         ratio = statistics.SHIFT + times
         cells.append(
             [
-                f"`{pair[0]}`", title(pair[1]), f"{len(whole)} of {len(plan.turned)}",
+                f"`{pair[0]}`", solver_title(pair[1]), f"{len(whole)} of {len(plan.turned)}",
                 *(
                     f"{sum(map(is_solved, each))}, {shifted_geometric_mean(times[turns]):.1f} s"
                     for turns, each in enumerate(zip(*whole, strict=True))
@@ -196,7 +196,7 @@ def long_table(rows: list[Row], plan: Plan) -> Table:
     """The runs of an hour."""
     cells = [
         [
-            row["instance"], f"`{row['formulation']}`", title(row["solver"]),
+            row["instance"], f"`{row['formulation']}`", solver_title(row["solver"]),
             "yes" if is_solved(row) else "no",
             *(MISSING if row[name] is None else f"{row[name]:.6g}" for name in ("objective", "bound")),
             f"{row['cpu']:.0f}",
@@ -233,7 +233,7 @@ def editions_table(rows: list[Row], plan: Plan) -> Table:
                 for mine in [[each[name] for name in common]]
             ]
             cells.append(line)
-    return ("formulation", "instances", "pairs", *(title(each) for each in sorted(COMMERCIAL))), cells
+    return ("formulation", "instances", "pairs", *(solver_title(each) for each in sorted(COMMERCIAL))), cells
 
 
 def part_of(run: Run) -> str:
@@ -261,7 +261,7 @@ def completeness(rows: list[Row], plan: Plan) -> str:
 
 def claims(rows: list[Row]) -> str:
     """Sentence on answers that contradict a proven bound or a known field, and on failures."""
-    best = known(rows)
+    best = known_values(rows)
     wrong = [row for row in rows if problem(row) in best and contradicted(row, *best[problem(row)])]
     lost = [row for row in rows if row["status"] in {FAILED, "unknown"}]
     return (
@@ -272,7 +272,7 @@ def claims(rows: list[Row]) -> str:
 
 def _listed(rows: list[Row]) -> str:
     """The numbers of rows by solver and formulation."""
-    found = Counter(f"{title(row['solver'])} on `{row['formulation']}`" for row in rows)
+    found = Counter(f"{solver_title(row['solver'])} on `{row['formulation']}`" for row in rows)
     return "; ".join(f"{name} {count}" for name, count in sorted(found.items())) or "none"
 
 
@@ -315,7 +315,7 @@ def _reach(found: dict[int, dict[Kind, list[Row]]], plan: Plan, start: str) -> t
         by = [[kind for kind in mine if kind[1] != PROVE], [kind for kind in mine if kind[1] == PROVE]]
         solved = [
             f"{series(len(_solved(found[count], some)) for count in complete)} by "
-            f"{'at least one of ' if len(some) > 1 else ''}{series(title(kind[1]) for kind in some)}"
+            f"{'at least one of ' if len(some) > 1 else ''}{series(solver_title(kind[1]) for kind in some)}"
             for some in by
             if some
         ]
@@ -343,7 +343,7 @@ def tables(rows: list[Row], plan: Plan) -> dict[str, Table]:
 def sentences(rows: list[Row], plan: Plan) -> dict[str, Any]:
     """The sentences of this part by name."""
     machines = sorted({row["machine"] for row in rows if row["machine"]})
-    versions = sorted({f"{title(row['solver'])} {row['version']}" for row in rows if row["version"]})
+    versions = sorted({f"{solver_title(row['solver'])} {row['version']}" for row in rows if row["version"]})
     return {
         "solvers_done": completeness(rows, plan),
         "claims": claims(rows),

@@ -108,7 +108,7 @@ QUICK: Final = Plan({10: ("pixels 3 7000",)}, 5.0, ("pixels 3 7000",), ("pixels 
 
 
 @lru_cache(maxsize=32)
-def made(name: str, turns: int = 0) -> Instance:
+def make_instance(name: str, turns: int = 0) -> Instance:
     """The instance of that name with the default weights, turned by that many quarters."""
     kind, size, *seed = name.split()
     if kind in SAMPLES:
