@@ -49,8 +49,8 @@ def _cell(text: str) -> str:
 
 
 def _text(text: str) -> str:
-    """A help text with names from the tables, and with brackets that are no markup."""
-    paragraphs = filled(text).replace("\\[", "[").split("\n\n")
+    """A help text with names from the tables."""
+    paragraphs = filled(text).split("\n\n")
     return "\n\n".join(" ".join(each.split()) for each in paragraphs)
 
 

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Final
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -77,12 +76,12 @@ def _list(start: Start) -> Iterator[bytes]:
 
 
 def _cplex(start: Start) -> Iterator[bytes]:
-    name = quoteattr(start.problem.instance.name)
+    name = start.problem.instance.name  # letters, digits and underscores
     yield (
         '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>\n'
         '<CPLEXSolutions version="1.2">\n'
         '<CPLEXSolution version="1.2">\n'
-        f'<header problemName={name} solutionName="start" solutionIndex="0" MIPStartEffortLevel="4"/>\n'
+        f'<header problemName="{name}" solutionName="start" solutionIndex="0" MIPStartEffortLevel="4"/>\n'
         "<variables>\n"
     ).encode()
     count = start.problem.n_columns

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import Any, Final
 
-from rich.markup import escape
 from typer.core import TyperCommand, TyperGroup
 
 
@@ -127,12 +126,6 @@ class Command(TyperCommand):
             _flag(option)
         order = ["", *PANELS]
         self.params.sort(key=lambda each: order.index(getattr(each, "rich_help_panel", None) or ""))
-        if self.rich_markup_mode != "rich":  # brackets are no markup then, and a backslash would be printed
-            return
-        self.help = escape(self.help or "")
-        for parameter in self.params:
-            if text := getattr(parameter, "help", None):
-                parameter.help = escape(text)  # type: ignore[attr-defined]
 
     def get_help_option(self, ctx: Any) -> Any:
         """The option --help, in its panel."""
@@ -144,10 +137,16 @@ class Command(TyperCommand):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Fill the help texts of the command and of its parameters, then show them."""
         # A line break in a docstring begins no paragraph.
-        described = re.sub(r"(?<!\n)\n(?!\n)", " ", filled(self.help or ""))
+        described = re.sub(r"(?<!\n)\n(?!\n)", " ", self._shown(self.help or ""))
         example = EXAMPLES.get(ctx.command_path.partition(" ")[2])
         self.help = f"Example: {example}\n\n{described}" if example else described
         for parameter in self.params:
             if text := getattr(parameter, "help", None):
-                parameter.help = filled(text)  # type: ignore[attr-defined]
+                parameter.help = self._shown(text)  # type: ignore[attr-defined]
         super().format_help(ctx, formatter)
+
+    def _shown(self, text: str) -> str:
+        """The text with names from the tables, its brackets escaped where they would be markup."""
+        from rich.markup import escape
+
+        return escape(filled(text)) if self.rich_markup_mode == "rich" else filled(text)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 import typer
 
-from ...models.processes.process_pool import MOST
+from ...models.processes.job_counts import MOST
 from .output import print_json, print_line, show_facts
 
 _KINDS_OF_SKETCH: Final = (

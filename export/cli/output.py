@@ -23,8 +23,6 @@ from ...models.errors import CrossfieldError, printable
 from ...models.processes.deadline import Progress, silent
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from ...models.instance.instance import Instance
     from ...models.surface.surface import Surface
     from ..solving.report import Report
@@ -49,10 +47,7 @@ def progress(*, quiet: bool = False) -> Iterator[Progress]:
     A terminal shows it next to a spinner and the time; elsewhere it is a line every few seconds. Raises
     InterruptedRunError for Ctrl-C, unless the work itself handles it.
     """
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    shown = nullcontext(silent) if quiet else _spinning(console) if console.is_terminal else _lines()
+    shown = nullcontext(silent) if quiet else _spinner() if sys.stderr.isatty() else _lines()
     try:
         with shown as show:
             yield show
@@ -61,16 +56,17 @@ def progress(*, quiet: bool = False) -> Iterator[Progress]:
 
 
 @contextmanager
-def _spinning(console: Console) -> Iterator[Progress]:
+def _spinner() -> Iterator[Progress]:
     """Function that shows the current step next to a spinner and the time."""
     from rich import progress as rich
+    from rich.console import Console
 
     columns = (
         rich.SpinnerColumn(),
         rich.TextColumn("{task.description}", markup=False),
         rich.TimeElapsedColumn(),
     )
-    with rich.Progress(*columns, console=console, transient=True) as bar:
+    with rich.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("starting")
         yield lambda text: bar.update(task, description=text)
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 from ...models.field.field import CrossField, field_in_windows
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock, Deadline, Over, Progress, never, silent
+from ...models.processes.job_counts import cores
 from ...models.processes.limits import Limits
-from ...models.processes.process_pool import cores
 from ...models.search.box_qp import fit_in_box
 from ...models.search.greedy import greedy_field
 from ...models.search.search import Search, search

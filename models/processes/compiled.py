@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar, cast
 import numba
 import numpy as np
 
-from .process_pool import check_jobs
+from .job_counts import check_jobs
 
 _Part = TypeVar("_Part")
 _Work = TypeVar("_Work", bound=Callable[..., Any])

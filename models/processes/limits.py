@@ -9,7 +9,7 @@ from typing import Final
 from ..arguments import check_fields
 from ..errors import InputError
 from .deadline import Deadline
-from .process_pool import check_jobs
+from .job_counts import check_jobs
 
 LEAST: Final = 0.01  # seconds of a solve for which no time is left: its starting point is still returned
 

@@ -6,35 +6,19 @@ processes running.
 
 from __future__ import annotations
 
-import os
 import queue
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from typing import Final, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
-from ..errors import InputError
 from .child import Child
+from .job_counts import check_jobs
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 P = ParamSpec("P")
-
-MOST: Final = max(16, 2 * (os.cpu_count() or 1))
-"""Most threads or processes: beyond twice the cores there is no gain, and each takes memory."""
-
-
-def check_jobs(count: int, name: str = "jobs", *, least: int = 1) -> int:
-    """The number of threads or processes. Raises InputError if it is out of range."""
-    if not least <= count <= MOST:
-        raise InputError(f"{name} must be between {least} and {MOST}, got {count}")
-    return count
-
-
-def cores() -> int:
-    """The number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

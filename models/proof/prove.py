@@ -13,8 +13,8 @@ from ..instance.instance import Instance
 from ..processes.compiled import crew
 from ..processes.deadline import Deadline, Progress, Stop, never, silent, stop_function
 from ..processes.groups import catch_interrupts
+from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
-from ..processes.process_pool import check_jobs
 from ..smooth.systems import one_thread
 from .certificate import REFUSALS, checked_proof
 from .compiling import compile_proofs

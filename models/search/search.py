@@ -20,8 +20,9 @@ from ..instance.grid import Bools
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
 from ..processes.groups import catch_interrupts
+from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
-from ..processes.process_pool import check_jobs, parallel_map
+from ..processes.process_pool import parallel_map
 from ..smooth.polyvector import power_field
 from ..smooth.systems import one_thread
 from .box_qp import FreeField, stroke_bounds

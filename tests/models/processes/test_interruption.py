@@ -11,7 +11,7 @@ import crossfield as cf
 import pytest
 from children import all_end, complaints, descendants, running
 from crossfield.export.cli.app import invoke
-from crossfield.models.processes.process_pool import MOST
+from crossfield.models.processes.job_counts import MOST
 
 FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj", "field.sings"}
 

@@ -10,7 +10,8 @@ from children import descendants
 from crossfield.models.errors import InputError
 from crossfield.models.processes import process_pool as module
 from crossfield.models.processes.control import WorkerError
-from crossfield.models.processes.process_pool import MOST, check_jobs, parallel_map, process_pool
+from crossfield.models.processes.job_counts import MOST, check_jobs
+from crossfield.models.processes.process_pool import parallel_map, process_pool
 
 
 def test_answers_come_in_the_order_of_the_tasks():
