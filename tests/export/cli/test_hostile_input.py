@@ -367,9 +367,9 @@ def test_pictures_are_the_same_for_any_number_of_rows_per_band(tmp_path, monkeyp
         with monkeypatch.context() as patch:
             patch.setattr(bitmap, "_BAND", 400)
             banded = bitmap.read_bitmap((tmp_path / name).read_bytes(), 4)
-            mask = bitmap.read_white((tmp_path / name).read_bytes())
+            mask = bitmap.read_white_pixels((tmp_path / name).read_bytes())
         np.testing.assert_array_equal(whole.ink, banded.ink)
-        np.testing.assert_array_equal(mask, bitmap.read_white((tmp_path / name).read_bytes()))
+        np.testing.assert_array_equal(mask, bitmap.read_white_pixels((tmp_path / name).read_bytes()))
 
 
 def test_texts_from_files_are_safe_in_messages(tmp_path):

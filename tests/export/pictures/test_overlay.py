@@ -190,7 +190,7 @@ def test_another_drawing_and_another_kind_are_refused(tmp_path):
 def test_the_command_lays_a_field_over_a_sample(tmp_path, capsys, suffix, head):
     write_field(power_field(sample("ring", 10)), tmp_path / "f.npz")
     path = tmp_path / f"over{suffix}"
-    assert invoke(["draw", str(tmp_path / "f.npz"), "--underlay", "ring", "-o", str(path), "-q"]) == 0
+    assert invoke(["draw", str(tmp_path / "f.npz"), "--underlay", "ring", "-o", str(path)]) == 0
     assert path.read_bytes().startswith(head)
     assert suffix != ".svg" or "drawing" in layers_of(path)[1]
     assert (
