@@ -26,7 +26,6 @@ import numpy as np
 from ..field.field import CrossField, Norm, field_in_windows
 from ..field.jumps import free_jumps
 from ..instance.angles import QUARTER
-from ..instance.grid import Floats
 from ..instance.instance import Instance
 from ..processes.compiled import Crew
 from ..processes.deadline import Deadline, Over, Progress, never
@@ -110,8 +109,6 @@ class _Chain:
     levels: list[LevelRecord] = field(default_factory=list)
     convex: float = -math.inf
     forced: int = 0
-    multipliers: Floats | None = None
-    cuts: tuple[int, ...] = (-1,)
 
     @property
     def bound(self) -> float:
@@ -175,7 +172,7 @@ class Descent:
         bound, energy = min(self.proven.bound, self.energy(self.best)), self.energy(self.best)
         return Proof(
             self.best, energy, bound, self.proven.forced, tuple(self.proven.levels), seconds, ended,
-            self.norm, self.proven.multipliers, self.proven.cuts,
+            self.norm,
         )  # fmt: skip
 
     def run(self) -> str:
@@ -270,7 +267,7 @@ class Descent:
         chain.forced = int(choices.pairs.sum())
         if choices.everything:
             energy = self.energy(self.best)
-            solution, bound, chain.multipliers, chain.cuts = choices.least(energy, self.ends.over)
+            solution, bound, *_ = choices.least(energy, self.ends.over)
             chain.convex = max(chain.convex, min(bound, chain.levels[-1].energy))
             if bound < energy:
                 better = field_in_windows(self.instance, solution.alpha, solution.beta, solution.p)

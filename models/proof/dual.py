@@ -228,12 +228,12 @@ class Dual:
         """
         self._before = []  # a level is recorded next, which takes memory
         most = max(self._greatest()[0], 2.0**-16)
-        least = 2.0 ** (math.ceil(math.log2(most)) - (30 if self.lattice.norm == 2 else 48))
+        least = 2.0 ** (math.ceil(math.log2(most)) - 30)
         # Shares and tables, wrong by half a quantum, enter the minima of pixels and pairs, or of clusters.
         wrong = np.array([2 * len(self.lattice.p), 4 * len(self.quads)])
         lost = _LOST * gap * np.array([1 - _TABLES, _TABLES]) / np.maximum(wrong, 1)
         of_shares, of_tables = (
-            min(2.0 ** math.floor(math.log2(max(most_lost, least))), check_certificate.MOST_SCALE)
+            min(2.0 ** math.floor(math.log2(max(most_lost, least))), check_certificate.MOST_UNIT)
             for most_lost in lost
         )
         for values, quantum in zip(self._values, (of_shares, of_shares, of_tables), strict=True):
@@ -300,7 +300,7 @@ class Dual:
     def arrays(self, quanta: tuple[float, float]) -> tuple[Arrays, Arrays]:
         """Messages and tables as whole numbers of their scales, after `quantise`."""
         shares, (of_shares, of_tables) = (self.state.shares_first, self.state.shares_second), quanta
-        messages = messages_of(self.lattice, shares, of_shares, slice(0, len(self.lattice.p)))
+        messages = messages_of(self.lattice, shares, of_shares)
         return messages, tables_of(self.lattice, self.state.clusters, of_tables)
 
 

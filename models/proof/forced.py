@@ -1,12 +1,10 @@
-"""The convex quadratic that remains when no choice of jumps and lines is left.
+"""The convex problem that remains when no choice of jumps and lines is left.
 
-models/proof/check_certificate.py, 4, proves when the jumps of the centre are best on the boxes, and that a
-convex quadratic bounds the energy there: the energy at these jumps with line u at every stroke (`qp-fixed`),
+Sections 6 and 9 of docs/proofs.md prove when the jumps of the centre are best on the boxes, and that a
+convex problem bounds the energy there: the energy at these jumps with line u at every stroke (`qp-fixed`),
 less terms linear in beta at strokes whose box exceeds the window. If the loss is too large, boxes are cut at
-the edges of the window. Beyond them, v carries the stroke.
-
-The least value of that quadratic on the boxes is bounded from its gradient g at any point x: by its value
-there + the least of g (y - x) over y in the boxes.
+the edges of the window. Beyond them, v carries the stroke. Multipliers of its residuals bound its least
+value.
 """
 
 from __future__ import annotations
@@ -15,37 +13,36 @@ from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, Self
 
 import numpy as np
-from scipy import sparse
 
 from ..field.field import CrossField
 from ..instance.angles import HALF, QUARTER
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
-from ..search.box_qp import field_at, minimise_in_box
-from ..search.energy import QuadraticForm, energy_at
-from ..smooth.systems import stroke_weight
-from .check_certificate import convex_error
+from ..search.absolute_fit import absolute_fit
+from ..search.box_qp import field_at
+from .check_certificate import LastStep
+from .lattice import Lattice
 from .pruning import RemainingCells
 from .record import EXACT
 
 _MOST_PIECES: Final = 60
 _MOST_CROSSED: Final = 6  # strokes whose windows the boxes exceed; with more, all pieces are too many
 MARGIN: Final = 2e-9  # radians by which conditions hold here, as the checker's boxes are wider by less
-_ROUNDING: Final = 1e-10  # deduction from a bound, relative to 1 + its value: float64 loses some 1e-12 in it
+_BEYOND: Final = 1e-12  # radians by which a box exceeds a window, as in the checker
 
 
 class Least(NamedTuple):
-    """The least energy on the boxes: its field, and a bound.
+    """The least energy on the boxes: its field, a bound, and the multipliers that prove it.
 
-    Where pairs count with absolute values, multipliers (pieces, r) prove it, of each piece that stays whole;
-    see models/search/absolute_fit.py. cuts: for each piece, in the order of the search, the stroke where it
-    is cut into three parts, or -1 if it stays whole.
+    multipliers: (r,) of a piece, (pieces, r) of all that stay whole; see models/search/absolute_fit.py. cuts:
+    for each piece, in the order of the search, the stroke where it is cut into three parts, or -1 if it stays
+    whole.
     """
 
     field: CrossField
     bound: float
-    multipliers: Floats | None = None
+    multipliers: Floats
     cuts: tuple[int, ...] = (-1,)
 
 
@@ -83,38 +80,35 @@ class Forced:
     def whole(self) -> Piece:
         """The boxes as one piece."""
         at = self.left.lattice.instance.stroke_index
-        above = self.left.alpha_low[at] - self.target >= QUARTER
-        below = self.target - self.left.alpha_high[at] >= QUARTER
+        above = self.left.alpha_low[at] - self.target - QUARTER > _BEYOND
+        below = self.target - self.left.alpha_high[at] - QUARTER > _BEYOND
         return Piece(self.left, above.astype(np.int32) - below, self.target)
 
     def least(self, energy: float, over: Over = never) -> Least:
         """The minimum of the lowest piece, and a bound of all; pieces with a bound of `energy` stay whole.
 
-        Where multipliers have to prove it, the bound is that of the whole boxes if pieces are missing.
+        The bound is that of the whole boxes if pieces are missing.
         """
-        waiting: list[tuple[float, Piece | None]] = [(-np.inf, self.whole)]
+        waiting: list[Piece | None] = [self.whole]
         found, whole, cuts = list[Least](), list[Least | None](), list[int]()
         few = np.count_nonzero(np.add(*self.whole.beyond)) <= _MOST_CROSSED
         while waiting and len(found) < (_MOST_PIECES if few else 1) and not (found and over()):
-            _, piece = waiting.pop()
+            piece = waiting.pop()
             cuts.append(-1)
             if piece is None:
                 whole.append(None)
                 continue
-            found.append(piece.least(over))
+            found.append(piece.least())
             if found[-1].bound < energy - EXACT / 2 * (1 + energy):
                 cuts[-1] = piece.crossed(found[-1].field)
             if cuts[-1] < 0:
                 whole.append(found[-1])
             else:
-                waiting += [(found[-1].bound, part) for part in reversed(piece.cut(cuts[-1]))]
+                waiting += reversed(piece.cut(cuts[-1]))
         best = min(filter(None, whole), key=lambda each: each.bound, default=found[-1])
-        first = found[0].multipliers
-        if first is None:
-            return Least(best.field, min([best.bound, *(bound for bound, part in waiting if part)]))
         if waiting:
-            return found[0]._replace(field=best.field)
-        of_pieces = [first * 0.0 if each is None else np.asarray(each.multipliers) for each in whole]
+            return found[0]._replace(field=best.field, multipliers=found[0].multipliers[None])
+        of_pieces = [np.zeros_like(best.multipliers) if each is None else each.multipliers for each in whole]
         return Least(best.field, best.bound, np.stack(of_pieces), tuple(cuts))
 
 
@@ -130,36 +124,30 @@ class Piece:
     lines: Ints
     target: Floats
 
-    def least(self, over: Over = never) -> Least:
-        """The field that minimises the quadratic on the piece, and a lower bound of the energy there."""
-        lattice = self.left.lattice
-        (lower, upper), quadratic = self.left.bounds, self._quadratic()
-        x = minimise_in_box(quadratic, np.concatenate([lattice.alpha, lattice.beta]), lower, upper, over=over)
-        gradient = 2 * quadratic.slope(x)
-        field = field_at(lattice.instance, x, lattice.p)
-        value = field.energy().total - float(self._given(field).sum())
-        bound = value + float(np.minimum(gradient * (lower - x), gradient * (upper - x)).sum())
-        return Least(field, bound - _ROUNDING * (1 + abs(bound)) - self._error(field, upper - lower))
-
-    def _error(self, field: CrossField, far: Floats) -> float:
-        """Margin that the checker takes off the bound for rounding, or a little more."""
-        instance, at = field.instance, field.instance.stroke_index
-        weight, skew = stroke_weight(instance), instance.skew_coefficient
-        angles, goal = np.concatenate([field.alpha, field.beta]), self.target + HALF * self.lines
-        r = field.alpha[at] + np.where(self.lines == 0, 1, -1) * field.beta[at] - goal
-        sizes = (
-            skew * np.abs(field.beta).sum() + np.abs(field.residual_a).sum() + np.abs(field.residual_b).sum()
-        )
-        sizes += weight[at] @ (np.abs(r) + 4 * np.add(*self.beyond))
-        terms = field.energy().total + float(sizes)
-        return convex_error(weight, skew, (angles, goal, self.left.lattice.p), terms, far)
+    def least(self) -> Least:
+        """The field that minimises the convex problem on the piece, and a lower bound of the energy there."""
+        lattice, (above, below) = self.left.lattice, self.beyond
+        instance, weight = lattice.instance, lattice.instance.stroke_terms.weight
+        tilt, constant = np.zeros(2 * instance.grid.size), 2 * float(weight @ (above + below))
+        if lattice.norm != 1:
+            tilt[instance.grid.size + instance.stroke_index] = 4 * weight * (above - below)
+            constant *= HALF
+        fit = absolute_fit(
+            instance, lattice.p, lattice.norm, *self.left.bounds,
+            tilt=tilt, lines=self.lines, target=self.target,
+        )  # fmt: skip
+        return Least(field_at(instance, fit.x, lattice.p), fit.bound - constant, fit.multipliers)
 
     def crossed(self, field: CrossField) -> int:
         """The stroke with the largest deduction whose window the piece exceeds, or -1."""
-        above, below = self.beyond
+        (above, below), instance = self.beyond, field.instance
         if not (above + below).any():
             return -1
-        return int(np.argmax(np.where(above + below > 0, 1e-12 + self._given(field), 0.0)))
+        beta = field.beta[instance.stroke_index]
+        away = above + below
+        if self.left.lattice.norm != 1:
+            away = above * (QUARTER + beta) + below * (QUARTER - beta)
+        return int(np.argmax(np.where(above + below > 0, 1e-12 + instance.stroke_terms.weight * away, 0.0)))
 
     def cut(self, stroke: int) -> list[Self | None]:
         """The parts below, in and above the window of a stroke, None for an empty one."""
@@ -189,31 +177,25 @@ class Piece:
         below = np.maximum(self.target - QUARTER - self.left.alpha_low[at], 0.0)
         return above * u, below * u
 
-    def _given(self, field: CrossField) -> Floats:
-        """Difference between the energy and the quadratic at each stroke, shape (s,)."""
-        instance = field.instance
-        at, weight = instance.stroke_index, instance.stroke_coefficient * instance.w
-        alpha, beta, counted = field.alpha[at], field.beta[at], field.residual_r
-        u, v = alpha + beta - self.target, alpha - HALF * self.lines - beta - self.target
-        above, below = self.beyond
-        tilt = 4 * (above * (beta + QUARTER) + below * (QUARTER - beta))
-        given: Floats = weight * (counted * counted - np.where(self.lines == 0, u * u - tilt, v * v))
-        return given
 
-    def _quadratic(self) -> QuadraticForm:
-        """The quadratic of the piece without its constant."""
-        lattice = self.left.lattice
-        instance, n = lattice.instance, lattice.instance.grid.size
-        energy, at = energy_at(instance, lattice.p), instance.stroke_index
-        weight, v = instance.stroke_coefficient * instance.w, self.lines != 0
-        above, below = self.beyond
-        vector, turned = energy.vector.copy(), self.target - instance.target
-        vector[at] += weight * (turned + HALF * self.lines)
-        of_v = -2 * instance.target - turned - HALF * self.lines
-        vector[n + at] += weight * np.where(v, of_v, turned + 2 * (above - below))
-        places = (np.concatenate([at, at + n]), np.concatenate([at + n, at]))
-        swapped = sparse.csr_array((np.tile(-2 * weight * v, 2), places), shape=energy.matrix.shape)
-        return QuadraticForm(energy.matrix + swapped, vector)
+def pieces_of(first: Lattice, step: LastStep, energy: float) -> tuple[Ints, Floats]:
+    """The cuts and multipliers of a certificate for a last step of the checker; see docs/files.md.
+
+    first: any lattice of the proof. energy: at which a bound is sufficient.
+    """
+    instance, (low, high) = first.instance, (step.boxes[:, ::2].T, step.boxes[:, 1::2].T)
+    middle = (low + high) / 2
+    lattice = replace(first, alpha=middle[0], beta=middle[1], p=step.p.astype(np.int32))
+    left = RemainingCells(lattice, first.allowed, low[0], high[0], low[1], high[1])
+    pairs, strokes = np.ones(len(step.p), bool), np.ones(len(instance.theta), bool)
+    least = Forced(left, pairs, strokes, step.theta[instance.stroke_index]).least(energy)
+    at, cuts = instance.stroke_index, np.array(least.cuts, np.int32)
+    m, s, n = len(step.p), len(at), instance.grid.size
+    multipliers = np.zeros((len(least.multipliers), 2 * m + 2 * n))
+    multipliers[:, : 2 * m] = least.multipliers[:, : 2 * m]
+    multipliers[:, 2 * m + at] = least.multipliers[:, 2 * m : 2 * m + s]
+    multipliers[:, 2 * m + n :] = least.multipliers[:, 2 * m + s :]
+    return np.where(cuts < 0, -1, at[cuts]).astype(np.int32), multipliers
 
 
 def forced(left: RemainingCells, target: Floats | None = None) -> Forced:

@@ -11,7 +11,7 @@ from ..arguments import check_arguments, check_count
 from ..field.field import CrossField, Norm, check_norm, field_in_windows
 from ..instance.instance import Instance
 from ..processes.compiled import crew
-from ..processes.deadline import Deadline, Progress, Stop, never, silent, stop_function
+from ..processes.deadline import Deadline, Progress, Stop, silent, stop_function
 from ..processes.groups import catch_interrupts
 from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
@@ -123,6 +123,6 @@ def prove(
         return proof
     progress("checking the levels")
     try:
-        return checked_proof(proof, never)
+        return checked_proof(proof)
     except (*REFUSALS, MemoryError):  # `write_certificate` names the reason
         return replace(proof, bound=0.0, forced=0)

@@ -2,13 +2,13 @@
 
 It is that of models/proof/descent.py, on a lattice common to all pixels. Once the boxes of a level leave no
 choice of jumps, a linear or quadratic program gives the energy on them, except for strokes at the edges of
-their windows, where boxes are cut. Its multipliers prove its least value. models/proof/check_certificate.py,
-5, states and proves the lemmas.
+their windows, where boxes are cut. Its multipliers prove its least value. Section 9 of docs/proofs.md states
+and proves the lemmas.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar, cast
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,50 +19,14 @@ from ..instance.grid import Floats
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
-from ..search.absolute_fit import absolute_fit, alternate_absolute, fit_absolute
-from ..search.box_qp import field_at
+from ..search.absolute_fit import alternate_absolute, fit_absolute
 from .descent import COARSEST, Descent
-from .forced import MARGIN, Forced, Least, Piece, at_pairs
+from .forced import MARGIN, Forced, at_pairs
 from .lattice import Lattice
 from .pruning import RemainingCells
 
 
-class ForcedAbsolute(Forced):
-    """Choices that the boxes force; then a program gives the energy on each piece of them."""
-
-    @property
-    def whole(self) -> Piece:
-        """The boxes as one piece."""
-        return AbsolutePiece(self.left, np.zeros(len(self.strokes), dtype=np.int32), self.target)
-
-
-class AbsolutePiece(Piece):
-    """A part of the boxes where pairs count with absolute values."""
-
-    def least(self, over: Over = never) -> Least:  # noqa: ARG002
-        """Minimum-energy field with the lines of the piece, and a lower bound on the energy there."""
-        instance, p = self.left.lattice.instance, self.left.lattice.p
-        weight, (above, below) = instance.stroke_coefficient * instance.w, self.beyond
-        tilt, constant = np.zeros(2 * instance.grid.size), 2 * float(weight @ (above + below))
-        if self._norm == "mixed":
-            tilt[instance.grid.size + instance.stroke_index] = 4 * weight * (above - below)
-            constant *= HALF
-        fit = absolute_fit(instance, p, self._norm, *self.left.bounds, tilt=tilt, lines=self.lines)
-        return Least(field_at(instance, fit.x, p), fit.bound - constant, fit.multipliers)
-
-    @property
-    def _norm(self) -> AbsoluteNorm:
-        return cast("AbsoluteNorm", self.left.lattice.norm)
-
-    def _given(self, field: CrossField) -> Floats:
-        """Deduction at each stroke whose window the piece exceeds, shape (s,)."""
-        if self._norm == "mixed":
-            return super()._given(field)
-        deduction: Floats = 2 * field.instance.w * np.add(*self.beyond)
-        return deduction
-
-
-def forced_absolute(left: RemainingCells, target: Floats | None = None) -> ForcedAbsolute:
+def forced_absolute(left: RemainingCells, target: Floats | None = None) -> Forced:
     """Choices that are forced on the boxes that are left, as `forced`."""
     reach = QUARTER if left.lattice.norm == 1 else HALF
     i, j = left.lattice.instance.grid.first, left.lattice.instance.grid.second
@@ -76,7 +40,7 @@ def forced_absolute(left: RemainingCells, target: Floats | None = None) -> Force
     instance = left.lattice.instance
     at, target = instance.stroke_index, instance.target if target is None else target
     away = np.maximum(left.alpha_high[at] - target, target - left.alpha_low[at])
-    return ForcedAbsolute(left, pairs, away - QUARTER <= reach - MARGIN, target)
+    return Forced(left, pairs, away - QUARTER <= reach - MARGIN, target)
 
 
 class AbsoluteDescent(Descent):

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, cast
+from typing import TYPE_CHECKING, Final, Literal, Self, cast
 
 from ..array_archive import Arrays
 from ..field.field import CrossField, Norm
-from ..instance.grid import Floats
 from .check_certificate import Verdict, gap_of, status_of
 from .lattice import Lattice
 
@@ -17,19 +16,6 @@ if TYPE_CHECKING:
 Status = Literal["optimal", "gap"]
 
 EXACT: Final = 4e-9  # gap relative to 1 + energy at which the prover ends; `status_of` allows a little more
-
-
-class Branch(NamedTuple):
-    """The cells that a level covers: those of a level before it, or a part of them.
-
-    above: number of that level, -1 for none. pixel: that of a cut, or -1 for all cells. side: 0 for cells
-    below a step of alpha, 1 for those above, 2 and 3 the same for beta. step: the first one above the cut.
-    """
-
-    above: int
-    pixel: int = -1
-    side: int = 0
-    step: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +41,10 @@ class Claim:
 class LevelRecord(Lattice):
     """One level of a proof: its lattice and a dual solution on it.
 
-    messages, tables: the arrays of messages and clusters that models/proof/certificate.py describes: whole
-    multiples of powers of two. bound: sum over pixels of min (D + shares) + sum over pairs of min (c + tables
-    - shares) + sum over clusters of min (- tables), over allowed labels, minus a bound of its rounding error.
-    energy: U when the level was pruned; fields outside the next level have more (models/proof/pruning.py).
+    messages, tables: the arrays of shares and quads of a certificate (models/proof/encoding.py). bound: sum
+    over pixels of min (D + shares) + sum over pairs of min (c + tables - shares) + sum over clusters of min
+    (- tables), over allowed labels, minus a bound of its rounding error. energy: U when the level was pruned;
+    fields outside the next level have more (models/proof/pruning.py).
     """
 
     messages: Arrays
@@ -97,8 +83,8 @@ class Proof(Claim):
     forced
         Number of pairs with the same jump in every field that could be better.
     levels
-        The last chain of lattices, coarsest first, on the parts of the mask that have a stroke. Each follows
-        from the one before, or, if there are branches, from that which they name.
+        The last chain of lattices, coarsest first, on the parts of the mask that have a stroke. Each covers
+        what the one before leaves.
     seconds
         Duration of the work without the check.
     ended
@@ -106,17 +92,10 @@ class Proof(Claim):
         would be too large.
     norm
         1, 2 or `mixed`.
-    multipliers
-        Where pairs count with absolute values and all jumps are forced: the multipliers that prove the least
-        energy on each piece of the last boxes that stays whole, shape (pieces, 2m + s + n); 0 for an empty
-        one. See models/search/absolute_fit.py.
-    cuts
-        For each piece, before its parts, the stroke at whose window it is cut into three, or -1 if it stays
-        whole.
-    branches
-        For each level, what it follows from.
     verdict
         Findings of the checker; None before the check.
+    pieces
+        The arrays of the certificate that prove the last step; None before the check.
 
     """
 
@@ -125,7 +104,5 @@ class Proof(Claim):
     seconds: float
     ended: str
     norm: Norm = 2
-    multipliers: Floats | None = None
-    cuts: tuple[int, ...] = (-1,)
-    branches: tuple[Branch, ...] = ()
     verdict: Verdict | None = field(default=None, init=False, repr=False)  # `replace` leaves it out
+    pieces: Arrays | None = field(default=None, init=False, repr=False)

@@ -23,7 +23,7 @@ def windows_left(certificate: Certificate) -> Windows:
     """
     field, verdict = certificate.field, certificate.verdict
     instance, grid = field.instance, field.instance.grid
-    steps = np.round((field.alpha - verdict.centres[:, 0]) / HALF).astype(np.int32)
+    steps = np.round((field.alpha - verdict.boxes[:, :2].mean(axis=1)) / HALF).astype(np.int32)
     alpha, beta = (
         verdict.boxes[:, :2] + HALF * steps[:, None],
         verdict.boxes[:, 2:] * parity_sign(steps)[:, None],

@@ -1,9 +1,10 @@
-"""The best angles for given jumps where pairs count with absolute values, and the bound from its multipliers.
+"""The best angles for given jumps, and the bound from their multipliers.
 
 With x = (alpha, beta), shape (2n,), the energy at jumps p (docs/mathematics.md, 5) is sum k phi(Mx + c): two
 rows for each pair, A and B with k = 2, one for each stroke, R with k = w_strokes w, and one for each pixel,
 beta with k = w_beta. In the 1-norm phi is the absolute value, and the best angles solve a linear program. In
-the mixed norm phi is the square in rows of strokes and pixels, and they solve a quadratic program.
+the mixed norm phi is the square in rows of strokes and pixels, in the 2-norm in all rows, and they solve a
+quadratic program.
 
 For any number l, phi(r) >= l r - psi(l): with psi = 0 and -1 <= l <= 1 for the absolute value, and with
 psi = l^2 / 4 for the square. So the energy is at least the sum of k (l (Mx + c) - psi), which is linear. Its
@@ -21,7 +22,7 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import CrossfieldError
-from ..field.field import AbsoluteNorm, CrossField
+from ..field.field import AbsoluteNorm, CrossField, Norm
 from ..field.jumps import best_jumps
 from ..instance.angles import HALF
 from ..instance.grid import Bools, Floats, Ints
@@ -52,15 +53,18 @@ class Residuals:
     squared: Bools
 
     @classmethod
-    def at(cls, instance: Instance, p: Ints, norm: AbsoluteNorm, lines: Ints | None = None) -> Residuals:
+    def at(
+        cls, instance: Instance, p: Ints, norm: Norm, lines: Ints | None = None, target: Floats | None = None
+    ) -> Residuals:
         """Residuals at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels.
 
         lines (s,): 0 where line u carries the stroke, None for zeros; -1 and 1 where v does, below and above
-        the window of u.
+        the window of u. target (s,): the direction of each stroke at one turn, None for that of the gauge.
         """
         n, pairs, strokes = instance.grid.size, instance.pair_terms, instance.stroke_terms
         unit, m = sparse.eye_array(n, format="csr"), len(p)
         lines = np.zeros(len(strokes.goal), np.int32) if lines is None else lines
+        target = strokes.goal if target is None else target
         nothing, at = sparse.csr_array((m, n)), unit[strokes.pixel]
         a = sparse.hstack([unit[pairs.first] - unit[pairs.second], nothing])
         signed = sparse.diags_array(parity_sign(p)) @ unit[pairs.first]
@@ -70,9 +74,9 @@ class Residuals:
         weight = np.concatenate([np.full(2 * m, 2.0), strokes.weight, np.full(n, instance.skew_coefficient)])
         return cls(
             sparse.vstack([a, b, r, skew], format="csr"),
-            np.concatenate([pairs.offset(p), np.zeros(m), -strokes.goal - HALF * lines, np.zeros(n)]),
+            np.concatenate([pairs.offset(p), np.zeros(m), -target - HALF * lines, np.zeros(n)]),
             weight,
-            (np.arange(len(weight)) >= 2 * m) & (norm == "mixed"),
+            (norm == 2) | ((np.arange(len(weight)) >= 2 * m) & (norm == "mixed")),
         )
 
     def energy(self, x: Floats) -> float:
@@ -114,20 +118,22 @@ class AbsoluteFit:
 def absolute_fit(
     instance: Instance,
     p: Ints,
-    norm: AbsoluteNorm,
+    norm: Norm,
     lower: Floats,
     upper: Floats,
     *,
     tilt: Floats | None = None,
     lines: Ints | None = None,
+    target: Floats | None = None,
 ) -> AbsoluteFit:
     """Compute the angles that minimise the energy minus tilt x in a box, with Clarabel.
 
     p: jumps, shape (m,). lower, upper: the box of x = (alpha, beta) in radians, shapes (2n,). tilt: shape
-    (2n,), None for zeros. lines: as of `Residuals.at`. Raises CrossfieldError when Clarabel finds no
+    (2n,), None for zeros. lines, target: as of `Residuals.at`. Raises CrossfieldError when Clarabel finds no
     solution; one always exists.
     """
-    terms, tilt = Residuals.at(instance, p, norm, lines), np.zeros(len(lower)) if tilt is None else tilt
+    terms = Residuals.at(instance, p, norm, lines, target)
+    tilt = np.zeros(len(lower)) if tilt is None else tilt
     x, multipliers = _solve_program(terms, lower, upper, tilt)
     multipliers = np.where(terms.squared, multipliers, np.clip(multipliers, -1.0, 1.0))
     multipliers[terms.weight == 0] = 0.0

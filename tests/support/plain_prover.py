@@ -7,7 +7,7 @@ from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.proof.clusters import clusters_on
 from crossfield.models.proof.encoding import messages_of, tables_of
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.record import Branch, LevelRecord, Proof
+from crossfield.models.proof.record import LevelRecord, Proof
 
 QUANTUM = 2.0**-24
 
@@ -113,16 +113,6 @@ class Table:
         self.alive = [self.visit(i, True) <= energy + 1e-7 - bound for i in range(len(self.unary))]
         return [halved(*self.labels[i], self.offset[i], alive) for i, alive in enumerate(self.alive)]
 
-    def finer_part(self, pixel, side):
-        """As `finer` before, for a pixel's cells on one side of its middle step of alpha; also that step."""
-        step = int(np.median(self.labels[pixel][0]))
-        kept = (self.labels[pixel][0][:-1] >= step) == bool(side)
-        parts = [kept if i == pixel else None for i in range(len(self.unary))]
-        return [
-            halved(*self.labels[i], self.offset[i], alive, part)
-            for i, (alive, part) in enumerate(zip(self.alive, parts, strict=True))
-        ], step
-
     def record(self, bound, energy):
         labels = self.labels
         first, second = ([share[side] for share in self.shares] for side in (0, 1))
@@ -137,7 +127,7 @@ class Table:
         )
         shares = [np.concatenate([*each, []]) for each in (first, second)]
         clusters = clusters_on(lattice, np.zeros(0, int))
-        messages = messages_of(lattice, shares, QUANTUM, slice(0, len(self.field.p)))
+        messages = messages_of(lattice, shares, QUANTUM)
         arrays = messages, tables_of(lattice, clusters, QUANTUM)
         return LevelRecord.on(lattice, arrays, bound=bound, energy=energy)
 
@@ -150,15 +140,13 @@ def whole(field, h, i, offset):
     return k, q, np.ones((len(k), len(q)), bool)
 
 
-def halved(k, q, allowed, offset, alive, part=None):
-    """Labels of half the spacing on what is left. part: whether to keep the cells of each alpha."""
+def halved(k, q, allowed, offset, alive):
+    """Labels of half the spacing on what is left."""
     alive = alive.reshape(allowed.shape)
     corners = [
         (slice(a, a - 1 or None), slice(b, b - 1 or None)) for a, b in itertools.product((0, 1), (0, 1))
     ]
     cells = np.all([allowed[x] for x in corners], axis=0) & np.any([alive[x] for x in corners], axis=0)
-    if part is not None:
-        cells &= part[:, None]
     rows, columns = np.nonzero(cells)
     extra = int(offset > 0)
     wide = {
@@ -185,20 +173,6 @@ def proof_of(field, *, steps=8, levels=3, passes=8, most=300):
         if max(allowed.size for *_, allowed in labels) > most:
             break
     return Proof(field, energy, max(record.bound for record in records), 0, tuple(records), 0.0, "gap")
-
-
-def proof_in_parts(field, *, steps=8, passes=8):
-    """A proof round a field: a level, and one for each half of its alphas at the first pixel."""
-    energy = field.energy().total
-    table, first = risen(field, HALF / steps, None, passes)
-    table.finer(first.bound, energy)
-    records, branches = [first], [Branch(-1)]
-    for side in (0, 1):
-        labels, step = table.finer_part(0, side)
-        records.append(risen(field, HALF / steps / 2, labels, passes)[1])
-        branches.append(Branch(0, 0, side, step))
-    parts = tuple(records), 0.0, "gap"
-    return Proof(field, energy, first.bound, 0, *parts, branches=tuple(branches))
 
 
 def risen(field, h, labels, passes):

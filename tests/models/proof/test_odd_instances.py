@@ -113,7 +113,7 @@ def assert_round_trip(seed, folder):
     proof = cf.prove(instance, norm=norm, jobs=1, work=WORK)
     path = folder / f"{seed}.npz"
     written = cf.write_certificate(proof, path)
-    verdict = check_certificate.checked(str(path), plain=True)
+    verdict = check_certificate.check(check_certificate.read(str(path)))
     read = cf.read_certificate(path, on=instance.with_gauge("strokes"))
     claims = [(each.status, each.bound, each.gap, each.forced) for each in (proof, written, read)]
     assert claims[0] == claims[1] == claims[2]

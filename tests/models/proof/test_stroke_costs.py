@@ -27,9 +27,9 @@ def test_every_label_costs_what_the_checker_computes():
         level = LevelRecord.of(Dual(Lattice.whole(field, 16), hands), field.energy().total)
     proof = Proof(field, field.energy().total, 0.0, 0, (level,), 0.0, "labels")
     arrays = _arrays(proof) | _head(proof)
-    sketch = check_certificate.sketch_of(arrays)
+    sketch, _ = check_certificate.sketch_of(arrays)
     same = check_certificate.level_of(arrays, 0, sketch)
     mine = np.split(level.unary_costs(), level.start[1:-1])
     for i, cost in enumerate(mine):
-        checked, _ = check_certificate.unary(same, sketch, i)
+        checked, _ = check_certificate.pixel_costs(same, sketch, i)
         assert np.allclose(cost, checked.ravel(), rtol=0, atol=1e-12)
