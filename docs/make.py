@@ -54,7 +54,7 @@ def write_formulations() -> None:
     )
     for name, recipe in FORMULATIONS.items():
         formulation = declare(name)
-        settable = ", ".join(sorted(recipe.settable)) or "none"
+        settable = ", ".join(sorted(recipe.option_names)) or "none"
         about = (
             recipe.source,
             recipe.kind,

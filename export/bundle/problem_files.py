@@ -144,7 +144,7 @@ def write_all(
     declarations = [declaration_of(name) for name in formulations]
 
     def chosen(declaration: Declaration) -> dict[str, Any]:
-        unfit = {*Options.__dataclass_fields__} - declaration.settable
+        unfit = {*Options.__dataclass_fields__} - declaration.option_names
         return {key: value for key, value in options.items() if key not in unfit}
 
     formats = tuple(formats)

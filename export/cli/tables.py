@@ -58,7 +58,7 @@ def _with_relaxations() -> list[tuple[Problem, bool]]:
     rows: list[tuple[Problem, bool]] = []
     for name, recipe in FORMULATIONS.items():
         rows.append((smallest(declare(name)), False))
-        if "relax" in recipe.settable:
+        if "relax" in recipe.option_names:
             rows.append((smallest(declare(name, relax=True)), True))
     return rows
 

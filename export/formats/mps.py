@@ -112,9 +112,13 @@ def _incident(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | No
     """
     instance, kind = family.problem.instance, SLOTS[family.family.over][term.symbols[0]][1]
     if kind == "itself":
-        own = None if family.everywhere else _inverse(family.elements, family.block(term.symbols[0]).count)
+        own = (
+            None
+            if family.covers_index_set
+            else _inverse(family.elements, family.block(term.symbols[0]).count)
+        )
         return [(0, own, term)]
-    assert family.everywhere  # families on a part of the pairs have terms of only those pairs
+    assert family.covers_index_set  # families on a part of the pairs have terms of only those pairs
     if kind == "stroke":
         return [(0, _inverse(instance.stroke_index, instance.grid.size), term)]
     left, upper, right, lower = _pairs_round(instance.grid)

@@ -20,7 +20,7 @@ with warnings.catch_warnings(action="ignore"):  # its import warns on newer Pyth
     import casadi as ca
 
 from ...models.instance.grid import Bools, Floats
-from ...models.processes.control import is_stopped, on_stop
+from ...models.processes.child_program import is_stopped, on_stop
 from ..solutions.readers.ampl import write_ampl_sol
 from ..statuses import CASADI
 from .protocol import Job, Outcome, RefusedError, file_names, interrupt_self

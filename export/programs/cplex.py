@@ -13,7 +13,7 @@ import cplex
 import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
-from ...models.processes.control import on_stop
+from ...models.processes.child_program import on_stop
 from ..statuses import CPLEX, CPLEX_STOPPED, Status
 from ..writing.terms import Terms, listed
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete

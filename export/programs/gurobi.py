@@ -10,7 +10,7 @@ from typing import Any
 import gurobipy
 import numpy as np
 
-from ...models.processes.control import on_stop
+from ...models.processes.child_program import on_stop
 from ..writing.terms import Terms, listed
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
 from .reading import Meaning, finite

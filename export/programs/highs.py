@@ -9,7 +9,7 @@ import highspy
 import numpy as np
 
 from ...models.errors import OutputError
-from ...models.processes.control import is_stopped
+from ...models.processes.child_program import is_stopped
 from ..writing.terms import of_triangle, terms
 from .protocol import Job, Outcome, RefusedError, complete
 from .reading import Meaning, finite

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from ...models.errors import CrossfieldError
-from ...models.processes.control import is_stopped, on_stop
+from ...models.processes.child_program import is_stopped, on_stop
 from ...models.processes.deadline import Deadline
 from ..statuses import Status
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 import pyscipopt
 
-from ...models.processes.control import on_stop
+from ...models.processes.child_program import on_stop
 from ..statuses import SCIP_GAP, Status, closes, of_scip
 from ..writing.stamps import is_one_column
 from ..writing.terms import Terms, listed

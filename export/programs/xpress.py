@@ -11,7 +11,7 @@ import numpy as np
 with warnings.catch_warnings(action="ignore"):  # it prints which licence it uses
     import xpress
 
-from ...models.processes.control import on_stop
+from ...models.processes.child_program import on_stop
 from ...models.storage import replacing
 from ..statuses import XPRESS, Status
 from ..writing.terms import Terms, listed, of_triangle, terms

@@ -30,7 +30,7 @@ from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...models.processes.child import Child, KilledError
-from ...models.processes.control import WorkerError
+from ...models.processes.child_program import WorkerError
 from ...models.processes.deadline import Deadline, Stop, stop_function
 from ...models.processes.limits import Limits
 from ...models.storage import make_folder
@@ -133,7 +133,7 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
     if not present:
         raise MissingSolverError(willing[0].missing)
     formats = {solver.name: FORMATS[taking[solver.name].format] for solver in present}
-    return min(present, key=lambda each: carried(problem, formats[each.name]).formulation.weakened)
+    return min(present, key=lambda each: carried(problem, formats[each.name]).formulation.is_weakened)
 
 
 def format_for(problem: Problem, solver: str) -> Taking:

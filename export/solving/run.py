@@ -13,8 +13,8 @@ from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline, Over, Progress, Stop, silent, stop_function
-from ...models.processes.groups import catch_interrupts
 from ...models.processes.limits import Limits
+from ...models.processes.process_groups import catch_interrupts
 from ...models.search.starts import first_field
 from ...models.storage import make_folder, remove_file, replacing_files, write_bytes
 from ...models.surface.lift import surface

@@ -99,7 +99,7 @@ def find_jumps(
     limits = Limits.bounded(limits)
     deadline = Deadline.after(limits.time_limit)
     start = start or first_field(instance, deadline.share(_STARTING).passed)
-    foreign = set(Options.__dataclass_fields__) - set(FORMULATIONS["milp-mccormick"].settable)
+    foreign = set(Options.__dataclass_fields__) - set(FORMULATIONS["milp-mccormick"].option_names)
     chosen = {key: value for key, value in options.items() if key not in foreign}
     problem = formulate(instance, "milp-mccormick", **chosen)
     return solve(problem, None, folder=folder, limits=limits.until(deadline), start=start, stop=stop)

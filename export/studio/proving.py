@@ -6,7 +6,7 @@ import re
 import sys
 from typing import Any, Final
 
-from ...models.processes.control import is_stopped
+from ...models.processes.child_program import is_stopped
 from ...models.processes.limits import Limits
 from .document import Document
 from .session import field_of

@@ -17,7 +17,7 @@ from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats, Ints
 from ...models.instance.instance import SKEW_WEIGHT, Instance, Reading
-from ...models.processes.control import is_stopped
+from ...models.processes.child_program import is_stopped
 from ...models.sketch.cover import LEAST_WEIGHT, Frame, curve_pixels
 from ...models.sketch.outline import enclosed_region
 from ...models.sketch.read import drop_silhouette, find_mask, frame_around, instance_of_mask

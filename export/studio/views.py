@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.field.field import FAR, CrossField
-from ...models.processes.control import is_stopped
+from ...models.processes.child_program import is_stopped
 from ...models.surface.surface import Surface
 from ...models.surface.trust import OFF, UNFIT, right_angle_deviation
 from ..pictures.draw import counted

@@ -69,7 +69,7 @@ class _Subject:
 
     def check(self, program: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any) -> Check:
         own, of = self.held.sha256[:16], self.problem.sha256[:16]
-        group, relaxes = (own, of) if self.held.formulation.weakened else (of, "")
+        group, relaxes = (own, of) if self.held.formulation.is_weakened else (of, "")
         facts = (_title(self.problem), self.name, program, step, verdict, reason)
         return Check(*facts, **numbers, group=group, relaxes=relaxes)
 

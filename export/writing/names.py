@@ -41,7 +41,9 @@ class Names:
     def row(self, family: PlacedFamily) -> Tagged:
         """Names of the rows of a family in order."""
         words = self._of(family.family.over)
-        return Tagged(family.family.tag.encode(), words if family.everywhere else words.at(family.elements))
+        return Tagged(
+            family.family.tag.encode(), words if family.covers_index_set else words.at(family.elements)
+        )
 
     def at(self, family: PlacedFamily, symbol: sp.Symbol) -> Tagged:
         """Name of the symbol's column at each element of a family."""

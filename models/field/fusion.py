@@ -36,7 +36,7 @@ def fuse_fields(one: CrossField, other: CrossField) -> CrossField:
         return one
     fields = (one, other)
     pairs = np.nonzero(far[grid.first] | far[grid.second])[0].astype(np.int32)
-    terms = one.instance.pair_terms.chosen(pairs)
+    terms = one.instance.pair_terms.select(pairs)
     same, mixed, mixed_too, exchanged = (
         _least_pair_costs(terms, first, second) for first in fields for second in fields
     )

@@ -141,7 +141,7 @@ class Declaration:
         return Options(**{parameter.name: parameter.default for parameter in parameters})
 
     @cached_property
-    def settable(self) -> frozenset[str]:
+    def option_names(self) -> frozenset[str]:
         """Names of the options that may be chosen; `relax` if a variable is an integer."""
         return frozenset(inspect.signature(self.families).parameters) | (
             {"relax"} if not self.fixed else set()
@@ -173,7 +173,7 @@ class Declaration:
         for key, value in chosen.items():
             if key not in known:
                 raise FormulationError(f"there is no option {key!r}; the options are {', '.join(known)}")
-            if key not in self.settable and value != getattr(self.defaults, key):
+            if key not in self.option_names and value != getattr(self.defaults, key):
                 raise FormulationError(
                     f"{self.name} has no option {key}; it is always {getattr(self.defaults, key)}"
                 )
@@ -242,7 +242,7 @@ class Formulation:
         return not self.options.relax and self.options.facet != "printed"
 
     @property
-    def weakened(self) -> bool:
+    def is_weakened(self) -> bool:
         """Whether lifting has made the formulation a relaxation of itself.
 
         Between its facets z is p1 beta_i only at p1 = 0 and 1, and here p1 may lie between.

@@ -107,11 +107,11 @@ class PlacedFamily:
         """The symbol's place in its block at each element, (count,); None: the element's own."""
         index = index_map(self.problem.instance, SLOTS[self.family.over][symbol][1])
         if isinstance(index, slice):
-            return None if self.everywhere else self.elements
-        return index if self.everywhere else index[self.elements]
+            return None if self.covers_index_set else self.elements
+        return index if self.covers_index_set else index[self.elements]
 
     @property
-    def everywhere(self) -> bool:
+    def covers_index_set(self) -> bool:
         """Whether its elements are the whole index set."""
         return self.family.only is None
 
@@ -128,7 +128,7 @@ class PlacedFamily:
             return getattr(self.problem.instance, SCALARS[symbol])
         name, kind = SLOTS[self.family.over][symbol]
         values = self.problem.data[name][index_map(self.problem.instance, kind)]
-        return values if self.everywhere else values[self.elements]
+        return values if self.covers_index_set else values[self.elements]
 
     @cached_property
     def terms(self) -> tuple[Monomial, ...] | None:

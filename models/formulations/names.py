@@ -95,7 +95,7 @@ def column_names(problem: Problem) -> Bytes:
 def family_names(family: PlacedFamily) -> Bytes:
     """Names of the rows of a family, shape (count, width), no padding."""
     names = element_names(family.problem.instance, family.family.tag, family.family.over)
-    return names if family.everywhere else names[family.elements]
+    return names if family.covers_index_set else names[family.elements]
 
 
 def row_names(problem: Problem) -> Bytes:

@@ -81,7 +81,7 @@ class PairTerms:
         p_min = np.floor(-2 * greatest / np.pi + _SLACK).astype(np.int32)
         return p_min, np.ceil(-2 * least / np.pi - _SLACK).astype(np.int32)
 
-    def chosen(self, pairs: NDArray[Any], number: Ints | None = None) -> PairTerms:
+    def select(self, pairs: NDArray[Any], number: Ints | None = None) -> PairTerms:
         """Some of the pairs, by their numbers or a mask, at pixels renumbered by `number` (n,)."""
         first, second = self.first[pairs], self.second[pairs]
         return PairTerms(first, second) if number is None else PairTerms(number[first], number[second])
@@ -106,6 +106,6 @@ class StrokeTerms:
         """Sums of the terms' values at each of `size` pixels, shape (size,)."""
         return np.bincount(self.pixel, values, size).astype(np.float64, copy=False)
 
-    def chosen(self, terms: Ints, number: Ints) -> StrokeTerms:
+    def select(self, terms: Ints, number: Ints) -> StrokeTerms:
         """Some of the terms, by their numbers, at pixels renumbered by `number` (n,)."""
         return StrokeTerms(number[self.pixel[terms]], self.goal[terms], self.weight[terms])

@@ -20,9 +20,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from .control import StopMessage, TaskMessage, WorkerError, error_text, send
+from .child_program import StopMessage, TaskMessage, WorkerError, error_text, send
 from .deadline import Deadline, Over, never
-from .groups import KILLED, describe_exit, kill_group, start_group
+from .process_groups import KILLED, describe_exit, kill_group, start_group
 
 GRACE: Final = 0.5
 GRACE_SHARE: Final = 0.05
@@ -32,7 +32,7 @@ PATIENCE: Final = 4.0
 _TICK: Final = 0.1
 _PROGRAM: Final = (
     "import sys; sys.path += [each for each in sys.argv[1:] if each not in sys.path]; "
-    f"from {__package__}.control import main; main()"
+    f"from {__package__}.child_program import main; main()"
 )
 """Finds modules where this process does, but puts no folder of the user before those of libraries."""
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any, Final
 
 from ..errors import InputError
-from .control import WorkerError
+from .child_program import WorkerError
 
 _PATIENCE: Final = "10s"  # to reach a scheduler
 

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.grid import Floats, Grid, Ints
-from ..processes.compiled import compiled
+from ..processes.compilation import compiled
 from .lattice import Lattice, starts
 from .min_plus import Given, betas, least_cost, least_of, min_plus, min_plus_between, over_beta
 from .passes import all_taken, alpha_costs, ends_of, share_of

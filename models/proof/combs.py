@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from ..instance.grid import Floats
-from ..processes.compiled import Crew, compiled
+from ..processes.compilation import Crew, compiled
 from .passes import add, all_taken, copy, product, share_of
 from .state import State
 

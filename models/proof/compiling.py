@@ -16,8 +16,8 @@ from filelock import FileLock
 
 from ..errors import CrossfieldError, SolverError
 from ..processes.child import Child, KilledError
-from ..processes.compiled import cache_folder, crew, is_all_compiled
-from ..processes.control import WorkerError
+from ..processes.child_program import WorkerError
+from ..processes.compilation import cache_folder, crew, is_all_compiled
 from ..processes.deadline import Deadline, Over, Progress, never, silent
 from ..sketch.samples import sample
 from .certificate import write_certificate

@@ -27,7 +27,7 @@ from ..field.field import CrossField, Norm, field_in_windows
 from ..field.jumps import free_jumps
 from ..instance.angles import QUARTER
 from ..instance.instance import Instance
-from ..processes.compiled import Crew
+from ..processes.compilation import Crew
 from ..processes.deadline import Deadline, Over, Progress, never
 from ..processes.limits import Limits
 from ..search.improvement import improved_field

@@ -32,9 +32,9 @@ from numpy.typing import NDArray
 from ..array_archive import Arrays
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Grid
-from ..processes.compiled import Crew, compiled
+from ..processes.compilation import Crew, compiled
 from ..processes.deadline import Over, never
-from ..smooth.systems import stroke_weight
+from ..smooth.sparse_systems import stroke_weight
 from . import check_certificate
 from .clusters import (
     cluster_fronts,

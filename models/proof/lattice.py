@@ -27,7 +27,7 @@ from ..field.jumps import step_labels
 from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import Instance
-from ..smooth.systems import stroke_weight
+from ..smooth.sparse_systems import stroke_weight
 
 Starts = NDArray[np.int64]  # places in flat arrays, as of the starts of blocks and the end of the last one
 

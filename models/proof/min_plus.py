@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.grid import Floats
-from ..processes.compiled import compiled, compiled_in_any_order
+from ..processes.compilation import compiled, compiled_in_any_order
 from .state import Ends, State
 
 _NEAR: Final = 1  # terms on both sides of the best one of a row that come before the others

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ..instance.grid import Floats
-from ..processes.compiled import compiled
+from ..processes.compilation import compiled
 from .min_plus import Given, Terms, betas, least_cost, least_of, lower_rows, over_beta
 from .state import Ends, State
 

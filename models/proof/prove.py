@@ -10,12 +10,12 @@ from typing import Final
 from ..arguments import check_arguments, check_count
 from ..field.field import CrossField, Norm, check_norm, field_in_windows
 from ..instance.instance import Instance
-from ..processes.compiled import crew
+from ..processes.compilation import crew
 from ..processes.deadline import Deadline, Progress, Stop, silent, stop_function
-from ..processes.groups import catch_interrupts
 from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
-from ..smooth.systems import one_thread
+from ..processes.process_groups import catch_interrupts
+from ..smooth.sparse_systems import one_thread
 from .certificate import REFUSALS, checked_proof
 from .compiling import compile_proofs
 from .descent import Descent, Ends

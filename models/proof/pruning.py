@@ -23,7 +23,7 @@ import numpy as np
 
 from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats, Ints
-from ..processes.compiled import compiled
+from ..processes.compilation import compiled
 from .lattice import Lattice, Starts, ranges, starts, strip
 
 

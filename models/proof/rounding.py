@@ -15,7 +15,7 @@ from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps
 from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats
-from ..processes.compiled import compiled
+from ..processes.compilation import compiled
 from ..processes.deadline import Over, never
 from ..search.box_qp import FreeField
 from ..search.energy import LinearSolver

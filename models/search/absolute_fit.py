@@ -29,7 +29,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
-from ..smooth.systems import one_thread
+from ..smooth.sparse_systems import one_thread
 from .box_qp import angle_bounds, field_at
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from ..instance.angles import QUARTER
 from ..instance.grid import Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
-from ..smooth.systems import PULL, one_thread
+from ..smooth.sparse_systems import PULL, one_thread
 from .energy import LinearSolver, QuadraticForm, energy_at
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15

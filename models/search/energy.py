@@ -17,7 +17,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
-from ..smooth.systems import PULL, Solve, factor_matrix, stroke_weight, symmetric_matrix
+from ..smooth.sparse_systems import PULL, Solve, factor_matrix, stroke_weight, symmetric_matrix
 
 CLOSE: Final = 1e-2  # relative residual of a step that ranks jumps as the exact one does
 
@@ -46,7 +46,7 @@ def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadra
     n, at, strokes = instance.grid.size, instance.stroke_index, instance.stroke_terms
     pairs = instance.pair_terms
     if known is not None:
-        pairs, p = pairs.chosen(known), p[known]
+        pairs, p = pairs.select(known), p[known]
     i, j = pairs.first, pairs.second
     degree = 2.0 * pairs.degree(n)
     weight, turn = stroke_weight(instance), 2 * pairs.offset(p)

@@ -18,7 +18,7 @@ from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
-from ..smooth.systems import one_thread, solve_locally
+from ..smooth.sparse_systems import one_thread, solve_locally
 from .box_qp import FreeField
 from .energy import CLOSE, LinearSolver, energy_at
 from .nearest_stroke import nearest_strokes

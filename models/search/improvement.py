@@ -21,7 +21,7 @@ from ..instance.grid import Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, Stop, never, stop_function
-from ..smooth.systems import one_thread
+from ..smooth.sparse_systems import one_thread
 from .box_qp import FreeField, minimise_in_box, stroke_bounds
 from .energy import CLOSE, LinearSolver, energy_at
 from .nearest_stroke import chamfer_distances, nearest_strokes

@@ -37,7 +37,7 @@ from ..instance.angles import HALF
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import PairTerms, parity_sign
-from ..smooth.systems import PULL
+from ..smooth.sparse_systems import PULL
 from .box_qp import stroke_bounds
 from .energy import energy_at
 
@@ -87,7 +87,7 @@ class Patch:
         number = np.full(grid.size, -1, dtype=np.int32)
         number[pixels] = np.arange(len(pixels), dtype=np.int32)
         pairs = np.nonzero(free[grid.first] & free[grid.second])[0].astype(np.int32)
-        return cls(instance, pixels, pairs, instance.pair_terms.chosen(pairs, number))
+        return cls(instance, pixels, pairs, instance.pair_terms.select(pairs, number))
 
     @property
     def unknowns(self) -> Ints:
@@ -130,11 +130,11 @@ class PatchEnergy:
         outside = np.setdiff1d(ends, pixels)
         number = np.zeros(grid.size, dtype=np.int32)
         number[np.concatenate([pixels, outside])] = np.arange(len(pixels) + len(outside))
-        self._terms = instance.pair_terms.chosen(self._pairs, number)
+        self._terms = instance.pair_terms.select(self._pairs, number)
         alpha, beta = np.split(x, 2)
         self._alpha, self._beta = alpha[outside], beta[outside]
         strokes = np.nonzero(free[instance.stroke_terms.pixel])[0].astype(np.int32)
-        self._strokes = instance.stroke_terms.chosen(strokes, number)
+        self._strokes = instance.stroke_terms.select(strokes, number)
         field, terms = CrossField(instance, alpha, beta, p), instance.stroke_terms
         pair = field.residual_a**2 + field.residual_b**2
         stroke = terms.weight * terms.residuals(alpha, beta) ** 2
@@ -326,7 +326,7 @@ class Landscape:
 
     def _push_of(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
         """The change of b, shape (2k,), and the change of c - 2 x'b."""
-        terms, q = self.patch.terms.chosen(pairs), HALF * steps
+        terms, q = self.patch.terms.select(pairs), HALF * steps
         a = terms.residual_a(self._x, self.p[self.patch.pairs[pairs]])
         push = np.zeros(len(self._x))
         np.subtract.at(push, terms.first, 2 * q)
@@ -337,7 +337,7 @@ class Landscape:
     def _couplings(self, pairs: Ints, steps: Ints) -> tuple[Ints, Floats]:
         """The unknowns beta whose couplings turn, shape (c,), and the additions to H there, shape (c, c)."""
         odd = pairs[(steps & 1) == 1]
-        turned = self.patch.terms.chosen(odd)
+        turned = self.patch.terms.select(odd)
         ends = np.concatenate([turned.first, turned.second])
         places, where = np.unique(ends, return_inverse=True)
         first, second = where[: len(odd)], where[len(odd) :]

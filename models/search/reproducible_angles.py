@@ -15,7 +15,7 @@ import numpy as np
 
 from ..field.field import CrossField
 from ..instance.grid import Floats
-from ..smooth.systems import one_thread
+from ..smooth.sparse_systems import one_thread
 from .box_qp import angle_bounds, field_at, fit_in_box
 from .energy import LinearSolver, QuadraticForm, energy_at
 from .nearest_stroke import nearest_strokes

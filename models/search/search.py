@@ -19,14 +19,14 @@ from ..field.field import CrossField
 from ..instance.grid import Bools
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
-from ..processes.groups import catch_interrupts
 from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
+from ..processes.process_groups import catch_interrupts
 from ..processes.process_pool import parallel_map
 from ..smooth.polyvector import power_field
-from ..smooth.systems import one_thread
+from ..smooth.sparse_systems import one_thread
 from .box_qp import FreeField, stroke_bounds
-from .coarse import halve_resolution, prolong_field
+from .coarse_grid import halve_resolution, prolong_field
 from .energy import LinearSolver
 from .improvement import improved_field, pixel_curves, settle
 from .landscape import FieldPoint
@@ -166,7 +166,7 @@ class _Ends:
     rounds: int | None
     interrupted: Callable[[], bool]
 
-    def met(self, rounds: int) -> str:
+    def reason_to_end(self, rounds: int) -> str:
         """The limit that is met after that many rounds; empty when none is."""
         if self.interrupted():
             return "interrupted"
@@ -236,14 +236,14 @@ class _Hunt:
         return min(self._state.fit_in_bounds(over), self._start, key=rounded_energy)
 
     @property
-    def large(self) -> bool:
+    def is_large(self) -> bool:
         """Whether the grid is more than one patch."""
         return self._instance.grid.size > _PATCH * 5 // 4
 
     @property
     def _explores_starts(self) -> bool:
         """Whether this round explores from several starts."""
-        return not self.large and self.round < _APART
+        return not self.is_large and self.round < _APART
 
     def latest(self, over: Over) -> list[CrossField]:
         """The last fields that were the best for a round or more, the best first."""
@@ -257,10 +257,10 @@ class _Hunt:
 
     def run(self, explorers: Explorers, ends: _Ends, progress: Progress) -> str:
         """Adopt fields from coarser grids, then explore until a limit is met; return which one."""
-        if self.large:
+        if self.is_large:
             for field in _fields_from_coarse(self._instance, self._seed, ends, explorers):
                 self.offer(field)
-        while not (ended := ends.met(self.round)):
+        while not (ended := ends.reason_to_end(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
             tasks = self.tasks(ends.deadline)
@@ -291,7 +291,7 @@ class _Hunt:
     def _patches(self, rng: np.random.Generator) -> Iterator[Bools]:
         """The patches of a round, alternately around pixels of high energy and others."""
         grid = self._instance.grid
-        if not self.large:
+        if not self.is_large:
             yield from [self._reached] * _PATCHES
             return
         high = self._state.field.pixel_energy + 1e-12
@@ -311,9 +311,9 @@ class _Hunt:
                 self._adopt(task, better, over)
         if any(points) and self._unsettled:
             self._latest.append(self._state.field)
-        if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.large):
+        if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.is_large):
             self._settle(over)
-        if self.large and (self.round + 1) % _IMPROVE == 0:
+        if self.is_large and (self.round + 1) % _IMPROVE == 0:
             self.offer(improved_field(self.best(over), stop=over))
 
     def _adopt_in_starts(self, points: list[FieldPoint | None]) -> None:
@@ -335,7 +335,7 @@ class _Hunt:
         )
         inside = np.concatenate([task.free, task.free])
         trial.x = np.clip(np.where(inside, better.x, state.x), *self._bounds)
-        if not self.large and trial.energy >= state.energy - LOWER:
+        if not self.is_large and trial.energy >= state.energy - LOWER:
             # Other patches were adopted in the same place: the angles for all new jumps are neither's.
             trial.x = state.x
             settle(trial, self._solver, over)

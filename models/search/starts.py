@@ -20,9 +20,9 @@ from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
-from ..smooth.systems import one_thread, solve_locally
+from ..smooth.sparse_systems import one_thread, solve_locally
 from .box_qp import FreeField, fit_in_box, stroke_bounds
-from .coarse import CREEP, copy_to_fine_grid, halve_resolution
+from .coarse_grid import CREEP, copy_to_fine_grid, halve_resolution
 from .energy import LinearSolver, energy_at
 from .greedy import greedy_field, rough_greedy
 from .improvement import improved_field, settle

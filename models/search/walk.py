@@ -20,7 +20,7 @@ import numpy as np
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over
-from ..smooth.systems import one_thread
+from ..smooth.sparse_systems import one_thread
 from .box_qp import field_at
 from .landscape import STEPS, FieldPoint, Landscape, Patch
 

@@ -21,7 +21,7 @@ from ..field.field import CrossField
 from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.grid import Floats, Ints
 from ..processes.deadline import Over, Stop, stop_function
-from .systems import SimilarSystems, nested_dissection_order, one_thread
+from .sparse_systems import SimilarSystems, nested_dissection_order, one_thread
 
 _Places = NDArray[np.intp]
 

@@ -19,7 +19,7 @@ from ..field.jumps import free_jumps, label_of
 from ..instance.angles import HALF
 from ..instance.grid import Floats
 from ..instance.instance import Instance
-from .systems import factor_matrix, one_thread, smoothness, solve_locally, stroke_weight
+from .sparse_systems import factor_matrix, one_thread, smoothness, solve_locally, stroke_weight
 
 _Complex = NDArray[np.complex128]
 

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from ..instance.grid import Bools, Floats, Ints
 from ..processes.deadline import Over
-from ..smooth.systems import SimilarSystems
+from ..smooth.sparse_systems import SimilarSystems
 from .stencils import SLOPES, Crosses, Stencils, scale_rows
 
 CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree

@@ -14,7 +14,7 @@ from ..arguments import check_arguments
 from ..field.field import CrossField
 from ..instance.grid import Floats, Grid
 from ..processes.deadline import Over, Progress, Stop, silent, stop_function
-from ..smooth.systems import one_thread
+from ..smooth.sparse_systems import one_thread
 from .equations import FORGIVEN, Equations, Weights, descend, normals_of
 from .hints import Hint, check_hints, hint_rows
 from .stencils import Crosses, GridLevel, Stencils, levels_of
@@ -116,11 +116,11 @@ class TimeLimit:
 def _solve_part(part: GridLevel, hints: Sequence[Hint], over: Over, *, flip: bool) -> Floats:
     """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
     coarse, *finer = levels_of(part)
-    dome, *planes = ([*_from_start(coarse, z, hints, over, flip=flip)] for z in coarse.starts)
+    dome, *planes = ([*_from_start(coarse, z, hints, over, flip=flip)] for z in coarse.initial_heights)
     candidates = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
     _, z = min(candidates, key=itemgetter(0))
     for level in finer:
-        z = _descend_with_hints(level, level.refined(coarse, z), hints, over)[1]
+        z = _descend_with_hints(level, level.interpolate(coarse, z), hints, over)[1]
         coarse = level
     return z if hints else _orient(part, z, flip=flip)
 

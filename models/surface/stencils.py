@@ -13,7 +13,7 @@ from scipy import sparse
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..smooth.polyvector import roots
-from ..smooth.systems import nested_dissection_order
+from ..smooth.sparse_systems import nested_dissection_order
 
 SMALL: Final = 500  # most pixels of the coarsest level, where all starts are tried
 SLOPES: Final = np.array([[-0.5, 0.5, -0.5, 0.5], [0.5, 0.5, -0.5, -0.5]])
@@ -155,7 +155,7 @@ class GridLevel:
         """Its pixels."""
         return self.stencils.grid
 
-    def coarser(self) -> GridLevel:
+    def coarsen(self) -> GridLevel:
         """The level of pixels twice as large: one for each nonempty 2 x 2, with its mean cross."""
         grid = self.grid
         even = np.pad(grid.mask, [(0, size % 2) for size in grid.mask.shape])
@@ -165,7 +165,7 @@ class GridLevel:
         mean = sparse.csr_array((share, (at, np.arange(grid.size))), shape=(larger.size, grid.size))
         return GridLevel(Stencils(larger), self.crosses.averaged(mean), self.corner, self.halved + 1)
 
-    def refined(self, coarse: GridLevel, heights: Floats) -> Floats:
+    def interpolate(self, coarse: GridLevel, heights: Floats) -> Floats:
         """The heights (N,) interpolated from the coarser level, which was made from this one."""
         picture = np.zeros(coarse.stencils.used.shape)
         picture[coarse.stencils.used] = heights
@@ -174,7 +174,7 @@ class GridLevel:
         return np.asarray(2 * np.mean(ends, axis=0))
 
     @property
-    def starts(self) -> list[Floats]:
+    def initial_heights(self) -> list[Floats]:
         """Initial heights: a dome over the mask, and planes that rise to the right and upwards."""
         from scipy import ndimage
 
@@ -191,5 +191,5 @@ def levels_of(level: GridLevel) -> list[GridLevel]:
     """The level and coarser ones, the coarsest first."""
     levels = [level]
     while levels[0].grid.size > SMALL:
-        levels.insert(0, levels[0].coarser())
+        levels.insert(0, levels[0].coarsen())
     return levels

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from crossfield.models.processes.groups import start_group
+from crossfield.models.processes.process_groups import start_group
 
 
 def interrupted(program: str) -> list[str]:

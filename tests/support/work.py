@@ -4,14 +4,14 @@ import os
 import time
 from pathlib import Path
 
-from crossfield.models.processes import control
+from crossfield.models.processes import child_program
 from crossfield.models.processes.deadline import Deadline
 
 
 def until_stopped(begun: Path) -> str:
     """Wait until the parent requests a stop."""
     begun.touch()
-    while not control.is_stopped():
+    while not child_program.is_stopped():
         time.sleep(0.01)
     return "stopped"
 
@@ -30,7 +30,7 @@ def left(deadline: Deadline) -> float:
 def hooked(begun: Path) -> list[str]:
     """Calls of a hook after the parent requested a stop."""
     heard: list[str] = []
-    with control.on_stop(lambda: heard.append("hook")):
+    with child_program.on_stop(lambda: heard.append("hook")):
         begun.touch()
         while not heard:
             time.sleep(0.01)

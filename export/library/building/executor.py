@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from typing import Any, Final, TypeVar
 
 from ....models.errors import CrossfieldError
+from ....models.processes.child_program import WorkerError
 from ....models.processes.cluster import connect_cluster
-from ....models.processes.control import WorkerError
 from ....models.processes.process_pool import process_pool
 
 T = TypeVar("T")

@@ -19,7 +19,7 @@ from ....models.errors import InputError, naming, shortened
 from ....models.field.field import CrossField, Norm
 from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import read_document, schema_error
-from ....models.processes.groups import catch_interrupts
+from ....models.processes.process_groups import catch_interrupts
 from ....models.storage import read_bytes, write_bytes
 from .. import documents
 from ..plan.spec import check_day

@@ -67,5 +67,5 @@ def _of_random(recipe: InstanceRecipe) -> Instance:
 def formulate_entry(instance: Instance, formulation: str, facet: str, jumps: Ints | None) -> Problem:
     """Return the problem of an entry in its full windows. jumps: fixed ones, which only `qp-fixed` has."""
     declared = FORMULATIONS[formulation]
-    options = {"facet": facet} if "facet" in declared.settable else {}
+    options = {"facet": facet} if "facet" in declared.option_names else {}
     return formulate(instance, formulation, p=jumps if declared.fixed else None, **options)

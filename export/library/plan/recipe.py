@@ -127,7 +127,7 @@ def norm_minimised(formulation: str, facet: str = "hull") -> Norm | None:
     declared = FORMULATIONS[formulation]
     if declared.minimises == AT_JUMPS:
         return None
-    return norm_of(declare(formulation, facet=facet if "facet" in declared.settable else None))
+    return norm_of(declare(formulation, facet=facet if "facet" in declared.option_names else None))
 
 
 def norms_of(formulations: Iterable[str]) -> tuple[Norm, ...]:

@@ -334,7 +334,7 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
 
 def facets_of(formulation: str) -> tuple[str, ...]:
     """Return the facets of which a formulation has entries: hull alone, unless it has the option."""
-    return FACETS if "facet" in FORMULATIONS[formulation].settable else ("hull",)
+    return FACETS if "facet" in FORMULATIONS[formulation].option_names else ("hull",)
 
 
 def _check_entries(formulations: tuple[str, ...], rungs: Sequence[Rung]) -> None:

@@ -52,7 +52,7 @@ def combinations() -> list[tuple[str, str, dict[str, Any]]]:
     return [
         (name, gauge, dict(zip(options, values, strict=True)))
         for name, declaration in FORMULATIONS.items()
-        for options in [[option for option in OPTIONS if option in declaration.settable]]
+        for options in [[option for option in OPTIONS if option in declaration.option_names]]
         for gauge in ("strokes", "box")
         for values in product(*(OPTIONS[option] for option in options))
     ]

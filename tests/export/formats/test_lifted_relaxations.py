@@ -82,7 +82,7 @@ def test_a_solver_is_chosen_that_reads_the_products(two):
     problem = cf.formulate(two, "minlp-quartic", relax=True)
     assert solver_for(problem).formats[0] == "nl"
     assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
-    assert carried(cf.formulate(two, "minlp-quartic"), FORMATS["mps"]).formulation.weakened is False
+    assert carried(cf.formulate(two, "minlp-quartic"), FORMATS["mps"]).formulation.is_weakened is False
 
 
 @pytest.mark.slow

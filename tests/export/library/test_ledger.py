@@ -57,7 +57,7 @@ def test_every_shipped_record_counts_and_contradicts_nothing():
         recipe, entry = recipes[record.entry]
         instance = instances.setdefault(recipe.name, make_instance(recipe))
         declared = FORMULATIONS[entry.formulation]
-        options = {"facet": entry.facet} if "facet" in declared.settable else {}
+        options = {"facet": entry.facet} if "facet" in declared.option_names else {}
         if declared.fixed:
             options["p"] = points(recipe.name).field("baseline").field.p
         problem = formulate(instance, entry.formulation, **options)

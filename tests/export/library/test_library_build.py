@@ -267,7 +267,7 @@ def test_the_library_is_flat_and_sha256sums_lists_all_but_itself(built):
 
 
 def test_every_wanted_entry_is_there_in_every_format_or_refused(built):
-    printed = sum("facet" in each.settable for each in FORMULATIONS.values())
+    printed = sum("facet" in each.option_names for each in FORMULATIONS.values())
     assert len(built.entries) == 2 * (len(FORMULATIONS) + printed) + len(FORMULATIONS)
     for document in built.entries:
         wanted = {"nl", "gms", "lp", "mps"} if document["rung"] == "tiny" else {"nl", "mps"}
@@ -538,7 +538,7 @@ def test_an_interrupted_build_ends_soon_with_one_line_and_whole_files(begun, bui
 def test_a_process_that_dies_ends_the_build_with_one_line_and_whole_files(begun, built):
     process, out = begun
     lines = command_lines()
-    workers = [child for child in descendants(process.pid) if b"processes.control" in lines[child]]
+    workers = [child for child in descendants(process.pid) if b"processes.child_program" in lines[child]]
     assert len(workers) == 2
     os.kill(workers[0], signal.SIGKILL)
     error = complaints(process.communicate()[1])

@@ -10,7 +10,7 @@ from crossfield.export.formats.nl import Layout
 from crossfield.export.programs.casadi import FEASIBLE, Watch, ca, read_nl
 from crossfield.export.programs.casadi import solve_model as solve
 from crossfield.export.programs.protocol import RefusedError
-from crossfield.models.processes import control
+from crossfield.models.processes import child_program
 
 
 @pytest.fixture
@@ -51,11 +51,11 @@ def test_only_feasible_points_that_are_lower_are_kept(relaxed):
     assert seen(worse[order]) == seen(broken[order]) == start
     assert seen(lower[order]) == pytest.approx(problem.objective_value(lower))
     assert watch.value < start
-    control.ask_to_stop()
+    child_program.ask_to_stop()
     try:
         assert watch.eval([ca.DM(np.zeros(size)) for size in watch.sizes.values()]) == [1]
     finally:
-        control.forget_stops()
+        child_program.forget_stops()
 
 
 def test_a_stop_at_an_iterate_that_breaks_rows_leaves_the_start(relaxed, own_interrupt):

@@ -313,7 +313,7 @@ CLAIMS = [
     (kind, name)
     for kind in ("whole", "relaxed")
     for name in FORMULATIONS
-    if kind == "whole" or "relax" in FORMULATIONS[name].settable
+    if kind == "whole" or "relax" in FORMULATIONS[name].option_names
 ]
 
 

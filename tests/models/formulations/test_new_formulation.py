@@ -48,7 +48,11 @@ def test_it_is_listed(toy, instance):
     problem = cf.formulate(instance, "toy")
     (listed,) = (each for each in tables()["formulations"][1] if each["name"] == "toy")
     assert (listed["class"], listed["summary"]) == ("MILP", "directions alone")
-    assert (problem.problem_class, problem.convex, toy.settable) == ("MILP", True, {"relax", "stroke_norm"})
+    assert (problem.problem_class, problem.convex, toy.option_names) == (
+        "MILP",
+        True,
+        {"relax", "stroke_norm"},
+    )
     assert cf.formulate(instance, "toy", stroke_norm=2).problem_class == "MIQP"
     assert r"\sum_{(i,j) \in E} 2 v_{ij}" in latex(problem.formulation)
 

@@ -12,7 +12,7 @@ import pytest
 import work
 from children import all_end, descendants
 from crossfield.models.processes.child import Child, KilledError
-from crossfield.models.processes.control import WorkerError
+from crossfield.models.processes.child_program import WorkerError
 from crossfield.models.processes.deadline import Deadline
 
 pytestmark = pytest.mark.smoke

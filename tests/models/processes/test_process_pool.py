@@ -9,7 +9,7 @@ import pytest
 from children import descendants
 from crossfield.models.errors import InputError
 from crossfield.models.processes import process_pool as module
-from crossfield.models.processes.control import WorkerError
+from crossfield.models.processes.child_program import WorkerError
 from crossfield.models.processes.job_counts import MOST, check_jobs
 from crossfield.models.processes.process_pool import parallel_map, process_pool
 

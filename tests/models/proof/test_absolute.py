@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import Instance
-from crossfield.models.processes.compiled import crew
+from crossfield.models.processes.compilation import crew
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.dual import Dual

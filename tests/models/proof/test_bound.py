@@ -9,7 +9,7 @@ import pytest
 from crossfield.models.field.field import field_in_windows
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import Instance
-from crossfield.models.processes.compiled import crew
+from crossfield.models.processes.compilation import crew
 from crossfield.models.processes.deadline import never
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice

@@ -3,7 +3,7 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.processes.compiled import crew
+from crossfield.models.processes.compilation import crew
 from crossfield.models.proof import work
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.dual import Dual

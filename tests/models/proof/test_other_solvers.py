@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from crossfield.export.formats.registry import write
 from crossfield.models.formulations.problem import formulate
-from crossfield.models.processes.compiled import crew
+from crossfield.models.processes.compilation import crew
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.search.starts import first_field

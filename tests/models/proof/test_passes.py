@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from crossfield.models.processes.compiled import crew
+from crossfield.models.processes.compilation import crew
 from crossfield.models.proof.clusters import clusters_on
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice

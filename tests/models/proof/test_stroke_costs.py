@@ -3,7 +3,7 @@
 import crossfield as cf
 import numpy as np
 from crossfield.models.field.field import CrossField
-from crossfield.models.processes.compiled import crew
+from crossfield.models.processes.compilation import crew
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import _arrays, _head
 from crossfield.models.proof.dual import Dual

@@ -11,7 +11,7 @@ from children import interrupted
 from crossfield.models.errors import InstanceError
 from crossfield.models.instance.angles import QUARTER
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.search.coarse import halve_resolution, prolong_field
+from crossfield.models.search.coarse_grid import halve_resolution, prolong_field
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.improvement import improved_field, pixel_curves
 from crossfield.models.search.landscape import STEPS, Landscape, Patch

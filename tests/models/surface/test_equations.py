@@ -101,4 +101,4 @@ def test_a_plane_stays_a_plane_on_finer_levels():
         for level in (coarse, fine):
             row, column = np.nonzero(level.stencils.used)
             planes.append((0.3 * row - 0.2 * column) * 1.0)
-        assert fine.refined(coarse, planes[0]) == pytest.approx(planes[1])
+        assert fine.interpolate(coarse, planes[0]) == pytest.approx(planes[1])
