@@ -29,7 +29,7 @@ from typing import Any, Final
 # Every run is on one thread: libraries read this when they are loaded, here and in all children.
 os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
 
-from crossfield.export.library.documents.lock import locked
+from crossfield.export.library.documents.lock import library_lock
 from crossfield.export.solvers_table import SOLVERS
 from studying.solvers.measure import SLACK, busy_seconds, measure_run
 from studying.solvers.plan import DATA, FULL, PROVE, QUICK, Plan, Row, Run, table
@@ -137,7 +137,7 @@ def main() -> None:
         print(f"{study.plan.size} runs, {len(study.kept.rows)} done")
         return
     certificates(data).mkdir(parents=True, exist_ok=True)
-    with locked(data.parent, "a study", lambda line: print(line, file=sys.stderr)):
+    with library_lock(data.parent, "a study", lambda line: print(line, file=sys.stderr)):
         study.kept = table(data)
         cores = sorted(os.sched_getaffinity(0))[-given.jobs :]
         threads = [threading.Thread(target=study.work, args=(core,)) for core in cores]

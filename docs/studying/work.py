@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from crossfield.export.library.building.executor import Tasks, open_executor, tasks_ahead
-from crossfield.export.library.documents.lock import locked
+from crossfield.export.library.documents.lock import library_lock
 from machine import machine_facts
 
 from .fields import field_row
@@ -55,7 +55,7 @@ def carry_out(
     """
     wanted = frozenset(parts)
     data.mkdir(parents=True, exist_ok=True)
-    with locked(data, "a study", progress), open_executor(jobs, scheduler) as chosen:
+    with library_lock(data, "a study", progress), open_executor(jobs, scheduler) as chosen:
         kept = tables(data)
         for stage in stages(plan, folder):
             runs = [run for run in stage.runs if not wanted or run.part in wanted]

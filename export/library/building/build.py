@@ -24,7 +24,7 @@ from ..documents.documents import (
     read_library,
     read_sidecar,
 )
-from ..documents.lock import locked
+from ..documents.lock import library_lock
 from ..ledger.known_points import NO_POINTS, PointSource, given_points_of, read_points
 from ..ledger.ledger import LEDGER, Ledger, Record, merge_ledgers, read_ledger, write_ledger
 from ..plan.recipe import InstancePlan, plan_library, without_skipped
@@ -54,7 +54,7 @@ def build(
     folder, is_new = Path(folder), not Path(folder).exists()
     make_folder(folder)
     try:
-        with locked(folder, "a build of the library", progress):
+        with library_lock(folder, "a build of the library", progress):
             points = read_points(spec.points) if spec.points else NO_POINTS
             ledger = read_ledger(spec.ledger.parent, spec.ledger.name) if spec.ledger else Ledger(folder)
             return build_locked(
@@ -70,7 +70,7 @@ def build(
 def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
     """Bring a library up to date with its ledger; only files that the change affects are written again."""
     folder = read_library(folder).folder
-    with locked(folder, "a build of the library", progress):
+    with library_lock(folder, "a build of the library", progress):
         return rebuild_locked(folder, jobs=jobs, progress=progress)
 
 

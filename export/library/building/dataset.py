@@ -75,14 +75,14 @@ def croissant(spec: Spec, rows: bytes) -> bytes:
                     "name": "entries",
                     "description": "One record per entry: an instance in one formulation.",
                     "key": {"@id": "entries/name"},
-                    "field": list(map(_field, COLUMNS)),
+                    "field": list(map(_croissant_field, COLUMNS)),
                 }
             ],
         }
     )
 
 
-def _field(name: str) -> dict[str, Any]:
+def _croissant_field(name: str) -> dict[str, Any]:
     return {
         "@type": "cr:Field",
         "@id": f"entries/{name}",

@@ -35,7 +35,7 @@ def make_entry(task: EntryTask) -> Files:
     """Make the files of an entry; return their contents by name, the sidecar last."""
     with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
         folder = Path(temporary)
-        instance, known = _read(task, folder)
+        instance, known = _read_known_fields(task, folder)
         recipe, jumps = task.recipe, known["baseline"].field.p
         problem = formulate_entry(instance, recipe.formulation, recipe.facet, jumps)
         certified = None
@@ -54,7 +54,7 @@ def make_entry(task: EntryTask) -> Files:
         return contents | {f"{task.name}.json": document_bytes(sidecar)}
 
 
-def _read(task: EntryTask, folder: Path) -> tuple[Instance, dict[str, KnownField]]:
+def _read_known_fields(task: EntryTask, folder: Path) -> tuple[Instance, dict[str, KnownField]]:
     """The instance and its known fields by role, read from files in a temporary folder."""
     for name, data in task.files.items():
         (folder / name).write_bytes(data)

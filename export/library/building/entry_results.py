@@ -8,11 +8,11 @@ from ....models.errors import InputError
 from ..documents.statistics import density, tangent_bound
 from ..ledger.grades import (
     best_runs,
-    contradicts,
     cut_bound,
     difficulty,
     entry_status,
     is_proven,
+    is_refuted,
     relative_gap,
     shown_runs,
 )
@@ -78,7 +78,7 @@ def _bounds(task: EntryTask, best: BestPoint, records: list[Record]) -> list[dic
         bounds.append(_computed_bound(METHOD, certificate["bound"]) | facts)
     for facts in bounds:
         bound = float(facts["bound"])
-        if contradicts(bound, best.objective):
+        if is_refuted(bound, best.objective):
             remedy = "build again without it" if facts["status"] == "computed" else "take its record out"
             raise InputError(
                 f"has the bound {bound!r} of {facts['via'] or name} by {facts['solver']}, "

@@ -35,14 +35,14 @@ def tasks_ahead(jobs: int, scheduler: str | None) -> int:
 def open_executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
     """Yield an executor. Raises InputError without a scheduler or dask; BuildError when workers die."""
     try:
-        with _cluster(scheduler) if scheduler else process_pool(jobs) as chosen:
+        with _dask_executor(scheduler) if scheduler else process_pool(jobs) as chosen:
             yield chosen
     except WorkerError as error:
         raise BuildError(f"{error}; complete files are kept") from error
 
 
 @contextmanager
-def _cluster(address: str) -> Iterator[Executor]:
+def _dask_executor(address: str) -> Iterator[Executor]:
     with connect_cluster(address) as client:
         yield client.get_executor(pure=False, retries=_TRIES)
 

@@ -55,16 +55,16 @@ def search_fields(
     """Find the fields that the sketch of a recipe asks for. sent: certificates that replace proofs."""
     effort = recipe.sketch.points
     if effort == "none":
-        nearest = _nearest(instance)
+        nearest = _nearest_stroke_field(instance)
         return nearest, [nearest], []
     baseline = KnownField(reproducible_field(greedy_field(instance)), provenance_by("greedy"))
     if effort == "greedy":
         return baseline, [baseline], []
     if effort == "proven":
-        low, proven = _prove_missing(baseline, recipe, sent)
+        low, proven = _prove_norms(baseline, recipe, sent)
         return baseline, [baseline, *low], proven
-    searched = _search(instance)
-    low, proven = _prove_missing(searched, recipe, sent)
+    searched = _search_in_2norm(instance)
+    low, proven = _prove_norms(searched, recipe, sent)
     fitted = improve_in_1norm(searched.field, recipe.rung)
     staged = [KnownField(reproducible_field(known.field), provenance_by("two stages")) for known in fitted]
     return baseline, [searched, *low, *fitted, *staged], proven
@@ -76,13 +76,13 @@ def given_fields(given: InstancePoints, instance: Instance, recipe: InstanceReci
     return given.field("baseline"), low, given.certificates(instance, recipe.prove)
 
 
-def _nearest(instance: Instance) -> KnownField:
+def _nearest_stroke_field(instance: Instance) -> KnownField:
     """Right-angled crosses along the nearest stroke, or along the first one in a part without strokes."""
     theta = instance.theta[np.maximum(nearest_strokes(instance), 0)]
     return KnownField(CrossField.from_lines(instance, theta, theta + HALF), provenance_by("nearest stroke"))
 
 
-def _prove_missing(
+def _prove_norms(
     start: KnownField, recipe: InstanceRecipe, sent: Sequence[CheckedCertificate]
 ) -> tuple[list[KnownField], list[CheckedCertificate]]:
     """Prove the optima in the norms of the recipe that no submitted certificate is in."""
@@ -92,7 +92,7 @@ def _prove_missing(
     return [known for known, _ in proofs], certificates
 
 
-def _search(instance: Instance) -> KnownField:
+def _search_in_2norm(instance: Instance) -> KnownField:
     """Find a field of low 2-norm energy."""
     return KnownField(
         reproducible_field(search(instance, rounds=_ROUNDS, jobs=1).field), provenance_by("search")

@@ -74,20 +74,22 @@ def general_files(
     folder: Path, spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, str]
 ) -> dict[str, bytes]:
     """Return the files about the library as a whole, the index last. folder: holds all other files."""
-    context = _context(spec, sidecars) | {"skipped": skipped}
+    context = _template_context(spec, sidecars) | {"skipped": skipped}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
     checkers = {CHECKER: standalone_program(Path(check_point.__file__))}
     if context["certified"]:
         checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
-    index = _index(spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
+    index = _index_document(spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
     rows = table(folder, sidecars)
-    facts = {SOLU: _optima(sidecars), TABLE: rows, CROISSANT: croissant(spec, rows)}
+    facts = {SOLU: _solu_content(sidecars), TABLE: rows, CROISSANT: croissant(spec, rows)}
     return texts | drawings | checkers | facts | {INDEX: document_bytes(index)}
 
 
-def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    rungs = [_rung(name, [sidecar for sidecar in sidecars if sidecar["rung"] == name]) for name in RUNGS]
+def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
+    rungs = [
+        _rung_facts(name, [sidecar for sidecar in sidecars if sidecar["rung"] == name]) for name in RUNGS
+    ]
     written = {file["format"] for sidecar in sidecars for file in sidecar["files"]}
     return {
         "spec": spec,
@@ -105,12 +107,12 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
         "packed": any(file["name"].endswith(".gz") for sidecar in sidecars for file in sidecar["files"]),
         "tightened": sum("tightened" in sidecar for sidecar in sidecars),
         "certified": any("certificate" in bound for sidecar in sidecars for bound in sidecar["bounds"]),
-        "proven_by": _minimising(spec),
+        "proven_by": _formulations_by_norm(spec),
         "example": sidecars[0],
     }
 
 
-def _minimising(spec: Spec) -> list[str]:
+def _formulations_by_norm(spec: Spec) -> list[str]:
     """The formulations of a specification by the norm that they minimise."""
     minimising = {
         norm: [formulation for formulation in spec.formulations if norm_minimised(formulation) == norm]
@@ -119,7 +121,7 @@ def _minimising(spec: Spec) -> list[str]:
     return [f"norm {norm}, {', '.join(names)}" for norm, names in minimising.items() if names]
 
 
-def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
+def _rung_facts(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
     """Facts about a rung: sizes, share of strokes, numbers of entries, optima and grades."""
     sizes = sorted({sidecar["source"]["size"] for sidecar in sidecars})
     proven = sum(sidecar["status"] == "optimal" for sidecar in sidecars)
@@ -129,7 +131,7 @@ def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
     return stated | {"density": f"{density:.2f}"}
 
 
-def _optima(sidecars: list[dict[str, Any]]) -> bytes:
+def _solu_content(sidecars: list[dict[str, Any]]) -> bytes:
     """The content of library.solu as MINLPLib and SCIP have it: =opt= or =best=, and =bestdual=."""
     lines = []
     for sidecar in sidecars:
@@ -140,7 +142,7 @@ def _optima(sidecars: list[dict[str, Any]]) -> bytes:
     return "".join(lines).encode()
 
 
-def _index(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
+def _index_document(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "format": INDEX_FORMAT,
         "version": VERSION,

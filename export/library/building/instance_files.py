@@ -72,7 +72,7 @@ def make_instance_files(task: InstanceTask) -> Files | NoStrokeError:
             best = max(of_norm, key=lambda certificate: certificate.facts["bound"])
             files[best.file] = best.data
             certificates[str(norm)] = {"file": best.file, **best.facts}
-    about = _about(instance, task, {role: fields[role] for role in SUFFIXES})
+    about = _instance_document(instance, task, {role: fields[role] for role in SUFFIXES})
     about |= {"certificates": certificates} if certificates else {}
     return files | {about_file(task.name): document_bytes(about)}
 
@@ -82,7 +82,7 @@ def _are_equal(first: CrossField, second: CrossField) -> bool:
     return all(bool((one == other).all()) for one, other in pairs)
 
 
-def _about(instance: Instance, task: InstanceTask, fields: dict[str, Any]) -> dict[str, Any]:
+def _instance_document(instance: Instance, task: InstanceTask, fields: dict[str, Any]) -> dict[str, Any]:
     given = {"given": task.given.sha256} if task.given and task.given.sha256 else {}
     recipe = task.recipe
     stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added, "split": recipe.split}
@@ -94,7 +94,7 @@ def _about(instance: Instance, task: InstanceTask, fields: dict[str, Any]) -> di
         "title": task.recipe.sketch.title,
         "rung": task.recipe.rung,
         "generator": generator(),
-        "source": _source(instance, task.recipe),
+        "source": _source_facts(instance, task.recipe),
         **{key: value for key, value in stated.items() if value},
         "instance": {
             "file": f"{task.name}.instance.json",
@@ -106,7 +106,7 @@ def _about(instance: Instance, task: InstanceTask, fields: dict[str, Any]) -> di
     }
 
 
-def _source(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
+def _source_facts(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
     """The facts about the source of an instance."""
     parameters: dict[str, Any] = {
         "w_strokes": instance.stroke_coefficient,

@@ -22,7 +22,7 @@ from ...formats.registry import generator
 from ..documents.check_point import BadInputError, check
 from ..documents.checksums import SUMS, is_intact, read_checksums
 from ..documents.documents import INDEX, Library, existing_folder, read_library
-from ..documents.lock import LOCK, locked_if_writable
+from ..documents.lock import LOCK, library_lock_if_writable
 from ..ledger.grades import FEASIBLE
 from ..ledger.known_points import all_points_of
 from ..ledger.ledger import LEDGER, read_ledger
@@ -63,14 +63,14 @@ def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = si
     folder = existing_folder(folder)
     if not (folder / INDEX).is_file() and not (folder / SUMS).is_file():
         raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
-    with locked_if_writable(folder, "a verification of the library", progress):
+    with library_lock_if_writable(folder, "a verification of the library", progress):
         progress("files and checksums")
-        defects = [*_misplaced(folder), *_damaged(folder)]
+        defects = [*_find_misplaced_files(folder), *_find_damaged_files(folder)]
         named = {defect.file for defect in defects}
-        return [*defects, *sorted(_differing(folder, named, jobs, progress))]
+        return [*defects, *sorted(_find_differences(folder, named, jobs, progress))]
 
 
-def _files(folder: Path) -> set[str]:
+def _file_names(folder: Path) -> set[str]:
     """The names of the files that a library may have."""
     return {
         path.name
@@ -79,7 +79,7 @@ def _files(folder: Path) -> set[str]:
     }
 
 
-def _misplaced(folder: Path) -> Iterator[Defect]:
+def _find_misplaced_files(folder: Path) -> Iterator[Defect]:
     """Links, folders and temporary files."""
     for path in sorted(folder.iterdir()):
         if path.is_symlink() or not path.is_file():
@@ -89,14 +89,14 @@ def _misplaced(folder: Path) -> Iterator[Defect]:
             yield Defect(path.name, "was left by a build that was stopped")
 
 
-def _damaged(folder: Path) -> Iterator[Defect]:
+def _find_damaged_files(folder: Path) -> Iterator[Defect]:
     """Files that are missing, differ from SHA256SUMS, or are not in it."""
     try:
         sums = read_checksums(folder)
     except CrossfieldError as error:
         yield Defect.of(error, SUMS) if (folder / SUMS).exists() else Defect(SUMS, "is missing", _FETCH)
         return
-    present = _files(folder)
+    present = _file_names(folder)
     for name in sums:
         if name not in present:
             yield Defect(name, "is missing", _FETCH)
@@ -110,7 +110,9 @@ def _damaged(folder: Path) -> Iterator[Defect]:
         yield Defect(name, "is not in SHA256SUMS", BUILD if name in of_ledger else f"{_REMOVE}, or {BUILD}")
 
 
-def _differing(folder: Path, named: Collection[str], jobs: int, progress: Progress) -> Iterator[Defect]:
+def _find_differences(
+    folder: Path, named: Collection[str], jobs: int, progress: Progress
+) -> Iterator[Defect]:
     """Files that a build does not make or makes otherwise, and wrong points; not those named before."""
     try:
         library = read_library(folder)
@@ -123,23 +125,23 @@ def _differing(folder: Path, named: Collection[str], jobs: int, progress: Progre
             again = Path(temporary)
             ledger, points = read_ledger(folder), all_points_of(library)
             rebuilt = build_locked(library.spec, again, ledger, points, jobs=jobs, progress=progress)
-            present, built = _files(folder), _files(again)
+            present, built = _file_names(folder), _file_names(again)
             remedy = BUILD if has_unbuilt_records(library) else f"{_REMOVE}, and {BUILD}"
             for name in (present | built) - {SUMS, *named}:
                 if name not in built:
                     yield Defect(name, "belongs to nothing in the library", _REMOVE)
                 elif name not in present:
                     yield Defect(name, "is missing", _FETCH)
-                elif _content(folder / name) != _content(again / name):
+                elif _read_unpacked(folder / name) != _read_unpacked(again / name):
                     yield Defect(name, "is not what a build makes", remedy)
             progress("points")
-            wrong = _wrong_points(folder, rebuilt, jobs)
+            wrong = _find_wrong_points(folder, rebuilt, jobs)
             yield from (defect for defect in wrong if defect.file not in named)
     except CrossfieldError as error:
         yield Defect.of(error, INDEX)
 
 
-def _content(path: Path) -> bytes:
+def _read_unpacked(path: Path) -> bytes:
     """The bytes of a file, unpacked, because versions of zlib pack differently; as they are if damaged."""
     data = read_bytes(path)
     with suppress(OSError, EOFError, zlib.error):
@@ -147,7 +149,7 @@ def _content(path: Path) -> bytes:
     return data
 
 
-def _wrong_points(folder: Path, library: Library, jobs: int) -> list[Defect]:
+def _find_wrong_points(folder: Path, library: Library, jobs: int) -> list[Defect]:
     defects: list[Defect] = []
     with open_executor(jobs, None) as chosen:
         tasks = Tasks(chosen, tasks_ahead(jobs, None))

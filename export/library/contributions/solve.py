@@ -29,8 +29,8 @@ from ...solving.local import Solvers, format_for
 from ...statuses import Status
 from ..building.build import has_unbuilt_records, rebuild
 from ..documents.documents import Library, problem_of, read_library
-from ..documents.lock import locked
-from ..ledger.grades import contradicts, is_better
+from ..documents.lock import library_lock
+from ..ledger.grades import is_better, is_refuted
 from ..ledger.ledger import (
     Ledger,
     Record,
@@ -64,9 +64,9 @@ def solve_library(
     with the runs before it, and KeyboardInterrupt is raised. Raises InputError for an unknown name,
     MissingSolverError for a named solver that cannot be used.
     """
-    rungs = RUNGS[: RUNGS.index(_known(up_to or RUNGS[-1], RUNGS, "rung")) + 1]
+    rungs = RUNGS[: RUNGS.index(_check_known(up_to or RUNGS[-1], RUNGS, "rung")) + 1]
     for name in solvers or ():
-        if missing := SOLVERS[_known(name, SOLVERS, "solver")].missing:
+        if missing := SOLVERS[_check_known(name, SOLVERS, "solver")].missing:
             raise MissingSolverError(missing)
     chosen = dict.fromkeys(solvers or [name for name, solver in SOLVERS.items() if not solver.missing])
     check_text("by", by)
@@ -76,7 +76,7 @@ def solve_library(
         library = _bring_up_to_date(library, progress)
     try:
         with Solvers() as at_work:
-            work = _Solving(library, at_work, time_limit)
+            work = _SolveSession(library, at_work, time_limit)
             runs = list(work.runs(list(chosen), rungs))
             for number, (document, solver) in enumerate(runs, 1):
                 progress(f"{number} of {len(runs)} runs: {solver} on {document['name']}")
@@ -86,7 +86,7 @@ def solve_library(
                     progress(f"{document['name']}: {error}")
                     continue
                 record = replace(record, by=by, machine=machine)
-                with locked(library.folder, _PURPOSE, progress):
+                with library_lock(library.folder, _PURPOSE, progress):
                     records.append(asdict(add_record(library.folder, record, field)))
     finally:  # records count although Ctrl-C or an error ended the runs
         if has_unbuilt_records(library):
@@ -96,34 +96,34 @@ def solve_library(
 
 def _bring_up_to_date(library: Library, progress: Progress) -> Library:
     """Rebuild what follows from the ledger, without the measured bounds that its points refute."""
-    with locked(library.folder, _PURPOSE, progress):
-        drop_refuted(library)
+    with library_lock(library.folder, _PURPOSE, progress):
+        drop_refuted_bounds(library)
     return rebuild(library.folder, progress=progress)
 
 
-def _known(name: str, table: Any, kind: str) -> str:
+def _check_known(name: str, table: Any, kind: str) -> str:
     if name not in table:
         raise InputError(f"there is no {kind} {name!r}; choose from {', '.join(table)}")
     return name
 
 
-def drop_refuted(library: Library) -> None:
+def drop_refuted_bounds(library: Library) -> None:
     """Remove measured bounds that a point found later refutes. The caller holds the lock."""
     ledger = read_ledger(library.folder)
     dropped: dict[Record, Record] = {}
     for document in library.entries:
         records = ledger.records_of(document["name"], document["problem_sha256"])
         measured = [record for record in records if record.bound is not None]
-        best = _best(library, document, ledger) if measured else 0.0
+        best = _least_objective(library, document, ledger) if measured else 0.0
         dropped |= {
             record: replace(record, bound=None)
             for record in measured
-            if contradicts(record.bound or 0.0, best)
+            if is_refuted(record.bound or 0.0, best)
         }
     write_ledger(replace(ledger, records=tuple(dropped.get(record, record) for record in ledger.records)))
 
 
-def _best(library: Library, document: dict[str, Any], ledger: Ledger) -> float:
+def _least_objective(library: Library, document: dict[str, Any], ledger: Ledger) -> float:
     """The least objective of an entry at its best point and at the ledger's fields of its instance."""
     problem, file = problem_of(library, document), document["instance"]["file"]
     relatives = (sidecar["name"] for sidecar in library.entries if sidecar["instance"]["file"] == file)
@@ -136,7 +136,7 @@ def _best(library: Library, document: dict[str, Any], ledger: Ledger) -> float:
 
 
 @dataclass
-class _Solving:
+class _SolveSession:
     """Runs on a library with a time limit each."""
 
     library: Library
@@ -153,10 +153,10 @@ class _Solving:
             have = ledger.records_of(document["name"], problem.sha256)
             for solver in solvers:
                 takes = format_for(problem, solver).answer == "yes"
-                if takes and not any(self._covers(record, solver) for record in have):
+                if takes and not any(self._is_covered_by(record, solver) for record in have):
                     yield document, solver
 
-    def _covers(self, record: Record, solver: str) -> bool:
+    def _is_covered_by(self, record: Record, solver: str) -> bool:
         """Whether a record is of a run of the solver with at least this time limit."""
         if record.solver != SOLVERS[solver].title or record.version != self.solvers.version(solver):
             return False
@@ -186,12 +186,12 @@ class _Solving:
             return record, None
         if solution.interrupted:
             raise KeyboardInterrupt
-        proves, bound = _proves(problem, solver, solution), solution.bound
+        proves, bound = _has_proof(problem, solver, solution), solution.bound
         if bound is None and solution.objective is not None and proves:
             bound = solution.objective - GAP * abs(solution.objective)
         record = replace(
             record,
-            bound=None if bound is None or contradicts(bound, best) else bound,
+            bound=None if bound is None or is_refuted(bound, best) else bound,
             seconds=None if solution.seconds is None else round(solution.seconds, 3),
         )
         if solution.point is None:
@@ -215,7 +215,7 @@ class _Solving:
         return solution
 
 
-def _proves(problem: Problem, solver: str, solution: Solution) -> bool:
+def _has_proof(problem: Problem, solver: str, solution: Solution) -> bool:
     """Whether the solver ended with a proof of a global optimum."""
     if solution.problem.formulation.is_weakened or not (problem.convex or SOLVERS[solver].proves == "global"):
         return False

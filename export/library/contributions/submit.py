@@ -29,8 +29,8 @@ from ...solvers_table import SOLVERS
 from ...writing.stamps import is_stated
 from ..building.build import has_unbuilt_records, rebuild_locked
 from ..documents.documents import Library, about_file, existing_folder, problem_of, read_about, read_library
-from ..documents.lock import locked
-from ..ledger.grades import FEASIBLE, SAME, contradicts, is_better
+from ..documents.lock import library_lock
+from ..ledger.grades import FEASIBLE, SAME, is_better, is_refuted
 from ..ledger.ledger import LEDGER, Record, read_ledger, write_ledger
 from ..ledger.points import clipped_field, complete_point
 from ..plan.recipe import norm_minimised
@@ -125,12 +125,12 @@ def submit(
     if library.document["generator"] != generator():
         builder = library.document["generator"]
         raise InputError(f"was built by {builder}; submit with that version, or build it again", file=folder)
-    with locked(library.folder, "a submission", progress):
+    with library_lock(library.folder, "a submission", progress):
         if has_unbuilt_records(library):
             library = rebuild_locked(library.folder, progress=progress)
         if entry is not None:
             library.entry(entry)
-        session = _Session(library, entry, facts)
+        session = _SubmitSession(library, entry, facts)
         results = []
         for submitted in find_submitted_files(files):
             progress(f"checking {submitted.path.name}")
@@ -145,7 +145,7 @@ def submit(
 
 
 @dataclass
-class _Session:
+class _SubmitSession:
     """A submission in progress: the ledger with all accepted records.
 
     problems: by entry; fields: accepted ones by the SHA-256 of their instance; bounds: accepted ones by
@@ -363,7 +363,7 @@ class _Session:
         objective = problem.objective_value(point)
         bounds = [sidecar["bound"], self.bounds.get(sidecar["name"])]
         bound = max((bound for bound in bounds if bound is not None), default=None)
-        if bound is not None and contradicts(bound, objective):
+        if bound is not None and is_refuted(bound, objective):
             raise SolutionError(
                 f"is feasible with objective {objective!r}, "
                 f"but the library has the dual bound {bound!r} of {sidecar['name']}; "

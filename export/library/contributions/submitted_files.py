@@ -33,13 +33,13 @@ class SubmittedFile:
 
 def find_submitted_files(files: Sequence[str | Path]) -> list[SubmittedFile]:
     """Return files and the files in folders with their kinds. Raises InputError if there are none."""
-    files_found = [_submitted_file(path, listed) for path, listed in _expanded(files)]
+    files_found = [_submitted_file(path, listed) for path, listed in _expand_folders(files)]
     if not files_found:
         raise InputError("there is nothing to submit; give files")
     return files_found
 
 
-def _expanded(files: Iterable[str | Path]) -> Iterator[tuple[Path, bool]]:
+def _expand_folders(files: Iterable[str | Path]) -> Iterator[tuple[Path, bool]]:
     """The files with those in folders, and whether each was listed by itself."""
     for path in map(Path, files):
         if path.is_dir():

@@ -23,7 +23,7 @@ PATIENCE: Final = 600.0  # seconds that a process waits for another one to end
 
 
 @contextmanager
-def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[None]:
+def library_lock(folder: Path, action: str, progress: Progress = silent) -> Iterator[None]:
     """Lock a library. Raises OutputError after PATIENCE seconds, or for a folder that cannot be written.
 
     action: shown to processes that wait.
@@ -57,11 +57,11 @@ def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[N
         lock.release()
 
 
-def locked_if_writable(
+def library_lock_if_writable(
     folder: Path, action: str, progress: Progress = silent
 ) -> AbstractContextManager[None]:
     """Lock a folder for reading, unless it cannot be written."""
-    return locked(folder, action, progress) if os.access(folder, os.W_OK) else nullcontext()
+    return library_lock(folder, action, progress) if os.access(folder, os.W_OK) else nullcontext()
 
 
 def _holder(path: Path) -> str:

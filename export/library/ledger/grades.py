@@ -43,7 +43,7 @@ def bound_tolerance(objective: float) -> float:
     return 1e-6 * max(1.0, abs(objective))
 
 
-def contradicts(bound: float, objective: float) -> bool:
+def is_refuted(bound: float, objective: float) -> bool:
     """Whether a bound lies so far above the objective of a feasible point that it cannot be a bound."""
     return bound - objective > bound_tolerance(objective)
 
@@ -106,7 +106,9 @@ def entry_status(
         ("tangent", [bound for bound in computed if "certificate" not in bound]),
     ):
         if proofs:
-            return _solved(by, [{key: bound[key] for key in ("solver", "version")} for bound in proofs])
+            return _optimal_status(
+                by, [{key: bound[key] for key in ("solver", "version")} for bound in proofs]
+            )
     claims = [
         record
         for record in records
@@ -114,14 +116,14 @@ def entry_status(
     ]
     sound = best_runs((record for record in claims if record.solver in MAKERS), entry)
     if len({MAKERS[record.solver] for record in sound}) >= AGREE:
-        return _solved("agreement", [_program(record, entry) for record in sound])
+        return _optimal_status("agreement", [_program(record, entry) for record in sound])
     if claims:
         programs = [_program(record, entry) for record in best_runs(claims, entry)]
         return {"status": "claimed", "claimed": programs}
     return {"status": "best known"}
 
 
-def _solved(by: str, programs: list[dict[str, Any]]) -> dict[str, Any]:
+def _optimal_status(by: str, programs: list[dict[str, Any]]) -> dict[str, Any]:
     return {"status": "optimal", "solved": {"by": by, "programs": programs}}
 
 

@@ -165,11 +165,11 @@ class Ledger:
 
     def document(self) -> dict[str, Any]:
         """Return the ledger as JSON."""
-        certificates = list(map(_document, self.certificates))
+        certificates = list(map(_row_document, self.certificates))
         return {
             "format": FORMAT,
             "version": VERSION,
-            "records": list(map(_document, self.records)),
+            "records": list(map(_row_document, self.records)),
             **({"certificates": certificates} if certificates else {}),
         }
 
@@ -180,7 +180,7 @@ def check_text(name: str, text: str | None) -> None:
         raise InputError(f"{name} must be one line of at most {_LONGEST} printable characters")
 
 
-def _document(row: Record | SubmittedCertificate) -> dict[str, Any]:
+def _row_document(row: Record | SubmittedCertificate) -> dict[str, Any]:
     """The known facts of a row by key."""
     return {key: value for key, value in asdict(row).items() if value is not None}
 

@@ -20,7 +20,9 @@ from .recipe import InstanceRecipe
 
 def make_instance(recipe: InstanceRecipe) -> Instance:
     """Return the instance of a recipe. Raises InputError; NoStrokeError if its size leaves no strokes."""
-    make = {"sample": _of_sample, "file": _of_file, "random": _of_random}[recipe.sketch.kind]
+    make = {"sample": _sample_instance, "file": _drawing_instance, "random": _random_instance}[
+        recipe.sketch.kind
+    ]
     try:
         # The coefficients of the paper, 1 and 1e-6, on every grid, so that published results apply.
         of_paper = {name: getattr(Instance, name) for name in ("stroke_coefficient", "skew_coefficient")}
@@ -38,11 +40,11 @@ def kind_of(recipe: InstanceRecipe) -> str:
     return SAMPLES[recipe.sketch.what].kind if kind == "sample" else kind
 
 
-def _of_sample(recipe: InstanceRecipe) -> Instance:
+def _sample_instance(recipe: InstanceRecipe) -> Instance:
     return sample(recipe.sketch.what, recipe.size, gauge=cast("Gauge", recipe.gauge))
 
 
-def _of_file(recipe: InstanceRecipe) -> Instance:
+def _drawing_instance(recipe: InstanceRecipe) -> Instance:
     sketch = recipe.sketch
     drawing = parse_drawing(sketch.drawing, Path(sketch.what).suffix, recipe.size)
     white = read_mask(sketch.mask, drawing.page) if sketch.mask else None
@@ -52,7 +54,7 @@ def _of_file(recipe: InstanceRecipe) -> Instance:
     )
 
 
-def _of_random(recipe: InstanceRecipe) -> Instance:
+def _random_instance(recipe: InstanceRecipe) -> Instance:
     assert recipe.seed is not None  # as the schema of specifications demands
     # Weights are set later, because coefficients of the paper replace them by default.
     return random_instance(

@@ -236,7 +236,7 @@ def spec_of(document: dict[str, Any], path: Path) -> Spec:
     """Return the specification of a document with files next to `path`. Raises InputError."""
     with naming(path):
         _check_form(document)
-        return _spec(document, path.parent)
+        return _read_document(document, path.parent)
 
 
 def _check_form(document: dict[str, Any]) -> None:
@@ -248,10 +248,10 @@ def _check_form(document: dict[str, Any]) -> None:
     except ValueError as large:  # of a whole number of more digits than Python writes
         raise InputError("holds a number of thousands of digits; write a smaller one") from large
     if error is not None:
-        raise InputError(_of_key(error) or _of_value(error))
+        raise InputError(_key_message(error) or _value_message(error))
 
 
-def _of_key(error: Any) -> str | None:
+def _key_message(error: Any) -> str | None:
     """The message about an unknown or missing key; None if the error is about a value."""
     table, rule, place = error.instance, error.validator_value, error.json_path[2:]
     known = error.schema.get("properties", {})
@@ -272,7 +272,7 @@ def _of_key(error: Any) -> str | None:
     return f"{place}.{key}: {words}" if place else f"{key}: {words}"
 
 
-def _of_value(error: Any) -> str:
+def _value_message(error: Any) -> str:
     """The message about a value; the place of an entry is the place of its list."""
     place, schema, value = error.json_path[2:], error.schema, shortened(error.instance)
     if not isinstance(error.instance, dict):
@@ -294,23 +294,23 @@ def _of_value(error: Any) -> str:
     return f"{place}: {words}"
 
 
-def _spec(document: dict[str, Any], folder: Path) -> Spec:
+def _read_document(document: dict[str, Any], folder: Path) -> Spec:
     defaults = {
         "formats": tuple(FORMATS),
-        "gauges": _words(document, "gauges", GAUGES, ("strokes",)),
-        "facets": _words(document, "facets", FACETS, ("hull",)),
+        "gauges": _read_words(document, "gauges", GAUGES, ("strokes",)),
+        "facets": _read_words(document, "facets", FACETS, ("hull",)),
     }
-    formulations = _formulations(document, "formulations", tuple(FORMULATIONS))
+    formulations = _read_formulations(document, "formulations", tuple(FORMULATIONS))
     rungs = tuple(
-        _rung(name, document["rungs"][name], defaults, formulations)
+        _read_rung(name, document["rungs"][name], defaults, formulations)
         for name in RUNGS
         if name in document["rungs"]
     )
     sketches = tuple(
-        _sketch(table, f"sketches[{number}].", folder, rungs)
+        _read_sketch(table, f"sketches[{number}].", folder, rungs)
         for number, table in enumerate(document["sketches"])
     )
-    if (name := _twice([sketch.name for sketch in sketches])) is not None:
+    if (name := _first_repetition([sketch.name for sketch in sketches])) is not None:
         raise InputError(
             f"sketches[{name[0]}].name: {name[1]!r} is the name of two sketches; give each its own"
         )
@@ -351,14 +351,14 @@ def _check_entries(formulations: tuple[str, ...], rungs: Sequence[Rung]) -> None
                 f"rungs.{rung.name}.facets: none of the formulations has the facet 'printed'; add hull"
             )
         for name in present:
-            if not any(_holds(file_format, name) for file_format in rung.formats):
+            if not any(_can_hold(file_format, name) for file_format in rung.formats):
                 raise InputError(
                     f"rungs.{rung.name}.formats: none of {', '.join(rung.formats)} holds {name}; "
                     "add nl or gms, or omit the formulation"
                 )
 
 
-def _holds(file_format: str, formulation: str) -> bool:
+def _can_hold(file_format: str, formulation: str) -> bool:
     try:
         carried(smallest(declare(formulation)), FORMATS[file_format])
     except UnsupportedByFormatError:
@@ -366,12 +366,12 @@ def _holds(file_format: str, formulation: str) -> bool:
     return True
 
 
-def _twice(names: Sequence[str]) -> tuple[int, str] | None:
+def _first_repetition(names: Sequence[str]) -> tuple[int, str] | None:
     """Place and name of the first repetition."""
     return next(((at, name) for at, name in enumerate(names) if name in names[:at]), None)
 
 
-def _words(
+def _read_words(
     table: dict[str, Any], key: str, known: Collection[str], default: tuple[str, ...], place: str = ""
 ) -> tuple[str, ...]:
     """The words of a list, all of them known, or the default."""
@@ -386,25 +386,25 @@ def _check_known(word: str, known: Collection[str], place: str, kind: str = "") 
         raise InputError(f"{place}: there is no {kind}{shortened(word)!r}; choose from {', '.join(known)}")
 
 
-def _formulations(
+def _read_formulations(
     table: dict[str, Any], key: str, default: tuple[str, ...], place: str = ""
 ) -> tuple[str, ...]:
     """The full names of formulations in a list, or the default."""
-    named = _words(table, key, (*FORMULATIONS, *short_names()), default, place)
+    named = _read_words(table, key, (*FORMULATIONS, *short_names()), default, place)
     formulations = tuple(declaration_of(name).name for name in named)
-    if (name := _twice(formulations)) is not None:
+    if (name := _first_repetition(formulations)) is not None:
         raise InputError(f"{place}{key}: {name[1]!r} is listed twice; list it once")
     return formulations
 
 
-def _rung(
+def _read_rung(
     name: str, table: dict[str, Any], defaults: dict[str, tuple[str, ...]], formulations: tuple[str, ...]
 ) -> Rung:
     known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
-    words = {key: _words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
+    words = {key: _read_words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
     compress, prove = table.get("compress", False), table.get("prove", name in PROVEN)
     added = check_day(table.get("added", ""), f"rungs.{name}.added")
-    tightened = _formulations(table, "tightened", (), f"rungs.{name}.")
+    tightened = _read_formulations(table, "tightened", (), f"rungs.{name}.")
     for formulation in tightened:
         if formulation not in formulations:
             raise InputError(f"rungs.{name}.tightened: {formulation!r} is not in formulations; add it there")
@@ -413,30 +413,30 @@ def _rung(
                 f"rungs.{name}.tightened: {formulation} has fixed jumps, and no certificate is about it; "
                 "omit it"
             )
-    sizes = _whole(table["sizes"])
+    sizes = _whole_numbers(table["sizes"])
     return Rung(name, sizes, compress=compress, prove=prove, added=added, tightened=tightened, **words)
 
 
-def _whole(numbers: list[float]) -> tuple[int, ...]:
+def _whole_numbers(numbers: list[float]) -> tuple[int, ...]:
     """The numbers of a list that is checked: 4.0 is whole too."""
     return tuple(map(int, numbers))
 
 
-def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
+def _read_sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
     name, names = table["name"], tuple(rung.name for rung in rungs)
-    wanted = _words(table, "rungs", names, names, place)
+    wanted = _read_words(table, "rungs", names, names, place)
     sizes = table.get("sizes", {})
     if unknown := [rung for rung in sizes if rung not in wanted]:
         raise InputError(f"{place}sizes.{unknown[0]}: is unknown; the keys here are {', '.join(wanted)}")
     kind = next(kind for kind in get_args(SketchKind) if kind in table)
     word = table[kind]
     if kind == "file":
-        what = _file(table, place, folder)
+        what = _read_drawing(table, place, folder)
     elif kind == "random":
         shape = "full square" if word == "full" else "ragged part of a square"
         title = f"random strokes on a {shape}"
         what = {"what": word, "title": title, "seeds": seeds_of(table["seeds"], f"{place}seeds")}
-        what["random"] = _random(table, word, place)
+        what["random"] = _read_random(table, word, place)
     else:
         _check_known(word, SAMPLES, f"{place}sample", "sample ")
         what = {"what": word, "title": SAMPLES[word].description}
@@ -445,7 +445,7 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
         kind,
         title=table.get("title", what.pop("title")),
         rungs=wanted,
-        sizes=tuple((rung, _whole(sizes[rung])) for rung in wanted if rung in sizes),
+        sizes=tuple((rung, _whole_numbers(sizes[rung])) for rung in wanted if rung in sizes),
         origin=Origin.of(table),
         added=check_day(table.get("added", ""), f"{place}added"),
         splits=splits_of(table.get("split", ""), what.get("seeds", (None,)), f"{place}split"),
@@ -462,7 +462,7 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
     return sketch
 
 
-def _random(table: dict[str, Any], shape: str, place: str) -> tuple[tuple[str, Any], ...]:
+def _read_random(table: dict[str, Any], shape: str, place: str) -> tuple[tuple[str, Any], ...]:
     """The stated options of random strokes, in order."""
     if shape == "full" and "mask_share" in table:
         raise InputError(f'{place}mask_share: goes with random = "ragged"; omit it, or change the shape')
@@ -471,15 +471,15 @@ def _random(table: dict[str, Any], shape: str, place: str) -> tuple[tuple[str, A
     return tuple((key, table[key]) for key in RANDOM if key in table)
 
 
-def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
+def _read_drawing(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
     what, mask = table["file"], table.get("mask", "")
     source = table.get("file_name", Path(what).name)
-    drawn = _content(folder / what, f"{place}file")
+    drawn = _read_file(folder / what, f"{place}file")
     try:
         drawing, suffix = publishable_sketch(drawn, Path(source).suffix.lower())
     except InputError as error:
         raise InputError(f"{place}file: {what}: {error}") from error
-    masked = _content(folder / mask, f"{place}mask") if mask else b""
+    masked = _read_file(folder / mask, f"{place}mask") if mask else b""
     return {
         "what": source,
         "title": source,
@@ -490,7 +490,7 @@ def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
     }
 
 
-def _content(path: Path, place: str) -> bytes:
+def _read_file(path: Path, place: str) -> bytes:
     if not path.is_file():
         raise InputError(
             f"{place}: there is no file {path}; check the path, which starts at the specification's folder"

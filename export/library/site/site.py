@@ -31,7 +31,7 @@ from ..building.table import role_of
 from ..documents.checksums import SUMS, is_intact, read_checksums
 from ..documents.documents import Library, about_file, files_of_instance, read_about, read_library
 from ..plan.spec import RUNGS
-from .study import study
+from .study import study_entry
 
 ASSETS: Final = ("site.css", "site.js", "icon.svg")  # copied from the templates
 FOLDERS: Final = ("entry", "files", "instance", "pictures")
@@ -91,16 +91,16 @@ def write_site(folder: str | Path, output: str | Path, progress: Progress = sile
         )
     sums = read_checksums(library.folder)
     shown = _instances(library, sums)
-    with _replacing_folder(Path(output)) as stage:
+    with _replace_folder(Path(output)) as stage:
         for name in FOLDERS:
             make_folder(stage / name)
         for name in ASSETS:
             write_bytes(stage / name, files(templates).joinpath("site", name).read_bytes())
         progress("files")
-        _place(library.folder, sums, stage / "files")
+        _copy_files(library.folder, sums, stage / "files")
         for instance in shown:
             progress(f"pictures of {instance.name}")
-            _draw(library.folder, instance, stage / "pictures")
+            _draw_pictures(library.folder, instance, stage / "pictures")
         progress("pages")
         pages = _write_pages(library, shown, sums, stage)
     return [Path(output) / page for page in pages]
@@ -122,7 +122,7 @@ def _instances(library: Library, names: Iterable[str]) -> list[InstancePages]:
     return instances
 
 
-def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
+def _copy_files(folder: Path, sums: dict[str, str], target: Path) -> None:
     """Copy every file of the library into a folder. Raises InputError for symbolic links and other files.
 
     A hard link would save space, but whoever edits a file of the site would edit the library.
@@ -142,7 +142,7 @@ def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
         shutil.copyfile(folder / name, target / name)
 
 
-def _draw(folder: Path, shown: InstancePages, target: Path) -> None:
+def _draw_pictures(folder: Path, shown: InstancePages, target: Path) -> None:
     """Write the pictures of an instance and of each of its different fields."""
     instance = read_instance(folder / shown.about["instance"]["file"])
     write_bytes(target / f"{shown.name}.svg", instance_picture(instance))
@@ -176,7 +176,7 @@ def _write_pages(
         "instances": shown,
         "instance_of": {entry["name"]: instance for instance in shown for entry in instance.entries},
         "families": families,
-        "faces": {name: max(members, key=_detail) for name, members in families.items()},
+        "faces": {name: max(members, key=_detail_rank) for name, members in families.items()},
         "tokens": {name: declared.short for name, declared in FORMULATIONS.items()},
         "sizes": {name: (library.folder / name).stat().st_size for name in (*sums, SUMS)},
         "sums": sums,
@@ -199,7 +199,7 @@ def _write_pages(
         citation=read_bytes(library.folder / "CITATION.cff").decode(),
         licence=read_bytes(library.folder / "LICENSE").decode(),
         solu=SOLU,
-        statistics={"statuses": statuses(library.entries), "solvers": solvers(library.entries)},
+        statistics={"statuses": status_table(library.entries), "solvers": solvers(library.entries)},
     )
     for instance in shown:
         write(
@@ -209,12 +209,12 @@ def _write_pages(
             files=files_of_instance(instance.about),
         )
         for entry in instance.entries:
-            details = study(library, entry, stage / "pictures")
+            details = study_entry(library, entry, stage / "pictures")
             write(f"entry/{entry['name']}.html", "entry", shown=instance, entry=entry, study=details)
     return written
 
 
-def _detail(shown: InstancePages) -> tuple[int, bool]:
+def _detail_rank(shown: InstancePages) -> tuple[int, bool]:
     """Sort key for the picture of a sketch: the largest grid, in the gauge `strokes`."""
     source = shown.entries[0]["source"]
     return source["size"], source["gauge"] == "strokes"
@@ -235,7 +235,7 @@ class CrossTable:
     rows: dict[str, list[str]]
 
 
-def statuses(entries: Sequence[dict[str, Any]]) -> CrossTable:
+def status_table(entries: Sequence[dict[str, Any]]) -> CrossTable:
     """Return the numbers of entries by rung and status."""
     numbers = Counter((entry["rung"], entry["status"]) for entry in entries)
     shown = [rung for rung in RUNGS if any(key[0] == rung for key in numbers)]
@@ -294,7 +294,7 @@ def size(number: int) -> str:
 
 
 @contextmanager
-def _replacing_folder(output: Path) -> Iterator[Path]:
+def _replace_folder(output: Path) -> Iterator[Path]:
     """Yield an empty folder that replaces an earlier site on success. Raises OutputError."""
     output = output.resolve()
     if output.exists() and not output.is_dir():

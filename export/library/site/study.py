@@ -28,7 +28,7 @@ _HIGHEST: Final = 4  # the greatest degree of a polynomial in any formulation
 
 
 @dataclass(frozen=True)
-class Study:
+class EntryStudy:
     """Results computed from an entry.
 
     latex: its formulation; lines: the same line by line; matrix, hessian: None if empty; blocks: number and
@@ -42,27 +42,27 @@ class Study:
     blocks: dict[str, float] | None
 
 
-def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
+def study_entry(library: Library, entry: dict[str, Any], pictures: Path) -> EntryStudy:
     """Compute the content of an entry's page and write its pictures. Raises as `problem_of`; OutputError."""
     problem = problem_of(library, entry)
     patterns = {
         kind: pattern
-        for kind, pattern in (("matrix", matrix(problem)), ("hessian", hessian(problem)))
+        for kind, pattern in (("matrix", jacobian_pattern(problem)), ("hessian", hessian_pattern(problem)))
         if pattern.entries
     }
     for kind, pattern in patterns.items():
         write_bytes(pictures / f"{entry['name']}.{kind}.svg", sparsity_picture(pattern))
     source = latex(problem.formulation)
-    return Study(
+    return EntryStudy(
         source,
         lines_of(source),
         patterns.get("matrix"),
         patterns.get("hessian"),
-        blocks(patterns["hessian"]) if "hessian" in patterns else None,
+        hessian_blocks(patterns["hessian"]) if "hessian" in patterns else None,
     )
 
 
-def matrix(problem: Problem) -> Pattern:
+def jacobian_pattern(problem: Problem) -> Pattern:
     """Return the entries of the Jacobian of the rows by family, with nonlinear ones marked."""
     rows: list[Places] = [np.zeros(0, np.int64)]
     columns: list[Places] = [np.zeros(0, np.int64)]
@@ -79,7 +79,7 @@ def matrix(problem: Problem) -> Pattern:
     return Pattern(down, _columns(problem), *map(np.concatenate, (rows, columns, curved)))
 
 
-def hessian(problem: Problem) -> Pattern:
+def hessian_pattern(problem: Problem) -> Pattern:
     """Return the entries of the Hessian of the Lagrangian, both triangles."""
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *_pairs(problem)])
     both = np.concatenate([pairs, pairs[:, ::-1]])
@@ -90,7 +90,7 @@ def hessian(problem: Problem) -> Pattern:
     )
 
 
-def blocks(pattern: Pattern) -> dict[str, float]:
+def hessian_blocks(pattern: Pattern) -> dict[str, float]:
     """Return number and sizes of the blocks of a Hessian among the columns of nonlinear terms."""
     used, place = np.unique(np.concatenate([pattern.rows, pattern.columns]), return_inverse=True)
     ends = place[: pattern.entries], place[pattern.entries :]

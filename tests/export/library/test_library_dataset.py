@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from crossfield.export.library.building.build import build
 from crossfield.export.library.building.dataset import CROISSANT, croissant
-from crossfield.export.library.building.table import COLUMNS, TABLE, parsed
+from crossfield.export.library.building.table import COLUMNS, TABLE, parse_table
 from crossfield.export.library.plan.spec import default_spec, read_spec
 
 SPEC = """format = "crossfield-library-spec"
@@ -54,7 +54,7 @@ def test_the_table_has_features_labels_and_the_split(built):
 
 def test_a_table_is_read_as_it_was_written(built):
     data = (built.folder / TABLE).read_bytes()
-    for row, sidecar in zip(parsed(data), built.entries, strict=True):
+    for row, sidecar in zip(parse_table(data), built.entries, strict=True):
         assert {key for key, value in row.items() if value is not None} <= COLUMNS.keys()
         assert row["objective"] == sidecar["best"]["objective"]
         assert (row["seed"], row["bound"]) == (sidecar["source"]["seed"], sidecar["bound"])
@@ -85,7 +85,7 @@ def test_mlcroissant_validates_and_loads_the_table(built):
 
     found = mlcroissant.Dataset(built.folder / CROISSANT)
     assert (found.metadata.issues.errors, found.metadata.issues.warnings) == (set(), set())
-    wanted = parsed((built.folder / TABLE).read_bytes())
+    wanted = parse_table((built.folder / TABLE).read_bytes())
     for record, row in zip(found.records("entries"), wanted, strict=True):
         plain = {
             key.removeprefix("entries/"): value.decode() if isinstance(value, bytes) else value

@@ -12,7 +12,7 @@ from crossfield.export.library.building.build import build
 from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.documents import lock
 from crossfield.export.library.documents.documents import read_library
-from crossfield.export.library.documents.lock import locked
+from crossfield.export.library.documents.lock import library_lock
 from crossfield.export.library.ledger.ledger import (
     Record,
     add_record,
@@ -29,8 +29,8 @@ pytestmark = pytest.mark.slow
 HOLDER = """
 import sys
 from pathlib import Path
-from crossfield.export.library.documents.lock import locked
-with locked(Path(sys.argv[1]), "a test of the lock"):
+from crossfield.export.library.documents.lock import library_lock
+with library_lock(Path(sys.argv[1]), "a test of the lock"):
     print("held", flush=True)
     sys.stdin.read()
 """
@@ -50,7 +50,7 @@ def holder(lib):
 def test_a_process_that_waits_too_long_names_the_holder(lib, holder, monkeypatch, capsys):
     monkeypatch.setattr(lock, "PATIENCE", 0.3)
     said = []
-    with pytest.raises(OutputError) as caught, locked(lib, "this test", said.append):
+    with pytest.raises(OutputError) as caught, library_lock(lib, "this test", said.append):
         pass
     assert said[0].startswith(f"this test waits for a test of the lock, process {holder.pid} on ")
     assert f"is held by a test of the lock, process {holder.pid} on " in str(caught.value)
@@ -74,7 +74,7 @@ def test_a_verification_waits_for_changes_and_changes_for_it(lib, holder, monkey
     def change(line):
         with (
             pytest.raises(OutputError, match=r"is held by a verification of the library"),
-            locked(lib, line),
+            library_lock(lib, line),
         ):
             pass
 
@@ -98,7 +98,7 @@ def test_a_process_that_was_killed_locks_nobody_out(lib, holder, monkeypatch):
     assert (lib / lock.LOCK).exists()
     assert verify_library(lib) == []
     monkeypatch.setattr(lock, "PATIENCE", 0.0)
-    with locked(lib, "this test"):
+    with library_lock(lib, "this test"):
         assert (lib / lock.LOCK).exists()
     assert not (lib / lock.LOCK).exists()
 

@@ -8,7 +8,7 @@ import crossfield as cf
 import numpy as np
 from cases import CASES, make_instance, make_problem, problem_of
 from crossfield.export.library.documents.statistics import problem_counts
-from crossfield.export.library.site.study import blocks, hessian, matrix
+from crossfield.export.library.site.study import hessian_blocks, hessian_pattern, jacobian_pattern
 from crossfield.export.pictures.marks import FAMILIES, STROKE
 from crossfield.export.pictures.sparsity import CELLS, Parts, Pattern, sparsity_picture
 from crossfield.export.writing.canonical import Canonical
@@ -48,18 +48,18 @@ def dense(pattern):
 def test_the_patterns_are_where_derivatives_are(label, tmp_path):
     problem = problem_of(label)
     jacobian, second = differentiated(problem, tmp_path / "tiny.nl")
-    assert (dense(matrix(problem)) == (np.abs(jacobian) > 1e-12)).all()
-    assert (dense(hessian(problem)) == (np.abs(second) > 1e-9)).all()
+    assert (dense(jacobian_pattern(problem)) == (np.abs(jacobian) > 1e-12)).all()
+    assert (dense(hessian_pattern(problem)) == (np.abs(second) > 1e-9)).all()
 
 
 def test_blocks_are_the_columns_that_no_entry_joins():
     problem = make_problem("miqcp-bilinear", make_instance("parts"))
-    held = dense(hessian(problem))
+    held = dense(hessian_pattern(problem))
     joined = np.linalg.matrix_power(np.eye(len(held)) + held, len(held)) > 0
     sizes = sorted(
         len(set(rows)) for rows in {tuple(np.flatnonzero(row)) for row in joined[held.any(axis=1)]}
     )
-    found = blocks(hessian(problem))
+    found = hessian_blocks(hessian_pattern(problem))
     assert found["average"] == sum(sizes) / len(sizes)
     assert (found["count"], found["least"], found["greatest"]) == (len(sizes), sizes[0], sizes[-1])
     assert problem_counts(problem)["nonlinear_variables"] == sum(sizes)
@@ -79,7 +79,7 @@ def cells_of(picture, pattern):
 
 def test_a_small_matrix_is_drawn_entry_by_entry_with_the_names_of_its_parts():
     problem = make_problem("miqcp-bilinear", make_instance())
-    pattern = matrix(problem)
+    pattern = jacobian_pattern(problem)
     assert pattern.bin == 1
     drawn, names = cells_of(sparsity_picture(pattern), pattern)
     assert drawn == {"linear": int((~pattern.curved).sum()), "curved": int(pattern.curved.sum())}

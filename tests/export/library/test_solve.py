@@ -9,14 +9,14 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.cli.library_command import solve_command
 from crossfield.export.library.building.build import rebuild
 from crossfield.export.library.building.verification import verify_library
-from crossfield.export.library.contributions.solve import drop_refuted, solve_library
+from crossfield.export.library.contributions.solve import drop_refuted_bounds, solve_library
 from crossfield.export.library.documents.documents import read_library, read_sidecar
 from crossfield.export.library.ledger.grades import (
     MAKERS,
-    contradicts,
     cut_bound,
     entry_status,
     is_proven,
+    is_refuted,
     relative_gap,
 )
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
@@ -59,8 +59,8 @@ def record_of(lib, solver, name=MILP, **given):
 def test_the_rule_of_bounds():
     """A little above a feasible point a bound is cut to it; far above it is wrong."""
     assert cut_bound(8.4e-9, 1.3e-28) == 1.3e-28
-    assert not contradicts(8.4e-9, 1.3e-28)
-    assert contradicts(1e-3, 1.3e-28)
+    assert not is_refuted(8.4e-9, 1.3e-28)
+    assert is_refuted(1e-3, 1.3e-28)
     assert cut_bound(0.4, 0.5) == 0.4
     assert is_proven(1.3e-28, cut_bound(8.4e-9, 1.3e-28))
     assert relative_gap(1.3e-28, 1.3e-28) == 0.0
@@ -128,7 +128,7 @@ def test_measured_bounds_above_a_point_found_later_are_dropped_and_others_stay(l
     right = record_of(lib, "HiGHS", bound=0.9 * best)
     for record in (wrong, right):
         add_record(lib, record)
-    drop_refuted(read_library(lib))
+    drop_refuted_bounds(read_library(lib))
     after = {each.solver: each.bound for each in read_ledger(lib).records}
     assert after == {"Xpress": None, "HiGHS": right.bound}
 
