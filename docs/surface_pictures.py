@@ -14,7 +14,7 @@ from typing import Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.pictures.drawing import read_drawing
+from crossfield.export.pictures.underlay import read_underlay
 from crossfield.export.shading.colours import coloured, eight_bit, lit, matcap
 from crossfield.export.shading.raster import raster
 from crossfield.export.surfaces.files import over, strokes
@@ -96,7 +96,7 @@ def strip(surface: Surface, drawing: str | Path, path: Path) -> Path:
 def _cells(row: Row, scale: int) -> list[Floats]:
     """The pictures of a row, (h, w, 4) each, `scale` pixels per pixel of the grid."""
     instance = row.surface.instance
-    drawing = None if row.drawing is None else read_drawing(row.drawing, on=instance)
+    drawing = None if row.drawing is None else read_underlay(row.drawing, on=instance)
     found = raster(instance, row.surface.normals, scale)
     faint = np.ones((*found.opacity.shape, 4)) * (0.94, 0.94, 0.94, 1.0)
     faint[..., 3] = found.opacity

@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .drawing import ink_colours
 from .marks import Area, Dots, Lines, Mark, Sheet
+from .underlay import ink_colours
 
 _SIDE: Final = 400.0  # points of the longer side of the page
 _TIP: Final = 1e-3  # of a pixel: else a side could be rounded down by a pixel

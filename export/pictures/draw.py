@@ -25,9 +25,9 @@ from ...models.surface.surface import Surface
 from ..shading.colours import coloured, lit, matcap
 from . import panels
 from .canvas import cover, page_of
-from .drawing import Drawing, read_drawing
 from .layers import sheet
 from .svg import svg_of
+from .underlay import Underlay, read_underlay
 
 Panel = Callable[[Any, panels.Picture], None]
 
@@ -120,7 +120,7 @@ def draw(
     path: str | Path,
     *,
     kind: str | None = None,
-    underlay: str | Path | Drawing | None = None,
+    underlay: str | Path | Underlay | None = None,
 ) -> Path:
     """Draw an instance, a field or a surface into a file.
 
@@ -197,9 +197,9 @@ def _fitting(what: Subject, suffix: str, *, underlaid: bool) -> str:
     return LAYERS if suffix == ".svg" or underlaid else "field"
 
 
-def _layers(field: CrossField, suffix: str, underlay: str | Path | Drawing | None) -> bytes:
+def _layers(field: CrossField, suffix: str, underlay: str | Path | Underlay | None) -> bytes:
     if isinstance(underlay, str | Path):
-        underlay = read_drawing(underlay, on=field.instance)
+        underlay = read_underlay(underlay, on=field.instance)
     layers = sheet(field, underlay)
     if suffix == ".svg":
         return svg_of(layers)

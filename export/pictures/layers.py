@@ -17,9 +17,9 @@ from ...models.instance.instance import Instance
 from ...models.sketch.cover import Box
 from ...models.sketch.curves import lines_as_cubics
 from ..shading.raster import drawn_border
-from .drawing import INK, Drawing
 from .marks import FAMILIES, Frame, Layer, Lines, Sheet, runs
 from .streamlines import streamlines
+from .underlay import INK, Underlay
 
 UNITS: Final = 400.0  # parts of the longer side of the grid in which the lengths below are given
 _SPACING: Final = 7.6  # of streamlines of one family
@@ -36,7 +36,7 @@ _DRAWN_BORDER: Final = 0.15  # more where strokes are the border: they run throu
 _MOST_CROSSES: Final = 64  # along a side; of more, one in several
 
 
-def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
+def sheet(field: CrossField, drawing: Underlay | None = None) -> Sheet:
     """The layers of a field, over its drawing if given; crosses are hidden at first."""
     place = Place(field.instance)
     every = int(np.ceil(max(field.instance.mask.shape) / _MOST_CROSSES))
@@ -50,7 +50,7 @@ def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
     return Sheet(place.page if drawing is None else drawing.page, layers, drawing)
 
 
-def strokes_sheet(instance: Instance, drawing: Drawing | None = None) -> Sheet:
+def strokes_sheet(instance: Instance, drawing: Underlay | None = None) -> Sheet:
     """The strokes of the drawing, or of the instance, on the part of the page that the grid covers."""
     place = Place(instance)
     layer = Layer("strokes", _strokes(place)) if drawing is None else _drawn(drawing, place)
@@ -89,7 +89,7 @@ class Place:
         return x, y, width, height
 
 
-def _drawn(drawing: Drawing, place: Place) -> Layer:
+def _drawn(drawing: Underlay, place: Place) -> Layer:
     """The curves of a drawing; many over each other are drawn thinner."""
     every = [piece for found in drawing.curves.values() for piece in found]
     length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)

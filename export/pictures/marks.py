@@ -13,8 +13,8 @@ from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.cover import Box
-from .drawing import Drawing
 from .streamlines import Streamline, combed, streamlines
+from .underlay import Underlay
 
 FAMILIES: Final = ("#00798c", "#e1812c")
 """Teal and orange, which differ for all common kinds of colour blindness."""
@@ -92,7 +92,7 @@ class Sheet:
 
     page: Box
     layers: tuple[Layer, ...]
-    drawing: Drawing | None = None
+    drawing: Underlay | None = None
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.instance.grid import Floats
-from .drawing import Drawing, ink_colours, size_in_units
 from .marks import Area, Dots, Layer, Lines, Mark, Sheet, Text
+from .underlay import Underlay, ink_colours, size_in_units
 
 LABEL: Final = "#555e68"
 """The colour of text."""
@@ -65,7 +65,7 @@ def _body(sheet: Sheet, fineness: float) -> Iterator[str]:
             yield from parts
 
 
-def _group(layer: Layer, drawing: Drawing | None, parts: list[str]) -> Iterator[str]:
+def _group(layer: Layer, drawing: Underlay | None, parts: list[str]) -> Iterator[str]:
     yield (
         f'<g id="{layer.name}" inkscape:groupmode="layer" inkscape:label="{layer.name}" '
         f'style="display:{"inline" if layer.shown else "none"}"{_faded(layer.opacity)}>'

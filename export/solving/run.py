@@ -20,8 +20,8 @@ from ...models.storage import make_folder, remove_file, replacing_files, write_b
 from ...models.surface.lift import surface
 from ..bundle.manifest import Manifest
 from ..bundle.problem_files import write_all
-from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.mask import has_mask, write_mask
+from ..pictures.underlay import Underlay, read_underlay
 from ..surfaces.files import SHADED, write_shaded
 from .methods import METHODS, Candidate, Request
 from .proven import Proven
@@ -112,7 +112,7 @@ def run(
 
     """
     should_stop = stop_function(stop)
-    drawn = None if drawing is None else read_drawing(drawing, on=instance)
+    drawn = None if drawing is None else read_underlay(drawing, on=instance)
     limits, folder = Limits.bounded(limits), make_folder(folder)
     progress(plan(limits))
     watch = Stopwatch()
@@ -223,7 +223,7 @@ def _write_certificate(report: Report, path: Path) -> Report:
 
 
 def _draw_all(
-    report: Report, folder: Path, drawn: Drawing | None, request: Request, watch: Stopwatch
+    report: Report, folder: Path, drawn: Underlay | None, request: Request, watch: Stopwatch
 ) -> tuple[Report, set[str]]:
     """Draw the kept field and its surface, unless the run was interrupted; return the names of the pictures.
 
@@ -245,7 +245,7 @@ def _draw_all(
 
 
 def _draw_field(
-    report: Report, folder: Path, drawn: Drawing | None, progress: Progress, stop: Over
+    report: Report, folder: Path, drawn: Underlay | None, progress: Progress, stop: Over
 ) -> Report:
     """Draw the kept field; return the report, marked where Ctrl-C or the caller ended that."""
     from ..pictures.draw import LAYERS, draw

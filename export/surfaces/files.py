@@ -25,8 +25,8 @@ from ...models.surface.trust import right_angle_deviation
 from ..formats.registry import generator
 from ..pictures.canvas import pixels_of
 from ..pictures.draw import own_settings
-from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.layers import strokes_sheet
+from ..pictures.underlay import Underlay, read_underlay
 from ..shading.colours import UPPER_LEFT, Light, eight_bit, lit, matcap, normal_map
 from ..shading.raster import raster, scale_of
 
@@ -57,7 +57,7 @@ def write_surface(
     surface: Surface,
     folder: str | Path,
     *,
-    drawing: str | Path | Drawing | None = None,
+    drawing: str | Path | Underlay | None = None,
     light: Light = UPPER_LEFT,
     scale: int | None = None,
     about: Mapping[str, Any] | None = None,
@@ -96,8 +96,8 @@ def write_surface(
         If a file cannot be written.
 
     """
-    if drawing is not None and not isinstance(drawing, Drawing):
-        drawing = read_drawing(drawing, on=surface.instance)
+    if drawing is not None and not isinstance(drawing, Underlay):
+        drawing = read_underlay(drawing, on=surface.instance)
     fine = scale_of(surface.instance, scale)
     folder = make_folder(folder)
     (folder / REPORT).unlink(missing_ok=True)
@@ -137,7 +137,7 @@ def png_of(picture: NDArray[np.uint8]) -> bytes:
     return stream.getvalue()
 
 
-def strokes(instance: Instance, drawing: Drawing | None, scale: int) -> Floats:
+def strokes(instance: Instance, drawing: Underlay | None, scale: int) -> Floats:
     """Red, green, blue and opacity (h, w, 4) in [0, 1] of the strokes of the drawing, or of the instance."""
     height, width = (side * scale for side in instance.mask.shape)
     with own_settings():

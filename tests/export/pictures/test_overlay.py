@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.pictures.draw import draw
-from crossfield.export.pictures.drawing import INK, read_drawing
+from crossfield.export.pictures.underlay import INK, read_underlay
 from crossfield.export.solving.run import run
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import write_field
@@ -140,7 +140,7 @@ def test_pen_strokes_may_lie_beyond_their_page(tmp_path):
     path = tmp_path / "a.scap"
     path.write_text("#80 30\n@1\n" + "\n".join(rows) + "\n")
     field = field_of(path)
-    assert read_drawing(path, on=field.instance).page == (0, -20, 80, 50)
+    assert read_underlay(path, on=field.instance).page == (0, -20, 80, 50)
     root, layers = layers_of(draw(field, tmp_path / "over.svg", underlay=path))
     assert numbers(root.get("viewBox")).tolist() == [0, -20, 80, 50]
     assert lines_in(layers["drawing"])[0].tolist() == [[0, -20], [60, -20], [60, 20]]
@@ -154,11 +154,11 @@ def test_a_drawing_in_space_lies_below_its_field_as_the_field_saw_it(tmp_path):
     assert (instance.source, instance.view) == ("a.curves", "60, 25")
     seen = read_curves(path.read_bytes(), "60,25")
     with pytest.raises(InputError, match=r"lies elsewhere .* from the same side"):
-        read_drawing(path, on=replace(instance, view=None))
+        read_underlay(path, on=replace(instance, view=None))
     write_instance(instance, tmp_path / "a.json")
-    assert read_drawing(path, on=read_instance(tmp_path / "a.json")).page == seen.page
+    assert read_underlay(path, on=read_instance(tmp_path / "a.json")).page == seen.page
     with pytest.raises(InputError, match=r"b.svg: is flat: only a .curves file can be seen from 60, 25"):
-        read_drawing(svg(tmp_path / "b.svg"), on=instance)
+        read_underlay(svg(tmp_path / "b.svg"), on=instance)
 
 
 def test_another_drawing_and_another_kind_are_refused(tmp_path):

@@ -37,7 +37,7 @@ _SAME: Final = 0.8  # least share of the stroke pixels of a field that lie on it
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
+class Underlay:
     """Curves or ink, in the drawing's own coordinates, y down.
 
     page: x, y, width, height, larger where strokes lie beyond it. curves: unbroken runs by colours of INK,
@@ -53,7 +53,7 @@ class Drawing:
     scale: float = 1.0
 
 
-def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
+def read_underlay(what: str | Path, *, on: Instance) -> Underlay:
     """The drawing of an instance, from a sketch file or a drawn sample; .curves is seen from the same side.
 
     Raises InputError for an unreadable file, a computed sample, and a drawing that lies elsewhere.
@@ -97,7 +97,7 @@ def _inked(picture: Bitmap, frame: Frame) -> Bools:
     return drawn
 
 
-def _of_curves(curves: Curves, data: bytes) -> Drawing:
+def _of_curves(curves: Curves, data: bytes) -> Underlay:
     left, top, right, bottom = curves.box
     x, y, width, height = curves.page or (0.0, 0.0, 0.0, 0.0)
     left, top = min(left, x), min(top, y)
@@ -106,7 +106,7 @@ def _of_curves(curves: Curves, data: bytes) -> Drawing:
     found: dict[str, list[Floats]] = {name: [] for name in INK}
     for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):
         found["red" if red else "black"].append(run[:, [0, 3]] if are_straight(run) else run)
-    return Drawing(page, found, _size(data, curves.page, page))
+    return Underlay(page, found, _size(data, curves.page, page))
 
 
 def size_in_units(page: Box) -> tuple[str, str]:
@@ -131,15 +131,15 @@ def _size(data: bytes, declared: Box | None, page: Box) -> tuple[str, str]:
     )
 
 
-def _of_ink(picture: Bitmap) -> Drawing:
+def _of_ink(picture: Bitmap) -> Underlay:
     level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
     ink = (level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)).astype(np.uint8)
     page = (0.0, 0.0, float(picture.width), float(picture.height))
-    return Drawing(page, {}, size_in_units(page), ink, float(picture.reduction))
+    return Underlay(page, {}, size_in_units(page), ink, float(picture.reduction))
 
 
 def ink_colours() -> Any:
-    """Red, green, blue and opacity of the numbers in `Drawing.ink`, uint8 (2 * levels, 4)."""
+    """Red, green, blue and opacity of the numbers in `Underlay.ink`, uint8 (2 * levels, 4)."""
     opacity = np.round(np.linspace(0, 255, _LEVELS)).astype(np.uint8)
     tables = [
         np.column_stack([np.tile(np.frombuffer(bytes.fromhex(ink[1:]), np.uint8), (_LEVELS, 1)), opacity])
