@@ -10,7 +10,7 @@ import numpy as np
 from crossfield.export.pictures.draw import own_settings
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.grid import Bools, Floats, Grid
-from crossfield.models.proof.lattice import offsets, starts
+from crossfield.models.proof.lattice import block_starts, checkerboard_offsets
 from crossfield.models.proof.record import LevelRecord, Proof
 from diagrams import STYLE, U, V
 from matplotlib.colors import LogNorm
@@ -27,7 +27,7 @@ SHOWN: Final = 6  # levels whose cells are drawn for single pixels
 
 def allowed_cells(level: LevelRecord, pixel: int) -> Bools:
     """The cells of a pixel with four allowed vertices, (alpha, beta)."""
-    begin = starts(level.alpha_count.astype(np.int64) * level.beta_count)
+    begin = block_starts(level.alpha_count.astype(np.int64) * level.beta_count)
     shape = (level.alpha_count[pixel], level.beta_count[pixel])
     found: Bools = level.allowed[begin[pixel] : begin[pixel + 1]].reshape(shape)
     return found[:-1, :-1] & found[1:, :-1] & found[:-1, 1:] & found[1:, 1:]
@@ -133,7 +133,7 @@ def draw_strips(proof: Proof, path: Path) -> list[int]:
 
 def _strip(place: Any, level: LevelRecord, pixel: int, proof: Proof) -> None:
     """Draw one pixel's strip, the cells that are left of it, and the cross of the field."""
-    offset = offsets(proof.field.instance.grid)[pixel]
+    offset = checkerboard_offsets(proof.field.instance.grid)[pixel]
     alpha, beta = (
         np.degrees(centre[pixel] + level.h * (first[pixel] + np.arange(count[pixel]) + offset))
         for centre, first, count in (

@@ -19,7 +19,7 @@ from crossfield.models.formulations.problem import Problem, with_windows
 from crossfield.models.instance.instance import Instance
 from crossfield.models.proof.certificate import Certificate, write_certificate
 from crossfield.models.proof.prove import prove
-from crossfield.models.proof.tightening import windows_left
+from crossfield.models.proof.tightening import remaining_windows
 from drawings import Sketch
 
 THREADS: Final = 2
@@ -107,7 +107,7 @@ def solver_rows(name: str, size: int, seconds: float, proof_seconds: float) -> I
             proofs[instance.sha256] = certificate_of(instance, proof_seconds)
         proof = proofs[instance.sha256]
         cold = cf.formulate(instance, formulation)
-        narrow = with_windows(cold, windows_left(proof))
+        narrow = with_windows(cold, remaining_windows(proof))
         row = {
             "name": name, "width": instance.grid.width, "height": instance.grid.height,
             "pixels": instance.grid.size, "solver": solver, "formulation": formulation,

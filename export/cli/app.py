@@ -176,11 +176,11 @@ def export_command(
         field, jumps_of, windows = read_start(start, instance), None, None
         if tightened is not None:
             from ...models.proof.certificate import read_certificate
-            from ...models.proof.tightening import windows_left
+            from ...models.proof.tightening import remaining_windows
 
             show("checking the certificate")
             certificate = read_certificate(tightened, on=instance)
-            jumps_of, windows = certificate.field, windows_left(certificate)
+            jumps_of, windows = certificate.field, remaining_windows(certificate)
         manifests = write_all(
             instance,
             output,

@@ -119,9 +119,9 @@ def run(
     progress("greedy field")
     start = first_field(instance)
     watch.lap(START)
-    from ...models.proof.compiling import compiling  # it loads Numba
+    from ...models.proof.compiling import compile_in_background  # it loads Numba
 
-    with compiling():
+    with compile_in_background():
         manifests = _write_models(instance, folder, start, progress)
         watch.lap("models")
         request = Request(instance, folder / "solve", limits, start, progress=progress, stop=should_stop)

@@ -28,10 +28,18 @@ from numpy.typing import NDArray
 
 from ..instance.grid import Floats, Grid, Ints
 from ..processes.compilation import compiled
-from .lattice import Lattice, starts
-from .min_plus import Given, betas, least_cost, least_of, min_plus, min_plus_between, over_beta
-from .passes import all_taken, alpha_costs, ends_of, share_of
-from .state import Clusters, Ends, Indices, State
+from .lattice import Lattice, block_starts
+from .min_plus import (
+    RaggedMatrix,
+    beta_lines,
+    fill_product_over_beta,
+    least_beta_cost,
+    least_value,
+    min_plus,
+    min_plus_between,
+)
+from .passes import alpha_costs, reparametrised_costs, row_ends, shares_at
+from .state import Clusters, Indices, RowEnds, State
 
 IndexTable = NDArray[np.int64]  # of two axes
 
@@ -41,11 +49,11 @@ _ENDS: Final = np.array([[0, 1], [1, 2], [3, 2], [0, 3]])
 _THRESHOLDS: Final = (0.25, 0.75)  # of the rounding
 
 
-def clusters_on(lattice: Lattice, quads: Indices) -> Clusters:
+def zero_clusters(lattice: Lattice, quads: Indices) -> Clusters:
     """Clusters with zero tables on some quads of the grid. quads (q,): their numbers, ascending."""
     grid = lattice.instance.grid
     pairs = grid.quads[quads].astype(np.int64)
-    begin = starts(table_sizes(lattice, pairs))
+    begin = block_starts(table_sizes(lattice, pairs))
     of_pair = np.full((len(grid.first), 2), -1, np.int64)
     for number, pair in enumerate(pairs.ravel().tolist()):
         of_pair[pair, int(of_pair[pair, 0] >= 0)] = number
@@ -64,7 +72,7 @@ def table_work(lattice: Lattice, quads: Indices) -> float:
     return float((table_sizes(lattice, quads) ** 1.5).sum())
 
 
-def extended(old: Clusters, new: Clusters) -> Clusters:
+def copy_tables(old: Clusters, new: Clusters) -> Clusters:
     """The new clusters, with the tables of the old ones, which are among them."""
     places = np.searchsorted(new.quads[:, 0], old.quads[:, 0])
     for number, place in enumerate(places):
@@ -73,21 +81,21 @@ def extended(old: Clusters, new: Clusters) -> Clusters:
     return new
 
 
-def prolonged_clusters(old: Lattice, clusters: Clusters, new: Lattice) -> Clusters:
+def interpolate_clusters(old: Lattice, clusters: Clusters, new: Lattice) -> Clusters:
     """The clusters on a finer lattice with the same centres: tables are interpolated between labels."""
     grid = old.instance.grid
     numbers = np.flatnonzero(np.isin(grid.quads[:, 0], clusters.quads[:, 0]))
-    found = clusters_on(new, numbers)
-    for number, pair in enumerate(found.quads.ravel()):
+    fine = zero_clusters(new, numbers)
+    for number, pair in enumerate(fine.quads.ravel()):
         ends = (grid.first[pair], grid.second[pair])
-        was = clusters.tables[clusters.start[number] : clusters.start[number + 1]]
+        coarse = clusters.tables[clusters.start[number] : clusters.start[number + 1]]
         (low, up), (left, right) = (_between(old, new, i) for i in ends)
-        table = was.reshape([old.alpha_count[i] for i in ends])
+        table = coarse.reshape([old.alpha_count[i] for i in ends])
         up = up[:, None]
         rows = (1 - up) * table[low] + up * table[low + 1]
         values = (1 - right) * rows[:, left] + right * rows[:, left + 1]
-        found.tables[found.start[number] : found.start[number + 1]] = values.ravel()
-    return found
+        fine.tables[fine.start[number] : fine.start[number + 1]] = values.ravel()
+    return fine
 
 
 def _between(old: Lattice, new: Lattice, i: int) -> tuple[Indices, Floats]:
@@ -99,7 +107,7 @@ def _between(old: Lattice, new: Lattice, i: int) -> tuple[Indices, Floats]:
     return low, place - low
 
 
-def cluster_fronts(grid: Grid, clusters: Clusters) -> list[Indices]:
+def independent_clusters(grid: Grid, clusters: Clusters) -> list[Indices]:
     """The clusters in two parts, like the colours of a checkerboard: no two of one part share a pair.
 
     Those with the largest tables come first, so that threads that share a part end together.
@@ -107,19 +115,19 @@ def cluster_fronts(grid: Grid, clusters: Clusters) -> list[Indices]:
     corner = grid.first[clusters.quads[:, 0]]
     colour = (grid.rows[corner] + grid.columns[corner]) % 2
     order = np.argsort(-np.diff(clusters.start[::4]), kind="stable")
-    return [order[colour[order] == each] for each in (0, 1)]
+    return [order[colour[order] == part] for part in (0, 1)]
 
 
 def quad_slacks(lattice: Lattice, state: State, angles: tuple[Floats, Floats]) -> Floats:
-    """The slack of the four pixels of each quad, and half of the slack of each of their pairs; shape (q,).
+    """The slack of the four pixels of pixel quad, and half of the slack of pixel of their pairs; shape (q,).
 
     Pairs count as after a pass, when their least value is 0. Without a label near the field, a slack is 0.
-    angles: alpha and beta of a field, as from `labels_at`.
+    angles: alpha and beta of a field, as from `nearest_labels`.
     """
     grid = lattice.instance.grid
     corners = _corners(lattice, *angles)
     theta = np.empty(lattice.start[-1])
-    _fill_taken(state, theta)
+    _fill_reparametrised(state, theta)
     begin = lattice.start[:-1]
     least = np.minimum.reduceat(theta, begin)
     at_pixel = np.mean([theta[begin + corner.label] for corner in corners], axis=0) - least
@@ -128,8 +136,8 @@ def quad_slacks(lattice: Lattice, state: State, angles: tuple[Floats, Floats]) -
         np.add.at(at_pixel, ends, at_pair)
     bottom, _, top, _ = grid.quads.T
     pixels = (grid.first[bottom], grid.second[bottom], grid.first[top], grid.second[top])
-    found: Floats = np.sum([at_pixel[each] for each in pixels], axis=0)
-    return np.where(np.isfinite(found), found, 0.0)
+    slacks: Floats = np.sum([at_pixel[pixel] for pixel in pixels], axis=0)
+    return np.where(np.isfinite(slacks), slacks, 0.0)
 
 
 class _Corner:
@@ -157,10 +165,10 @@ def _corners(lattice: Lattice, alpha: Floats, beta: Floats) -> list[_Corner]:
 
 
 @compiled
-def _fill_taken(state: State, theta: Floats) -> None:
+def _fill_reparametrised(state: State, theta: Floats) -> None:
     """Fill in the cost of each label plus the shares of all pairs there."""
     for i in range(state.least.size):
-        theta[state.start[i] : state.start[i + 1]] = all_taken(i, state)
+        theta[state.start[i] : state.start[i + 1]] = reparametrised_costs(i, state)
 
 
 def _pair_slacks(lattice: Lattice, state: State, corner: _Corner) -> Floats:
@@ -188,34 +196,34 @@ def _pair_slacks(lattice: Lattice, state: State, corner: _Corner) -> Floats:
 def update_clusters(numbers: Indices, state: State) -> None:
     """Update some clusters, one after the other; their least values are then 0."""
     for number in numbers:
-        rows = _rows(number, state)
+        rows = _allowed_alphas(number, state)
         table = 4 * number
-        f0, f1 = _reduced(table, rows, state), _reduced(table + 1, rows, state)
-        f2, f3 = _reduced(table + 2, rows, state), _reduced(table + 3, rows, state)
+        f0, f1 = _reduced_costs(table, rows, state), _reduced_costs(table + 1, rows, state)
+        f2, f3 = _reduced_costs(table + 2, rows, state), _reduced_costs(table + 3, rows, state)
         upper, lower = min_plus(f0, f1), min_plus(f3, f2)
-        _store(table, rows, state, f0, min_plus(lower, _turned(f1)))
-        _store(table + 1, rows, state, f1, min_plus(_turned(f0), lower))
-        _store(table + 2, rows, state, f2, min_plus(_turned(f3), upper))
-        _store(table + 3, rows, state, f3, min_plus(upper, _turned(f2)))
+        _store_table(table, rows, state, f0, min_plus(lower, _transposed(f1)))
+        _store_table(table + 1, rows, state, f1, min_plus(_transposed(f0), lower))
+        _store_table(table + 2, rows, state, f2, min_plus(_transposed(f3), upper))
+        _store_table(table + 3, rows, state, f3, min_plus(upper, _transposed(f2)))
 
 
 @compiled
 def least_of_clusters(begin: int, end: int, state: State, least: Floats) -> None:
     """Fill in the least of - sum lambda of some clusters over the allowed alphas."""
     for number in range(begin, end):
-        rows = _rows(number, state)
+        rows = _allowed_alphas(number, state)
         table = 4 * number
-        upper = min_plus(_negative(table, rows, state), _negative(table + 1, rows, state))
-        lower = min_plus(_negative(table + 3, rows, state), _negative(table + 2, rows, state))
-        found = np.inf
+        upper = min_plus(_negative_table(table, rows, state), _negative_table(table + 1, rows, state))
+        lower = min_plus(_negative_table(table + 3, rows, state), _negative_table(table + 2, rows, state))
+        lowest = np.inf
         for x in range(upper.shape[0]):
             for z in range(upper.shape[1]):
-                found = min(found, upper[x, z] + lower[x, z])
-        least[number] = found
+                lowest = min(lowest, upper[x, z] + lower[x, z])
+        least[number] = lowest
 
 
 @compiled
-def _rows(number: int, state: State) -> IndexTable:
+def _allowed_alphas(number: int, state: State) -> IndexTable:
     """The number of alphas with an allowed label at the pixels a, b, c, d of a quad, then these alphas."""
     bottom, top = state.clusters.quads[number, 0], state.clusters.quads[number, 2]
     most = 0
@@ -223,60 +231,60 @@ def _rows(number: int, state: State) -> IndexTable:
         pair = bottom if place < 2 else top
         i = state.first[pair] if place in (0, 3) else state.second[pair]
         most = max(most, state.alpha_count[i])
-    found = np.empty((4, most + 1), np.int64)
+    alphas = np.empty((4, most + 1), np.int64)
     for place in range(4):
         pair = bottom if place < 2 else top
         i = state.first[pair] if place in (0, 3) else state.second[pair]
-        begin, end = ends_of(i, state)
+        begin, end = row_ends(i, state)
         count = 0
         for row in range(begin.size):
             if begin[row] < end[row]:
                 count += 1
-                found[place, count] = row
-        found[place, 0] = count
-    return found
+                alphas[place, count] = row
+        alphas[place, 0] = count
+    return alphas
 
 
 @compiled
-def _reduced(table: int, rows: IndexTable, state: State) -> Floats:
+def _reduced_costs(table: int, rows: IndexTable, state: State) -> Floats:
     """The least of a pair's cost - shares over betas and jumps, without this table; by allowed alphas."""
     column = table % 4
     pair = state.clusters.quads[table // 4, column]
     i, j = state.first[pair], state.second[pair]
-    mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
-    own, other = _given(pair, i, mine, state), _given(pair, j, others, state)
-    given = Given(other, _ends_of(j, others, state))
+    rows_i, rows_j = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
+    shares_i, shares_j = _negative_shares(pair, i, rows_i, state), _negative_shares(pair, j, rows_j, state)
+    ragged = RaggedMatrix(shares_j, _chosen_row_ends(j, rows_j, state))
     in_alpha = np.empty((state.alpha_count[i], state.alpha_count[j]))
-    half = np.empty((other.shape[0], own.shape[1]))
-    best = np.empty((own.shape[0], other.shape[0]))
+    half = np.empty((shares_j.shape[0], shares_i.shape[1]))
+    best = np.empty((shares_i.shape[0], shares_j.shape[0]))
     best[:] = np.inf
-    least = _least_of_rows(own), _least_of_rows(other)
+    least = _least_of_rows(shares_i), _least_of_rows(shares_j)
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
-        betas_i, betas_j = betas(pair, i, state, odd)
+        betas_i, betas_j = beta_lines(pair, i, state, odd)
         alpha_costs(pair, i, state, odd, in_alpha)
-        in_beta = least_cost(betas_i, betas_j, (own.shape[1], other.shape[1]), state.power)
-        ends = _may_lower(best, least, in_alpha, (mine, others), in_beta)
+        in_beta = least_beta_cost(betas_i, betas_j, (shares_i.shape[1], shares_j.shape[1]), state.power)
+        ends = _ends_that_may_lower(best, least, in_alpha, (rows_i, rows_j), in_beta)
         if (ends[0] < ends[1]).any():
-            over_beta(given, betas_i, betas_j, state.power, half)
-            found = min_plus_between(own, _turned(half), ends)
-            _lower_to(best, found, in_alpha, (mine, others), ends)
-    _add(best, _negative(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
+            fill_product_over_beta(ragged, betas_i, betas_j, state.power, half)
+            sums = min_plus_between(shares_i, _transposed(half), ends)
+            _lower_between(best, sums, in_alpha, (rows_i, rows_j), ends)
+    _add_matrix(best, _negative_table(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
     return best
 
 
 @compiled
 def _least_of_rows(matrix: Floats) -> Floats:
-    found = np.empty(matrix.shape[0])
-    for x in range(found.size):
-        found[x] = least_of(matrix[x])
-    return found
+    least = np.empty(matrix.shape[0])
+    for x in range(least.size):
+        least[x] = least_value(matrix[x])
+    return least
 
 
 @compiled
-def _ends_of(i: int, rows: Indices, state: State) -> Ends:
-    """The ends of some rows of a pixel, as of `ends_of`."""
-    begin, end = ends_of(i, state)
+def _chosen_row_ends(i: int, rows: Indices, state: State) -> RowEnds:
+    """The ends of some rows of a pixel, as of `row_ends`."""
+    begin, end = row_ends(i, state)
     some = np.empty(rows[0], np.int64), np.empty(rows[0], np.int64)
     for x in range(rows[0]):
         some[0][x], some[1][x] = begin[rows[x + 1]], end[rows[x + 1]]
@@ -284,88 +292,88 @@ def _ends_of(i: int, rows: Indices, state: State) -> Ends:
 
 
 @compiled
-def _may_lower(
+def _ends_that_may_lower(
     best: Floats, least: tuple[Floats, Floats], in_alpha: Floats, rows: tuple[Indices, Indices], plus: float
-) -> Ends:
+) -> RowEnds:
     """The part of each row where a bound is below the best sum.
 
     The bound is the sum of two least numbers, of a cost in alpha and of a constant.
     """
-    (mine, others), (first, second) = rows, least
+    (rows_i, rows_j), (first, second) = rows, least
     begins, ends = np.zeros(best.shape[0], np.int64), np.zeros(best.shape[0], np.int64)
     for x in range(best.shape[0]):
-        begin, end, costs = 0, best.shape[1], in_alpha[mine[x + 1]]
-        while begin < end and first[x] + second[begin] + costs[others[begin + 1]] + plus >= best[x, begin]:
+        begin, end, costs = 0, best.shape[1], in_alpha[rows_i[x + 1]]
+        while begin < end and first[x] + second[begin] + costs[rows_j[begin + 1]] + plus >= best[x, begin]:
             begin += 1
-        while begin < end and first[x] + second[end - 1] + costs[others[end]] + plus >= best[x, end - 1]:
+        while begin < end and first[x] + second[end - 1] + costs[rows_j[end]] + plus >= best[x, end - 1]:
             end -= 1
         begins[x], ends[x] = begin, end
     return begins, ends
 
 
 @compiled
-def _lower_to(
-    best: Floats, found: Floats, in_alpha: Floats, rows: tuple[Indices, Indices], ends: Ends
+def _lower_between(
+    best: Floats, sums: Floats, in_alpha: Floats, rows: tuple[Indices, Indices], ends: RowEnds
 ) -> None:
     """Lower the best sums between the ends to those of two tables, the second by all alphas."""
-    mine, others = rows
+    rows_i, rows_j = rows
     for x in range(best.shape[0]):
         for y in range(ends[0][x], ends[1][x]):
-            best[x, y] = min(best[x, y], found[x, y] + in_alpha[mine[x + 1], others[y + 1]])
+            best[x, y] = min(best[x, y], sums[x, y] + in_alpha[rows_i[x + 1], rows_j[y + 1]])
 
 
 @compiled
-def _add(matrix: Floats, other: Floats, constant: float) -> None:
+def _add_matrix(matrix: Floats, addend: Floats, constant: float) -> None:
     for x in range(matrix.shape[0]):
         for y in range(matrix.shape[1]):
-            matrix[x, y] += other[x, y] + constant
+            matrix[x, y] += addend[x, y] + constant
 
 
 @compiled
-def _given(pair: int, i: int, rows: Indices, state: State) -> Floats:
+def _negative_shares(pair: int, i: int, rows: Indices, state: State) -> Floats:
     """Minus the shares of a pair at the allowed alphas of its end i; inf at labels that are not allowed."""
     columns = state.beta_count[i]
-    share, begin = share_of(pair, i, state), state.start[i]
-    given = np.empty((rows[0], columns))
+    share, begin = shares_at(pair, i, state), state.start[i]
+    negative = np.empty((rows[0], columns))
     for x in range(rows[0]):
         for y in range(columns):
             at = rows[x + 1] * columns + y
-            given[x, y] = -share[at] if state.unary[begin + at] < np.inf else np.inf
-    return given
+            negative[x, y] = -share[at] if state.unary[begin + at] < np.inf else np.inf
+    return negative
 
 
 @compiled
-def _negative(table: int, rows: IndexTable, state: State) -> Floats:
+def _negative_table(table: int, rows: IndexTable, state: State) -> Floats:
     """Minus a table of a cluster, at the allowed alphas."""
     column = table % 4
-    mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
+    rows_i, rows_j = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     begin = state.clusters.start[table]
     wide = state.alpha_count[state.second[state.clusters.quads[table // 4, column]]]
-    found = np.empty((mine[0], others[0]))
-    for x in range(mine[0]):
-        for y in range(others[0]):
-            found[x, y] = -state.clusters.tables[begin + mine[x + 1] * wide + others[y + 1]]
-    return found
+    negative = np.empty((rows_i[0], rows_j[0]))
+    for x in range(rows_i[0]):
+        for y in range(rows_j[0]):
+            negative[x, y] = -state.clusters.tables[begin + rows_i[x + 1] * wide + rows_j[y + 1]]
+    return negative
 
 
 @compiled
-def _store(table: int, rows: IndexTable, state: State, f: Floats, rest: Floats) -> None:
+def _store_table(table: int, rows: IndexTable, state: State, f: Floats, rest: Floats) -> None:
     """Set a table to a quarter of the least of all four f, f + rest, less its own f, at allowed alphas."""
     column = table % 4
-    mine, others = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
+    rows_i, rows_j = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     begin = state.clusters.start[table]
     wide = state.alpha_count[state.second[state.clusters.quads[table // 4, column]]]
     for x in range(f.shape[0]):
         for y in range(f.shape[1]):
             value = 0.25 * (f[x, y] + rest[x, y]) - f[x, y]
-            state.clusters.tables[begin + mine[x + 1] * wide + others[y + 1]] = value
+            state.clusters.tables[begin + rows_i[x + 1] * wide + rows_j[y + 1]] = value
 
 
 @compiled
-def _turned(matrix: Floats) -> Floats:
+def _transposed(matrix: Floats) -> Floats:
     """The transposed matrix, as rows one after the other."""
-    found = np.empty((matrix.shape[1], matrix.shape[0]))
+    transposed = np.empty((matrix.shape[1], matrix.shape[0]))
     for x in range(matrix.shape[0]):
         for y in range(matrix.shape[1]):
-            found[y, x] = matrix[x, y]
-    return found
+            transposed[y, x] = matrix[x, y]
+    return transposed

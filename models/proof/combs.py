@@ -17,7 +17,7 @@ import numpy as np
 
 from ..instance.grid import Floats
 from ..processes.compilation import Crew, compiled
-from .passes import add, all_taken, copy, product, share_of
+from .passes import add_to, copy_to, fill_product, reparametrised_costs, shares_at
 from .state import State
 
 _COLUMN: Final = (0, 2)  # of `State.around`: the neighbours before and after a pixel in its column
@@ -47,13 +47,13 @@ def _along(line: tuple[int, int], excesses: Floats, state: State, crew: Crew) ->
 
 
 @compiled
-def _fill_excesses(begin: int, end: int, state: State, found: Floats) -> None:
+def _fill_excesses(begin: int, end: int, state: State, excesses: Floats) -> None:
     """Fill in D + shares less the least, at the labels of some pixels."""
     for i in range(begin, end):
-        theta = all_taken(i, state)
+        theta = reparametrised_costs(i, state)
         least = theta.min()
         for x in range(theta.size):
-            found[state.start[i] + x] = theta[x] - least
+            excesses[state.start[i] + x] = theta[x] - least
 
 
 @compiled
@@ -67,22 +67,22 @@ def _follow(i: int, after: int, state: State, excesses: Floats, sums: Floats) ->
         pair = state.around[i, after]
         j = state.first[pair] + state.second[pair] - i
         carried = _message(pair, i, carried, state)
-        add(sums[state.start[j] : state.start[j + 1]], carried)
-        add(carried, excesses[state.start[j] : state.start[j + 1]])
+        add_to(sums[state.start[j] : state.start[j + 1]], carried)
+        add_to(carried, excesses[state.start[j] : state.start[j + 1]])
         i = j
 
 
 @compiled
 def _message(pair: int, i: int, carried: Floats, state: State) -> Floats:
-    """The least of the carried excess at end i plus c - shares of a pair, at labels of its other end."""
+    """The least of the carried excess at end i plus c - shares of a pair, at labels of its share_j end."""
     j = state.first[pair] + state.second[pair] - i
-    share, other = share_of(pair, i, state), share_of(pair, j, state)
-    kept, found = share.copy(), other.copy()
-    _subtract(share, carried)
-    product(pair, j, state, found)
-    copy(kept, share)
-    _subtract(found, other)
-    return found
+    share_i, share_j = shares_at(pair, i, state), shares_at(pair, j, state)
+    before, message = share_i.copy(), share_j.copy()
+    _subtract(share_i, carried)
+    fill_product(pair, j, state, message)
+    copy_to(before, share_i)
+    _subtract(message, share_j)
+    return message
 
 
 @compiled

@@ -21,13 +21,13 @@ from ..processes.compilation import cache_folder, crew, is_all_compiled
 from ..processes.deadline import Deadline, Over, Progress, never, silent
 from ..sketch.samples import sample
 from .certificate import write_certificate
-from .descent import Descent, Ends
+from .descent import Descent, Termination
 from .dual import Dual
 from .lattice import Lattice
 
 
 @contextmanager
-def compiling() -> Iterator[None]:
+def compile_in_background() -> Iterator[None]:
     """Compile the functions of proofs in the background, unless they are; stop at the end of the context."""
     if is_all_compiled():
         yield
@@ -71,7 +71,7 @@ def compile_all() -> None:
         if is_all_compiled():
             return
         instance = sample("mouse", 4).with_gauge("strokes")
-        ends = Ends(Deadline(), never, gap=0.0, work=math.inf)
+        ends = Termination(Deadline(), never, gap=0.0, work=math.inf)
         with crew(1) as thread:
             first = Descent.first_field(instance, None, never)
             descent = Descent(instance, first, ends, thread, 0, 1, silent)

@@ -37,10 +37,10 @@ from .check_certificate import MOST_COUNT
 from .clusters import table_sizes
 from .dual import Dual
 from .forced import forced
-from .lattice import Lattice, labels_at
-from .pruning import RemainingCells, finer, narrowed
+from .lattice import Lattice, nearest_labels
+from .pruning import RemainingCells, finer_lattice, smaller_lattice
 from .record import EXACT, LevelRecord, Proof
-from .rounding import Rounding, improve
+from .rounding import Rounding, better_field
 
 # Levels
 COARSEST: Final = 16  # steps in pi/2 of the first level: with fewer it drops nothing
@@ -61,7 +61,8 @@ _FEWER: Final = 0.5  # share of more labels that are left, at which passes go on
 _RECORD: Final = 11  # passes that take as long as a record, with combs and two passes before it
 
 # Clusters
-_CLUSTERS: Final = 0.08  # share of quads that become clusters, later half of it: a vortex needs some 20
+_CLUSTERS: Final = 24  # quads that become clusters, later half of them: a vortex needs some 20
+_CLUSTERS_OF_ALL: Final = 0.08  # the same as a share of all quads, if that is more
 _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above which there are more
 
 # Fields
@@ -74,7 +75,7 @@ _ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which shares are rounded wh
 
 
 @dataclass
-class Ends:
+class Termination:
     """When to end: a deadline, a request to stop, a sufficient gap, enough work.
 
     work: greatest number of labels; labels: those so far.
@@ -129,12 +130,12 @@ class Descent:
     """
 
     norm: ClassVar[Norm] = 2
-    improve = staticmethod(improve)
+    better_field = staticmethod(better_field)
     forced = staticmethod(forced)
 
     instance: Instance
     best: CrossField
-    ends: Ends
+    ends: Termination
     crew: Crew
     seed: int
     jobs: int
@@ -150,7 +151,7 @@ class Descent:
         """The best of the first field, the user's field and, in time, the PolyVector start, each improved."""
         return best_start(instance, start, over, polyvector_start)
 
-    def improved(self, field: CrossField, over: Over = never) -> CrossField:
+    def improve_field(self, field: CrossField, over: Over = never) -> CrossField:
         """The field, with jumps and angles improved."""
         return improved_field(field, stop=over)
 
@@ -187,7 +188,7 @@ class Descent:
         if reason := self.ends.reason():
             return reason
         self.chain, self.began, centre = _Chain(), time.monotonic(), self.best
-        dual = Dual(self.first_level(_rounded(centre)), self.crew)
+        dual = Dual(self.first_level(_centre_at(centre)), self.crew)
         patient = False  # whether a finer lattice was too large, so that this one has the same spacing
         while True:
             self._add_clusters(dual)
@@ -195,7 +196,7 @@ class Descent:
             left = self._record_level(dual)
             if (reason := self._reason_to_end()) or left is None:
                 return reason or "time"
-            lattice = narrowed(left) if rising and not patient else finer(left)
+            lattice = smaller_lattice(left) if rising and not patient else finer_lattice(left)
             self._search_between_levels(lattice)
             better = self.energy(self.best) < self.energy(centre) * (1 - _BETTER)
             if better and (len(self.chain.last_of_spacings) <= _SETTLED or _is_at_seam(self.best, lattice)):
@@ -205,7 +206,7 @@ class Descent:
                     return self.ends.reason() if better else "labels"
                 if self._is_closing(dual):
                     return self.ends.reason() or "time"
-                lattice = narrowed(left)
+                lattice = smaller_lattice(left)
             patient = lattice.h == dual.lattice.h and (patient or not rising)
             dual.move(lattice)
 
@@ -215,7 +216,7 @@ class Descent:
         Returns whether it does not, but the gap has become so small that passes over fewer labels are worth a
         record. patient: whether to go on while the bound rises at all, because no finer lattice may follow.
         """
-        rounding, reached, rises = Rounding(dual, self.improve), -math.inf, [math.inf] * 2
+        rounding, reached, rises = Rounding(dual, self.better_field), -math.inf, [math.inf] * 2
         for _ in range(_MOST_ROUNDS):
             bound = dual.ascend(_PASSES, self.ends.over, lambda: self._is_closing(dual))
             self.best = rounding.lower(self.best, lambda: self._is_closing(dual))
@@ -252,7 +253,7 @@ class Descent:
             chain.levels.append(level)
         if not self.ends.over():
             left = dual.remaining_cells(level.bound, energy)
-            if left.nothing:
+            if left.is_empty:
                 chain.convex, left = energy, None
             else:
                 self._solve_if_forced(left)
@@ -262,7 +263,7 @@ class Descent:
 
     def _solve_if_forced(self, left: RemainingCells) -> None:
         """Count the jumps that are forced, and if all choices are, solve the convex problem that is left."""
-        chain, (_, _, jumps) = self.chain, labels_at(self.best, left.lattice)
+        chain, (_, _, jumps) = self.chain, nearest_labels(self.best, left.lattice)
         choices = self.forced(replace(left, lattice=replace(left.lattice, p=jumps)))
         chain.forced = int(choices.pairs.sum())
         if choices.everything:
@@ -271,14 +272,14 @@ class Descent:
             chain.convex = max(chain.convex, min(bound, chain.levels[-1].energy))
             if bound < energy:
                 better = field_in_windows(self.instance, solution.alpha, solution.beta, solution.p)
-                self._offer(self.improved(better, self.ends.over))
+                self._offer(self.improve_field(better, self.ends.over))
 
     def _add_clusters(self, dual: Dual) -> None:
         """Add clusters at the beginning of a spacing, if vortices cause the gap."""
         if self._needs_clusters(dual.lattice):
             dual.ascend(_PASSES, self.ends.over, lambda: self._is_closing(dual))
-            share = _CLUSTERS / 2 if len(dual.quads) else _CLUSTERS
-            dual.add_clusters(math.ceil(share * len(self.instance.grid.quads)), self.best)
+            count = max(_CLUSTERS, _CLUSTERS_OF_ALL * len(self.instance.grid.quads))
+            dual.add_clusters(math.ceil(count / 2 if len(dual.quads) else count), self.best)
 
     def _needs_clusters(self, lattice: Lattice) -> bool:
         """Whether quads should become clusters on a lattice, which is the next one."""
@@ -339,12 +340,12 @@ class Descent:
 
     def _has_time_for(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for a level on the next lattice: its record, and passes that take as long."""
-        one, tables = dual.seconds_on(lattice)
+        one, tables = dual.expected_seconds(lattice)
         return not self.ends.over(_RECORD * (2 * one + tables))
 
     def _is_closing(self, dual: Dual) -> bool:
         """Whether only the time to record the level is left."""
-        one, tables = dual.seconds_on(dual.lattice)
+        one, tables = dual.expected_seconds(dual.lattice)
         return self.ends.over(_RECORD * one + 2 * tables)
 
     def _reason_to_end(self) -> str:
@@ -374,10 +375,10 @@ def _is_too_large(dual: Dual, lattice: Lattice) -> bool:
 
 def _is_at_seam(field: CrossField, lattice: Lattice) -> bool:
     """Whether a cross of the field is near both ends of the labels, where no box is small."""
-    return bool(np.abs(labels_at(field, lattice)[0] - lattice.alpha).max() > _NEAR * QUARTER)
+    return bool(np.abs(nearest_labels(field, lattice)[0] - lattice.alpha).max() > _NEAR * QUARTER)
 
 
-def _rounded(field: CrossField) -> CrossField:
+def _centre_at(field: CrossField) -> CrossField:
     """The crosses of a field in the gauge `strokes`, with few digits and the best jump of each pair."""
     instance = field.instance.with_gauge("strokes")
     alpha, beta = (np.round(angle, _DECIMALS) for angle in (field.alpha, field.beta))

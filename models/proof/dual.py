@@ -37,21 +37,21 @@ from ..processes.deadline import Over, never
 from ..smooth.sparse_systems import stroke_weight
 from . import check_certificate
 from .clusters import (
-    cluster_fronts,
-    clusters_on,
-    extended,
+    copy_tables,
+    independent_clusters,
+    interpolate_clusters,
     least_of_clusters,
-    prolonged_clusters,
     quad_slacks,
     table_work,
     update_clusters,
+    zero_clusters,
 )
 from .combs import comb_excesses
 from .encoding import messages_of, tables_of
-from .lattice import Lattice, labels_at
-from .passes import all_taken, ends_of, pair_minimum, pixel_pass, share_of
-from .pruning import RemainingCells, boxed, cells_left, prolonged_shares
-from .state import Clusters, Ends, Indices, State, state_of
+from .lattice import Lattice, nearest_labels
+from .passes import pair_minimum, reparametrised_costs, row_ends, shares_at, visit_pixel
+from .pruning import RemainingCells, bound_by_boxes, interpolate_shares, surviving_cells
+from .state import Clusters, Indices, RowEnds, State, state_on
 
 Singles = NDArray[np.float32]
 
@@ -76,21 +76,21 @@ class Dual:
         """Start from zero shares and without clusters."""
         self._crew = crew
         grid = lattice.instance.grid
-        self._fronts = fronts(grid)
+        self._fronts = antidiagonals(grid)
         self._pass_seconds = self._table_seconds = 0.0  # of the last pass that was not cut off
         self._left_by_combs = 1.0
         first, second = (np.zeros(int(lattice.share_starts(ends)[-1])) for ends in (grid.first, grid.second))
-        self._begin(lattice, (first, second), clusters_on(lattice, np.zeros(0, np.int64)))
+        self._start_on(lattice, (first, second), zero_clusters(lattice, np.zeros(0, np.int64)))
 
-    def _begin(self, lattice: Lattice, shares: tuple[Floats, Floats], clusters: Clusters) -> None:
-        self.lattice, self.state = lattice, state_of(lattice, shares, clusters)
+    def _start_on(self, lattice: Lattice, shares: tuple[Floats, Floats], clusters: Clusters) -> None:
+        self.lattice, self.state = lattice, state_on(lattice, shares, clusters)
         self._parts = [self._crew.parts(lattice.count[front]) for front in self._fronts]
-        self._take_clusters(clusters)
+        self._adopt_clusters(clusters)
         self._times, self._reached = 0, -math.inf
 
-    def _take_clusters(self, clusters: Clusters) -> None:
+    def _adopt_clusters(self, clusters: Clusters) -> None:
         self.state = self.state._replace(clusters=clusters)
-        self._cluster_fronts = cluster_fronts(self.lattice.instance.grid, clusters)
+        self._cluster_fronts = independent_clusters(self.lattice.instance.grid, clusters)
         self._before = []
         self._least_of_clusters = self._find_least_of_clusters()
 
@@ -101,13 +101,13 @@ class Dual:
 
     def move(self, lattice: Lattice) -> None:
         """Go on, with interpolated shares and tables, on a finer or smaller lattice with the same centres."""
-        self._pass_seconds, self._table_seconds = self.seconds_on(lattice)
+        self._pass_seconds, self._table_seconds = self.expected_seconds(lattice)
         self._before = []  # first of all, for memory
         old, state = self.lattice, self.state
-        shares = prolonged_shares(old, (state.shares_first, state.shares_second), lattice)
-        clusters = prolonged_clusters(old, state.clusters, lattice)
+        shares = interpolate_shares(old, (state.shares_first, state.shares_second), lattice)
+        clusters = interpolate_clusters(old, state.clusters, lattice)
         del self.state, state  # the new arrays need its memory
-        self._begin(lattice, shares, clusters)
+        self._start_on(lattice, shares, clusters)
 
     def forward(self, over: Over = never) -> float:
         """The bound after a forward pass; -inf if time cut it off."""
@@ -165,11 +165,12 @@ class Dual:
         first, second, old_tables = self._before
         state, tables = self.state, self.state.clusters.tables
         self._crew.run(
-            lambda pairs: _carry_shares(pairs, state, (first, second), part),
+            lambda pairs: _extrapolate_shares(pairs, state, (first, second), part),
             [(at.start, at.stop) for at in self._crew.equal_parts(len(state.first))],
         )
         self._crew.run(
-            lambda at: _carry_on(tables[at], old_tables[at], part), self._crew.equal_parts(len(tables))
+            lambda at: _extrapolate_values(tables[at], old_tables[at], part),
+            self._crew.equal_parts(len(tables)),
         )
 
     @property
@@ -181,12 +182,12 @@ class Dual:
 
         Before: a backward pass.
         """
-        alpha, beta, _ = labels_at(field, self.lattice)
+        alpha, beta, _ = nearest_labels(field, self.lattice)
         quads = self.lattice.instance.grid.quads
         slack = quad_slacks(self.lattice, self.state, (alpha, beta))
         slack[np.isin(quads[:, 0], self.quads[:, 0])] = np.inf
         numbers = np.sort(np.argsort(-slack, kind="stable")[: len(self.quads) + count])
-        self._take_clusters(extended(self.state.clusters, clusters_on(self.lattice, numbers)))
+        self._adopt_clusters(copy_tables(self.state.clusters, zero_clusters(self.lattice, numbers)))
 
     def update_clusters(self, way: int = 1) -> None:
         """Update all clusters; way: -1 for the reverse order."""
@@ -204,17 +205,17 @@ class Dual:
     def _find_least_of_clusters(self) -> Floats:
         """The least of the negative tables of each cluster."""
         least = np.zeros(len(self.quads))
-        self._in_parts(least_of_clusters, least)
+        self._fill_in_parallel(least_of_clusters, least)
         return least
 
-    def _in_parts(self, fill: Callable[[int, int, State, Floats], None], values: Floats) -> None:
+    def _fill_in_parallel(self, fill: Callable[[int, int, State, Floats], None], values: Floats) -> None:
         """Fill in values, one for each pixel, pair or cluster, by all threads."""
         self._crew.run(
             lambda part: fill(part.start, part.stop, self.state, values),
             self._crew.equal_parts(len(values)),
         )
 
-    def seconds_on(self, lattice: Lattice) -> tuple[float, float]:
+    def expected_seconds(self, lattice: Lattice) -> tuple[float, float]:
         """Expected seconds of a pass, and of an update of the clusters, estimated from the last ones here."""
         passes = lattice.pass_work / max(self.lattice.pass_work, 1.0)
         tables = table_work(lattice, self.quads) / max(table_work(self.lattice, self.quads), 1.0)
@@ -227,7 +228,7 @@ class Dual:
         the rounding costs a small part at most.
         """
         self._before = []  # a level is recorded next, which takes memory
-        most = max(self._greatest()[0], 2.0**-16)
+        most = max(self._greatest_sizes()[0], 2.0**-16)
         least = 2.0 ** (math.ceil(math.log2(most)) - 30)
         # Shares and tables, wrong by half a quantum, enter the minima of pixels and pairs, or of clusters.
         wrong = np.array([2 * len(self.lattice.p), 4 * len(self.quads)])
@@ -242,24 +243,24 @@ class Dual:
             np.multiply(values, quantum, out=values)
         return of_shares, of_tables
 
-    def _greatest(self) -> tuple[float, float]:
+    def _greatest_sizes(self) -> tuple[float, float]:
         """The greatest size of a share or a number of a table, and of a finite cost of a pixel."""
         unary = self.state.unary
-        return max(map(_most, self._values)), _most(unary[np.isfinite(unary)])
+        return max(map(_greatest_size, self._values)), _greatest_size(unary[np.isfinite(unary)])
 
     def bound(self) -> float:
         """The bound that any shares prove, as `LevelRecord` defines it."""
         pixels, pairs = np.zeros(len(self.lattice.count)), np.zeros(len(self.lattice.p))
-        self._in_parts(_pixel_minima, pixels)
-        self._in_parts(_pair_minima, pairs)
-        return math.fsum([*pixels, *pairs, *self._find_least_of_clusters(), -self._roundings()[0]])
+        self._fill_in_parallel(_pixel_minima, pixels)
+        self._fill_in_parallel(_pair_minima, pairs)
+        return math.fsum([*pixels, *pairs, *self._find_least_of_clusters(), -self._rounding_margins()[0]])
 
-    def _roundings(self) -> tuple[float, float]:
+    def _rounding_margins(self) -> tuple[float, float]:
         """Margin that the checker takes off the bound of a pass, and adds to the energy for combs.
 
         It is more than this process rounds. See models/proof/check_certificate.py, 6 and `Pass`.
         """
-        lattice, (shares, costs) = self.lattice, self._greatest()
+        lattice, (shares, costs) = self.lattice, self._greatest_sizes()
         instance, n, m = lattice.instance, len(lattice.count), len(lattice.p)
         weight, skew = stroke_weight(instance), instance.skew_coefficient
         size = 2 + np.abs([lattice.alpha, lattice.beta]).sum(axis=0)
@@ -280,9 +281,9 @@ class Dual:
         cells = self._cells_of_pass(excess)
         before = max(int(np.count_nonzero(cells)), 1)
         for excesses in comb_excesses(self.state, self._crew):
-            cells &= cells_left(self.lattice, excesses <= excess)
+            cells &= surviving_cells(self.lattice, excesses <= excess)
         self._left_by_combs = int(np.count_nonzero(cells)) / before
-        return boxed(self.lattice, cells)
+        return bound_by_boxes(self.lattice, cells)
 
     def count_left(self, bound: float, energy: float) -> int:
         """The number of cells that the last pass leaves, times the share that combs left the last time."""
@@ -291,11 +292,13 @@ class Dual:
     def _cells_of_pass(self, excess: float) -> Bools:
         """The cells where a vertex's theta exceeds the least by at most `excess`, flat."""
         state = self.state
-        return cells_left(self.lattice, state.theta <= np.repeat(state.least + excess, self.lattice.count))
+        return surviving_cells(
+            self.lattice, state.theta <= np.repeat(state.least + excess, self.lattice.count)
+        )
 
     def _excess(self, bound: float, energy: float) -> float:
         """The excess over a bound up to which labels survive."""
-        return energy + _TOLERANCE * (1 + energy) + self._roundings()[1] - bound
+        return energy + _TOLERANCE * (1 + energy) + self._rounding_margins()[1] - bound
 
     def arrays(self, quanta: tuple[float, float]) -> tuple[Arrays, Arrays]:
         """Messages and tables as whole numbers of their scales, after `quantise`."""
@@ -304,7 +307,7 @@ class Dual:
         return messages, tables_of(self.lattice, self.state.clusters, of_tables)
 
 
-def fronts(grid: Grid) -> list[Indices]:
+def antidiagonals(grid: Grid) -> list[Indices]:
     """The pixels of each anti-diagonal. No two of one diagonal form a pair; earlier pixels come sooner."""
     diagonal = grid.rows + grid.columns
     order = np.argsort(diagonal, kind="stable")
@@ -312,7 +315,7 @@ def fronts(grid: Grid) -> list[Indices]:
     return np.split(order, begin[1:])
 
 
-def _most(values: Floats) -> float:
+def _greatest_size(values: Floats) -> float:
     """The greatest size, without an array of all sizes."""
     return float(max(values.max(initial=0.0), -values.min(initial=0.0)))
 
@@ -321,30 +324,32 @@ def _most(values: Floats) -> float:
 def _pass_pixels(pixels: Indices, earlier: int, state: State) -> None:
     """Do a pass over some pixels, one after the other; earlier: 0 forwards, 2 backwards."""
     for i in pixels:
-        pixel_pass(i, earlier, state)
+        visit_pixel(i, earlier, state)
 
 
 @compiled
-def _carry_shares(pairs: tuple[int, int], state: State, before: tuple[Singles, Singles], part: float) -> None:
+def _extrapolate_shares(
+    pairs: tuple[int, int], state: State, before: tuple[Singles, Singles], part: float
+) -> None:
     """Extrapolate the shares of consecutive pairs. before: those at their first and their second pixels."""
     for pair in range(pairs[0], pairs[1]):
         i, j = state.first[pair], state.second[pair]
         was = before[0][state.start_first[pair] : state.start_first[pair + 1]]
-        _carry_used(share_of(pair, i, state), was, ends_of(i, state), state.beta_count[i], part)
+        _extrapolate_used(shares_at(pair, i, state), was, row_ends(i, state), state.beta_count[i], part)
         was = before[1][state.start_second[pair] : state.start_second[pair + 1]]
-        _carry_used(share_of(pair, j, state), was, ends_of(j, state), state.beta_count[j], part)
+        _extrapolate_used(shares_at(pair, j, state), was, row_ends(j, state), state.beta_count[j], part)
 
 
 @compiled
-def _carry_used(values: Floats, before: Singles, ends: Ends, columns: int, part: float) -> None:
+def _extrapolate_used(values: Floats, before: Singles, ends: RowEnds, columns: int, part: float) -> None:
     """Extrapolate the used part of the shares of a pair at one pixel."""
     for row in range(ends[0].size):
         begin, end = row * columns + ends[0][row], row * columns + ends[1][row]
-        _carry_on(values[begin:end], before[begin:end], part)
+        _extrapolate_values(values[begin:end], before[begin:end], part)
 
 
 @compiled
-def _carry_on(values: Floats, before: Singles, part: float) -> None:
+def _extrapolate_values(values: Floats, before: Singles, part: float) -> None:
     """Extrapolate numbers by a part of their last change, and store them as they were."""
     for x in range(values.size):
         now = values[x]
@@ -363,4 +368,4 @@ def _pair_minima(begin: int, end: int, state: State, least: Floats) -> None:
 def _pixel_minima(begin: int, end: int, state: State, least: Floats) -> None:
     """Fill in the least D + sum of the shares of some pixels."""
     for i in range(begin, end):
-        least[i] = all_taken(i, state).min()
+        least[i] = reparametrised_costs(i, state).min()

@@ -65,18 +65,6 @@ class Forced:
         return bool(self.pairs.all() and self.strokes.all())
 
     @property
-    def open_pixels(self) -> Bools:
-        """Pixels where something is not forced; if all is, those whose box exceeds a window; shape (n,)."""
-        instance = self.left.lattice.instance
-        grid, found = instance.grid, np.zeros(instance.grid.size, dtype=bool)
-        for pixels in (grid.first[~self.pairs], grid.second[~self.pairs]):
-            found[pixels] = True
-        found[instance.stroke_index[~self.strokes]] = True
-        if self.everything:
-            found[instance.stroke_index] = np.add(*self.whole.beyond) > 0
-        return found
-
-    @property
     def whole(self) -> Piece:
         """The boxes as one piece."""
         at = self.left.lattice.instance.stroke_index

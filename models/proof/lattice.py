@@ -69,7 +69,7 @@ class Lattice:
         Cells that stick out are kept.
         """
         h = HALF / steps
-        ranges = whole_ranges(field.beta, h, offsets(field.instance.grid))
+        ranges = full_ranges(field.beta, h, checkerboard_offsets(field.instance.grid))
         return cls(field.instance, h, field.alpha, field.beta, field.p, **ranges)
 
     @classmethod
@@ -78,7 +78,7 @@ class Lattice:
         h, beta = HALF / steps, np.zeros(field.instance.grid.size)
         alpha = h * np.round(field.alpha / h)
         most = 1.0 if norm == 1 else HALF
-        ranges = whole_ranges(beta, h, beta)
+        ranges = full_ranges(beta, h, beta)
         return cls(
             field.instance, h, alpha, beta, field.p, **ranges, norm=norm, slopes=np.clip(slopes, -most, most)
         )
@@ -86,7 +86,9 @@ class Lattice:
     @cached_property
     def offset(self) -> Floats:
         """The offset o of each pixel in steps, 0 or 1/2; shape (n,)."""
-        return offsets(self.instance.grid) if self.norm == 2 else np.zeros(self.instance.grid.size)
+        return (
+            checkerboard_offsets(self.instance.grid) if self.norm == 2 else np.zeros(self.instance.grid.size)
+        )
 
     @cached_property
     def count(self) -> Ints:
@@ -96,14 +98,14 @@ class Lattice:
     @cached_property
     def allowed_count(self) -> Starts:
         """Number of allowed labels of each pixel, shape (n,)."""
-        found, some = np.zeros(len(self.count), np.int64), self.count > 0
-        found[some] = np.add.reduceat(self.allowed, self.start[:-1][some], dtype=np.int64)
-        return found
+        counts, filled = np.zeros(len(self.count), np.int64), self.count > 0
+        counts[filled] = np.add.reduceat(self.allowed, self.start[:-1][filled], dtype=np.int64)
+        return counts
 
     @cached_property
     def start(self) -> Starts:
         """Start of each pixel's labels in flat arrays, shape (n + 1,)."""
-        return starts(self.count)
+        return block_starts(self.count)
 
     @cached_property
     def pixel(self) -> Ints:
@@ -127,12 +129,12 @@ class Lattice:
         """The work of a pass, in additions of the product over alpha."""
         i, j = self.instance.grid.first, self.instance.grid.second
         rows, columns = self.alpha_count.astype(np.float64), self.beta_count.astype(np.float64)
-        over_beta = _LINEAR if self.norm == 2 else columns[j]
-        return float(2 * rows[j] @ (columns[i] * over_beta + self.allowed_count[i]))
+        fill_product_over_beta = _LINEAR if self.norm == 2 else columns[j]
+        return float(2 * rows[j] @ (columns[i] * fill_product_over_beta + self.allowed_count[i]))
 
     def share_starts(self, end: Ints) -> Starts:
         """Starts of the pairs' shares at one end (`first` or `second` of the grid), flat; shape (m + 1,)."""
-        return starts(self.count[end])
+        return block_starts(self.count[end])
 
     def unary_costs(self) -> Floats:
         """D of each label, flat: skew and stroke term; inf for labels that are not allowed."""
@@ -141,16 +143,16 @@ class Lattice:
         for begin in range(0, len(cost), _AT_ONCE):
             at = begin + np.flatnonzero(self.allowed[begin : begin + _AT_ONCE])
             alpha, beta = self.angles(at)
-            cost[at] = self.instance.skew_coefficient * self._skew(beta)
+            cost[at] = self.instance.skew_coefficient * self._skew_costs(beta)
             weight = weights[self.pixel[at]]
             held = np.flatnonzero(weight)
-            cost[at[held]] += weight[held] * self._misfit(at[held], alpha[held], beta[held])
+            cost[at[held]] += weight[held] * self._stroke_costs(at[held], alpha[held], beta[held])
         return cost
 
-    def _skew(self, beta: Floats) -> Floats:
+    def _skew_costs(self, beta: Floats) -> Floats:
         return np.abs(beta) if self.norm == 1 else beta**2 - self.h * self.h / 4
 
-    def _misfit(self, at: Starts, alpha: Floats, beta: Floats) -> Floats:
+    def _stroke_costs(self, at: Starts, alpha: Floats, beta: Floats) -> Floats:
         """The size of the angle from the stroke to the nearer line, less its deduction, at some labels."""
         pixel, half = self.pixel[at], self.h * self.h / 2
         target = np.zeros(self.instance.grid.size)
@@ -158,7 +160,7 @@ class Lattice:
         u = alpha + beta - target[pixel]
         v = wrap(alpha + HALF - beta - target[pixel], -HALF, np.pi)
         if self.norm == 2:
-            return self._squares(at, u, v, target)
+            return self._stroke_squares(at, u, v, target)
         u, slope = wrap(u, -HALF, np.pi), np.zeros(self.instance.grid.size)
         slope[self.instance.stroke_index] = self.slopes
         # A value that rounding could put on either side of 2 h takes the lesser cost, that of the near side.
@@ -169,7 +171,7 @@ class Lattice:
         away = np.abs(u - slope[pixel] / 2)
         return np.minimum(u * u - np.where(away < near, away * away, half), v * v - half)
 
-    def _squares(self, at: Starts, u: Floats, v: Floats, target: Floats) -> Floats:
+    def _stroke_squares(self, at: Starts, u: Floats, v: Floats, target: Floats) -> Floats:
         """In the 2-norm. One line and turn, u as at the centre, has its own deduction, even if v is near."""
         pixel, square = self.pixel[at], self.h * self.h
         k, l = self.steps(at)  # noqa: E741 - the letters of the equation
@@ -182,13 +184,13 @@ class Lattice:
         return np.minimum((u - np.pi * turn) ** 2 - lost * square, others**2 - square / 2)
 
 
-def labels_at(field: CrossField, lattice: Lattice) -> tuple[Floats, Floats, Ints]:
+def nearest_labels(field: CrossField, lattice: Lattice) -> tuple[Floats, Floats, Ints]:
     """Angles (n,) and jumps (m,) of a field, with the labels nearest to the centres of a lattice."""
     steps = np.round((lattice.alpha - field.alpha) / HALF).astype(np.int32)
     return step_labels(lattice.instance.grid, field.alpha, field.beta, field.p, steps)
 
 
-def offsets(grid: Grid) -> Floats:
+def checkerboard_offsets(grid: Grid) -> Floats:
     """0 on black pixels of the checkerboard (row + column even), 1/2 on white ones; shape (n,)."""
     return 0.5 * ((grid.rows + grid.columns) % 2).astype(np.float64)
 
@@ -202,18 +204,18 @@ def ranges(k: Ints, last_k: Ints, l: Ints, last_l: Ints) -> dict[str, Any]:  # n
     }  # fmt: skip
 
 
-def whole_ranges(beta: Floats, h: float, offset: Floats) -> dict[str, Any]:
+def full_ranges(beta: Floats, h: float, offset: Floats) -> dict[str, Any]:
     """The ranges round centres of those betas that hold every cross of the strip."""
     k = np.full(len(beta), round(QUARTER / h), np.int32)
-    return ranges(-k, k, *strip(beta, h, offset))
+    return ranges(-k, k, *beta_range(beta, h, offset))
 
 
-def starts(counts: Ints | Starts) -> Starts:
+def block_starts(counts: Ints | Starts) -> Starts:
     """Starts of consecutive blocks of those lengths, and the end of the last."""
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
 
 
-def strip(beta: Floats, h: float, offset: Floats) -> tuple[Ints, Ints]:
+def beta_range(beta: Floats, h: float, offset: Floats) -> tuple[Ints, Ints]:
     """Least and greatest step l so that the cells round the centres cover [-pi/4, pi/4]; shapes (n,)."""
     lower, upper = (-QUARTER - beta) / h - offset, (QUARTER - beta) / h - offset
     return np.floor(lower).astype(np.int32), np.ceil(upper).astype(np.int32)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from ..instance.grid import Floats
 from ..processes.compilation import compiled, compiled_in_any_order
-from .state import Ends, State
+from .state import RowEnds, State
 
 _NEAR: Final = 1  # terms on both sides of the best one of a row that come before the others
 
 
-class Terms(NamedTuple):
+class RightMatrix(NamedTuple):
     """The right matrix of a product, a lower bound of each of its rows, and room for a sum with each."""
 
     rows: Floats
@@ -27,21 +27,21 @@ class Terms(NamedTuple):
 
 
 @compiled
-def terms_of(rows: Floats) -> Terms:
+def right_matrix(rows: Floats) -> RightMatrix:
     """The right matrix of a product."""
     least = np.empty(rows.shape[0])
     for y in range(least.size):
-        least[y] = least_of(rows[y])
-    return Terms(rows, least, np.empty(least.size))
+        least[y] = least_value(rows[y])
+    return RightMatrix(rows, least, np.empty(least.size))
 
 
 @compiled
-def lower_row(target: Floats, left: Floats, terms: Terms, first: int, begin: int) -> float:
+def lower_row(target: Floats, left: Floats, terms: RightMatrix, first: int, begin: int) -> float:
     """Lower the target to the least of left[y] + rows[first + y, begin:], without y that cannot lower it.
 
     Returns the greatest that is left.
     """
-    sums, end, reached = terms.sums, begin + target.size, _most_of(target)
+    sums, end, reached = terms.sums, begin + target.size, _greatest_value(target)
     lowest = _add_up(left, terms.least[first : first + left.size], sums)
     if lowest >= reached:
         return reached
@@ -52,15 +52,15 @@ def lower_row(target: Floats, left: Floats, terms: Terms, first: int, begin: int
     for y in range(near, far):
         if sums[y] < np.inf:
             _lower(target, terms.rows[first + y, begin:end], left[y])
-    reached = _most_of(target)
+    reached = _greatest_value(target)
     for y in range(left.size):
         if sums[y] < reached and not near <= y < far:
             _lower(target, terms.rows[first + y, begin:end], left[y])
-    return _most_of(target)
+    return _greatest_value(target)
 
 
 @compiled
-def lower_rows(targets: Floats, left: Floats, terms: Terms, at: tuple[int, int]) -> float:
+def lower_rows(targets: Floats, left: Floats, terms: RightMatrix, at: tuple[int, int]) -> float:
     """Lower four rows to the least of left[:, y] + rows[y], without y that cannot lower any of them.
 
     targets (4, t), left (4, n), of terms (n, ...) with n >= 4. at: the columns of the terms that belong to
@@ -93,7 +93,7 @@ def min_plus(left: Floats, right: Floats) -> Floats:
 
 
 @compiled
-def min_plus_between(left: Floats, right: Floats, ends: Ends) -> Floats:
+def min_plus_between(left: Floats, right: Floats, ends: RowEnds) -> Floats:
     """The (min,+) product of two matrices between the ends of each row; elsewhere too great or inf."""
     out = np.empty((left.shape[0], right.shape[1]))
     out[:] = np.inf
@@ -106,21 +106,21 @@ def min_plus_between(left: Floats, right: Floats, ends: Ends) -> Floats:
     for begin in range(0, rows, 4):
         row = min(begin, rows - 4)
         low, high = ends[0][row : row + 4].min(), ends[1][row : row + 4].max()
-        first, end = _finite(left, row)
+        first, end = _finite_columns(left, row)
         for y in range(first, end, 4):
             _lower_four(out, left, right, (row, min(y, terms - 4)), (low, low, high))
     return out
 
 
 @compiled
-def _finite(left: Floats, row: int) -> tuple[int, int]:
+def _finite_columns(left: Floats, row: int) -> tuple[int, int]:
     """The first column with a number below inf in four rows of a matrix, and the one after the last."""
     first, end = left.shape[1], 0
-    for each in range(row, row + 4):
+    for line in range(row, row + 4):
         y, last = 0, left.shape[1]
-        while y < first and left[each, y] == np.inf:
+        while y < first and left[line, y] == np.inf:
             y += 1
-        while last > end and left[each, last - 1] == np.inf:
+        while last > end and left[line, last - 1] == np.inf:
             last -= 1
         first, end = min(first, y), max(end, last)
     return first, end
@@ -130,7 +130,7 @@ def _finite(left: Floats, row: int) -> tuple[int, int]:
 
 
 @compiled_in_any_order
-def least_of(values: Floats) -> float:
+def least_value(values: Floats) -> float:
     """The least value; infinity without any."""
     least = np.inf
     for x in range(values.size):
@@ -139,7 +139,7 @@ def least_of(values: Floats) -> float:
 
 
 @compiled_in_any_order
-def _most_of(values: Floats) -> float:
+def _greatest_value(values: Floats) -> float:
     most = -np.inf
     for x in range(values.size):
         most = max(most, values[x])
@@ -214,67 +214,69 @@ Line = tuple[float, float]
 """First value and step of equally spaced numbers."""
 
 
-class Given(NamedTuple):
+class RaggedMatrix(NamedTuple):
     """A matrix by alpha and beta, and the part of each row that is in use."""
 
     values: Floats
-    ends: Ends
+    ends: RowEnds
 
 
 class _Room(NamedTuple):
     """Room for parabolas of one width with their centres at 0, 1, ..., and for their envelope.
 
-    values: least value of each. kept: those of the envelope; begins: where each begins. slopes: half of the
-    reciprocal of the slope's change over each distance.
+    values: least value of each. envelope: those in it; begins: where each of them begins. slopes: half of
+    the reciprocal of the slope's change over each distance.
     """
 
     values: Floats
-    kept: NDArray[np.int64]
+    envelope: NDArray[np.int64]
     begins: Floats
     slopes: Floats
 
 
 @compiled
-def betas(pair: int, i: int, state: State, odd: bool) -> tuple[Line, Line]:
+def beta_lines(pair: int, i: int, state: State, odd: bool) -> tuple[Line, Line]:
     """The betas of end i of a pair, and those of the other end, negative for odd jumps."""
     first = state.beta[state.first[pair] + state.second[pair] - i]
     return (state.beta[i], state.h), ((-first, -state.h) if odd else (first, state.h))
 
 
 @compiled
-def least_cost(mine: Line, other: Line, counts: tuple[int, int], power: int) -> float:
+def least_beta_cost(line_i: Line, line_j: Line, counts: tuple[int, int], power: int) -> float:
     """A lower bound of 2 B^2 or 2 |B| over all betas, of which there are so many."""
-    high, end = mine[0] + mine[1] * (counts[0] - 1), other[0] + other[1] * (counts[1] - 1)
-    away = max(0.0, mine[0] - max(other[0], end), min(other[0], end) - high)
+    high, end = line_i[0] + line_i[1] * (counts[0] - 1), line_j[0] + line_j[1] * (counts[1] - 1)
+    away = max(0.0, line_i[0] - max(line_j[0], end), min(line_j[0], end) - high)
     return 2 * away * away if power == 2 else 2 * away
 
 
 @compiled
-def over_beta(given: Given, mine: Line, other: Line, power: int, out: Floats) -> None:
-    """Fill in the least over y of given[row, y] + 2 B^2 or 2 |B|, at betas x of one end."""
+def fill_product_over_beta(labels: RaggedMatrix, line_i: Line, line_j: Line, power: int, out: Floats) -> None:
+    """Fill in the least over y of labels[row, y] + 2 B^2 or 2 |B|, at betas x of one end."""
     if power == 2:
-        backwards = other[1] < 0
-        first = other[0] + other[1] * (given.values.shape[1] - 1) if backwards else other[0]
-        _over_squares(given, (first - mine[0]) / mine[1], 2 * mine[1] * mine[1], backwards, out)
+        backwards = line_j[1] < 0
+        first = line_j[0] + line_j[1] * (labels.values.shape[1] - 1) if backwards else line_j[0]
+        _fill_over_squares(labels, (first - line_i[0]) / line_i[1], 2 * line_i[1] * line_i[1], backwards, out)
     else:
-        _over_sizes(given, mine, other, out)
+        _fill_over_sizes(labels, line_i, line_j, out)
 
 
 @compiled
-def _over_squares(given: Given, apart: float, weight: float, backwards: bool, out: Floats) -> None:
-    """Fill in the least over y of given[row, y] + weight (x - y - apart)^2, counting y backwards or not."""
-    columns, ends = given.values.shape[1], given.ends
+def _fill_over_squares(
+    labels: RaggedMatrix, apart: float, weight: float, backwards: bool, out: Floats
+) -> None:
+    """Fill in the least over y of labels[row, y] + weight (x - y - apart)^2, counting y backwards or not."""
+    columns, ends = labels.values.shape[1], labels.ends
     room = _Room(np.empty(columns), np.empty(columns, np.int64), np.empty(columns + 1), np.empty(columns))
     for y in range(1, columns):
         room.slopes[y] = 0.5 / (weight * y)
-    for row in range(given.values.shape[0]):
+    for row in range(labels.values.shape[0]):
         begin, end = ends[0][row], ends[1][row]
         if backwards:
             begin, end = columns - end, columns - begin
         for y in range(begin, end):
-            room.values[y] = given.values[row, columns - 1 - y if backwards else y]
+            room.values[y] = labels.values[row, columns - 1 - y if backwards else y]
         if _find_envelope(room, begin, end) > 0:
-            _fill_in(room, apart, weight, out[row])
+            _fill_from_envelope(room, apart, weight, out[row])
         else:
             out[row] = np.inf
 
@@ -282,19 +284,19 @@ def _over_squares(given: Given, apart: float, weight: float, backwards: bool, ou
 @compiled
 def _find_envelope(room: _Room, first: int, end: int) -> int:
     """Find those of some parabolas of finite value that are the least somewhere; return their number."""
-    values, kept, begins = room.values, room.kept, room.begins
+    values, envelope, begins = room.values, room.envelope, room.begins
     count = 0
     for y in range(first, end):
         if values[y] == np.inf:
             continue
         begin = -np.inf
         while count > 0:
-            z = kept[count - 1]
+            z = envelope[count - 1]
             begin = (values[y] - values[z]) * room.slopes[y - z] + 0.5 * (y + z)
             if begin > begins[count - 1]:
                 break
             count -= 1
-        kept[count] = y
+        envelope[count] = y
         begins[count] = begin if count > 0 else -np.inf
         count += 1
     begins[count] = np.inf
@@ -302,26 +304,26 @@ def _find_envelope(room: _Room, first: int, end: int) -> int:
 
 
 @compiled
-def _fill_in(room: _Room, apart: float, weight: float, out: Floats) -> None:
+def _fill_from_envelope(room: _Room, apart: float, weight: float, out: Floats) -> None:
     """Fill in the envelope."""
     piece = 0
     for x in range(out.size):
         while room.begins[piece + 1] < x - apart:
             piece += 1
-        away = x - apart - room.kept[piece]
-        out[x] = room.values[room.kept[piece]] + weight * away * away
+        away = x - apart - room.envelope[piece]
+        out[x] = room.values[room.envelope[piece]] + weight * away * away
 
 
 @compiled
-def _over_sizes(given: Given, mine: Line, other: Line, out: Floats) -> None:
-    """Fill in the least over y of given[row, y] + 2 |x - y|."""
-    cost = np.empty((given.values.shape[1], out.shape[1]))
+def _fill_over_sizes(labels: RaggedMatrix, line_i: Line, line_j: Line, out: Floats) -> None:
+    """Fill in the least over y of labels[row, y] + 2 |x - y|."""
+    cost = np.empty((labels.values.shape[1], out.shape[1]))
     for y in range(cost.shape[0]):
         for x in range(cost.shape[1]):
-            cost[y, x] = 2 * abs(mine[0] + mine[1] * x - (other[0] + other[1] * y))
-    terms = terms_of(cost)
-    for row in range(given.values.shape[0]):
-        begin, end = given.ends[0][row], given.ends[1][row]
+            cost[y, x] = 2 * abs(line_i[0] + line_i[1] * x - (line_j[0] + line_j[1] * y))
+    terms = right_matrix(cost)
+    for row in range(labels.values.shape[0]):
+        begin, end = labels.ends[0][row], labels.ends[1][row]
         out[row] = np.inf
         if begin < end:
-            lower_row(out[row], given.values[row, begin:end], terms, begin, 0)
+            lower_row(out[row], labels.values[row, begin:end], terms, begin, 0)

@@ -16,10 +16,10 @@ from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
 from ..processes.process_groups import catch_interrupts
 from ..smooth.sparse_systems import one_thread
+from .absolute_descent import DescentIn1Norm, DescentInMixedNorm
 from .certificate import REFUSALS, checked_proof
 from .compiling import compile_proofs
-from .descent import Descent, Ends
-from .prove_absolute import DescentIn1Norm, DescentInMixedNorm
+from .descent import Descent, Termination
 from .record import Proof
 from .stroked import extended, restricted, stroked_parts
 
@@ -102,17 +102,17 @@ def prove(
     part = stroked_parts(instance)
     start = None if start is None else restricted(start, part)
     check_jobs(jobs)
-    given, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
-    with catch_interrupts() as interrupted, crew(given.threads or jobs) as threads:
+    chosen, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
+    with catch_interrupts() as interrupted, crew(chosen.threads or jobs) as threads:
 
         def over() -> bool:
             return interrupted() or asked()
 
-        end = given.deadline()
+        end = chosen.deadline()
         seconds = end.left()
         compile_proofs(progress, over)
         began = time.monotonic()
-        ends = Ends(Deadline.after(seconds, end.clock), over, given.gap, work or math.inf)
+        ends = Termination(Deadline.after(seconds, end.clock), over, chosen.gap, work or math.inf)
         first = DESCENTS[norm].first_field(part, start, ends.over)
         descent = DESCENTS[norm](part, first, ends, threads, seed, jobs, progress)
         proof = descent.proof(0.0, descent.run())

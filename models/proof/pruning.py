@@ -24,7 +24,7 @@ import numpy as np
 from ..instance.angles import QUARTER
 from ..instance.grid import Bools, Floats, Ints
 from ..processes.compilation import compiled
-from .lattice import Lattice, Starts, ranges, starts, strip
+from .lattice import Lattice, Starts, beta_range, block_starts, ranges
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class RemainingCells:
     beta_high: Floats
 
     @property
-    def nothing(self) -> bool:
+    def is_empty(self) -> bool:
         """Whether a pixel has no cell, so that no field is left."""
         return bool((np.add.reduceat(self.cells, self.lattice.start[:-1], dtype=np.int64) == 0).any())
 
@@ -54,9 +54,9 @@ class RemainingCells:
         return low, np.concatenate([self.alpha_high, self.beta_high])
 
 
-def boxed(lattice: Lattice, cells: Bools) -> RemainingCells:
+def bound_by_boxes(lattice: Lattice, cells: Bools) -> RemainingCells:
     """Cells that are left on a lattice, with the boxes round them."""
-    at = lattice.h * (_ends(lattice, cells) + lattice.offset[:, None])
+    at = lattice.h * (_vertex_ranges(lattice, cells) + lattice.offset[:, None])
     return RemainingCells(
         lattice, cells,
         lattice.alpha + at[:, 0], lattice.alpha + at[:, 1],
@@ -64,33 +64,33 @@ def boxed(lattice: Lattice, cells: Bools) -> RemainingCells:
     )  # fmt: skip
 
 
-def cells_left(lattice: Lattice, survives: Bools) -> Bools:
+def surviving_cells(lattice: Lattice, survives: Bools) -> Bools:
     """The cells whose vertices are allowed and of which one survives; both flat like the labels."""
     cells = np.zeros(len(survives), dtype=bool)
     _mark_cells(rectangles(lattice), lattice.allowed, survives, cells)
     return cells
 
 
-def finer(left: RemainingCells) -> Lattice:
+def finer_lattice(left: RemainingCells) -> Lattice:
     """The lattice of half the spacing on the cells that are left."""
     lattice = left.lattice
     h, half = lattice.h / 2, (lattice.offset > 0).astype(np.int32)
-    lowest, highest = strip(lattice.beta, h, lattice.offset)
-    ends = 2 * _ends(lattice, left.cells)
+    lowest, highest = beta_range(lattice.beta, h, lattice.offset)
+    ends = 2 * _vertex_ranges(lattice, left.cells)
     ends[:, 1] += half
     ends[:, 2], ends[:, 3] = np.maximum(ends[:, 2], lowest), np.minimum(ends[:, 3] + half, highest)
     new = replace(lattice, h=h, **ranges(*ends.T))
-    return _covering(left, new, 2, 3 + half)
+    return _allow_vertices(left, new, 2, 3 + half)
 
 
-def narrowed(left: RemainingCells) -> Lattice:
+def smaller_lattice(left: RemainingCells) -> Lattice:
     """The vertices of the cells that are left, as a lattice of the same spacing."""
     lattice = left.lattice
-    new = replace(lattice, **ranges(*_ends(lattice, left.cells).T))
-    return _covering(left, new, 1, np.full(len(lattice.count), 2, np.int32))
+    new = replace(lattice, **ranges(*_vertex_ranges(lattice, left.cells).T))
+    return _allow_vertices(left, new, 1, np.full(len(lattice.count), 2, np.int32))
 
 
-def _covering(left: RemainingCells, new: Lattice, times: int, side: Ints) -> Lattice:
+def _allow_vertices(left: RemainingCells, new: Lattice, times: int, side: Ints) -> Lattice:
     """The new lattice with the labels of `_allow` alone."""
     allowed = new.allowed
     allowed[:] = False
@@ -98,7 +98,7 @@ def _covering(left: RemainingCells, new: Lattice, times: int, side: Ints) -> Lat
     return new
 
 
-def prolonged_shares(old: Lattice, shares: tuple[Floats, Floats], new: Lattice) -> tuple[Floats, Floats]:
+def interpolate_shares(old: Lattice, shares: tuple[Floats, Floats], new: Lattice) -> tuple[Floats, Floats]:
     """Shares at both ends of all pairs, interpolated on a finer or smaller lattice with the same centres."""
     grid = old.instance.grid
     first, second = (np.zeros(int(new.share_starts(ends)[-1])) for ends in (grid.first, grid.second))
@@ -109,21 +109,21 @@ def prolonged_shares(old: Lattice, shares: tuple[Floats, Floats], new: Lattice) 
     return first, second
 
 
-def rows_of(lattice: Lattice) -> tuple[Starts, Starts, Starts]:
+def allowed_rows(lattice: Lattice) -> tuple[Starts, Starts, Starts]:
     """Where the rows of each pixel start, one for each alpha, and where the allowed labels of each row are.
 
     These are the first label and the one after the last; twice 0 in a row without any.
     """
-    start = starts(lattice.alpha_count)
+    start = block_starts(lattice.alpha_count)
     begin, end = np.zeros(start[-1], np.int64), np.zeros(start[-1], np.int64)
     _find_rows(rectangles(lattice), lattice.allowed, start, begin, end)
     return start, begin, end
 
 
-def _ends(lattice: Lattice, cells: Bools) -> Ints:
+def _vertex_ranges(lattice: Lattice, cells: Bools) -> Ints:
     """Least and greatest k, then l, of the vertices of each pixel's cells, shape (n, 4)."""
     ends = np.zeros((len(lattice.count), 4), np.int32)
-    _bounds(rectangles(lattice), cells, ends)
+    _find_vertex_ranges(rectangles(lattice), cells, ends)
     return ends + np.stack([lattice.alpha_first] * 2 + [lattice.beta_first] * 2, axis=1)
 
 
@@ -152,9 +152,9 @@ def _mark_cells(at: Rectangles, allowed: Bools, survives: Bools, cells: Bools) -
         for k in range(at.rows[i] - 1):
             for low in range(begin + k * columns, begin + (k + 1) * columns - 1):
                 high = low + columns
-                whole = allowed[low] and allowed[low + 1] and allowed[high] and allowed[high + 1]
-                some = survives[low] or survives[low + 1] or survives[high] or survives[high + 1]
-                cells[low] = whole and some
+                is_allowed = allowed[low] and allowed[low + 1] and allowed[high] and allowed[high + 1]
+                has_survivor = survives[low] or survives[low + 1] or survives[high] or survives[high + 1]
+                cells[low] = is_allowed and has_survivor
 
 
 @compiled
@@ -170,7 +170,7 @@ def _find_rows(at: Rectangles, allowed: Bools, start: Starts, begin: Starts, end
 
 
 @compiled
-def _bounds(at: Rectangles, cells: Bools, ends: Ints) -> None:
+def _find_vertex_ranges(at: Rectangles, cells: Bools, ends: Ints) -> None:
     """Find the first and last vertex of the cells in alpha and in beta, counted from the first label."""
     for i in range(len(at.rows)):
         low_k, high_k, low_l, high_l = at.rows[i], 0, at.columns[i], 0
@@ -210,23 +210,23 @@ def _interpolate(
     offset_and_allowed: tuple[Floats, Bools],
 ) -> None:
     """Fill in new shares at the allowed labels of those ends of pairs, bilinear between the old ones."""
-    (was, was_start, values), (now, now_start, found) = old, new
+    (was, was_start, values), (now, now_start, fine) = old, new
     offset, allowed = offset_and_allowed
     for pair in range(len(ends)):
         i = ends[pair]
-        given = values[was_start[pair] : was_start[pair + 1]].reshape((was.rows[i], was.columns[i]))
-        wanted = found[now_start[pair] : now_start[pair + 1]].reshape((now.rows[i], now.columns[i]))
-        mine = allowed[now.start[i] : now.start[i + 1]].reshape(wanted.shape)
+        coarse = values[was_start[pair] : was_start[pair + 1]].reshape((was.rows[i], was.columns[i]))
+        target = fine[now_start[pair] : now_start[pair + 1]].reshape((now.rows[i], now.columns[i]))
+        labels = allowed[now.start[i] : now.start[i + 1]].reshape(target.shape)
         for k in range(now.rows[i]):
             row, up = _between(now.first_row[i] + k, offset[i], ratio, was.first_row[i], was.rows[i])
             for l in range(now.columns[i]):  # noqa: E741 - the letter of the equation
-                if mine[k, l]:
+                if labels[k, l]:
                     column, right = _between(
                         now.first_column[i] + l, offset[i], ratio, was.first_column[i], was.columns[i]
                     )
-                    wanted[k, l] = (1 - up) * (
-                        (1 - right) * given[row, column] + right * given[row, column + 1]
-                    ) + up * ((1 - right) * given[row + 1, column] + right * given[row + 1, column + 1])
+                    target[k, l] = (1 - up) * (
+                        (1 - right) * coarse[row, column] + right * coarse[row, column + 1]
+                    ) + up * ((1 - right) * coarse[row + 1, column] + right * coarse[row + 1, column + 1])
 
 
 @compiled

@@ -21,47 +21,47 @@ from ..search.box_qp import FreeField
 from ..search.energy import LinearSolver
 from ..search.improvement import improved_field, settle
 from .dual import Dual
-from .passes import add, least_a, share_of, sized
+from .passes import add_to, least_a, shares_at, size_of
 from .state import Indices, State
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
 _HALF: Final = float(np.pi / 2)
 
-Improve = Callable[[CrossField, CrossField, Over], CrossField]
+BetterField = Callable[[CrossField, CrossField, Over], CrossField]
 """Returns the better of a rounded field and the best one so far, improved."""
 
 
 class Rounding:
     """Rounds fields from a dual, each set of jumps once."""
 
-    def __init__(self, dual: Dual, improve: Improve) -> None:
-        self._dual, self._improve = dual, improve
+    def __init__(self, dual: Dual, better_field: BetterField) -> None:
+        self._dual, self._better_field = dual, better_field
         self._tried: set[bytes] = set()
 
     def lower(self, best: CrossField, over: Over = never) -> CrossField:
         """`best`, or a lower field that the shares suggest; before and after it the last pass is backward."""
-        best = self._rounded(best, over, forwards=True)
+        best = self._round_dual(best, over, forwards=True)
         if over():
             return best
         self._dual.forward()
-        best = self._rounded(best, over, forwards=False)
+        best = self._round_dual(best, over, forwards=False)
         self._dual.backward()
         return best
 
-    def _rounded(self, best: CrossField, over: Over, *, forwards: bool) -> CrossField:
+    def _round_dual(self, best: CrossField, over: Over, *, forwards: bool) -> CrossField:
         instance = best.instance
         alpha, beta = decode(self._dual.state, forwards=forwards)
-        found = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
-        known = found.p.tobytes()
-        if known in self._tried:
+        rounded = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
+        jumps = rounded.p.tobytes()
+        if jumps in self._tried:
             return best
-        self._tried.add(known)
-        return self._improve(found, best, over)
+        self._tried.add(jumps)
+        return self._better_field(rounded, best, over)
 
 
-def improve(found: CrossField, best: CrossField, over: Over) -> CrossField:
+def better_field(rounded: CrossField, best: CrossField, over: Over) -> CrossField:
     """The field of lower 2-norm energy: the best field, or the new one, improved where that may pay."""
-    state = FreeField.of(found)
+    state = FreeField.of(rounded)
     settle(state, LinearSolver(), over)
     if state.energy >= best.energy().total * (1 - _BETTER):
         return best
@@ -92,7 +92,7 @@ def _decode(order: Indices, state: State, alpha: Floats, beta: Floats, fixed: Bo
             if fixed[j]:
                 _add_distance(i, state, alpha[j], beta[j], cost)
             else:
-                add(cost, share_of(pair, i, state))
+                add_to(cost, shares_at(pair, i, state))
         x = np.argmin(cost)
         alpha[i] = state.alpha[i] + state.h * (x // state.beta_count[i])
         beta[i] = state.beta[i] + state.h * (x % state.beta_count[i])
@@ -108,6 +108,6 @@ def _add_distance(i: int, state: State, alpha: float, beta: float, cost: Floats)
         even, odd = least_a(even), least_a(even + _HALF)
         for column in range(columns):
             mine = state.beta[i] + state.h * column
-            same = sized(even, state.power) + sized(mine - beta, state.power)
-            other = sized(odd, state.power) + sized(mine + beta, state.power)
-            cost[row * columns + column] += 2 * min(same, other)
+            with_even = size_of(even, state.power) + size_of(mine - beta, state.power)
+            with_odd = size_of(odd, state.power) + size_of(mine + beta, state.power)
+            cost[row * columns + column] += 2 * min(with_even, with_odd)

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from ..instance.grid import Floats, Grid, Ints
 from .lattice import Lattice, Starts
-from .pruning import rows_of
+from .pruning import allowed_rows
 
 Indices = NDArray[np.int64]
 """Numbers of pixels and pairs: all of one type, so that each function is compiled once."""
 
-Ends = tuple[Indices, Indices]
+RowEnds = tuple[Indices, Indices]
 """For each row of a matrix, the first column in use, and the one after the last."""
 
 
@@ -56,11 +56,11 @@ class State(NamedTuple):
     clusters: Clusters
 
 
-def state_of(lattice: Lattice, shares: tuple[Floats, Floats], clusters: Clusters) -> State:
+def state_on(lattice: Lattice, shares: tuple[Floats, Floats], clusters: Clusters) -> State:
     """A lattice as arrays, with shares at the first and at the second pixels of all pairs, and clusters."""
     grid = lattice.instance.grid
     unary = lattice.unary_costs()
-    row_start, begin, end = rows_of(lattice)
+    row_start, begin, end = allowed_rows(lattice)
     return State(
         lattice.h,
         lattice.alpha + lattice.h * (lattice.alpha_first + lattice.offset),

@@ -13,7 +13,7 @@ from .certificate import Certificate
 _MARGIN = 1e-9  # radians by which windows are wider than the boxes, to allow for rounding in solvers
 
 
-def windows_left(certificate: Certificate) -> Windows:
+def remaining_windows(certificate: Certificate) -> Windows:
     """Windows of the angles, and ranges of the jumps, of every field of at most the certificate's energy.
 
     Each box of the certificate is moved to the label that its field has in the gauge. If it exceeds the

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 from crossfield.models.instance.angles import HALF, QUARTER
-from crossfield.models.proof.clusters import clusters_on
+from crossfield.models.proof.clusters import zero_clusters
 from crossfield.models.proof.encoding import messages_of, tables_of
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.record import LevelRecord, Proof
@@ -126,7 +126,7 @@ class Table:
             np.concatenate([allowed.ravel() for *_, allowed in labels]),
         )
         shares = [np.concatenate([*each, []]) for each in (first, second)]
-        clusters = clusters_on(lattice, np.zeros(0, int))
+        clusters = zero_clusters(lattice, np.zeros(0, int))
         messages = messages_of(lattice, shares, QUANTUM)
         arrays = messages, tables_of(lattice, clusters, QUANTUM)
         return LevelRecord.on(lattice, arrays, bound=bound, energy=energy)

@@ -22,7 +22,7 @@ from crossfield.models.formulations.windows import Windows
 from crossfield.models.instance.instance import Instance
 from crossfield.models.proof.certificate import read_certificate
 from crossfield.models.proof.compiling import compile_all
-from crossfield.models.proof.tightening import windows_left
+from crossfield.models.proof.tightening import remaining_windows
 from crossfield.models.storage import replacing
 from machine import processor_name
 
@@ -172,7 +172,7 @@ def _windows(path: Path, instance: Instance) -> Windows:
     kept = path.with_suffix(".windows.npz")
     if not kept.exists() or kept.stat().st_mtime < path.stat().st_mtime:
         with replacing(kept) as file:
-            np.savez(file, **asdict(windows_left(read_certificate(path, on=instance))))
+            np.savez(file, **asdict(remaining_windows(read_certificate(path, on=instance))))
     with np.load(kept) as found:
         return Windows(**{name: array if array.ndim else array.item() for name, array in found.items()})
 

@@ -19,7 +19,7 @@ from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, formulate, with_windows
 from ....models.instance.file import read_document, read_instance
 from ....models.proof.certificate import Certificate, read_certificate
-from ....models.proof.tightening import windows_left
+from ....models.proof.tightening import remaining_windows
 from ....models.storage import read_bytes
 from ..plan.spec import Spec, spec_of
 
@@ -144,7 +144,7 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
 
 def tightened_by(certificate: Certificate, problem: Problem) -> Problem:
     """Return a problem in the windows that a certificate leaves."""
-    return with_windows(problem, windows_left(certificate))
+    return with_windows(problem, remaining_windows(certificate))
 
 
 def listed_jumps(problem: Problem) -> list[list[int]] | None:

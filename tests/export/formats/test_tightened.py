@@ -20,7 +20,7 @@ from crossfield.models.formulations.problem import formulate, with_windows
 from crossfield.models.formulations.windows import Windows
 from crossfield.models.instance.file import write_instance
 from crossfield.models.proof.certificate import read_certificate, write_certificate
-from crossfield.models.proof.tightening import windows_left
+from crossfield.models.proof.tightening import remaining_windows
 from exhaustive import exact, optimum, random_instance
 from plain_prover import proof_of
 
@@ -42,7 +42,7 @@ def problems(proof, name):
     """A formulation with the windows of the gauge, and with the narrowed ones."""
     recipe, field = FORMULATIONS[name], proof.field
     plain = formulate(field.instance, name, p=field.p if recipe.fixed else None)
-    return plain, with_windows(plain, windows_left(proof))
+    return plain, with_windows(plain, remaining_windows(proof))
 
 
 def test_windows_are_narrower_and_hold_the_optimum(proof):
@@ -79,7 +79,7 @@ def test_the_optimum_is_that_of_the_whole_problem(proof):
 )
 def test_windows_of_another_norm_keep_the_optimum_of_its_formulations(norm, formulations, tmp_path):
     found = cf.prove(random_instance(103, (2, 3), 9), norm=norm, jobs=1)
-    windows = windows_left(write_certificate(found, tmp_path / "it.npz"))
+    windows = remaining_windows(write_certificate(found, tmp_path / "it.npz"))
     for name in FORMULATIONS:
         problem = formulate(found.field.instance, name, p=found.field.p if FORMULATIONS[name].fixed else None)
         narrow = with_windows(problem, windows)
@@ -104,7 +104,7 @@ def test_no_better_field_is_cut_off(gauge, least, tmp_path):
         beta = np.clip(best.beta + np.random.default_rng(seed).normal(0, 0.02, 4), -np.pi / 4, np.pi / 4)
         best, worse = sorted((best, replace(best, beta=beta)), key=lambda field: field.energy().total)
         found = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
-        narrow = with_windows(formulate(instance, "minlp-parity"), windows_left(found))
+        narrow = with_windows(formulate(instance, "minlp-parity"), remaining_windows(found))
         assert narrow.violation(narrow.point(best)).worst < 1e-9
         plain = formulate(instance, "minlp-parity")
         checked += (narrow.upper - narrow.lower).sum() < 0.9 * (plain.upper - plain.lower).sum()
@@ -153,7 +153,7 @@ def test_what_does_not_fit_is_refused(proof, tmp_path, capsys):
     other = random_instance(104, (2, 3), 9)
     with pytest.raises(InputError, match="certificate of another instance"):
         read_certificate(path, on=other)
-    windows = windows_left(certificate)
+    windows = remaining_windows(certificate)
     with pytest.raises(InstanceError, match="window of beta number 0 is empty or beyond"):
         with_windows(
             formulate(certificate.field.instance, "miqp-exact"),

@@ -9,10 +9,10 @@ from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.compilation import crew
 from crossfield.models.proof import check_certificate
+from crossfield.models.proof.absolute_descent import forced_absolute
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.prove_absolute import forced_absolute
 from crossfield.models.proof.pruning import RemainingCells
 from crossfield.models.search.absolute_fit import Residuals, absolute_fit, fit_absolute
 from crossfield.models.search.starts import first_field

@@ -13,7 +13,7 @@ from crossfield.models.processes.compilation import crew
 from crossfield.models.processes.deadline import never
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import finer
+from crossfield.models.proof.pruning import finer_lattice
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 from labellings import discrete, least_labelling
@@ -183,7 +183,7 @@ def test_pruning_keeps_every_field_of_no_more_energy():
                 dual.quantise()
                 bound = dual.bound()
                 assert bound <= best.energy().total
-                lattice = finer(dual.remaining_cells(bound, energy))
+                lattice = finer_lattice(dual.remaining_cells(bound, energy))
                 dropped += (~lattice.allowed).sum()
                 assert holds(lattice, (best.alpha, best.beta))
                 for _ in range(20):

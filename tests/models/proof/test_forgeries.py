@@ -17,7 +17,7 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.instance.file import instance_of_arrays
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
-from crossfield.models.proof.clusters import clusters_on
+from crossfield.models.proof.clusters import zero_clusters
 from crossfield.models.proof.prove import prove
 from crossfield.models.search.absolute_fit import alternate_absolute
 from exhaustive import optimum, random_instance
@@ -40,7 +40,7 @@ def proof_of_kind(kind):
     proof = plain_prover.proof_of(field, levels=3, most=800)
     if kind == "tables":
         *before, last = proof.levels
-        clusters = clusters_on(last, np.zeros(1, int))
+        clusters = zero_clusters(last, np.zeros(1, int))
         tables = {
             "quads": field.instance.grid.first[clusters.quads[:, 0]].astype(np.int32),
             "table_steps": np.random.default_rng(3).integers(-1, 2, clusters.start[-1]).astype(np.int32),

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.processes.compilation import crew
-from crossfield.models.proof.clusters import clusters_on
+from crossfield.models.proof.clusters import zero_clusters
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.min_plus import Given, least_cost, min_plus, over_beta
-from crossfield.models.proof.passes import pair_minimum, product, share_of
+from crossfield.models.proof.min_plus import RaggedMatrix, fill_product_over_beta, least_beta_cost, min_plus
+from crossfield.models.proof.passes import fill_product, pair_minimum, shares_at
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 from labellings import discrete
@@ -46,17 +46,17 @@ def test_shares_and_minima_of_pairs_are_those_over_the_allowed_labels(seed):
     allowed = np.split(lattice.allowed, lattice.start[1:-1])
     with crew(1) as hands:
         state = Dual(lattice, hands).state
-    state = state._replace(clusters=clusters_on(lattice, np.arange(seed % 3 > 0)))
+    state = state._replace(clusters=zero_clusters(lattice, np.arange(seed % 3 > 0)))
     for values in (state.shares_first, state.shares_second, state.clusters.tables):
         values[:] = rng.normal(0, 0.5, len(values))
     for pair, (i, j, bare) in enumerate(discrete(lattice)[1]):
         cost = bare + dense_tables(state, pair, lattice)
         for mine, other, costs in ((i, j, cost), (j, i, cost.T)):
             out = np.full(lattice.count[mine], np.nan)
-            product(pair, mine, state, out)
-            most = (costs - share_of(pair, other, state))[:, allowed[other]].min(axis=1)
+            fill_product(pair, mine, state, out)
+            most = (costs - shares_at(pair, other, state))[:, allowed[other]].min(axis=1)
             np.testing.assert_allclose(out[allowed[mine]], most[allowed[mine]], rtol=0, atol=1e-12)
-        rest = cost - share_of(pair, i, state)[:, None] - share_of(pair, j, state)
+        rest = cost - shares_at(pair, i, state)[:, None] - shares_at(pair, j, state)
         least = rest[np.ix_(allowed[i], allowed[j])].min()
         assert pair_minimum(pair, state) == pytest.approx(least, abs=1e-12)
 
@@ -84,7 +84,7 @@ def test_products_over_beta_are_the_least_over_all_labels(power, seed):
     used = (np.arange(given.shape[1]) >= begin[:, None]) & (np.arange(given.shape[1]) < end[:, None])
     given[~used] = np.nan
     out = np.full((7, rng.integers(2, 40)), np.inf)
-    over_beta(Given(given, (begin, np.maximum(begin, end))), mine, other, power, out)
+    fill_product_over_beta(RaggedMatrix(given, (begin, np.maximum(begin, end))), mine, other, power, out)
     given[~used] = np.inf
     x, y = (
         first + step * np.arange(n) for (first, step), n in ((mine, out.shape[1]), (other, given.shape[1]))
@@ -92,4 +92,4 @@ def test_products_over_beta_are_the_least_over_all_labels(power, seed):
     cost = 2 * np.abs(x - y[:, None]) ** power
     np.testing.assert_allclose(out, (given[:, :, None] + cost).min(axis=1), rtol=1e-12, atol=1e-12)
     counts = (out.shape[1], given.shape[1])
-    assert least_cost(mine, other, counts, power) <= cost.min() * (1 + 1e-12) + 1e-15
+    assert least_beta_cost(mine, other, counts, power) <= cost.min() * (1 + 1e-12) + 1e-15

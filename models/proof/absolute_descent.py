@@ -32,11 +32,11 @@ def forced_absolute(left: RemainingCells, target: Floats | None = None) -> Force
     i, j = left.lattice.instance.grid.first, left.lattice.instance.grid.second
     most, even = at_pairs(left)[0], parity_sign(left.lattice.p) > 0
     above, below = np.maximum(left.beta_high, 0.0), np.maximum(-left.beta_low, 0.0)
-    same, other = np.where(even, above[j], below[j]), np.where(even, below[j], above[j])
-    unlike = np.maximum(np.minimum(above[i], other), np.minimum(below[i], same))
+    same, opposite = np.where(even, above[j], below[j]), np.where(even, below[j], above[j])
+    unlike = np.maximum(np.minimum(above[i], opposite), np.minimum(below[i], same))
     least = np.maximum(np.maximum(left.beta_low, -left.beta_high), 0.0)
-    given = np.where(unlike > 0, unlike, -np.minimum(least[i], least[j]))
-    pairs = (most <= HALF - MARGIN) & (most + given <= QUARTER - MARGIN)
+    growth = np.where(unlike > 0, unlike, -np.minimum(least[i], least[j]))
+    pairs = (most <= HALF - MARGIN) & (most + growth <= QUARTER - MARGIN)
     instance = left.lattice.instance
     at, target = instance.stroke_index, instance.target if target is None else target
     away = np.maximum(left.alpha_high[at] - target, target - left.alpha_low[at])
@@ -63,11 +63,11 @@ class AbsoluteDescent(Descent):
         around, slopes = fit_absolute(CrossField(instance, centre.alpha, centre.beta, jumps), self.norm)
         return Lattice.common(around, self.norm, slopes, COARSEST)
 
-    def improve(self, found: CrossField, best: CrossField, over: Over) -> CrossField:
+    def better_field(self, rounded: CrossField, best: CrossField, over: Over) -> CrossField:
         """The better one of a best field and a new one, fitted."""
-        return min(best, alternate_absolute(found, self.norm, over), key=self.energy)
+        return min(best, alternate_absolute(rounded, self.norm, over), key=self.energy)
 
-    def improved(self, field: CrossField, over: Over = never) -> CrossField:
+    def improve_field(self, field: CrossField, over: Over = never) -> CrossField:
         """The field, fitted."""
         return alternate_absolute(field, self.norm, over)
 
