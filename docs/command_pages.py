@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 from crossfield.export.cli.app import app as commands
-from crossfield.export.cli.help_texts import EXAMPLES, filled
+from crossfield.export.cli.help_texts import EXAMPLES, fill_names
 from sphinx.util.docutils import SphinxDirective
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def _cell(text: str) -> str:
 
 def _text(text: str) -> str:
     """A help text with names from the tables."""
-    paragraphs = filled(text).split("\n\n")
+    paragraphs = fill_names(text).split("\n\n")
     return "\n\n".join(" ".join(each.split()) for each in paragraphs)
 
 

@@ -58,7 +58,7 @@ class Manifest:
         """The problem that the files hold. Raises InputError, InstanceError, FormulationError."""
         instance = self.instance()
         try:
-            problem = narrowed(
+            problem = narrow_windows(
                 formulate(instance, self.formulation, p=self._jumps(instance), **self.document["options"]),
                 self._windows,
             )
@@ -68,7 +68,7 @@ class Manifest:
             raise InstanceError(
                 "does not fit its own instance, options and jumps; export again", file=self.path
             )
-        if self.document["columns"] != _columns(problem):
+        if self.document["columns"] != _column_blocks(problem):
             raise InstanceError(
                 "lists columns in another order than they have today; export again", file=self.path
             )
@@ -143,26 +143,26 @@ def add_to_manifest(problem: Problem, written: Written, folder: Path) -> Manifes
     """
     document = manifest_document(problem, [written], {})
     try:
-        earlier = read_manifest(_path(folder, stem_of(problem))).document
+        earlier = read_manifest(_manifest_path(folder, file_stem(problem))).document
     except CrossfieldError:
         earlier = {"sha256": ""}
     if earlier["sha256"] == problem.sha256:
         others = [file for file in earlier["files"] if file["name"] not in written.files]
         document |= {"files": others + document["files"], "refused": earlier["refused"]}
     write_instance(problem.instance, folder / instance_file(problem.instance))
-    return _write_document(document, folder, stem_of(problem))
+    return _write_document(document, folder, file_stem(problem))
 
 
 def _write_document(document: dict[str, Any], folder: Path, stem: str) -> Manifest:
-    path = write_bytes(_path(folder, stem), (json.dumps(document, indent=1) + "\n").encode())
+    path = write_bytes(_manifest_path(folder, stem), (json.dumps(document, indent=1) + "\n").encode())
     return Manifest(document, path)
 
 
-def _path(folder: Path, stem: str) -> Path:
+def _manifest_path(folder: Path, stem: str) -> Path:
     return folder / f"{stem}.manifest.json"
 
 
-def stem_of(problem: Problem) -> str:
+def file_stem(problem: Problem) -> str:
     """The name of a problem's files without suffixes."""
     return f"{problem.instance.name}.{problem.name}"
 
@@ -172,7 +172,7 @@ def instance_file(instance: Instance) -> str:
     return f"{instance.name}.instance.{'npz' if instance.grid.size > LARGE else 'json'}"
 
 
-def narrowed(problem: Problem, windows: Windows | None) -> Problem:
+def narrow_windows(problem: Problem, windows: Windows | None) -> Problem:
     """The problem with narrower windows, if there are any."""
     return problem if windows is None else with_windows(problem, windows)
 
@@ -213,12 +213,12 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
             "pairs": len(instance.grid.first),
             "stroke_pixels": len(instance.theta),
         },
-        "columns": _columns(problem),
+        "columns": _column_blocks(problem),
         "rows": [
             {"name": row.family.tag, "over": row.family.over, "count": row.count, "paper": row.family.paper}
             for row in problem.rows
         ],
-        "jumps": _listed_jumps(problem),
+        "jumps": _nonzero_jumps(problem),
         **tightening,
         "sha256": problem.sha256,
         "files": files,
@@ -227,7 +227,7 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
     }
 
 
-def _columns(problem: Problem) -> list[dict[str, Any]]:
+def _column_blocks(problem: Problem) -> list[dict[str, Any]]:
     """Blocks of columns in order, for the document."""
     return [
         {"name": block.name, "over": block.over, "first": block.offset, "count": block.count}
@@ -235,7 +235,7 @@ def _columns(problem: Problem) -> list[dict[str, Any]]:
     ]
 
 
-def _listed_jumps(problem: Problem) -> list[list[int]] | None:
+def _nonzero_jumps(problem: Problem) -> list[list[int]] | None:
     """[pair, jump] of every pair whose jump is data and not zero; None where jumps are variables."""
     if problem.jumps is None:
         return None

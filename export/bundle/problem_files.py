@@ -28,7 +28,7 @@ from ...models.processes.deadline import Progress, silent
 from ...models.storage import make_folder
 from ..formats.registry import DEFAULTS, FORMATS, carried, write
 from ..solvers_table import smallest
-from .manifest import LARGE, Manifest, narrowed, stem_of, write_manifest
+from .manifest import LARGE, Manifest, file_stem, narrow_windows, write_manifest
 from .starts import write_starts
 
 
@@ -76,7 +76,9 @@ def write_problem(
         raise InputError(f"a manifest cannot record {what}; write it as a single file")
     formats = tuple(formats)
     _check_formats(formats, dialects or {}, [problem.formulation])
-    return _write_set(problem, make_folder(folder), formats, start, dialects or {}, compress=compress)
+    return _write_problem_files(
+        problem, make_folder(folder), formats, start, dialects or {}, compress=compress
+    )
 
 
 @check_arguments
@@ -152,9 +154,13 @@ def write_all(
     folder, manifests = make_folder(folder), []
     for declaration in declarations:
         progress(declaration.name)
-        jumps = fixed_jumps(instance, declaration.name, jumps_of or start)
-        problem = narrowed(formulate(instance, declaration.name, p=jumps, **chosen(declaration)), windows)
-        manifests.append(_write_set(problem, folder, formats, start, dialects or {}, compress=compress))
+        jumps = jumps_as_data(instance, declaration.name, jumps_of or start)
+        problem = narrow_windows(
+            formulate(instance, declaration.name, p=jumps, **chosen(declaration)), windows
+        )
+        manifests.append(
+            _write_problem_files(problem, folder, formats, start, dialects or {}, compress=compress)
+        )
         del problem
         if instance.grid.size > LARGE:  # a problem is in a cycle with its families, and the collector counts
             gc.collect()  # objects, not their bytes
@@ -181,7 +187,7 @@ def _check_formats(
         raise UnsupportedByFormatError(f"nothing can be written: {', and '.join(reasons)}")
 
 
-def _write_set(
+def _write_problem_files(
     problem: Problem,
     folder: Path,
     formats: tuple[str, ...],
@@ -191,7 +197,7 @@ def _write_set(
     compress: bool,
 ) -> Manifest:
     """Write the files of a problem, its starting points and its manifest."""
-    stem, written, refused = stem_of(problem), [], {}
+    stem, written, refused = file_stem(problem), [], {}
     for name in dict.fromkeys(formats):
         entry = FORMATS[name]
         path = folder / f"{stem}{entry.suffix}{'.gz' if compress else ''}"
@@ -209,10 +215,10 @@ def _write_set(
 def is_recordable(problem: Problem) -> bool:
     """Whether formulation, options, jumps and windows determine a problem; nothing is fixed or lifted."""
     plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
-    return narrowed(plain, problem.windows).sha256 == problem.sha256
+    return narrow_windows(plain, problem.windows).sha256 == problem.sha256
 
 
-def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
+def jumps_as_data(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
     """The jumps that a formulation takes as data; None if they are variables. Raises FormulationError.
 
     They come from `start`, by default from the first field. All code that writes or solves a formulation by

@@ -70,12 +70,12 @@ class Start:
             yield b"c_ONE 1\n"
 
 
-def _list(start: Start) -> Iterator[bytes]:
+def _list_file(start: Start) -> Iterator[bytes]:
     yield f"# MIP start, objective {number(start.objective)}\n".encode()
     yield from start.lines()
 
 
-def _cplex(start: Start) -> Iterator[bytes]:
+def _cplex_file(start: Start) -> Iterator[bytes]:
     name = start.problem.instance.name  # letters, digits and underscores
     yield (
         '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>\n'
@@ -92,7 +92,7 @@ def _cplex(start: Start) -> Iterator[bytes]:
     yield b"</variables>\n</CPLEXSolution>\n</CPLEXSolutions>\n"
 
 
-def _highs(start: Start) -> Iterator[bytes]:
+def _highs_file(start: Start) -> Iterator[bytes]:
     yield b"Model status\nUnknown\n\n# Primal solution values\nFeasible\n"
     yield f"Objective {number(start.objective)}\n# Columns {start.form.column_count}\n".encode()
     yield from start.lines()
@@ -100,7 +100,7 @@ def _highs(start: Start) -> Iterator[bytes]:
     yield from start.activities()
 
 
-def _scip(start: Start) -> Iterator[bytes]:
+def _scip_file(start: Start) -> Iterator[bytes]:
     yield f"solution status: unknown\nobjective value: {number(start.objective)}\n".encode()
     yield from start.lines()
     for name, part in _objective_variables(start).items():
@@ -121,14 +121,14 @@ def _objective_variables(start: Start) -> dict[str, float]:
     return found
 
 
-def _slx(start: Start) -> Iterator[bytes]:
+def _slx_file(start: Start) -> Iterator[bytes]:
     yield f"NAME {start.problem.instance.name}\n".encode()
     yield from start.lines(b" C ")
     yield b"ENDATA\n"
 
 
 LAYOUTS: Final[dict[str, Callable[[Start], Iterator[bytes]]]] = {
-    "list": _list, "cplex": _cplex, "highs": _highs, "scip": _scip, "slx": _slx,
+    "list": _list_file, "cplex": _cplex_file, "highs": _highs_file, "scip": _scip_file, "slx": _slx_file,
 }  # fmt: skip
 """Functions that write a starting point, by the layout that the table of solvers names."""
 
@@ -136,7 +136,7 @@ STARTS: Final = {name: solver.start for name, solver in SOLVERS.items() if solve
 """The files of starting points, by solver."""
 
 
-def start_of(problem: Problem, field: CrossField) -> Start:
+def complete_start(problem: Problem, field: CrossField) -> Start:
     """The complete point of a field in the columns of the LP and MPS files.
 
     If LP and MPS cannot hold the problem, in the columns of the .nl file. Raises InstanceError when the field
@@ -157,8 +157,8 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
     """
     if solver not in STARTS:
         raise InputError(f"there is no start format of {solver!r}; choose one of {', '.join(STARTS)}")
-    start = start_of(problem, field)
-    refusal = _refusal(problem, start, solver)
+    start = complete_start(problem, field)
+    refusal = _reason_of_refusal(problem, start, solver)
     if refusal:
         raise UnsupportedBySolverError(refusal)
     save(Path(path), LAYOUTS[STARTS[solver].layout](start))
@@ -173,15 +173,15 @@ def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: 
     """
     if not problem.integer.any():
         return {}
-    start = start_of(problem, field)
-    solvers = [name for name in STARTS if not _refusal(problem, start, name)]
+    start = complete_start(problem, field)
+    solvers = [name for name in STARTS if not _reason_of_refusal(problem, start, name)]
     paths = {name: Path(folder) / f"{stem}.{name}{STARTS[name].suffix}" for name in solvers}
     for name, path in paths.items():
         save(path, LAYOUTS[STARTS[name].layout](start))
     return paths
 
 
-def _refusal(problem: Problem, start: Start, solver: str) -> str:
+def _reason_of_refusal(problem: Problem, start: Start, solver: str) -> str:
     """Reason why a solver does not start from a point of the problem, empty if it does."""
     taking = takes(problem, solver)
     if taking.answer == "no":

@@ -22,11 +22,11 @@ from . import options
 from .help_texts import Group
 from .inputs import (
     SAVED,
-    described_problem,
-    drawing_of,
-    field_or_instance,
-    formulations_of,
-    known,
+    check_names,
+    find_drawing,
+    full_formulation_names,
+    read_described_problem,
+    read_field_or_instance,
     read_start,
     require_suffix,
 )
@@ -38,9 +38,9 @@ from .output import (
     print_json,
     print_line,
     print_notice,
-    progress,
     show_lists,
     show_manifests,
+    show_progress,
     show_report,
 )
 from .prove_command import prove_command
@@ -100,16 +100,16 @@ def run_command(
     report.json contains all facts. Ctrl-C ends the run with the fields so far; a second Ctrl-C ends it now.
     """
     from ...models.processes.limits import Limits
-    from ..solving.run import plan, run
+    from ..solving.run import plan_sentence, run
 
     limits = Limits(time_limit, threads=threads)
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
         instance = sketch.instance(source, quiet=printing.quiet)
     if not (printing.quiet or printing.as_json):
-        print_line(plan(limits))
-    with progress(quiet=printing.quiet) as show:
-        report = run(instance, output, limits=limits, drawing=drawing_of(source), progress=show)
+        print_line(plan_sentence(limits))
+    with show_progress(quiet=printing.quiet) as show:
+        report = run(instance, output, limits=limits, drawing=find_drawing(source), progress=show)
     printing.show(report.document(), lambda: show_report(report, output))
     if report.interrupted:
         print_notice(f"interrupted: {report.interrupted}; report.json lists the results so far")
@@ -135,7 +135,7 @@ def instance_command(
     from ..pictures.mask import write_mask
 
     require_suffix(output, (".json", ".npz", ".png"))
-    with progress() as show:
+    with show_progress() as show:
         show("reading the sketch")
         instance = sketch.instance(source).with_weights(skew_weight=skew_weight)
         instance = instance if gauge is None else instance.with_gauge(gauge)
@@ -168,9 +168,9 @@ def export_command(
     from ..bundle.problem_files import write_all
     from ..formats.registry import DEFAULTS, FORMATS
 
-    formulations = formulations_of(formulation)
-    formats = known(file_format or list(DEFAULTS), FORMATS, "format")
-    with progress(quiet=printing.quiet) as show:
+    formulations = full_formulation_names(formulation)
+    formats = check_names(file_format or list(DEFAULTS), FORMATS, "format")
+    with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
         instance = SketchOptions(size).instance(source, quiet=printing.quiet)
         field, jumps_of, windows = read_start(start, instance), None, None
@@ -227,9 +227,9 @@ def read_command(
     from ..solutions.solution import read_solution
 
     require_suffix(output, SAVED)
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         show("reading the solution")
-        problem, held = described_problem(manifest)
+        problem, held = read_described_problem(manifest)
         answer = read_solution(solution, problem, held=held, tolerance=tolerance, solution=pick)
         if answer.point is None:
             words = answer.caveat and f"; claims {answer.caveat}"
@@ -261,9 +261,9 @@ def draw_command(
     from ..pictures.draw import SUFFIXES, draw
 
     require_suffix(output, tuple(SUFFIXES))
-    with progress() as show:
+    with show_progress() as show:
         show("reading")
-        subject = field_or_instance(source, on)
+        subject = read_field_or_instance(source, on)
         show("drawing")
         draw(subject, output, kind=kind, underlay=underlay)
     print_line(str(output))
@@ -315,11 +315,11 @@ def invoke(arguments: list[str]) -> int:
     except Exception as error:
         if "--debug" in arguments:
             raise
-        print_notice(_line(error))
+        print_notice(_error_line(error))
     return 1
 
 
-def _line(error: Exception) -> str:
+def _error_line(error: Exception) -> str:
     """One line about an error."""
     if isinstance(error, CrossfieldError):
         return str(error)

@@ -11,7 +11,7 @@ from typing import Any, Final
 from typer.core import TyperCommand, TyperGroup
 
 
-def _of(
+def _names_in(
     module: str, table: str, chosen: Callable[[Any], Iterable[str]] = list
 ) -> Callable[[], Iterable[str]]:
     """Function that imports a module and returns the names in one of its tables, or a choice of them."""
@@ -19,38 +19,42 @@ def _of(
 
 
 NAMES: Final = {
-    "formulations": _of("...models.formulations.catalogue", "FORMULATIONS"),
-    "short names": _of("...models.formulations.catalogue", "short_names", lambda short_names: short_names()),
-    "formats": _of("..formats.registry", "FORMATS"),
-    "default formats": _of("..formats.registry", "DEFAULTS"),
-    "methods": _of("..solving.methods", "METHODS"),
-    "kept method": _of("..solving.report", "KEPT", lambda name: [name]),
-    "bundled solvers": _of("..solvers_table", "BUNDLED"),
-    "all solvers": _of("..solvers_table", "SOLVERS"),
-    "programs": _of("..solvers_table", "PROGRAMS"),
-    "answers": _of(  # a description begins with the name of the program
+    "formulations": _names_in("...models.formulations.catalogue", "FORMULATIONS"),
+    "short names": _names_in(
+        "...models.formulations.catalogue", "short_names", lambda short_names: short_names()
+    ),
+    "formats": _names_in("..formats.registry", "FORMATS"),
+    "default formats": _names_in("..formats.registry", "DEFAULTS"),
+    "methods": _names_in("..solving.methods", "METHODS"),
+    "kept method": _names_in("..solving.report", "KEPT", lambda name: [name]),
+    "bundled solvers": _names_in("..solvers_table", "BUNDLED"),
+    "all solvers": _names_in("..solvers_table", "SOLVERS"),
+    "programs": _names_in("..solvers_table", "PROGRAMS"),
+    "answers": _names_in(  # a description begins with the name of the program
         "..solutions.readers.registry",
         "READERS",
         lambda readers: dict.fromkeys(re.split(r"[ ,]", reader.description)[0] for reader in readers),
     ),
-    "samples": _of("...models.sketch.samples", "SAMPLES"),
-    "size": _of("...models.sketch.read", "DEFAULT_SIZE", lambda size: [str(size)]),
-    "most weight": _of("...models.instance.instance", "MOST_WEIGHT", lambda weight: [f"{weight:,.0f}"]),
-    "stroke weight": _of("...models.instance.instance", "STROKE_WEIGHT", lambda weight: [f"{weight:g}"]),
-    "skew weight": _of("...models.instance.instance", "SKEW_WEIGHT", lambda weight: [f"{weight:g}"]),
-    "pictures": _of("..pictures.draw", "KINDS"),
-    "picture side": _of("..shading.raster", "SIDE", lambda side: [str(side)]),
-    "light": _of(
+    "samples": _names_in("...models.sketch.samples", "SAMPLES"),
+    "size": _names_in("...models.sketch.read", "DEFAULT_SIZE", lambda size: [str(size)]),
+    "most weight": _names_in("...models.instance.instance", "MOST_WEIGHT", lambda weight: [f"{weight:,.0f}"]),
+    "stroke weight": _names_in(
+        "...models.instance.instance", "STROKE_WEIGHT", lambda weight: [f"{weight:g}"]
+    ),
+    "skew weight": _names_in("...models.instance.instance", "SKEW_WEIGHT", lambda weight: [f"{weight:g}"]),
+    "pictures": _names_in("..pictures.draw", "KINDS"),
+    "picture side": _names_in("..shading.raster", "SIDE", lambda side: [str(side)]),
+    "light": _names_in(
         "..shading.colours",
         "UPPER_LEFT",
         lambda light: [f"{math.degrees(light.azimuth):.0f},{math.degrees(light.elevation):.0f}"],
     ),
-    "rungs": _of("..library.plan.spec", "RUNGS"),
+    "rungs": _names_in("..library.plan.spec", "RUNGS"),
 }
 """Words in braces in help texts, and the function that returns the names for each."""
 
 
-def filled(text: str) -> str:
+def fill_names(text: str) -> str:
     """The text with each word in braces replaced by the names of its table."""
     return re.sub(r"\{([a-z ]+)\}", lambda match: ", ".join(NAMES[match[1]]()), text)
 
@@ -92,12 +96,12 @@ EXAMPLES: Final = {
 _PANEL_OF: Final = {f"--{name}": panel for panel, names in PANELS.items() for name in names.split()}
 
 
-def _panel(option: Any) -> str:
+def _find_panel(option: Any) -> str:
     """The panel of an option; one without a name in the table belongs to the output."""
     return next((_PANEL_OF[name] for name in option.opts if name in _PANEL_OF), "Output")
 
 
-def _flag(option: Any) -> Any:
+def _hide_type_of_flag(option: Any) -> Any:
     """The option; without a type in its help if it takes no value."""
     if getattr(option, "is_flag", False):
         option.metavar = ""
@@ -109,11 +113,11 @@ class Group(TyperGroup):
 
     def __init__(self, *args: Any, **given: Any) -> None:
         super().__init__(*args, **given)
-        self.params = [_flag(each) for each in self.params]
+        self.params = [_hide_type_of_flag(each) for each in self.params]
 
     def get_help_option(self, ctx: Any) -> Any:
         """The option --help."""
-        return _flag(super().get_help_option(ctx))
+        return _hide_type_of_flag(super().get_help_option(ctx))
 
 
 class Command(TyperCommand):
@@ -122,8 +126,8 @@ class Command(TyperCommand):
     def __init__(self, *args: Any, **given: Any) -> None:
         super().__init__(*args, **given)
         for option in (each for each in self.params if each.param_type_name == "option"):
-            option.rich_help_panel = option.rich_help_panel or _panel(option)  # type: ignore[attr-defined]
-            _flag(option)
+            option.rich_help_panel = option.rich_help_panel or _find_panel(option)  # type: ignore[attr-defined]
+            _hide_type_of_flag(option)
         order = ["", *PANELS]
         self.params.sort(key=lambda each: order.index(getattr(each, "rich_help_panel", None) or ""))
 
@@ -131,8 +135,8 @@ class Command(TyperCommand):
         """The option --help, in its panel."""
         option = super().get_help_option(ctx)
         if option is not None:
-            option.rich_help_panel = _panel(option)
-        return _flag(option)
+            option.rich_help_panel = _find_panel(option)
+        return _hide_type_of_flag(option)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Fill the help texts of the command and of its parameters, then show them."""
@@ -149,4 +153,4 @@ class Command(TyperCommand):
         """The text with names from the tables, its brackets escaped where they would be markup."""
         from rich.markup import escape
 
-        return escape(filled(text)) if self.rich_markup_mode == "rich" else filled(text)
+        return escape(fill_names(text)) if self.rich_markup_mode == "rich" else fill_names(text)

@@ -24,7 +24,7 @@ def read_start(path: Path | None, instance: Instance) -> CrossField | None:
     return None if path is None else read_field(path, on=instance)
 
 
-def described_problem(path: Path) -> tuple[Problem, Mapping[str, Problem] | None]:
+def read_described_problem(path: Path) -> tuple[Problem, Mapping[str, Problem] | None]:
     """Problem of a manifest, or of an entry of a library by its sidecar, and the problem in each format.
 
     Raises InputError, InstanceError for a missing or damaged file.
@@ -43,7 +43,7 @@ def described_problem(path: Path) -> tuple[Problem, Mapping[str, Problem] | None
     return problem, manifest.held(problem)
 
 
-def field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:
+def read_field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:
     """Field or instance in a file; on: file of the instance of a .rawfield.
 
     Raises InputError for a file that holds neither.
@@ -77,7 +77,7 @@ def require_suffix(path: Path, allowed: tuple[str, ...]) -> None:
         raise InputError(f"has {has}, which selects no format; use {', '.join(allowed)}", file=path)
 
 
-def drawing_of(what: str) -> str | None:
+def find_drawing(what: str) -> str | None:
     """Drawing below the field of a sketch or a sample; None for an instance, which has no drawing."""
     from ...models.sketch.samples import SAMPLES
 
@@ -87,7 +87,7 @@ def drawing_of(what: str) -> str | None:
     return what if what in SAMPLES and SAMPLES[what].kind == "sketch" else None
 
 
-def known(names: list[str] | None, table: Mapping[str, Any], kind: str) -> list[str]:
+def check_names(names: list[str] | None, table: Mapping[str, Any], kind: str) -> list[str]:
     """The names without repetitions; all names of the table if none is given.
 
     Raises InputError for a name that is not in the table.
@@ -98,7 +98,7 @@ def known(names: list[str] | None, table: Mapping[str, Any], kind: str) -> list[
     return list(dict.fromkeys(names or table))
 
 
-def formulations_of(names: list[str] | None) -> list[str]:
+def full_formulation_names(names: list[str] | None) -> list[str]:
     """Formulations of full or short names, each once; all formulations if no name is given."""
     from ...models.formulations.catalogue import FORMULATIONS, declaration_of
 

@@ -11,7 +11,7 @@ import typer
 from .help_texts import FACTS, Group
 from .option_groups import command as command_of
 from .options import Folder, PrintOptions, Processes, Seconds
-from .output import print_line, print_notice, progress, show_table
+from .output import print_line, print_notice, show_progress, show_table
 
 if TYPE_CHECKING:
     from ..library.contributions.submit import Submission
@@ -66,7 +66,7 @@ def build_command(
     from ..library.building.build import build, records_of_changed_problems
     from ..library.plan.spec import default_spec, read_spec
 
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         show("reading the specification")
         wanted = default_spec() if spec == "default" else read_spec(spec)
         wanted = replace(wanted, points=None) if search else wanted
@@ -113,7 +113,7 @@ def get_command(
     chosen = [one for one in entries(rung=rung) if not asked or one.name in asked]
     if not chosen:
         raise InputError("no entry of the library that ships is selected; relax --rung")
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         written = write_entries(output, chosen, progress=show)
     number = sum(map(len, written.values()))
     printing.show(written, lambda: print_line(f"{output}: {number} files of {len(written)} entries"))
@@ -146,7 +146,7 @@ def solve_command(
     """Run the installed solvers on a library and add bounds, times and better points to its ledger.json."""
     from ..library.contributions.solve import solve_library
 
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         records = solve_library(
             folder,
             solvers=solver,
@@ -177,7 +177,7 @@ def verify_command(
 
     from ..library.building.verification import verify_library
 
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         defects = verify_library(folder, jobs=jobs, progress=show)
     result = f"defects: {len(defects)}" if defects else "no defects found"
     printing.show([asdict(defect) for defect in defects], lambda: print_line(f"{folder}: {result}"))
@@ -213,11 +213,12 @@ def submit_command(
     from ..library.contributions.submit import RunFacts, submit
 
     facts = RunFacts(solver, version, machine, by, date)
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         results = submit(folder, files, entry=entry, facts=facts, progress=show)
     columns = ("file", "result", "entry", "now")
     printing.show(
-        list(map(_submitted, results)), lambda: show_table(str(folder), columns, list(map(_row, results)))
+        list(map(_submission_document, results)),
+        lambda: show_table(str(folder), columns, list(map(_submission_row, results))),
     )
     for result in results:
         if result.reason:
@@ -226,7 +227,7 @@ def submit_command(
         raise typer.Exit(1)
 
 
-def _submitted(result: Submission) -> dict[str, object]:
+def _submission_document(result: Submission) -> dict[str, object]:
     """A result as JSON."""
     from dataclasses import asdict
 
@@ -236,7 +237,7 @@ def _submitted(result: Submission) -> dict[str, object]:
     }
 
 
-def _row(result: Submission) -> list[str]:
+def _submission_row(result: Submission) -> list[str]:
     """A row of the table of results, which leaves numbers to JSON so that it fits 80 columns."""
     more = f" +{len(result.entries) - 1}" if result.entries[1:] else ""
     return [
@@ -252,6 +253,6 @@ def site_command(folder: Library, output: Folder) -> None:
     """Write a static site about a library: a table of all entries and a page for each."""
     from ..library.site.site import write_site
 
-    with progress() as show:
+    with show_progress() as show:
         pages = write_site(folder, output, progress=show)
     print_line(f"{output}: {len(pages)} pages; open index.html")

@@ -15,10 +15,10 @@ from .help_texts import Command
 
 def command(app: typer.Typer, name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Decorator that adds a function to the app as a command of this name."""
-    return lambda function: app.command(name, cls=Command)(_with_option_groups(function))
+    return lambda function: app.command(name, cls=Command)(_expand_option_groups(function))
 
 
-def _with_option_groups(function: Callable[..., None]) -> Callable[..., None]:
+def _expand_option_groups(function: Callable[..., None]) -> Callable[..., None]:
     """Command in which each parameter whose type is a dataclass is replaced by one option per field.
 
     typer reads the options from the signature of the command. The function receives the dataclass.
@@ -29,7 +29,9 @@ def _with_option_groups(function: Callable[..., None]) -> Callable[..., None]:
         option
         for name, parameter in signature(function).parameters.items()
         for option in (
-            _options(groups[name]) if name in groups else [parameter.replace(annotation=hints[name])]
+            _option_parameters(groups[name])
+            if name in groups
+            else [parameter.replace(annotation=hints[name])]
         )
     ]
 
@@ -45,7 +47,7 @@ def _with_option_groups(function: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-def _options(group: Any) -> Iterator[Parameter]:
+def _option_parameters(group: Any) -> Iterator[Parameter]:
     """One keyword parameter per field of a dataclass."""
     hints = get_type_hints(group, include_extras=True)
     for field in fields(group):

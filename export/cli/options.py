@@ -26,7 +26,7 @@ _gap = partial(typer.Option, "--gap", min=0.0)
 _jobs = partial(typer.Option, "--jobs", min=1, max=MOST)
 
 
-def _norm(option: str, what: str) -> Any:
+def _norm_option(option: str, what: str) -> Any:
     """Option for a norm."""
     words = f"{what} in absolute values (1) or squares (2), where a formulation offers both."
     return typer.Option(option, min=1, max=2, help=words)
@@ -135,8 +135,8 @@ Facet = Annotated[
 ]
 
 
-StrokeNorm = Annotated[int | None, _norm("--stroke-norm", "Distance from the strokes")]
-BetaNorm = Annotated[int | None, _norm("--beta-norm", "Skew beta")]
+StrokeNorm = Annotated[int | None, _norm_option("--stroke-norm", "Distance from the strokes")]
+BetaNorm = Annotated[int | None, _norm_option("--beta-norm", "Skew beta")]
 Relax = Annotated[
     bool,
     typer.Option(

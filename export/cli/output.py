@@ -41,13 +41,13 @@ class InterruptedRunError(CrossfieldError):
 
 
 @contextmanager
-def progress(*, quiet: bool = False) -> Iterator[Progress]:
+def show_progress(*, quiet: bool = False) -> Iterator[Progress]:
     """Function that shows the current step on standard error, unless quiet.
 
     A terminal shows it next to a spinner and the time; elsewhere it is a line every few seconds. Raises
     InterruptedRunError for Ctrl-C, unless the work itself handles it.
     """
-    shown = nullcontext(silent) if quiet else _spinner() if sys.stderr.isatty() else _lines()
+    shown = nullcontext(silent) if quiet else _show_spinner() if sys.stderr.isatty() else _print_lines()
     try:
         with shown as show:
             yield show
@@ -56,7 +56,7 @@ def progress(*, quiet: bool = False) -> Iterator[Progress]:
 
 
 @contextmanager
-def _spinner() -> Iterator[Progress]:
+def _show_spinner() -> Iterator[Progress]:
     """Function that shows the current step next to a spinner and the time."""
     from rich import progress as rich
     from rich.console import Console
@@ -72,7 +72,7 @@ def _spinner() -> Iterator[Progress]:
 
 
 @contextmanager
-def _lines() -> Iterator[Progress]:
+def _print_lines() -> Iterator[Progress]:
     """Function that sets the current step, which a thread prints every few seconds with the time so far."""
     steps, ended, begin = deque(["starting"], maxlen=1), threading.Event(), time.monotonic()
 
@@ -135,21 +135,21 @@ def show_table(
     cells = [[printable(cell) for cell in row] for row in rows]
     shown = [list(columns), *cells] if header else cells
     print_line(typer.style(printable(title), bold=True))
-    fitting = ((widths, gap) for gap in ("  ", " ") if (widths := _widths(shown, width, len(gap))))
+    fitting = ((widths, gap) for gap in ("  ", " ") if (widths := _fit_widths(shown, width, len(gap))))
     widths, gap = next(fitting, (None, ""))
     if widths is None:
         for row in cells:
             named = (f"{name}: {cell}" for name, cell in zip(columns, row, strict=True))
-            print_line("\n".join(_wrapped(text, width) for text in named) + "\n")
+            print_line("\n".join(_wrap(text, width) for text in named) + "\n")
         return
     if header:
         shown.insert(1, ["-" * each for each in widths])
     right = [name in numbers for name in columns]
-    lines = [gap.join(parts).rstrip() for row in shown for parts in _lines_of(row, widths, right)]
+    lines = [gap.join(parts).rstrip() for row in shown for parts in _wrap_row(row, widths, right)]
     print_line("\n".join([*lines, ""] if header else lines))
 
 
-def _widths(rows: list[list[str]], width: int, gap: int) -> list[int] | None:
+def _fit_widths(rows: list[list[str]], width: int, gap: int) -> list[int] | None:
     """Widths of columns that fit, the widest ones narrowed first; None if a word would break."""
     columns = list(zip(*rows, strict=True))
     least = [max(len(word) for cell in column for word in [*cell.split(), "-"]) for column in columns]
@@ -159,9 +159,9 @@ def _widths(rows: list[list[str]], width: int, gap: int) -> list[int] | None:
     return next((widths for widths in caps if sum(widths) <= room), None)
 
 
-def _lines_of(row: list[str], widths: list[int], right: list[bool]) -> list[list[str]]:
+def _wrap_row(row: list[str], widths: list[int], right: list[bool]) -> list[list[str]]:
     """Lines of a row, in which longer cells are wrapped."""
-    cells = [_wrapped(cell, width, indent="").split("\n") for cell, width in zip(row, widths, strict=True)]
+    cells = [_wrap(cell, width, indent="").split("\n") for cell, width in zip(row, widths, strict=True)]
     return [
         [
             part.rjust(width) if at else part.ljust(width)
@@ -179,7 +179,7 @@ _LEGEND: Final = """\
 
 def show_report(report: Report, folder: Path) -> None:
     """Print the fields and files of a run, and which methods failed."""
-    from ..solving.methods import shown
+    from ..solving.methods import table_cells
 
     gap = ("gap",) if report.proven else ()  # the bound is the same for all
     columns = ("method", "2-norm", *gap, "1-norm", "off", "<45°", "sing.", "s", "status")
@@ -187,11 +187,11 @@ def show_report(report: Report, folder: Path) -> None:
     for candidate in report.candidates:
         facts = report.facts(candidate)
         mark = "*" if candidate is report.kept else ""
-        rows.append([candidate.method + mark, *shown(facts), _status(facts)])
+        rows.append([candidate.method + mark, *table_cells(facts), _describe_status(facts)])
     show_table(report.instance.summary, columns, rows, numbers=columns[1:-1])
     print_line(_LEGEND)
     for candidate in report.candidates:
-        if candidate.solution and (answer := _bound(report.facts(candidate))):
+        if candidate.solution and (answer := _describe_gap(report.facts(candidate))):
             print_line(f"  {candidate.method} {answer}")
     kept, best = report.facts(report.kept), report.facts(report.best)
     print_line(f"* kept: {folder / 'field.npz'} (.json, .rawfield)")
@@ -207,10 +207,10 @@ def show_report(report: Report, folder: Path) -> None:
     if report.surface is not None:
         doubts = "; ".join(report.surface.doubts)
         shaded = f"shaded surface: {folder / 'shaded.png'}"
-        print_line(_wrapped(f"no shaded surface: {doubts}" if doubts else shaded))
+        print_line(_wrap(f"no shaded surface: {doubts}" if doubts else shaded))
     print_line(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
     stages = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in report.stages.items())
-    print_line(_wrapped(f"{report.seconds:.1f} s: {stages}"))
+    print_line(_wrap(f"{report.seconds:.1f} s: {stages}"))
     for candidate in report.candidates:
         if candidate.interrupted:
             print_notice(f"{candidate.method}: interrupted; its best field so far was kept")
@@ -225,7 +225,7 @@ def _print_proof(report: Report, best: dict[str, Any]) -> None:
         print_line(f"  no field has less than {bound}; certificate: {report.proven.certificate}")
 
 
-def _wrapped(text: str, width: int = WIDTH, indent: str = "  ") -> str:
+def _wrap(text: str, width: int = WIDTH, indent: str = "  ") -> str:
     """The text in lines of at most this width, unless a word is longer."""
     return textwrap.fill(
         text,
@@ -237,21 +237,21 @@ def _wrapped(text: str, width: int = WIDTH, indent: str = "  ") -> str:
     )
 
 
-def _status(facts: dict[str, Any]) -> str:
+def _describe_status(facts: dict[str, Any]) -> str:
     """Status of a solver's answer, or that it is the start, without a proof that the start is optimal."""
     status = str(facts.get("status", ""))
-    return "start returned" if _returned_start(facts) else status
+    return "start returned" if _has_returned_start(facts) else status
 
 
-def _returned_start(facts: dict[str, Any]) -> bool:
+def _has_returned_start(facts: dict[str, Any]) -> bool:
     return bool(facts.get("start_returned")) and not str(facts["status"]).startswith("optimal")
 
 
-def _bound(facts: dict[str, Any]) -> str:
+def _describe_gap(facts: dict[str, Any]) -> str:
     """Gap between a solver's answer and its bound; empty if it is closed, or if there is no bound."""
     if str(facts["status"]).startswith("optimal"):
         return ""
-    how = "returned its start" if _returned_start(facts) else ""
+    how = "returned its start" if _has_returned_start(facts) else ""
     if facts["gap"] is None:
         return how and f"{how}, without a bound"
     words = f"objective {facts['objective_recomputed']:.4g}, bound {facts['dual_bound']:.4g}"
@@ -260,11 +260,11 @@ def _bound(facts: dict[str, Any]) -> str:
 
 def show_manifests(instance: Instance, documents: list[dict[str, Any]], folder: Path) -> None:
     """Print the files of an export by their manifests, and the reasons for files that were refused."""
-    names = list(dict.fromkeys(name for document in documents for name in _sizes(document)))
+    names = list(dict.fromkeys(name for document in documents for name in _sizes_of_models(document)))
     columns = ("formulation", "class", "columns", "rows", *names)
     rows = []
     for document in documents:
-        sizes, counts = _sizes(document), document["counts"]
+        sizes, counts = _sizes_of_models(document), document["counts"]
         written = [f"{sizes[name] / 1e3:.0f}" if name in sizes else "-" for name in names]
         size = [str(counts["columns"]), str(counts["rows"])]
         rows.append([document["formulation"], document["class"], *size, *written])
@@ -275,7 +275,7 @@ def show_manifests(instance: Instance, documents: list[dict[str, Any]], folder: 
     print_line(f"files: {folder}")
 
 
-def _sizes(document: dict[str, Any]) -> dict[str, int]:
+def _sizes_of_models(document: dict[str, Any]) -> dict[str, int]:
     """Size in bytes of the model file in each format."""
     from ..formats.registry import FORMATS
 
@@ -306,12 +306,12 @@ def show_surface(surface: Surface, folder: Path) -> None:
     facts = surface_facts(surface)
     sentences = ("doubts", "freedom", "firmness")
     show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in sentences})
-    print_line(_wrapped(f"firmness: {describe_firmness(surface.firmness)}"))
+    print_line(_wrap(f"firmness: {describe_firmness(surface.firmness)}"))
     for text in surface.freedom:
-        print_line(_wrapped(f"undetermined: {text}"))
+        print_line(_wrap(f"undetermined: {text}"))
     if surface.freedom:
         print_line(
-            _wrapped("--flip turns it inside out, --hint ROW,COLUMN,SLANT,TILT gives the normal at a pixel")
+            _wrap("--flip turns it inside out, --hint ROW,COLUMN,SLANT,TILT gives the normal at a pixel")
         )
     for doubt in surface.doubts:
         print_notice(f"in doubt: {doubt}")
@@ -321,11 +321,11 @@ def show_surface(surface: Surface, folder: Path) -> None:
 def show_facts(title: str, facts: dict[str, Any]) -> None:
     """Print facts as a table of two columns."""
     shown = {key: value for key, value in facts.items() if value or key not in _ONLY_IF_ANY}
-    rows = [[key.replace("_", " "), _text(value)] for key, value in shown.items()]
+    rows = [[key.replace("_", " "), _format_value(value)] for key, value in shown.items()]
     show_table(title, ("fact", "value"), rows, header=False)
 
 
-def _text(value: object) -> str:
+def _format_value(value: object) -> str:
     if value is None:
         return "not in the file"
     if isinstance(value, list):

@@ -11,7 +11,7 @@ import typer
 from ...models.errors import CrossfieldError
 from . import options
 from .inputs import read_start
-from .output import print_line, print_notice, progress, show_facts
+from .output import print_line, print_notice, show_facts, show_progress
 from .sketch_options import Size, SketchOptions
 
 if TYPE_CHECKING:
@@ -47,14 +47,14 @@ def prove_command(
     if check is not None:
         if source is not None or output is not None:
             raise typer.BadParameter("give --check FILE alone: the certificate contains the instance")
-        _check(check, printing)
+        _check_certificate(check, printing)
         return
     if source is None or output is None:
         raise typer.BadParameter("give a sketch, a sample or an instance, and -o DIR; or --check FILE")
     from ...models.processes.limits import Limits
     from ...models.proof.prove import prove
 
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
         instance = SketchOptions(size).instance(source, quiet=printing.quiet)
         proof = prove(
@@ -64,8 +64,8 @@ def prove_command(
             limits=Limits(time_limit, gap),
             progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
         )
-        document, failure = _write(proof, output)
-    printing.show(document, lambda: _show(proof, document, output))
+        document, failure = _write_proof(proof, output)
+    printing.show(document, lambda: _show_proof(proof, document, output))
     if instance.gauge == "box":
         print_notice("the proof is of the gauge strokes; its bound also holds in the gauge box")
     if proof.ended == "interrupted":
@@ -80,21 +80,21 @@ def prove_command(
         raise failure
 
 
-def _write(proof: Proof, folder: Path) -> tuple[dict[str, Any], CrossfieldError | None]:
+def _write_proof(proof: Proof, folder: Path) -> tuple[dict[str, Any], CrossfieldError | None]:
     """Write field, certificate and report of a proof; return the report, and why there is no certificate."""
     from ...models.field.file import write_field
     from ...models.storage import make_folder, remove_file, write_bytes
-    from ..solving.proven import certified
+    from ..solving.proven import certify
 
     stem = f"{proof.field.instance.name}.proof"
     path = make_folder(folder) / f"{stem}.certificate.npz"
     write_field(proof.field, folder / f"{stem}.field.npz")
     certificate, failure = None, None
     try:
-        certificate = certified(proof, path)
+        certificate = certify(proof, path)
     except CrossfieldError as error:
         failure = error
-    proven, bounds = _proven(proof, certificate)
+    proven, bounds = _proven_facts(proof, certificate)
     document = proven | {
         "reason": None if failure is None else str(failure),
         "seconds": proof.seconds,
@@ -110,14 +110,14 @@ def _write(proof: Proof, folder: Path) -> tuple[dict[str, Any], CrossfieldError 
     return document, failure
 
 
-def _proven(proof: Proof, certificate: Certificate | None) -> tuple[dict[str, Any], list[float]]:
+def _proven_facts(proof: Proof, certificate: Certificate | None) -> tuple[dict[str, Any], list[float]]:
     """Facts that are proven, and the bound of each level, as the checker confirms them."""
     if certificate is not None:
-        return facts(certificate), certificate.verdict.levels
-    return facts(proof) | {"status": UNPROVEN, "bound": 0.0, "gap": 1.0, "forced_jumps": 0}, []
+        return proof_facts(certificate), certificate.verdict.levels
+    return proof_facts(proof) | {"status": UNPROVEN, "bound": 0.0, "gap": 1.0, "forced_jumps": 0}, []
 
 
-def facts(source: Proof | Certificate) -> dict[str, Any]:
+def proof_facts(source: Proof | Certificate) -> dict[str, Any]:
     """Facts of a proof or a certificate, by name."""
     return {
         "instance": source.field.instance.name,
@@ -132,7 +132,7 @@ def facts(source: Proof | Certificate) -> dict[str, Any]:
     }
 
 
-def _show(proof: Proof, document: dict[str, Any], folder: Path) -> None:
+def _show_proof(proof: Proof, document: dict[str, Any], folder: Path) -> None:
     """Print the report without its levels, and the folder of the files."""
     shown = {key: value for key, value in document.items() if key != "levels"}
     show_facts(proof.field.instance.summary, shown)
@@ -140,12 +140,12 @@ def _show(proof: Proof, document: dict[str, Any], folder: Path) -> None:
     print_line(f"field, {certificate}report: {folder}")
 
 
-def _check(path: Path, printing: options.PrintOptions) -> None:
+def _check_certificate(path: Path, printing: options.PrintOptions) -> None:
     """Check a certificate and print its facts."""
     from ...models.proof.certificate import read_certificate
 
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         show("checking the certificate")
         found = read_certificate(path)
 
-    printing.show_facts(found.field.instance.summary, facts(found), "the certificate is valid")
+    printing.show_facts(found.field.instance.summary, proof_facts(found), "the certificate is valid")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 from ...models.errors import InputError, shortened
 from ...models.processes.deadline import Progress
 from . import options
-from .inputs import SAVED, drawing_of, field_or_instance
-from .output import progress, show_surface
+from .inputs import SAVED, find_drawing, read_field_or_instance
+from .output import show_progress, show_surface
 from .sketch_options import SketchOptions
 
 if TYPE_CHECKING:
@@ -46,22 +46,22 @@ def shade_command(
     from ...models.surface.lift import surface
     from ..surfaces.files import surface_document, write_surface
 
-    hints, lamp = hints_of(hint), light_of(light)
-    with progress(quiet=printing.quiet) as show:
+    hints, lamp = parse_hints(hint), parse_light(light)
+    with show_progress(quiet=printing.quiet) as show:
         show("reading")
-        saved = _saved_field(source, on)
+        saved = _read_saved_field(source, on)
         if saved is not None and sketch != SketchOptions():
             raise InputError(
                 "is a field, which has its own grid and strokes; omit the options that read a sketch",
                 file=source,
             )
         if saved is None:
-            field = _bend_field(sketch.instance(source, quiet=printing.quiet), show)
-            underlay = underlay or drawing_of(source)
+            field = _compute_field(sketch.instance(source, quiet=printing.quiet), show)
+            underlay = underlay or find_drawing(source)
         else:
             field = saved
         solid = surface(field, hints, flip=flip, progress=show)
-        about = _about("bend" if saved is None else None, hints, lamp, flip=flip)
+        about = _describe_choices("bend" if saved is None else None, hints, lamp, flip=flip)
         show("drawing and writing")
         write_surface(solid, output, drawing=underlay, light=lamp, scale=scale, about=about)
         if saved is None:
@@ -69,18 +69,18 @@ def shade_command(
     printing.show(surface_document(solid, about), lambda: show_surface(solid, output))
 
 
-def _saved_field(source: str, on: Path | None) -> CrossField | None:
+def _read_saved_field(source: str, on: Path | None) -> CrossField | None:
     """Field in a file; None for a sketch, sample or instance. Raises InputError."""
     from ...models.field.field import CrossField
 
     path = Path(source)
     if on is None and not (path.is_file() and path.suffix.lower() in SAVED):
         return None
-    content = field_or_instance(path, on)
+    content = read_field_or_instance(path, on)
     return content if isinstance(content, CrossField) else None
 
 
-def _bend_field(instance: Instance, show: Progress) -> CrossField:
+def _compute_field(instance: Instance, show: Progress) -> CrossField:
     """The field of the method bend."""
     from ...models.smooth.bend import bend_field
     from ...models.smooth.polyvector import HOLDS, polyvector_field
@@ -89,13 +89,13 @@ def _bend_field(instance: Instance, show: Progress) -> CrossField:
     return bend_field(polyvector_field(instance, hold=max(HOLDS)))
 
 
-def hints_of(texts: list[str] | None) -> tuple[Hint, ...]:
+def parse_hints(texts: list[str] | None) -> tuple[Hint, ...]:
     """Hints from texts in degrees. Raises InputError for a malformed text."""
     from ...models.surface.hints import Hint
 
     hints = []
     for text in texts or ():
-        row, column, slant, tilt = _numbers(text, "--hint ROW,COLUMN,SLANT,TILT", "12,30,45,90")
+        row, column, slant, tilt = _parse_numbers(text, "--hint ROW,COLUMN,SLANT,TILT", "12,30,45,90")
         if row % 1 or column % 1:
             raise InputError(
                 f"--hint {shortened(text)}: row and column must be whole numbers, as in 12,30,45,90"
@@ -104,17 +104,17 @@ def hints_of(texts: list[str] | None) -> tuple[Hint, ...]:
     return tuple(hints)
 
 
-def light_of(text: str | None) -> Light:
+def parse_light(text: str | None) -> Light:
     """Light from a text in degrees, or from the upper left. Raises InputError for a malformed text."""
     from ..shading.colours import UPPER_LEFT, Light
 
     if text is None:
         return UPPER_LEFT
-    azimuth, elevation = _numbers(text, "--light AZIMUTH,ELEVATION", "135,45")
+    azimuth, elevation = _parse_numbers(text, "--light AZIMUTH,ELEVATION", "135,45")
     return Light(math.radians(azimuth), math.radians(elevation))
 
 
-def _numbers(text: str, option: str, example: str) -> list[float]:
+def _parse_numbers(text: str, option: str, example: str) -> list[float]:
     """Finite numbers separated by commas, as many as in the example. Raises InputError."""
     try:
         numbers = [float(part) for part in text.split(",")]
@@ -125,7 +125,9 @@ def _numbers(text: str, option: str, example: str) -> list[float]:
     return numbers
 
 
-def _about(method: str | None, hints: tuple[Hint, ...], lamp: Light, *, flip: bool) -> dict[str, Any]:
+def _describe_choices(
+    method: str | None, hints: tuple[Hint, ...], lamp: Light, *, flip: bool
+) -> dict[str, Any]:
     """Method, hints and light of a surface, for its report; angles in degrees."""
     return {
         "method": method,

@@ -10,14 +10,14 @@ import typer
 from ...models.errors import InputError, SolutionError, SolverError
 from ...models.processes.deadline import Deadline
 from . import options
-from .inputs import formulations_of, known, read_start
-from .output import print_notice, progress
+from .inputs import check_names, full_formulation_names, read_start
+from .output import print_notice, show_progress
 from .sketch_options import Size, SketchOptions
 
 if TYPE_CHECKING:
     from ..solutions.solution import Solution
     from ..solving.methods import Candidate, Request
-    from ..solving.proven import Proven
+    from ..solving.proven import ProvenBound
 
 
 def solve_command(
@@ -45,7 +45,7 @@ def solve_command(
 
     if (formulation is None) == (method is None):
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
-    with progress(quiet=printing.quiet) as show:
+    with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
         instance = SketchOptions(size).instance(source, quiet=printing.quiet)
         request = Request(
@@ -57,9 +57,9 @@ def solve_command(
         )
         if method is not None:
             _check_method(method, solver, relax=relax)
-            candidate, proven, reason, target = _by_method(method, request)
+            candidate, proven, reason, target = _solve_by_method(method, request)
         else:
-            solution, target = _by_solver(str(formulation), solver, request, relax=relax)
+            solution, target = _solve_by_solver(str(formulation), solver, request, relax=relax)
     if method is not None:
         _print_candidate(candidate, proven, target, printing)
         if reason:
@@ -83,19 +83,19 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
 
     if name not in METHODS and name in {*FORMULATIONS, *short_names()}:
         raise typer.BadParameter(f"{name} is a formulation, not a method; write -f {name}")
-    known([name], METHODS, "method")
+    check_names([name], METHODS, "method")
     if relax:
         raise typer.BadParameter("--relax needs --formulation; methods do not take it")
     if solver is not None:
         raise typer.BadParameter(f"--solver {solver}: the method {name} has its own solvers")
 
 
-def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, str, Path]:
+def _solve_by_method(name: str, request: Request) -> tuple[Candidate, ProvenBound | None, str, Path]:
     """Final field of a method, its proof if any, why a proof has no bound, and the file of the field."""
     from ...models.field.file import write_field
     from ...models.storage import make_folder, remove_file
     from ..solving.methods import METHODS
-    from ..solving.proven import Proven
+    from ..solving.proven import ProvenBound
 
     target = make_folder(request.folder) / f"{request.instance.name}.{name}.field.npz"
     *_, candidate = METHODS[name].find(request)
@@ -104,24 +104,26 @@ def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, s
         return candidate, None, "", target
     certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
     try:
-        return candidate, Proven.by(candidate.proof, certificate), "", target
+        return candidate, ProvenBound.by(candidate.proof, certificate), "", target
     except SolverError as error:
         remove_file(certificate)  # it is of an earlier proof
         return candidate, None, str(error), target
 
 
-def _by_solver(name: str, solver: str | None, request: Request, *, relax: bool) -> tuple[Solution, Path]:
+def _solve_by_solver(
+    name: str, solver: str | None, request: Request, *, relax: bool
+) -> tuple[Solution, Path]:
     """Solution of one formulation, and the path of its field, which exists if the solution has a point."""
     from ...models.field.file import write_field
     from ...models.formulations.problem import formulate
-    from ..bundle.problem_files import fixed_jumps
+    from ..bundle.problem_files import jumps_as_data
     from ..solving.local import solve
 
-    (name,) = formulations_of([name])
+    (name,) = full_formulation_names([name])
     instance, deadline = request.instance, Deadline.after(request.limits.time_limit)
     request.progress("greedy start")
     start = request.begin(deadline)
-    problem = formulate(instance, name, p=fixed_jumps(instance, name, start), relax=relax)
+    problem = formulate(instance, name, p=jumps_as_data(instance, name, start), relax=relax)
     limits = request.limits.until(deadline)
     request.progress(f"solving {name}, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far")
     solution = solve(problem, solver, folder=request.folder, limits=limits, start=start)
@@ -134,7 +136,7 @@ def _by_solver(name: str, solver: str | None, request: Request, *, relax: bool) 
 
 
 def _print_candidate(
-    candidate: Candidate, proven: Proven | None, field: Path, printing: options.PrintOptions
+    candidate: Candidate, proven: ProvenBound | None, field: Path, printing: options.PrintOptions
 ) -> None:
     """Print the facts of a method's field and the path of its file."""
     facts = candidate.facts()

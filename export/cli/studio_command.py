@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from ...models.errors import InputError
-from .output import print_line, progress
+from .output import print_line, show_progress
 
 
 def studio_command(
@@ -43,9 +43,9 @@ def studio_command(
         raise InputError(
             f"studio needs the package {error.name}; pip install 'crossfield[studio]'"
         ) from error
-    with progress() as show:
+    with show_progress() as show:
         show("reading the drawing")
-        first = None if drawing is None else _opened(drawing)
+        first = None if drawing is None else _read_strokes(drawing)
     token = secrets.token_urlsafe(24)
     with listening(port) as place:
         address = f"http://{LOOPBACK}:{place.getsockname()[1]}/{token}/"
@@ -56,7 +56,7 @@ def studio_command(
         serve(place, token, first)
 
 
-def _opened(drawing: str) -> dict[str, Any]:
+def _read_strokes(drawing: str) -> dict[str, Any]:
     """Strokes of a file or a sample. Raises InputError."""
     from ...models.errors import naming
     from ...models.sketch.drawing_file import read_file

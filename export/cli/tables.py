@@ -11,7 +11,7 @@ from ...models.sketch.samples import samples
 from ..formats.registry import FORMATS, carried
 from ..solutions.readers.registry import READERS
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, smallest, takers
-from ..solving.local import format_for
+from ..solving.local import choose_format
 from ..solving.methods import METHODS
 
 Row = dict[str, Any]
@@ -35,7 +35,7 @@ def tables() -> Tables:
         ),
         "solvers": (
             ("formulation", *BUNDLED),
-            [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()],
+            [_solver_row(problem, relaxed) for problem, relaxed in _list_relaxations()],
         ),
         "externals": (("formulation", *SOLVERS), [_external_row(problem) for problem in smallest_problems()]),
         "methods": (
@@ -54,7 +54,7 @@ def smallest_problems() -> list[Problem]:
     return [smallest(declare(name)) for name in FORMULATIONS]
 
 
-def _with_relaxations() -> list[tuple[Problem, bool]]:
+def _list_relaxations() -> list[tuple[Problem, bool]]:
     rows: list[tuple[Problem, bool]] = []
     for name, recipe in FORMULATIONS.items():
         rows.append((smallest(declare(name)), False))
@@ -67,10 +67,10 @@ def _formulation_row(problem: Problem) -> Row:
     recipe = FORMULATIONS[problem.name]
     row: Row = {"name": problem.name, "short": recipe.short, "paper": recipe.paper}
     row |= {"class": recipe.kind, "summary": recipe.summary}
-    return row | {name: _carriage(problem, name) for name in FORMATS}
+    return row | {name: _describe_support(problem, name) for name in FORMATS}
 
 
-def _carriage(problem: Problem, name: str) -> str:
+def _describe_support(problem: Problem, name: str) -> str:
     try:
         held = carried(problem, FORMATS[name])
     except UnsupportedByFormatError:
@@ -91,7 +91,7 @@ def _format_row(name: str) -> Row:
 
 
 def _solver_row(problem: Problem, relaxed: bool) -> Row:
-    taking = {name: format_for(problem, name) for name in BUNDLED}
+    taking = {name: choose_format(problem, name) for name in BUNDLED}
     answers = {name: "yes" if each.answer == "yes" else each.reason for name, each in taking.items()}
     return {"formulation": f"{problem.name}, relaxed" if relaxed else problem.name} | answers
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from . import options
-from .inputs import known
-from .output import print_line, print_notice, progress, show_table
+from .inputs import check_names
+from .output import print_line, print_notice, show_progress, show_table
 
 if TYPE_CHECKING:
     from ..verify.checks import Verification
@@ -29,17 +29,17 @@ def verify_command(
     from ..solvers_table import PROGRAMS
     from ..verify.verify import verify
 
-    programs = known(program, PROGRAMS, "program")
-    with progress(quiet=printing.quiet) as show:
+    programs = check_names(program, PROGRAMS, "program")
+    with show_progress(quiet=printing.quiet) as show:
         found = verify(folder, seconds=solve, programs=programs, progress=show)
-    printing.show(found.document(), lambda: _show(found))
+    printing.show(found.document(), lambda: _show_verification(found))
     for check in found.bad:
         print_notice(f"{check.file}: {check.program}: {check.verdict}: {check.reason}")
     if not found.ok:
         raise typer.Exit(1)
 
 
-def _show(found: Verification) -> None:
+def _show_verification(found: Verification) -> None:
     """Print the number of files by program, step and verdict, and the absent programs."""
     verdicts = list(dict.fromkeys(check.verdict for check in found.checks))
     columns = ("program", "step", *map(str, verdicts))

@@ -104,12 +104,12 @@ def solve(
         When a file cannot be written.
 
     """
-    chosen = solver_for(problem, solver)
+    chosen = choose_solver(problem, solver)
     with Solvers() as solvers:
         return solvers.solve(problem, chosen.name, folder=folder, limits=limits, start=start, stop=stop)
 
 
-def solver_for(problem: Problem, name: str | None = None) -> Solver:
+def choose_solver(problem: Problem, name: str | None = None) -> Solver:
     """Return the solver of that name, or the preferred one of those that come with crossfield.
 
     A solver whose format holds a weaker relaxation of the problem comes after the others. Raises InputError
@@ -121,12 +121,12 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
     candidates = (
         [SOLVERS[name]] if name else [s for s in BUNDLED.values() if problem.problem_class not in s.not_for]
     )
-    taking = {solver.name: format_for(problem, solver.name) for solver in candidates}
+    taking = {solver.name: choose_format(problem, solver.name) for solver in candidates}
     willing = [solver for solver in candidates if taking[solver.name].answer == "yes"]
     if not willing:
         reasons = ", ".join(f"{solver} ({found.reason})" for solver, found in taking.items())
         raise UnsupportedBySolverError(
-            f"{problem.name} is {_described(problem)}, which is not for {reasons}; "
+            f"{problem.name} is {_describe_class(problem)}, which is not for {reasons}; "
             "`crossfield list` shows the problems that each solver takes; or relax it"
         )
     present = [solver for solver in willing if not solver.missing]
@@ -136,7 +136,7 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
     return min(present, key=lambda each: carried(problem, formats[each.name]).formulation.is_weakened)
 
 
-def format_for(problem: Problem, solver: str) -> Taking:
+def choose_format(problem: Problem, solver: str) -> Taking:
     """Return the format in which a solver gets a problem, or the reason why it does not take the problem.
 
     An answer without proof is accepted only from a solver that never proves anything.
@@ -151,11 +151,11 @@ def format_for(problem: Problem, solver: str) -> Taking:
     return found[0]
 
 
-def _described(problem: Problem) -> str:
+def _describe_class(problem: Problem) -> str:
     return f"{'a convex' if problem.convex else 'a non-convex'} {problem.problem_class}"
 
 
-class Files(NamedTuple):
+class SolveFiles(NamedTuple):
     """The files of a solve: model, solution in the solver's own layout, log, and starting point."""
 
     model: Path
@@ -184,7 +184,7 @@ class Solvers:
 
     def __enter__(self) -> Self:
         """Create the folder for the programs' own files."""
-        self._folder = Path(self._stack.enter_context(_folder()))
+        self._folder = Path(self._stack.enter_context(_open_folder()))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -236,10 +236,10 @@ class Solvers:
         """Solve a problem; parameters, result and errors are those of the function `solve`."""
         limits = Limits.bounded(limits)
         deadline = Deadline.after(limits.time_limit)
-        with _folder(folder) as place:
-            taking = format_for(problem, solver)
+        with _open_folder(folder) as place:
+            taking = choose_format(problem, solver)
             stem = f"{problem.instance.name}.{problem.name}"
-            files = Files.for_model(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
+            files = SolveFiles.for_model(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
             written = write(problem, files.model, start=start if FORMATS[taking.format].starts else None)
             if folder is not None and is_recordable(problem):
                 add_to_manifest(problem, written, place)
@@ -251,7 +251,7 @@ class Solvers:
         self,
         held: Problem,
         solver: str,
-        files: Files,
+        files: SolveFiles,
         limits: Limits,
         deadline: Deadline,
         *,
@@ -268,7 +268,7 @@ class Solvers:
         entry = SOLVERS[solver]
         for stale in (files.solution, files.log, files.start):
             stale.unlink(missing_ok=True)
-        begins = _start_file(held, solver, start, files.start)
+        begins = _write_start_file(held, solver, start, files.start)
         job = Job(
             solver,
             files.model,
@@ -302,10 +302,10 @@ class Solvers:
             ) from error
         finally:
             files.start.unlink(missing_ok=True)
-        found = _answer(held, files, outcome, entry)
+        found = _read_answer(held, files, outcome, entry)
         unsolved = found.status == Status.LIMIT_WITHOUT_POINT
         if unsolved and point is not None and held.violation(point).worst <= FEASIBLE:
-            found = _start_as_answer(held, point, files, outcome, entry)
+            found = _write_start_as_answer(held, point, files, outcome, entry)
         return replace(
             found,
             interrupted=interrupted,
@@ -315,7 +315,7 @@ class Solvers:
 
 
 @contextmanager
-def _folder(given: str | Path | None = None) -> Iterator[Path]:
+def _open_folder(given: str | Path | None = None) -> Iterator[Path]:
     """The given folder, or one that is deleted afterwards."""
     if given is not None:
         yield make_folder(given).resolve()
@@ -324,7 +324,7 @@ def _folder(given: str | Path | None = None) -> Iterator[Path]:
         yield Path(temporary).resolve()
 
 
-def _start_file(held: Problem, solver: str, start: CrossField | None, path: Path) -> Path | None:
+def _write_start_file(held: Problem, solver: str, start: CrossField | None, path: Path) -> Path | None:
     """Write the starting point for a solver that takes it as a separate file; None for the others.
 
     Files of .nl and GAMS hold the point themselves.
@@ -338,7 +338,7 @@ def _start_file(held: Problem, solver: str, start: CrossField | None, path: Path
     return path
 
 
-def _outcome_of_killed(files: Files, held: Problem) -> Outcome:
+def _outcome_of_killed(files: SolveFiles, held: Problem) -> Outcome:
     """Outcome of a solver that was killed: its solution file counts if the solver completed it."""
     part_of(files.solution).unlink(missing_ok=True)
     try:
@@ -349,14 +349,16 @@ def _outcome_of_killed(files: Files, held: Problem) -> Outcome:
     return Outcome(Status.LIMIT_WITH_POINT if status is Status.FEASIBLE else None, _KILLED)
 
 
-def _start_as_answer(held: Problem, point: Floats, files: Files, outcome: Outcome, entry: Solver) -> Solution:
+def _write_start_as_answer(
+    held: Problem, point: Floats, files: SolveFiles, outcome: Outcome, entry: Solver
+) -> Solution:
     """Write the feasible start as the solution of a solver that ended without a point, and read it."""
     save(files.solution, LAYOUTS["highs"](Start(held, point)))
     message = f"{entry.name}: stopped at its limit or by Ctrl-C, {_NO_BETTER}"
-    return _answer(held, files, outcome._replace(status=Status.LIMIT_WITH_POINT, message=message), entry)
+    return _read_answer(held, files, outcome._replace(status=Status.LIMIT_WITH_POINT, message=message), entry)
 
 
-def _answer(held: Problem, files: Files, outcome: Outcome, entry: Solver) -> Solution:
+def _read_answer(held: Problem, files: SolveFiles, outcome: Outcome, entry: Solver) -> Solution:
     """Read the solution file; other reports of the solver override the file."""
     if not files.solution.exists():
         status = outcome.status or Status.NO_POINT

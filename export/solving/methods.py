@@ -55,7 +55,7 @@ class Candidate:
         return facts if self.solution is None else facts | self.solution.facts()
 
 
-def shown(facts: dict[str, Any]) -> list[str]:
+def table_cells(facts: dict[str, Any]) -> list[str]:
     """Facts of a field of a run as the cells of a table; the gap only if there is a bound."""
     gap = []
     if "gap_2_norm" in facts:
@@ -118,69 +118,71 @@ class Method:
     timed: bool = True
 
 
-def _greedy(request: Request) -> Iterator[Candidate]:
+def _find_greedy(request: Request) -> Iterator[Candidate]:
     request.progress("greedy field")
     over = request.over()
-    yield _timed("greedy", lambda: greedy_field(request.instance, stop=over))
+    yield _time_candidate("greedy", lambda: greedy_field(request.instance, stop=over))
 
 
-def _power(request: Request) -> Iterator[Candidate]:
+def _find_power(request: Request) -> Iterator[Candidate]:
     request.progress("power field")
     over = request.over()
-    power = _timed("power", lambda: power_field(request.instance))
+    power = _time_candidate("power", lambda: power_field(request.instance))
     yield power
-    yield _timed("power + QP", lambda: fit_in_box(power.field, over))
+    yield _time_candidate("power + QP", lambda: fit_in_box(power.field, over))
 
 
-def _polyvector(request: Request) -> Iterator[Candidate]:
+def _find_polyvector(request: Request) -> Iterator[Candidate]:
     request.progress("PolyVector field")
     over = request.over()
-    yield _timed("polyvector", lambda: polyvector_field(request.instance))
+    yield _time_candidate("polyvector", lambda: polyvector_field(request.instance))
     if not over():
-        yield _timed("polyvector + QP", lambda: polyvector_start(request.instance, over))
+        yield _time_candidate("polyvector + QP", lambda: polyvector_start(request.instance, over))
 
 
-def _bend(request: Request) -> Iterator[Candidate]:
+def _find_bend(request: Request) -> Iterator[Candidate]:
     request.progress("bend field")
     deadline, start = request.deadline(), request.start
     own = deadline if start is None else deadline.share(_STARTING)
     hard = polyvector_field(request.instance, hold=max(HOLDS))
-    yield _timed("bend", lambda: bend_field(hard, stop=_steps(request, own)))
+    yield _time_candidate("bend", lambda: bend_field(hard, stop=_stop_between_steps(request, own)))
     if start is not None:
-        yield _timed("start + bend", lambda: bend_field(start, stop=_steps(request, deadline)))
+        yield _time_candidate(
+            "start + bend", lambda: bend_field(start, stop=_stop_between_steps(request, deadline))
+        )
 
 
-def _steps(request: Request, deadline: Deadline) -> Over:
+def _stop_between_steps(request: Request, deadline: Deadline) -> Over:
     """Return a function that states before a step whether the deadline or the caller ends the work."""
     late = deadline.steps()
     return lambda: late() or request.stop()
 
 
-def _search(request: Request) -> Iterator[Candidate]:
+def _find_by_search(request: Request) -> Iterator[Candidate]:
     begin, deadline = time.perf_counter(), request.deadline()
     request.progress("search: starting fields")
     found = search(
         request.instance,
         limits=request.limits.until(deadline),
-        jobs=_processes(request),
+        jobs=_count_processes(request),
         start=request.start,
-        progress=_progress_line(request, deadline),
+        progress=_report_search(request, deadline),
         stop=request.stop,
     )
-    yield _searched("search", found, begin, rounds=found.rounds)
+    yield _search_candidate("search", found, begin, rounds=found.rounds)
 
 
-def _searched(method: str, found: Search, begin: float, **counts: int) -> Candidate:
+def _search_candidate(method: str, found: Search, begin: float, **counts: int) -> Candidate:
     """The candidate of a search that began at a time of the performance counter."""
     seconds, interrupted = time.perf_counter() - begin, found.ended == "interrupted"
     return Candidate(method, found.field, seconds, interrupted=interrupted, counts=tuple(counts.items()))
 
 
-def _processes(request: Request) -> int:
+def _count_processes(request: Request) -> int:
     return request.limits.threads or cores()
 
 
-def _progress_line(request: Request, deadline: Deadline) -> Progress:
+def _report_search(request: Request, deadline: Deadline) -> Progress:
     """A callback that passes on the lines of a search, with the time left and what Ctrl-C keeps."""
 
     def report(line: str) -> None:
@@ -190,7 +192,7 @@ def _progress_line(request: Request, deadline: Deadline) -> Progress:
     return report
 
 
-def _prove(request: Request) -> Iterator[Candidate]:
+def _find_by_proof(request: Request) -> Iterator[Candidate]:
     begin, deadline = time.perf_counter(), request.deadline()
     from ...models.proof.prove import prove  # it loads compiled functions
 
@@ -200,7 +202,7 @@ def _prove(request: Request) -> Iterator[Candidate]:
         request.instance,
         start=request.start,
         limits=request.limits.until(deadline),
-        jobs=_processes(request),
+        jobs=_count_processes(request),
         progress=lambda line: request.progress(f"prove: {line}; Ctrl-C keeps them"),
         stop=request.stop,
     )
@@ -214,7 +216,7 @@ def _prove(request: Request) -> Iterator[Candidate]:
     yield Candidate("prove", field, seconds, None, proof.ended == "interrupted", counts, proof)
 
 
-def _two_stage(request: Request) -> Iterator[Candidate]:
+def _find_in_two_stages(request: Request) -> Iterator[Candidate]:
     deadline = request.deadline()
     start = request.begin(jumps_until(deadline))
     begin, limits = time.perf_counter(), request.limits.until(jumps_until(deadline))
@@ -228,13 +230,15 @@ def _two_stage(request: Request) -> Iterator[Candidate]:
         start=start,
         stop=request.stop,
     )
-    yield _of("MILP", milp)
+    yield _solution_candidate("MILP", milp)
     files = time.perf_counter() - begin - (milp.seconds or 0.0)
     if deadline.left() <= files or request.stop():  # those of the second stage take about as long
         return
     request.progress("Ipopt: angles for the jumps of the MILP")
     rest = request.limits.until(deadline)
-    yield _of("two-stage", fit_angles(milp.field, folder=request.folder, limits=rest, stop=request.stop))
+    yield _solution_candidate(
+        "two-stage", fit_angles(milp.field, folder=request.folder, limits=rest, stop=request.stop)
+    )
 
 
 METHODS: Final = {
@@ -243,56 +247,56 @@ METHODS: Final = {
         Method(
             "greedy",
             "the greedy strategy of BendFields, then the best angles: the baseline",
-            _greedy,
+            _find_greedy,
             timed=False,
         ),
         Method(
             "power",
             "smooth exp(4 i theta), right angles; then the best angles for its jumps; no limit cuts off the"
             " first factorisation",
-            _power,
+            _find_power,
             timed=False,
         ),
         Method(
             "polyvector",
             "smooth polynomials whose roots are the lines, at any angle; then the best angles for its jumps;"
             " no limit cuts off the first factorisation",
-            _polyvector,
+            _find_polyvector,
             timed=False,
         ),
         Method(
             "bend",
             "lines that change little along the other line, from the PolyVector field with hard strokes; no"
             " limit cuts off the factorisation of that field",
-            _bend,
+            _find_bend,
             timed=False,
         ),
         Method(
             "search",
             "local search over jumps and singularities from the greedy field on, up to the time limit",
-            _search,
+            _find_by_search,
         ),
         Method(
             "two-stage",
             "section 5 of the paper: HiGHS on milp-mccormick up to the time limit, Ipopt on qp-fixed",
-            _two_stage,
+            _find_in_two_stages,
         ),
         Method(
             "prove",
             "lower bounds on lattices of crosses, and fields from them, until one is proven optimal",
-            _prove,
+            _find_by_proof,
         ),
     )
 }
 """The table of methods; command line, runs, docs and tests are generated from it."""
 
 
-def _timed(method: str, find: Callable[[], CrossField]) -> Candidate:
+def _time_candidate(method: str, find: Callable[[], CrossField]) -> Candidate:
     begin = time.perf_counter()
     found = find()
     return Candidate(method, found, time.perf_counter() - begin)
 
 
-def _of(method: str, solution: Solution) -> Candidate:
+def _solution_candidate(method: str, solution: Solution) -> Candidate:
     seconds = solution.seconds or 0.0
     return Candidate(method, solution.field, seconds, solution, solution.interrupted)

@@ -24,16 +24,16 @@ _ENDED: Final = {
 
 
 @dataclass(frozen=True)
-class Proven:
+class ProvenBound:
     """The claim that no field has a 2-norm energy below `bound`, with its proof in the file `certificate`."""
 
     bound: float
     certificate: Path
 
     @classmethod
-    def by(cls, proof: Proof, path: Path) -> Proven:
-        """Return the result of a proof, with its certificate at `path`. Errors are those of `certified`."""
-        return cls(certified(proof, path).bound, path)
+    def by(cls, proof: Proof, path: Path) -> ProvenBound:
+        """Return the result of a proof, with its certificate at `path`. Errors are those of `certify`."""
+        return cls(certify(proof, path).bound, path)
 
     def facts(self, energy: float) -> dict[str, Any]:
         """Bound and relative gap of a field with that 2-norm energy, and whether the gap is zero."""
@@ -51,7 +51,7 @@ class Proven:
         return {"status": status, **facts, "certificate": self.certificate.name}
 
 
-def certified(proof: Proof, path: Path) -> Certificate:
+def certify(proof: Proof, path: Path) -> Certificate:
     """Write the certificate of a proof to `path`.
 
     Raises SolverError, with the reason, for a proof without a bound, InputError for a proof that the checker

@@ -14,7 +14,7 @@ from ..bundle.manifest import Manifest
 from ..formats.registry import FORMATS, generator
 from ..surfaces.files import SHADED, surface_facts
 from .methods import Candidate
-from .proven import Proven
+from .proven import ProvenBound
 
 KEPT: Final = "bend"
 """The method whose field is kept; docs/evidence.md has the measurements."""
@@ -51,7 +51,7 @@ class Report:
     manifests: tuple[Manifest, ...]
     failures: dict[str, str] = field(default_factory=dict)
     interrupted: str = ""
-    proven: Proven | None = None
+    proven: ProvenBound | None = None
     stages: dict[str, float] = field(default_factory=dict)
     surface: Surface | None = None
 

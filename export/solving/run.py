@@ -24,7 +24,7 @@ from ..pictures.mask import has_mask, write_mask
 from ..pictures.underlay import Underlay, read_underlay
 from ..surfaces.files import SHADED, write_shaded
 from .methods import METHODS, Candidate, Request
-from .proven import Proven
+from .proven import ProvenBound
 from .report import Report, Stopwatch
 from .run_page import REPORT, write_page
 
@@ -42,7 +42,7 @@ START: Final = "start"
 COMPILING: Final = "compiling"
 
 
-def plan(limits: Limits) -> str:
+def plan_sentence(limits: Limits) -> str:
     """A sentence on the time limit of a run's searches, in all and each."""
     timed = [method.name for method in METHODS.values() if method.timed]
     each = ", ".join(f"{name} {limits.time_limit:g}" for name in timed)
@@ -114,7 +114,7 @@ def run(
     should_stop = stop_function(stop)
     drawn = None if drawing is None else read_underlay(drawing, on=instance)
     limits, folder = Limits.bounded(limits), make_folder(folder)
-    progress(plan(limits))
+    progress(plan_sentence(limits))
     watch = Stopwatch()
     progress("greedy field")
     start = first_field(instance)
@@ -126,7 +126,7 @@ def run(
         watch.lap("models")
         request = Request(instance, folder / "solve", limits, start, progress=progress, stop=should_stop)
         results = _Results([Candidate(START, start, watch.stages[START])])
-        results.interrupted = _wait_for_compilation(request)
+        results.interrupted = _compile_functions(request)
         watch.lap(COMPILING)
     if not results.interrupted:
         _find_fields(results, request, watch)
@@ -177,7 +177,7 @@ class _Results:
         return tuple(sorted(self.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}")))
 
 
-def _wait_for_compilation(request: Request) -> str:
+def _compile_functions(request: Request) -> str:
     """Compile what methods need, so that a first run finds what later ones find; the stage if interrupted."""
     from ...models.proof.compiling import compile_proofs
 
@@ -214,7 +214,7 @@ def _write_certificate(report: Report, path: Path) -> Report:
     if proof is None:
         return report
     try:
-        return replace(report, proven=Proven.by(proof, path))
+        return replace(report, proven=ProvenBound.by(proof, path))
     except CrossfieldError as error:
         report.failures["certificate"] = str(error)
     except KeyboardInterrupt:

@@ -12,7 +12,7 @@ from ...templates import ENVIRONMENT
 from ..bundle.manifest import Manifest
 from ..formats.registry import FORMATS
 from ..solvers_table import BUNDLED, smallest, takes
-from .methods import shown
+from .methods import table_cells
 
 PAGE: Final = "index.html"
 REPORT: Final = "report.json"
@@ -50,37 +50,37 @@ def write_page(
 
     Raises InputError, OutputError.
     """
-    overlay = _svg(folder / "overlay.svg") if "overlay.svg" in names else ""
+    overlay = _read_svg(folder / "overlay.svg") if "overlay.svg" in names else ""
     text = ENVIRONMENT.get_template("run/index.html.j2").render(
         report=report,
         seconds=f"{report['seconds']:.0f}",
         bound=report["proof"] and f"{report['proof']['bound_2_norm']:.6g}",
         layers=[each for each in _LAYERS if each[0] != "drawing" or 'id="drawing"' in overlay],
         overlay=overlay,
-        overview=_picture(folder / "overview.png") if "overview.png" in names else "",
-        shaded=_picture(folder / "shaded.png") if "shaded.png" in names else "",
+        overview=_embed_picture(folder / "overview.png") if "overview.png" in names else "",
+        shaded=_embed_picture(folder / "shaded.png") if "shaded.png" in names else "",
         columns=["method", "2-norm", *["gap"] * bool(report["proof"]), *_COLUMNS],
         methods=[
-            [facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""), *shown(facts)]
+            [facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""), *table_cells(facts)]
             for facts in report["methods"]
         ],
-        sets=sorted(map(_set, manifests), key=lambda each: not each["solve"]),
+        sets=sorted(map(_describe_set, manifests), key=lambda each: not each["solve"]),
         files=[(name, meaning) for name, meaning in _FILES.items() if name in names | {REPORT}],
     )
     write_bytes(folder / PAGE, text.encode())
 
 
-def _svg(path: Path) -> str:
+def _read_svg(path: Path) -> str:
     """Our own SVG without its XML declaration."""
     return read_bytes(path).decode().partition("?>\n")[2]
 
 
-def _picture(path: Path) -> str:
+def _embed_picture(path: Path) -> str:
     """A PNG as the address that contains it."""
     return f"data:image/png;base64,{b64encode(read_bytes(path)).decode()}"
 
 
-def _set(manifest: Manifest) -> dict[str, Any]:
+def _describe_set(manifest: Manifest) -> dict[str, Any]:
     """The model files of a formulation, each with the lines that solve it and read its answer.
 
     solve: the line that solves the formulation with a solver that is installed with crossfield, if one can.
@@ -99,13 +99,15 @@ def _set(manifest: Manifest) -> dict[str, Any]:
         "columns": counts["columns"],
         "rows": counts["rows"],
         "files": [
-            _file(each) for each in document["files"] if FORMATS[each["format"]].is_model(each["name"])
+            _describe_file(each)
+            for each in document["files"]
+            if FORMATS[each["format"]].is_model(each["name"])
         ],
         "refused": list(document["refused"].values()),
     }
 
 
-def _file(file: dict[str, Any]) -> dict[str, Any]:
+def _describe_file(file: dict[str, Any]) -> dict[str, Any]:
     """A model file, with the line that solves it, if its format has one, and the line that reads the answer.
 
     A program that is given no name for its answer, such as an AMPL solver, writes it next to the model.

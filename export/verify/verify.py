@@ -34,7 +34,7 @@ from ..programs.protocol import NotReportedError, RefusedError, TooLargeError
 from ..programs.reading import Points
 from ..solutions.solution import Solution
 from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
-from ..solving.local import Files, Solvers
+from ..solving.local import SolveFiles, Solvers
 from ..statuses import Status
 from .checks import Check, Verdict, Verification
 from .comparison import difference, evaluation_difference, names_of
@@ -234,7 +234,7 @@ class _Bench:
             return ended(Verdict.NOT_TRIED, local)
         if missing := SOLVERS[solver].missing:
             return ended(Verdict.NOT_TRIED, missing)
-        files = Files.for_model(subject.path, solver)
+        files = SolveFiles.for_model(subject.path, solver)
         limits = Limits(seconds, GAP, threads=1)
         try:
             found = self.solvers.solve_file(

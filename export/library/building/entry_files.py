@@ -13,7 +13,7 @@ from ....models.formulations.problem import Problem
 from ....models.instance.file import read_instance
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import read_certificate
-from ...bundle.starts import Start, start_of
+from ...bundle.starts import Start, complete_start
 from ...formats.nl import Layout
 from ...formats.registry import Written, write
 from ...solutions.readers.ampl import write_ampl_sol
@@ -111,7 +111,7 @@ def _write_points(
 
 def _miplib_lines(best: BestPoint) -> Iterator[bytes]:
     """The lines of a .sol file in MIPLIB's format, with the columns of LP and MPS."""
-    problem = start_of(best.problem, best.known.field).problem
+    problem = complete_start(best.problem, best.known.field).problem
     start = Start(problem, complete_point(problem, best.known.field))
     yield f"=obj= {number(start.objective)}\n".encode()
     yield from start.lines(zeros=False)

@@ -25,7 +25,7 @@ from ....models.processes.deadline import Progress, silent
 from ....models.processes.limits import Limits
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
-from ...solving.local import Solvers, format_for
+from ...solving.local import Solvers, choose_format
 from ...statuses import Status
 from ..building.build import has_unbuilt_records, rebuild
 from ..documents.documents import Library, problem_of, read_library
@@ -152,7 +152,7 @@ class _SolveSession:
             problem = problem_of(self.library, document)
             have = ledger.records_of(document["name"], problem.sha256)
             for solver in solvers:
-                takes = format_for(problem, solver).answer == "yes"
+                takes = choose_format(problem, solver).answer == "yes"
                 if takes and not any(self._is_covered_by(record, solver) for record in have):
                     yield document, solver
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from cases import make_field, make_instance
-from crossfield.export.bundle.starts import STARTS, start_of, write_start, write_starts
+from crossfield.export.bundle.starts import STARTS, complete_start, write_start, write_starts
 from crossfield.export.formats.registry import write
 from crossfield.models.errors import InputError, UnsupportedBySolverError
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -165,6 +165,6 @@ def test_what_cannot_be_started_is_refused(tmp_path: Path):
     with pytest.raises(UnsupportedBySolverError, match="5002"):
         write_start(formulate(instance, "miqcp-bilinear"), field, tmp_path / "a", "cplex")
     assert list(tmp_path.iterdir()) == []
-    start = start_of(formulate(instance, "minlp-quartic"), field)
+    start = complete_start(formulate(instance, "minlp-quartic"), field)
     assert "z" in start.problem.blocks
     assert start.problem.violation(start.point).worst < 1e-12

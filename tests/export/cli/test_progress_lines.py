@@ -6,14 +6,14 @@ import threading
 import pytest
 import typer
 from crossfield.export.cli import output
-from crossfield.export.cli.output import progress
+from crossfield.export.cli.output import show_progress
 
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_lines_with_the_current_step_go_to_standard_error_unless_quiet(monkeypatch, capsys, quiet):
     monkeypatch.setattr(output, "EVERY", 0.01)
     lines, before = [], threading.active_count()
-    with progress(quiet=quiet) as show:
+    with show_progress(quiet=quiet) as show:
         show("reading")
         show("solving\x1b[2J")
         while not quiet and not lines:
@@ -29,7 +29,7 @@ def test_lines_with_the_current_step_go_to_standard_error_unless_quiet(monkeypat
 
 
 def test_short_work_prints_no_line(capsys):
-    with progress(quiet=False) as show:
+    with show_progress(quiet=False) as show:
         show("solving")
     assert capsys.readouterr() == ("", "")
 
@@ -43,5 +43,5 @@ def test_work_continues_after_the_stream_is_closed(monkeypatch):
         raise BrokenPipeError
 
     monkeypatch.setattr(typer, "echo", echo)
-    with progress(quiet=False):
+    with show_progress(quiet=False):
         assert called.wait(60)

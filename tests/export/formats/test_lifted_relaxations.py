@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.export.solving.local import solver_for
+from crossfield.export.solving.local import choose_solver
 from crossfield.export.verify.checks import Verdict
 from crossfield.export.verify.verify import compared, verify
 
@@ -80,7 +80,7 @@ def starts(instance):
 def test_a_solver_is_chosen_that_reads_the_products(two):
     """HiGHS would solve the weaker problem of the .mps; it does so on request, and the facts state it."""
     problem = cf.formulate(two, "minlp-quartic", relax=True)
-    assert solver_for(problem).formats[0] == "nl"
+    assert choose_solver(problem).formats[0] == "nl"
     assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
     assert carried(cf.formulate(two, "minlp-quartic"), FORMATS["mps"]).formulation.is_weakened is False
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import write
-from crossfield.export.solving.local import Files, Solvers
+from crossfield.export.solving.local import SolveFiles, Solvers
 from crossfield.export.solving.methods import METHODS, Request
-from crossfield.export.solving.proven import certified
+from crossfield.export.solving.proven import certify
 from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.processes.limits import Limits
@@ -57,7 +57,10 @@ def test_a_solver_process_is_told_seconds_and_no_time_of_this_clock(tmp_path):
     field = greedy_field(cf.sample("mouse", 6))
     problem = cf.formulate(field.instance, "qp-fixed", p=field.p)
     held = write(problem, tmp_path / "model.nl", start=field).problem
-    files, deadline = Files.for_model(tmp_path / "model.nl", "ipopt"), Deadline.after(600.0, lambda: -1e9)
+    files, deadline = (
+        SolveFiles.for_model(tmp_path / "model.nl", "ipopt"),
+        Deadline.after(600.0, lambda: -1e9),
+    )
     with Solvers() as solvers:
         solvers.solve_file(held, "ipopt", files, Limits(600.0), deadline, start=field)
     first = files.log.read_text().splitlines()[0]
@@ -80,7 +83,7 @@ def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
     with pytest.raises(SolverError, match="nothing was proven"):
         write_certificate(proof, path)
     with pytest.raises(SolverError, match=UNPROVEN):
-        certified(proof, path)
+        certify(proof, path)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -5,7 +5,7 @@ from collections import Counter
 import crossfield as cf
 import pytest
 from crossfield.export.solvers_table import takes_in
-from crossfield.export.solving.local import Files, Solvers
+from crossfield.export.solving.local import SolveFiles, Solvers
 from crossfield.export.statuses import Status
 from crossfield.export.verify.leeway import saved
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedByFormatError
@@ -42,7 +42,7 @@ def answers(problem, solvers, folder, only=tuple(BUNDLED)):
                 raise
             found[solver, form] = None
             continue
-        files = Files.for_model(folder / f"{solver}.{form}", solver)
+        files = SolveFiles.for_model(folder / f"{solver}.{form}", solver)
         limits = cf.Limits(SECONDS, gap=0.0)
         try:
             solution = solvers.solve_file(held, solver, files, limits, Deadline.after(10 * SECONDS))

@@ -10,7 +10,7 @@ import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.solving.methods import METHODS
-from crossfield.export.solving.proven import Proven
+from crossfield.export.solving.proven import ProvenBound
 from crossfield.models.proof.certificate import read_certificate
 
 
@@ -36,7 +36,7 @@ def test_a_run_says_what_is_proven_of_every_field(tmp_path, capsys):
 
 @pytest.mark.parametrize("energy, gap, optimal", [(2.0, 0.0, True), (2.5, 0.2, False)])
 def test_the_gap_is_relative_to_the_energy(tmp_path, energy, gap, optimal):
-    facts = Proven(2.0, tmp_path).facts(energy)
+    facts = ProvenBound(2.0, tmp_path).facts(energy)
     assert facts == {"bound_2_norm": 2.0, "gap_2_norm": gap, "proven_optimal": optimal}
 
 
@@ -63,7 +63,7 @@ def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
 def test_the_reason_of_a_missing_certificate_is_the_true_one(tmp_path, ended, words):
     proof = replace(cf.prove(cf.sample("skew", 4), work=1), bound=0.0, levels=(), ended=ended)
     with pytest.raises(cf.SolverError, match=words):
-        Proven.by(proof, tmp_path / "certificate.npz")
+        ProvenBound.by(proof, tmp_path / "certificate.npz")
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
 from crossfield.export.solvers_table import BUNDLED
-from crossfield.export.solving.local import solver_for
+from crossfield.export.solving.local import choose_solver
 from crossfield.export.solving.methods import Request
 from crossfield.export.statuses import Status
 from crossfield.models.errors import (
@@ -237,20 +237,20 @@ def test_the_preferred_solver_fits_the_class(small):
         "miqp-mccormick": "bonmin",
     }
     for name, solver in preferred.items():
-        assert solver_for(formulated(small, name)).name == solver
-    assert solver_for(formulated(small, "miqcp-bilinear", relax=True)).name == "ipopt"
+        assert choose_solver(formulated(small, name)).name == solver
+    assert choose_solver(formulated(small, "miqcp-bilinear", relax=True)).name == "ipopt"
     for name in ("minlp-parity", "minlp-cubic", "miqcp-bilinear"):
         with pytest.raises(UnsupportedBySolverError, match="crossfield list"):
-            solver_for(formulated(small, name))
+            choose_solver(formulated(small, name))
     with pytest.raises(InputError, match=r"choose one of gurobi, cplex, .*highs"):
-        solver_for(formulated(small, "qp-fixed"), "HiGHS")
+        choose_solver(formulated(small, "qp-fixed"), "HiGHS")
 
 
 def test_a_missing_package_is_a_named_error(small, monkeypatch):
     monkeypatch.setitem(sys.modules, "casadi", None)
     with pytest.raises(MissingSolverError, match="Ipopt is not installed; pip install casadi"):
-        solver_for(formulated(small, "qp-fixed"))
-    assert solver_for(formulated(small, "milp-mccormick")).name == "highs"
+        choose_solver(formulated(small, "qp-fixed"))
+    assert choose_solver(formulated(small, "milp-mccormick")).name == "highs"
 
 
 # Integers dropped or fixed

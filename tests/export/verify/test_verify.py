@@ -18,7 +18,7 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.solutions.solution import Solution
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
-from crossfield.export.solving.local import Files, Solvers
+from crossfield.export.solving.local import SolveFiles, Solvers
 from crossfield.export.statuses import Status
 from crossfield.export.verify.checks import Verdict, Verification
 from crossfield.export.verify.verify import _energy_difference, _judged, _subjects, random_field, same, verify
@@ -346,7 +346,7 @@ def test_claims_are_true(
 
 def proves(solvers: Solvers, held: Problem, path: Path, solver: str, optimum: float) -> bool:
     """Whether the solver, run all the same, returns the optimum with that status."""
-    files, limits = Files.for_model(path, solver), Limits(1.0, 0.0, 1)
+    files, limits = SolveFiles.for_model(path, solver), Limits(1.0, 0.0, 1)
     try:
         found = solvers.solve_file(held, solver, files, limits, Deadline.after(21.0), precise=True)
     except CrossfieldError:

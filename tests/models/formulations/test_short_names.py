@@ -2,7 +2,7 @@
 
 import crossfield as cf
 import pytest
-from crossfield.export.bundle.problem_files import fixed_jumps
+from crossfield.export.bundle.problem_files import jumps_as_data
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.documents.documents import Library
 from crossfield.export.library.plan.spec import read_spec
@@ -26,7 +26,7 @@ def test_both_names_of_every_formulation_mean_the_same():
     for name, declared in FORMULATIONS.items():
         assert declaration_of(name) is declaration_of(declared.short) is declared
         assert declare(declared.short).name == name
-        given = fixed_jumps(instance, declared.short, None)
+        given = jumps_as_data(instance, declared.short, None)
         assert cf.formulate(instance, declared.short, p=given).name == name
         assert (given is None) == (not declared.fixed)
 
