@@ -18,9 +18,9 @@ from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats, Ints
 from ...models.instance.instance import SKEW_WEIGHT, Instance, Reading
 from ...models.processes.child_program import is_stopped
-from ...models.sketch.cover import LEAST_WEIGHT, Frame, curve_pixels
+from ...models.sketch.cover import LEAST_WEIGHT, Frame, curve_pixels, fit_frame
 from ...models.sketch.outline import enclosed_region
-from ...models.sketch.read import drop_silhouette, find_mask, frame_around, instance_of_mask
+from ...models.sketch.read import drop_silhouette, find_mask, instance_of_mask
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.surface.hints import Hint
@@ -56,7 +56,7 @@ class Drawn:
 def drawn(document: Document, size: int | None = None) -> Drawn:
     """The instance of a document. size: instead of that of the document. Raises InputError."""
     curves = document.curves()
-    frame = frame_around(curves.box, size or document.size, margin=True)
+    frame = fit_frame(curves.box, size or document.size, margin=True)
     covers = curves.covers(frame)
     mask, reading = find_mask(curves, covers, frame)
     edited, gaps = _edited(document.mask, mask, covers.walls, reading, frame)

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..input_limits import MAX_PIECES
 from ..instance.angles import vector_length
 from ..instance.grid import Bools, Floats, Ints
+from ..memory import check_memory
 
 Box = tuple[float, float, float, float]
 Indices = NDArray[np.intp]
@@ -100,9 +101,14 @@ class Covers:
 
 
 def fit_frame(box: Box, size: int, *, margin: bool) -> Frame:
-    """The frame of `size` pixels on its longer side centred on a box (left, top, right, bottom)."""
+    """The frame of `size` pixels on its longer side centred on a box (left, top, right, bottom).
+
+    Raises InputError for a point, and for a grid that needs more memory than there is.
+    """
     left, top, right, bottom = box
     longer = max(right - left, bottom - top)
+    if longer <= 0:
+        raise InputError("draws no stroke: everything is one point")
     border = MARGIN if margin else 0.0
     pixel = longer * (1 + 2 * border) / size
     if margin and size > 4:
@@ -112,6 +118,7 @@ def fit_frame(box: Box, size: int, *, margin: bool) -> Frame:
         min(size, max(1, int(np.ceil((side + 2 * border) / pixel - 1e-6))))
         for side in (right - left, bottom - top)
     )
+    check_memory(height * width)
     return Frame(
         (left + right - width * pixel) / 2, (top + bottom - height * pixel) / 2, pixel, height, width
     )

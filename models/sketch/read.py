@@ -20,7 +20,6 @@ from ..errors import InputError, NoStrokeError, naming, printable, shortened
 from ..instance.angles import line_of
 from ..instance.grid import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading
-from ..memory import check_memory
 from .bitmap import read_white_pixels
 from .bridges import close_outline
 from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
@@ -145,7 +144,7 @@ def instance_of_drawing(
     white: the picture from `read_mask`; without it the mask is the inside of the drawing.
     """
     if white is None:
-        frame = frame_around(drawing.box, size, margin=True)
+        frame = fit_frame(drawing.box, size, margin=True)
         covers = drawing.covers(frame)
         mask, reading = find_mask(drawing, covers, frame)
         if silhouette == "outer":
@@ -163,15 +162,6 @@ def instance_of_drawing(
     )
 
 
-def frame_around(box: Box, size: int, *, margin: bool) -> Frame:
-    """The grid of `size` pixels on its longer side round a box. Raises InputError for a point."""
-    if max(box[2] - box[0], box[3] - box[1]) <= 0:
-        raise InputError("draws no stroke: everything is one point")
-    frame = fit_frame(box, size, margin=margin)
-    check_memory(frame.height * frame.width)
-    return frame
-
-
 def frame_around_white(white: Bools, page: Box, size: int) -> tuple[Frame, Bools]:
     """The grid round the white part of a page, and which pixels are white over half of their area or more."""
     x, y, width, height = page
@@ -179,7 +169,7 @@ def frame_around_white(white: Bools, page: Box, size: int) -> tuple[Frame, Bools
     high, wide = (np.nonzero(white.any(axis=axis))[0] for axis in (1, 0))
     left, right = x + across * wide[0], x + across * (wide[-1] + 1)
     top, bottom = y + down * high[0], y + down * (high[-1] + 1)
-    frame = frame_around((left, top, right, bottom), size, margin=False)
+    frame = fit_frame((left, top, right, bottom), size, margin=False)
     rows, columns = frame.edges
     share = block_means(white.astype(np.float32), (rows - y) / down, (columns - x) / across)
     return frame, share >= 0.5 - 1e-6
