@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from crossfield.export.formats.registry import FORMATS, carried, write
+from crossfield.export.formats.registry import FORMATS, problem_in_format, write
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.instance import Instance
@@ -77,7 +77,7 @@ def by_pyomo(instance: Instance, name: str, path: Path) -> None:
     from crossfield.export.formats.pyomo_model import to_pyomo
 
     problem, suffix = problem_of(instance, name), path.suffix[1:]
-    held = carried(problem, FORMATS[suffix]) if suffix in {"lp", "mps"} else problem
+    held = problem_in_format(problem, FORMATS[suffix]) if suffix in {"lp", "mps"} else problem
     kind = {"nl": "nl_v2", "lp": "lp_v2", "mps": "mps", "gms": "gams"}[suffix]
     to_pyomo(held).write(str(path.with_suffix(f".{kind}")), format=kind)
     path.with_suffix(f".{kind}").replace(path)

@@ -23,7 +23,7 @@ from ..models.errors import UnsupportedByFormatError
 from ..models.formulations.declaration import Formulation
 from ..models.formulations.problem import Problem
 from ..models.instance.instance import Instance
-from .formats.registry import FORMATS, carried
+from .formats.registry import FORMATS, problem_in_format
 from .licence import licence_error
 
 Stage = Literal["read", "solve", "local"]
@@ -317,7 +317,7 @@ def takes(problem: Problem, solver: str) -> Taking:
 def takes_in(problem: Problem, solver: str, name: str) -> Taking:
     """Whether the solver takes the problem in the format of that name."""
     try:
-        held = carried(problem, FORMATS[name])
+        held = problem_in_format(problem, FORMATS[name])
     except UnsupportedByFormatError as error:
         return Taking("no", name, str(error))
     entry = SOLVERS[solver]

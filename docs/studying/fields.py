@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.formats.registry import generator
+from crossfield.export.formats.registry import program_version
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.errors import CrossfieldError
 from crossfield.models.field.field import CrossField, field_in_windows
@@ -73,7 +73,7 @@ def energies(field: CrossField) -> dict[str, float]:
 def field_row(run: Run, folder: Path | None) -> dict[str, Any]:
     """The row of a field."""
     instance = instance_of(run, folder)
-    facts: dict[str, Any] = {"version": generator(), **sizes(instance)}
+    facts: dict[str, Any] = {"version": program_version(), **sizes(instance)}
     begin = time.perf_counter()
     try:
         field, facts_of_field = _field(run, instance)

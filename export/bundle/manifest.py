@@ -17,9 +17,9 @@ from ...models.instance.file import read_document, read_instance, write_instance
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
-from ..formats.registry import Written, generator
+from ..formats.registry import Written, program_version
 from ..solvers_table import smallest, takers
-from ..writing.canonical import Canonical
+from ..writing.canonical import CanonicalForm
 
 FORMAT: Final = "crossfield-manifest"
 VERSION: Final = 1
@@ -180,7 +180,7 @@ def narrow_windows(problem: Problem, windows: Windows | None) -> Problem:
 def manifest_document(problem: Problem, written: list[Written], refused: dict[str, str]) -> dict[str, Any]:
     """The document of a problem's files. refused: reasons by format."""
     instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
-    form = Canonical(problem)
+    form = CanonicalForm(problem)
     tightening = {}
     if problem.windows is not None:  # and the sentence about it in the files' headers
         tightening = {"tightened": problem.tightened, "windows": problem.windows.document()}
@@ -192,7 +192,7 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
     return {
         "format": FORMAT,
         "version": VERSION,
-        "generator": generator(),
+        "generator": program_version(),
         "instance": {
             "file": instance_file(instance),
             "name": instance.name,

@@ -26,7 +26,7 @@ from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Progress, silent
 from ...models.storage import make_folder
-from ..formats.registry import DEFAULTS, FORMATS, carried, write
+from ..formats.registry import DEFAULTS, FORMATS, problem_in_format, write
 from ..solvers_table import smallest
 from .manifest import LARGE, Manifest, file_stem, narrow_windows, write_manifest
 from .starts import write_starts
@@ -178,7 +178,7 @@ def _check_formats(
     for problem in map(smallest, formulations):
         for name in formats:
             try:
-                carried(problem, FORMATS[name])
+                problem_in_format(problem, FORMATS[name])
             except UnsupportedByFormatError as error:
                 reasons.append(str(error))
             else:

@@ -27,11 +27,11 @@ from ...models.errors import InputError, UnsupportedByFormatError, UnsupportedBy
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
-from ..formats.registry import FORMATS, carried
+from ..formats.registry import FORMATS, problem_in_format
 from ..solvers_table import SOLVERS, takes
-from ..writing.canonical import Canonical
-from ..writing.records import Decimals, Pieces, number, render, words
-from ..writing.sink import save
+from ..writing.canonical import CanonicalForm
+from ..writing.records import Decimals, Pieces, number_text, render, words
+from ..writing.sink import save_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +42,9 @@ class Start:
     point: Floats
 
     @cached_property
-    def form(self) -> Canonical:
+    def form(self) -> CanonicalForm:
         """The columns and rows of LP and MPS."""
-        return Canonical(self.problem)
+        return CanonicalForm(self.problem)
 
     @property
     def objective(self) -> float:
@@ -71,7 +71,7 @@ class Start:
 
 
 def _list_file(start: Start) -> Iterator[bytes]:
-    yield f"# MIP start, objective {number(start.objective)}\n".encode()
+    yield f"# MIP start, objective {number_text(start.objective)}\n".encode()
     yield from start.lines()
 
 
@@ -94,17 +94,17 @@ def _cplex_file(start: Start) -> Iterator[bytes]:
 
 def _highs_file(start: Start) -> Iterator[bytes]:
     yield b"Model status\nUnknown\n\n# Primal solution values\nFeasible\n"
-    yield f"Objective {number(start.objective)}\n# Columns {start.form.column_count}\n".encode()
+    yield f"Objective {number_text(start.objective)}\n# Columns {start.form.column_count}\n".encode()
     yield from start.lines()
     yield b"# Rows %d\n" % start.form.row_count("mps")
     yield from start.activities()
 
 
 def _scip_file(start: Start) -> Iterator[bytes]:
-    yield f"solution status: unknown\nobjective value: {number(start.objective)}\n".encode()
+    yield f"solution status: unknown\nobjective value: {number_text(start.objective)}\n".encode()
     yield from start.lines()
     for name, part in _objective_variables(start).items():
-        yield f"{name} {number(part)}\n".encode()
+        yield f"{name} {number_text(part)}\n".encode()
 
 
 def _objective_variables(start: Start) -> dict[str, float]:
@@ -143,7 +143,7 @@ def complete_start(problem: Problem, field: CrossField) -> Start:
     is on another instance.
     """
     try:
-        held = carried(problem, FORMATS["mps"])
+        held = problem_in_format(problem, FORMATS["mps"])
     except UnsupportedByFormatError:
         held = problem
     return Start(held, held.point(field))
@@ -161,7 +161,7 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
     refusal = _reason_of_refusal(problem, start, solver)
     if refusal:
         raise UnsupportedBySolverError(refusal)
-    save(Path(path), LAYOUTS[STARTS[solver].layout](start))
+    save_file(Path(path), LAYOUTS[STARTS[solver].layout](start))
     return start.objective
 
 
@@ -177,7 +177,7 @@ def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: 
     solvers = [name for name in STARTS if not _reason_of_refusal(problem, start, name)]
     paths = {name: Path(folder) / f"{stem}.{name}{STARTS[name].suffix}" for name in solvers}
     for name, path in paths.items():
-        save(path, LAYOUTS[STARTS[name].layout](start))
+        save_file(path, LAYOUTS[STARTS[name].layout](start))
     return paths
 
 

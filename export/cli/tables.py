@@ -8,7 +8,7 @@ from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.catalogue import FORMULATIONS, declare
 from ...models.formulations.problem import Problem
 from ...models.sketch.samples import samples
-from ..formats.registry import FORMATS, carried
+from ..formats.registry import FORMATS, problem_in_format
 from ..solutions.readers.registry import READERS
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, smallest, takers
 from ..solving.local import choose_format
@@ -72,7 +72,7 @@ def _formulation_row(problem: Problem) -> Row:
 
 def _describe_support(problem: Problem, name: str) -> str:
     try:
-        held = carried(problem, FORMATS[name])
+        held = problem_in_format(problem, FORMATS[name])
     except UnsupportedByFormatError:
         return f"refused: write {problem.formulation.equivalent}"
     return "lifted, exact; relaxed, weaker" if held.formulation.lifted else "yes"

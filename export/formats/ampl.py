@@ -34,17 +34,17 @@ from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet, Variable, p
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...templates import stream
-from ..writing.canonical import Canonical
-from ..writing.expressions import Language, wrapped
+from ..writing.canonical import CanonicalForm
+from ..writing.expressions import InfixLanguage, wrap_lines
 from ..writing.records import (
     Decimals,
     Piece,
     Pieces,
     Words,
     check_coefficients,
-    number,
+    number_text,
     render,
-    table,
+    word_table,
     words,
 )
 
@@ -68,14 +68,14 @@ _INDEX: Final[dict[IndexSet, str]] = {
 SENSES: Final = {">=": b" >= ", "<=": b" <= ", "==": b" = "}
 
 
-def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
+def generate(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
     """The bytes of the .mod file. header: lines of comment, without the comment sign.
 
     Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns
     fixed.
     """
     problem = form.problem
-    _check(problem)
+    _check_problem(problem)
     context = {
         "header": header,
         "sets": ["I", "S_c"] + ["E"] * bool(len(problem.instance.grid.first)),
@@ -84,34 +84,34 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
         "windows": problem.windows is not None,
         "jumps": problem.jumps is not None and len(problem.jumps) > 0,
         "variables": [
-            _variable(problem.variable(block.name), block)
+            _variable_text(problem.variable(block.name), block)
             | {"label": _label(problem.instance, block), "index": _INDEX[block.over]}
             for block in problem.blocks.values()
             if block.count
         ],
-        "terms": [_described(family) for family in problem.objective],
-        "rows": [_described(family) for family in problem.rows],
+        "terms": [_family_text(family) for family in problem.objective],
+        "rows": [_family_text(family) for family in problem.rows],
     }
     yield from stream("models/ampl.mod.j2", {}, **context)
 
 
-def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
+def generate_data(problem: Problem, header: list[str]) -> Iterator[bytes]:
     """The bytes of the .dat file, block by block. header: lines of comment, without the comment sign."""
     instance = problem.instance
     for line in header:
         yield f"# {line}\n".encode()
     yield b"data;\nset I :=\n"
-    rows, columns = _place(instance, "pixels")
+    rows, columns = _pixel_coordinates(instance, "pixels")
     yield from render([b"(", Decimals(rows), b",", Decimals(columns), b")\n"], len(rows))
     yield b";\nparam: S_c: theta w :=\n"
-    yield from _listed(instance, "strokes", [words(instance.target), b" ", words(instance.w)])
+    yield from _element_lines(instance, "strokes", [words(instance.target), b" ", words(instance.w)])
     weights = {"w_strokes": instance.stroke_coefficient, "w_beta": instance.skew_coefficient}
-    lines = "\n".join(f"param {name} := {number(value)};" for name, value in weights.items())
+    lines = "\n".join(f"param {name} := {number_text(value)};" for name, value in weights.items())
     yield b";\n" + lines.encode() + b"\n"
     if problem.jumps is not None and len(problem.jumps):
         at = np.nonzero(problem.jumps)[0]
         yield b"param p :=\n"
-        yield from _listed(instance, "pairs", [words(problem.jumps[at].astype(np.float64))], at)
+        yield from _element_lines(instance, "pairs", [words(problem.jumps[at].astype(np.float64))], at)
         yield b";\n"
     yield from _windows(problem)
     yield b"end;\n"
@@ -119,34 +119,34 @@ def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
 
 def _windows(problem: Problem) -> Iterator[bytes]:
     """The windows, and the ranges of jumps that are variables, where they are narrower than the gauge's."""
-    for over, names in _narrowed(problem).items():
+    for over, names in _narrowed_bounds(problem).items():
         yield f"param: {' '.join(names)} :=\n".encode()
         values = (words(problem.data[name].astype(np.float64)) for name in names)
-        parts = [part for each in values for part in (b" ", each)][1:]
-        yield from _listed(problem.instance, over, parts)
+        parts = [part for value in values for part in (b" ", value)][1:]
+        yield from _element_lines(problem.instance, over, parts)
         yield b";\n"
 
 
-def _place(instance: Instance, over: IndexSet) -> tuple[Ints, Ints]:
+def _pixel_coordinates(instance: Instance, over: IndexSet) -> tuple[Ints, Ints]:
     """Row and column of the pixel of each element."""
     at = pixel_of(instance, over)
     return instance.grid.rows[at], instance.grid.columns[at]
 
 
-def _listed(
+def _element_lines(
     instance: Instance, over: IndexSet, values: Pieces, at: NDArray[Any] | None = None
 ) -> Iterator[bytes]:
     """One element per line, its index and values: `1 2 u 0.3`; only the elements `at`, if given."""
-    rows, columns = _place(instance, over)
+    rows, columns = _pixel_coordinates(instance, over)
     sides = instance.grid.upward.view(np.uint8)
     if at is not None:
         rows, columns, sides = rows[at], columns[at], sides[at]
-    side: Pieces = [b" ", Words(table([b"r", b"u"]), sides)] if over == "pairs" else []
+    side: Pieces = [b" ", Words(word_table([b"r", b"u"]), sides)] if over == "pairs" else []
     yield from render([Decimals(rows), b" ", Decimals(columns), *side, b" ", *values, b"\n"], len(rows))
 
 
-def _variable(variable: Variable, block: Block) -> dict[str, str]:
-    language = _Ampl(block.over)
+def _variable_text(variable: Variable, block: Block) -> dict[str, str]:
+    language = _AmplExpressions(block.over)
     attributes = ["integer"] * block.integer
     attributes += [
         f"{sign} {language.bound(end)}"
@@ -167,17 +167,17 @@ def _label(instance: Instance, block: Block) -> str:
     return f"{block.name}_%0{digits}d_%0{digits}d" + "_%s" * (block.over == "pairs")
 
 
-def _described(family: PlacedFamily) -> dict[str, str]:
+def _family_text(family: PlacedFamily) -> dict[str, str]:
     """A family as the template prints it: its tag, its place in the paper, its set, and its text."""
     declared = family.family
-    words = _Ampl(declared.over)
+    words = _AmplExpressions(declared.over)
     if declared.is_row:
         left, right = (words.expression(side) for side in (declared.expression.lhs, declared.expression.rhs))
         pieces = [*left, SENSES[declared.sense], *right]
     else:
-        pieces = wrapped(words.summands(declared.expression), WIDTH, b"  ")
+        pieces = wrap_lines(words.summands(declared.expression), WIDTH, b"  ")
     paper = f"section {declared.paper}" if declared.paper[0].isdigit() else declared.paper
-    return {"tag": declared.tag, "paper": paper, "text": _text(pieces), "domain": _domain(family)}
+    return {"tag": declared.tag, "paper": paper, "text": _literal_text(pieces), "domain": _domain(family)}
 
 
 def _domain(family: PlacedFamily) -> str:
@@ -188,7 +188,7 @@ def _domain(family: PlacedFamily) -> str:
     return f"{DOMAINS[over][:-1]}: abs({only[0]}[{_INDEX[over]}]) mod 2 = {only[1]}}}"
 
 
-class _Ampl(Language):
+class _AmplExpressions(InfixLanguage):
     """The language of AMPL over an index set: names with indices, constants in mathematical notation."""
 
     def __init__(self, over: IndexSet) -> None:
@@ -219,15 +219,15 @@ class _Ampl(Language):
 
     def bound(self, expression: sp.Expr) -> str:
         """A bound of a variable for all elements of its set."""
-        return _text(self.alone(expression))
+        return _literal_text(self.alone(expression))
 
 
-def _text(pieces: list[Piece]) -> str:
+def _literal_text(pieces: list[Piece]) -> str:
     """The text of pieces that are all literal."""
     return b"".join(piece for piece in pieces if isinstance(piece, bytes)).decode().removeprefix(" + ")
 
 
-def _narrowed(problem: Problem) -> dict[IndexSet, tuple[str, ...]]:
+def _narrowed_bounds(problem: Problem) -> dict[IndexSet, tuple[str, ...]]:
     """Names of the data that are bounds where a proof has narrowed them, by index set; otherwise empty."""
     if problem.windows is None:
         return {}
@@ -236,7 +236,7 @@ def _narrowed(problem: Problem) -> dict[IndexSet, tuple[str, ...]]:
     return names | ({"pairs": ("p_min", "p_max")} if has_jumps else {})
 
 
-def _check(problem: Problem) -> None:
+def _check_problem(problem: Problem) -> None:
     """Raise UnsupportedByFormatError for columns fixed one by one, or weights that solvers would drop."""
     instance = problem.instance
     if problem.pinned is not None:

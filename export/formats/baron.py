@@ -28,17 +28,17 @@ import numpy as np
 from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
-from ..writing.canonical import Canonical, Kind, coefficient
-from ..writing.expressions import Language, wrapped
+from ..writing.canonical import CanonicalForm, ColumnKind, coefficient
+from ..writing.expressions import InfixLanguage, wrap_lines
 from ..writing.names import Names
-from ..writing.records import Piece, Tagged, render, signed, words
-from .gams import Scalar, declared
+from ..writing.records import Piece, TaggedWords, render, signed_texts, words
+from .gams import GamsExpressions, name_list
 
 WIDTH = 160
 """Approximate length of lines."""
 
 
-def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
+def generate(form: CanonicalForm, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the .bar file, block by block. header: lines of comment. start: a point (columns,)."""
     problem, names = form.problem, form.names
     for line in header:
@@ -52,7 +52,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         yield form.one + b": 1;\n}\n"
     if problem.rows:
         lists = [(names.row(family), family.count) for family in problem.rows]
-        yield from declared(b"EQUATIONS", lists)
+        yield from name_list(b"EQUATIONS", lists)
     for family in problem.rows:
         yield from _rows(family, names)
     yield from _objective(problem, names)
@@ -60,28 +60,28 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         yield from _start(form, start)
 
 
-_KEYWORDS: Final[dict[Kind, bytes]] = {
+_KEYWORDS: Final[dict[ColumnKind, bytes]] = {
     "binary": b"BINARY_VARIABLES",
     "integer": b"INTEGER_VARIABLES",
     "continuous": b"VARIABLES\n  %b,",  # of the column fixed to 1, which is in no block
 }
 
 
-def _variables(form: Canonical) -> Iterator[bytes]:
+def _variables(form: CanonicalForm) -> Iterator[bytes]:
     for kind, keyword in _KEYWORDS.items():
-        chosen = form.blocks(kind)
-        if chosen:
-            lists = [(form.names.of(block), block.count) for block in chosen]
-            yield from declared(keyword.replace(b"%b", form.one), lists)
+        blocks = form.blocks(kind)
+        if blocks:
+            lists = [(form.names.of(block), block.count) for block in blocks]
+            yield from name_list(keyword.replace(b"%b", form.one), lists)
 
 
 def _bounds(block: Block, names: Names, *, low: bool) -> Iterator[bytes]:
     values = block.lower if low else block.upper
     at = np.nonzero(np.isfinite(values))[0]
-    yield from _assigned(names.of(block).at(at), values[at])
+    yield from _assignments(names.of(block).at(at), values[at])
 
 
-def _assigned(name: Tagged, values: Floats) -> Iterator[bytes]:
+def _assignments(name: TaggedWords, values: Floats) -> Iterator[bytes]:
     if len(values):
         yield from render([name, b": ", words(values), b";\n"], len(values))
 
@@ -96,30 +96,30 @@ def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
 def _monomial(term: Monomial, names: Names) -> list[Piece]:
     """A signed term of a row, without a coefficient of 1."""
     assert term.degree in {1, 2}  # no declaration has other rows
-    lead: list[Piece] = [b" ", words(coefficient(term), signed), b"*"]
+    lead: list[Piece] = [b" ", words(coefficient(term), signed_texts), b"*"]
     if np.ndim(term.coefficient) == 0 and abs(term.coefficient) == 1:
         lead = [b" + " if term.coefficient == 1 else b" - "]
-    first, *rest = (names.at(term.family, symbol) for symbol in term.symbols)
-    return [*lead, first, *(piece for name in rest for piece in (b"*", name))]
+    first, *further = (names.at(term.family, symbol) for symbol in term.symbols)
+    return [*lead, first, *(piece for name in further for piece in (b"*", name))]
 
 
-class _Baron(Scalar):
+class _BaronExpressions(GamsExpressions):
     """The language of one family: scalar GAMS with other powers."""
 
-    power = Language.power
+    power = InfixLanguage.power
 
 
 def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
     yield b"OBJ: minimize\n"
     for family in problem.objective:
-        terms = _Baron(family, names).summands(family.family.expression)
-        yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)
+        terms = _BaronExpressions(family, names).summands(family.family.expression)
+        yield from render([*wrap_lines(terms, WIDTH, b"  "), b"\n"], family.count)
     yield b";\n"
 
 
-def _start(form: Canonical, start: Floats) -> Iterator[bytes]:
+def _start(form: CanonicalForm, start: Floats) -> Iterator[bytes]:
     yield b"STARTING_POINT{\n"
     for block in form.problem.blocks.values():
         if block.count:
-            yield from _assigned(form.names.of(block), start[block.slice])
+            yield from _assignments(form.names.of(block), start[block.slice])
     yield form.one + b": 1;\n}\n"

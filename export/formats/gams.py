@@ -34,23 +34,23 @@ from ...models.formulations.families import PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...templates import stream
-from ..writing.canonical import Canonical
-from ..writing.expressions import Language, is_data, wrapped
+from ..writing.canonical import CanonicalForm
+from ..writing.expressions import InfixLanguage, is_free_of_columns, wrap_lines
 from ..writing.names import Names
 from ..writing.records import (
     Piece,
-    Tagged,
+    TaggedWords,
     Texts,
     Words,
-    bounds,
+    bound_texts,
     check_coefficients,
-    number,
-    numbers,
+    number_text,
+    number_texts,
     render,
-    table,
+    word_table,
     words,
 )
-from ..writing.records import signed as with_sign
+from ..writing.records import signed_texts as with_sign
 
 MODEL_TYPES: Final = {
     "LP": "lp",
@@ -70,7 +70,7 @@ WIDTH: Final = 160
 """Approximate length of lines."""
 
 
-def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
+def generate(form: CanonicalForm, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the GAMS file, block by block. header: lines of comment. start: a point (columns,)."""
     problem, names = form.problem, form.names
     blocks = {
@@ -82,7 +82,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         "start": () if start is None else _start(problem, names, start),
         "results": _results(problem, names),
     }
-    objective = None if start is None else number(problem.objective_value(start))
+    objective = None if start is None else number_text(problem.objective_value(start))
     yield from stream(
         "models/gams.gms.j2",
         blocks,
@@ -93,13 +93,13 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
     )
 
 
-def bracketed(values: Floats) -> Texts:
+def bracketed_texts(values: Floats) -> Texts:
     """Numbers, in brackets if negative: `3`, `(-0.5)`."""
-    texts = numbers(values)
+    texts = number_texts(values)
     return np.where(values < 0, np.strings.add(np.strings.add(b"(", texts), b")"), texts)
 
 
-class Scalar(Language):
+class GamsExpressions(InfixLanguage):
     """GAMS's language for one family: symbols are column names, data are numbers, one per record."""
 
     def __init__(self, family: PlacedFamily, names: Names) -> None:
@@ -112,28 +112,28 @@ class Scalar(Language):
 
     def is_data(self, expression: sp.Expr) -> bool:
         """Whether it holds no column."""
-        return is_data(self._family, expression)
+        return is_free_of_columns(self._family, expression)
 
     def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
         """One number per element."""
-        return _number_words(self._family.data(expression), signed=signed)
+        return _data_words(self._family.data(expression), signed=signed)
 
     def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
         """One number per element; raises UnsupportedByFormatError for an extreme one."""
         values = self._family.data(expression)
         check_coefficients(values, f"family {self._family.family.tag}")
-        return _number_words(values, signed=signed)
+        return _data_words(values, signed=signed)
 
     def power(self, base: list[Piece], exponent: int) -> list[Piece]:
         """A power in a form that GAMS evaluates for bases of any sign (G1)."""
         return [b"sqr(", *base, b")"] if exponent == 2 else [b"power(", *base, f",{exponent})".encode()]
 
 
-def _number_words(values: Floats | float, *, signed: bool) -> Piece:
-    return words(values, with_sign if signed else bracketed)
+def _data_words(values: Floats | float, *, signed: bool) -> Piece:
+    return words(values, with_sign if signed else bracketed_texts)
 
 
-def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]:
+def name_list(keyword: bytes, lists: list[tuple[TaggedWords, int]]) -> Iterator[bytes]:
     """A statement that declares names as one wrapped list. lists: the names, with their numbers."""
     per_line = WIDTH // (max(name.width for name, _ in lists) + 2)
     total = sum(count for _, count in lists)
@@ -142,44 +142,48 @@ def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]
     for name, count in lists:
         place = np.arange(start + 1, start + count + 1)
         separator = np.where(place == total, 2, place % per_line == 0)
-        yield from render([name, Words(table([b", ", b",\n  ", b";\n"]), separator)], count)
+        yield from render([name, Words(word_table([b", ", b",\n  ", b";\n"]), separator)], count)
         start += count
 
 
 KEYWORDS: Final = {"continuous": b"Variables", "binary": b"Binary Variables", "integer": b"Integer Variables"}
 
 
-def _variables(form: Canonical) -> Iterator[bytes]:
+def _variables(form: CanonicalForm) -> Iterator[bytes]:
     for block in form.problem.blocks.values():
         if block.count:
             lists = [(form.names.of(block), block.count)]
-            yield from declared(KEYWORDS[form.kind(block)], lists)
+            yield from name_list(KEYWORDS[form.kind(block)], lists)
 
 
 def _equations(problem: Problem, names: Names) -> Iterator[bytes]:
     if problem.rows:
         lists = [(names.row(family), family.count) for family in problem.rows]
-        yield from declared(b"Equations", lists)
+        yield from name_list(b"Equations", lists)
 
 
 def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
     """The terms of the objective, one line per element (more if it is long)."""
     for family in problem.objective:
-        terms = Scalar(family, names).summands(family.family.expression)
-        yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)
+        terms = GamsExpressions(family, names).summands(family.family.expression)
+        yield from render([*wrap_lines(terms, WIDTH, b"  "), b"\n"], family.count)
 
 
 def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
     for family in problem.rows:
-        language, relation = Scalar(family, names), family.family.expression
+        language, relation = GamsExpressions(family, names), family.family.expression
         left, right = language.expression(relation.lhs), language.expression(relation.rhs)
         parts: list[Piece] = [names.row(family), b".. ", *left, SENSES[family.family.sense], *right, b";\n"]
         yield from render(parts, family.count)
 
 
-def _bounds(form: Canonical) -> Iterator[bytes]:
+def _bounds(form: CanonicalForm) -> Iterator[bytes]:
     for group in (group for block in form.problem.blocks.values() for group in form.bounds(block)):
-        name, lower, upper = group.names, words(group.lower, bounds), words(group.upper, bounds)
+        name, lower, upper = (
+            group.names,
+            words(group.lower, bound_texts),
+            words(group.upper, bound_texts),
+        )
         parts: list[Piece] = [name, b".lo = ", lower, b"; ", name, b".up = ", upper, b";\n"]
         if group.kind == "fixed":
             parts = [name, b".fx = ", lower, b";\n"]

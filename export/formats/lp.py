@@ -25,18 +25,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...models.formulations.families import Block, PlacedFamily
-from ..writing.canonical import Canonical, coefficient
+from ..writing.canonical import CanonicalForm, coefficient
 from ..writing.names import Names
-from ..writing.records import Piece, Pieces, bounds, render, signed, words
+from ..writing.records import Piece, Pieces, bound_texts, render, signed_texts, words
 
 
-def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
+def generate(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
     """The bytes of the LP file, block by block. header: lines of comment, without the comment sign."""
     problem, names = form.problem, form.names
     for line in header:
         yield f"\\ {line}\n".encode()
     yield f"Minimize\n obj_{problem.stamp}:".encode()
-    yield from render([b" ", words(form.constant, signed), b" ", form.one, b"\n"], 1)
+    yield from render([b" ", words(form.constant, signed_texts), b" ", form.one, b"\n"], 1)
     yield from _objective(form)
     yield b"Subject To\n"
     if not problem.rows:
@@ -58,20 +58,20 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     yield b"End\n"
 
 
-def _objective(form: Canonical) -> Iterator[bytes]:
+def _objective(form: CanonicalForm) -> Iterator[bytes]:
     names = form.names
     for block in form.problem.blocks.values():
-        cost = words(form.costs[block.slice], signed)
+        cost = words(form.costs[block.slice], signed_texts)
         yield from render([b" ", cost, b" ", names.of(block), b"\n"], block.count)
     index, factor = form.products()
     if not len(factor):
         return
     square = index[:, 0] == index[:, 1]
     yield b" + [\n"
-    for chosen in (square, ~square):
-        pair = index[chosen]
-        value = words(2 * factor[chosen], signed)
-        tail: Pieces = [b" ^2\n"] if chosen is square else [b" * ", names.all.at(pair[:, 1]), b"\n"]
+    for which in (square, ~square):
+        pair = index[which]
+        value = words(2 * factor[which], signed_texts)
+        tail: Pieces = [b" ^2\n"] if which is square else [b" * ", names.all.at(pair[:, 1]), b"\n"]
         yield from render([b" ", value, b" ", names.all.at(pair[:, 0]), *tail], len(pair))
     yield b" ] / 2\n"
 
@@ -79,14 +79,19 @@ def _objective(form: Canonical) -> Iterator[bytes]:
 def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     parts: list[Piece] = [b" ", names.row(family), b":"]
     for term in family.of_degree(1):
-        parts += [b" ", words(coefficient(term), signed), b" ", names.at(family, term.symbols[0])]
+        parts += [
+            b" ",
+            words(coefficient(term), signed_texts),
+            b" ",
+            names.at(family, term.symbols[0]),
+        ]
     products = family.of_degree(2)
     if products:
         parts.append(b" + [")
         for term in products:
             parts += [
                 b" ",
-                words(coefficient(term), signed),
+                words(coefficient(term), signed_texts),
                 b" ",
                 names.at(family, term.symbols[0]),
                 b" * ",
@@ -99,5 +104,5 @@ def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
 
 
 def _bounds(block: Block, names: Names) -> Iterator[bytes]:
-    lower, upper = (words(end, bounds) for end in (block.lower, block.upper))
+    lower, upper = (words(end, bound_texts) for end in (block.lower, block.upper))
     yield from render([b" ", lower, b" <= ", names.of(block), b" <= ", upper, b"\n"], block.count)

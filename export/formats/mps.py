@@ -26,21 +26,21 @@ from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SLOTS
 from ...models.instance.grid import Grid, Ints
-from ..writing.canonical import Bounds, Canonical, coefficient
+from ..writing.canonical import BlockBounds, CanonicalForm, coefficient
 from ..writing.names import Names, problem_name
 from ..writing.records import (
-    OnlyWhere,
+    OptionalPieces,
     Piece,
-    Tagged,
-    number,
+    TaggedWords,
+    number_text,
     render,
     words,
 )
 
-_KIND = {">=": b"G", "<=": b"L", "==": b"E"}
+_ROW_TYPES = {">=": b"G", "<=": b"L", "==": b"E"}
 
 
-def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
+def generate(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
     """The bytes of the MPS file, block by block. header: lines of comment, without the comment sign."""
     problem, names = form.problem, form.names
     for line in header:
@@ -49,7 +49,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     if not problem.rows:
         yield b" E c_ONE\n"
     for family in problem.rows:
-        head = b" " + _KIND[family.family.sense] + b" "
+        head = b" " + _ROW_TYPES[family.family.sense] + b" "
         yield from render([head, names.row(family), b"\n"], family.count)
     yield b"COLUMNS\n"
     yield from _columns(form)
@@ -66,12 +66,12 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     yield b"ENDATA\n"
 
 
-def _columns(form: Canonical) -> Iterator[bytes]:
+def _columns(form: CanonicalForm) -> Iterator[bytes]:
     """Matrix entries column by column; a record is a column: its cost first, then by row."""
     problem, names = form.problem, form.names
     rows = {family.family.tag: names.row(family) for family in problem.rows}
     markers = 0
-    for integer, blocks in _runs(problem):
+    for integer, blocks in _integrality_runs(problem):
         if integer:
             yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
         for block in blocks:
@@ -85,25 +85,27 @@ def _columns(form: Canonical) -> Iterator[bytes]:
         if integer:
             yield f" MARKER{markers + 1} 'MARKER' 'INTEND'\n".encode()
             markers += 2
-    yield b" %b obj %b\n" % (form.one, number(form.constant).encode())
+    yield b" %b obj %b\n" % (form.one, number_text(form.constant).encode())
     if not problem.rows:
         yield b" %b c_ONE 1\n" % form.one
 
 
-def _entries(family: PlacedFamily, block: Block, name: Tagged, rows: Tagged) -> Iterator[Piece | OnlyWhere]:
+def _entries(
+    family: PlacedFamily, block: Block, name: TaggedWords, rows: TaggedWords
+) -> Iterator[Piece | OptionalPieces]:
     """The lines of a column of a block for the rows of a family, in the order of rows."""
-    chosen = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
-    lines = [line for term in chosen for line in _incident(family, term)]
+    terms = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
+    lines = [line for term in terms for line in _incident_rows(family, term)]
     for _, row, term in sorted(lines, key=lambda line: line[0]):
         value = words(coefficient(term))
         if row is None:
             yield from (b" ", name, b" ", rows, b" ", value, b"\n")
         else:
             at_row = value if isinstance(value, bytes) else value.at(row)
-            yield OnlyWhere(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
+            yield OptionalPieces(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
 
 
-def _incident(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | None, Monomial]]:
+def _incident_rows(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | None, Monomial]]:
     """Rows of a family that contain a column of the term's block: (rank, row of each column or -1, term).
 
     None where row and column have the same number. Pairs are numbered by their first pixel, the upper before
@@ -112,27 +114,27 @@ def _incident(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | No
     """
     instance, kind = family.problem.instance, SLOTS[family.family.over][term.symbols[0]][1]
     if kind == "itself":
-        own = (
+        row = (
             None
             if family.covers_index_set
-            else _inverse(family.elements, family.block(term.symbols[0]).count)
+            else _inverse_index(family.elements, family.block(term.symbols[0]).count)
         )
-        return [(0, own, term)]
+        return [(0, row, term)]
     assert family.covers_index_set  # families on a part of the pairs have terms of only those pairs
     if kind == "stroke":
-        return [(0, _inverse(instance.stroke_index, instance.grid.size), term)]
-    left, upper, right, lower = _pairs_round(instance.grid)
+        return [(0, _inverse_index(instance.stroke_index, instance.grid.size), term)]
+    left, upper, right, lower = _pairs_of_pixels(instance.grid)
     return [(1, upper, term), (2, right, term)] if kind == "first" else [(0, left, term), (3, lower, term)]
 
 
-def _inverse(index: Ints, count: int) -> Ints:
+def _inverse_index(index: Ints, count: int) -> Ints:
     """Place in `index` of each number below `count`, -1 if it is missing."""
     place = np.full(count, -1, dtype=np.int32)
     place[index] = np.arange(len(index), dtype=np.int32)
     return place
 
 
-def _pairs_round(grid: Grid) -> tuple[Ints, Ints, Ints, Ints]:
+def _pairs_of_pixels(grid: Grid) -> tuple[Ints, Ints, Ints, Ints]:
     """Number of the pair of each pixel with its left, upper, right and lower neighbour; -1: none."""
     upper, right = grid.pair_number
     left, lower = np.full_like(right, -1), np.full_like(upper, -1)
@@ -140,7 +142,7 @@ def _pairs_round(grid: Grid) -> tuple[Ints, Ints, Ints, Ints]:
     return left[grid.mask], upper[grid.mask], right[grid.mask], lower[grid.mask]
 
 
-def _runs(problem: Problem) -> list[tuple[bool, list[Block]]]:
+def _integrality_runs(problem: Problem) -> list[tuple[bool, list[Block]]]:
     """Runs of consecutive blocks that are all integer or all not; empty blocks are left out."""
     runs: list[tuple[bool, list[Block]]] = []
     for block in filter(lambda block: block.count, problem.blocks.values()):
@@ -169,7 +171,7 @@ _ENDS: Final = {
 """Keywords of the lines of a column, by the kind of its bounds."""
 
 
-def _bounds(bounds: Bounds) -> Iterator[bytes]:
+def _bounds(bounds: BlockBounds) -> Iterator[bytes]:
     """One record per column, with two lines where both ends are named."""
     numbers = {b"FX": bounds.lower, b"LO": bounds.lower, b"UP": bounds.upper}
     parts: list[Piece] = []
@@ -179,7 +181,7 @@ def _bounds(bounds: Bounds) -> Iterator[bytes]:
     yield from render(parts, len(bounds.lower))
 
 
-def _objective_matrix(form: Canonical) -> Iterator[bytes]:
+def _objective_matrix(form: CanonicalForm) -> Iterator[bytes]:
     names, (index, factor) = form.names, form.products()
     if not len(factor):
         return

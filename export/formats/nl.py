@@ -1,6 +1,6 @@
 """AMPL .nl, text and binary, in the subset that the AMPL Solver Library, SCIP and CasADi read alike.
 
-The order of columns and rows is that of `writing.nl_layout`. Header, line by line (docs/format-rules.md):
+The order of columns and rows is that of `writing.nl_order`. Header, line by line (docs/format-rules.md):
 
     g4 1 1 0 123456789                 b4 for binary; the .sol repeats the options, the last of them the stamp
     variables rows objectives ranges equations
@@ -31,23 +31,21 @@ from numpy.typing import NDArray
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.names import name_length
 from ...models.instance.grid import Floats, Ints
-from ..writing.canonical import BOUND_KINDS, Canonical, coefficient
-from ..writing.expressions import Operator, Prefix
+from ..writing.canonical import BOUND_KINDS, CanonicalForm, coefficient
+from ..writing.expressions import Operator, PrefixLanguage
 from ..writing.names import OBJECTIVE
-from ..writing.nl_layout import Layout, nonlinear_terms, runs
+from ..writing.nl_order import NlOrder, equal_runs, nonlinear_terms
 from ..writing.records import (
     Decimals,
-    Part,
+    Hole,
     Piece,
     Pieces,
-    Raw,
+    RawValues,
     check_coefficients,
     render,
     words,
 )
 from ..writing.stamps import stamp_option
-
-__all__ = ["Layout", "generate"]
 
 ADD, MULTIPLY, POWER, NEGATE, COSINE, SUM = 0, 2, 5, 16, 46, 54
 
@@ -55,13 +53,13 @@ ADD, MULTIPLY, POWER, NEGATE, COSINE, SUM = 0, 2, 5, 16, 46, 54
 Numbers = NDArray[Any] | int | float
 
 
-class Text:
+class TextForm:
     """The text form: each token on its own line, its numbers apart by blanks."""
 
     letter, arithmetic = b"g", 0
     padded = True
 
-    def number(self, value: Numbers) -> bytes | Part:
+    def number(self, value: Numbers) -> bytes | Hole:
         """A number within a token, decimal if it is whole by its type."""
         if isinstance(value, int):
             return str(value).encode()
@@ -71,9 +69,9 @@ class Text:
     def token(self, name: bytes, *numbers: Numbers) -> list[Piece]:
         """A letter with numbers, numbers alone, or a digit with numbers, which then stand apart from it."""
         parts: list[Piece] = [name] if name else []
-        for place, each in enumerate(numbers):
+        for place, value in enumerate(numbers):
             parts += [b" "] if place or name.isdigit() else []
-            parts.append(self.number(each))
+            parts.append(self.number(value))
         return [*parts, b"\n"]
 
     def constant(self, value: Floats | float) -> list[Piece]:
@@ -91,19 +89,19 @@ class Text:
         return [*self.token(b"o", SUM), *self.token(b"", count)]
 
 
-class Binary(Text):
+class BinaryForm(TextForm):
     """The binary form: one letter, then little-endian int32 and float64."""
 
     letter, arithmetic = b"b", 1
     padded = False
 
-    def number(self, value: Numbers) -> bytes | Part:
+    def number(self, value: Numbers) -> bytes | Hole:
         """A number within a token, of four bytes if it is whole by its type."""
         if isinstance(value, int):
             return value.to_bytes(4, "little", signed=True)
         values = np.asarray(value)
         values = values.astype("<i4" if values.dtype.kind == "i" else "<f8")
-        return Raw(values) if values.ndim else values.tobytes()
+        return RawValues(values) if values.ndim else values.tobytes()
 
     def token(self, name: bytes, *numbers: Numbers) -> list[Piece]:
         """A letter or a digit, if any, and numbers."""
@@ -112,50 +110,50 @@ class Binary(Text):
 
 
 def generate(
-    form: Canonical, _header: Sequence[str] = (), *, binary: bool = False, start: Floats | None = None
+    form: CanonicalForm, _header: Sequence[str] = (), *, binary: bool = False, start: Floats | None = None
 ) -> Iterator[bytes]:
     """The bytes of the .nl file, which holds no comments. start: a point (columns,) for the segment x."""
-    problem, layout, code = form.problem, form.layout, Binary() if binary else Text()
-    yield _counts(layout, code)
+    problem, nl, code = form.problem, form.nl_order, BinaryForm() if binary else TextForm()
+    yield _head(nl, code)
     first = 0
-    for family in layout.rows:
+    for family in nl.rows:
         head = code.token(b"C", np.arange(first, first + family.count, dtype=np.int32))
-        yield from code.records([*head, *_Tree(family, layout, code).monomials()], family.count)
+        yield from code.records([*head, *_NlExpressions(family, nl, code).monomials()], family.count)
         first += family.count
-    yield from _objective(layout, code)
+    yield from _objective(nl, code)
     if start is not None:
         yield from code.records(code.token(b"x", problem.n_columns))
-        parts = code.token(b"", np.arange(problem.n_columns, dtype=np.int32), start[layout.order])
+        parts = code.token(b"", np.arange(problem.n_columns, dtype=np.int32), start[nl.order])
         yield from code.records(parts, problem.n_columns)
-    yield from _limits(layout, code)
+    yield from _limits(nl, code)
     yield from _bounds(form, code)
-    yield from _jacobian(layout, code)
+    yield from _jacobian(nl, code)
 
 
-def _counts(layout: Layout, code: Text) -> bytes:
-    problem, count = layout.problem, np.bincount(layout.group, minlength=9)
+def _head(nl: NlOrder, code: TextForm) -> bytes:
+    problem, count = nl.problem, np.bincount(nl.group, minlength=9)
     nlvb, nlvc, only = int(count[:2].sum()), int(count[:4].sum()), int(count[4:6].sum())
-    equations = sum(family.count for family in layout.rows if family.family.sense == "==")
-    entries = sum(family.count * len(_entries(family)) for family in layout.rows)
-    rows = (name_length(problem.instance, row.family.tag, row.family.over) for row in layout.rows)
+    equations = sum(family.count for family in nl.rows if family.family.sense == "==")
+    entries = sum(family.count * len(_entries(family)) for family in nl.rows)
+    rows = (name_length(problem.instance, row.family.tag, row.family.over) for row in nl.rows)
     columns = (name_length(problem.instance, block.name, block.over) for block in problem.blocks.values())
     lines = [
         b"%b4 1 1 0 %d" % (code.letter, stamp_option(problem.stamp)),
         b" %d %d 1 0 %d" % (problem.n_columns, problem.n_rows, equations),
-        b" %d %d" % (sum(family.count for family in layout.nonlinear_rows), bool(layout.nonlinear_objective)),
+        b" %d %d" % (sum(family.count for family in nl.nonlinear_rows), bool(nl.nonlinear_objective)),
         b" 0 0",
         b" %d %d %d" % (nlvc, nlvc + only if only else nlvb, nlvb),
         b" 0 0 %d 1" % code.arithmetic,
         b" %d %d %d %d %d" % tuple(int(count[group]) for group in (7, 8, 1, 3, 5)),
-        b" %d %d" % (entries, len(_gradient(layout)[0])),
+        b" %d %d" % (entries, len(_gradient(nl)[0])),
         b" %d %d" % (max([len(OBJECTIVE), *rows]), max(columns)),
         b" 0 0 0 0 0",
     ]
     return b"\n".join(lines) + b"\n"
 
 
-def _objective(layout: Layout, code: Text) -> Iterator[bytes]:
-    families = layout.nonlinear_objective
+def _objective(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
+    families = nl.nonlinear_objective
     yield from code.records(code.token(b"O", 0, 0))
     summands = sum(family.count for family in families)
     if not summands:
@@ -163,15 +161,15 @@ def _objective(layout: Layout, code: Text) -> Iterator[bytes]:
     elif summands > 1:
         yield from code.records(code.sum(summands))
     for family in families:
-        yield from code.records(_Tree(family, layout, code).expression(family.family.body), family.count)
+        yield from code.records(_NlExpressions(family, nl, code).expression(family.family.body), family.count)
 
 
-class _Tree(Prefix):
+class _NlExpressions(PrefixLanguage):
     """Expressions of a family in a form of the file."""
 
-    def __init__(self, family: PlacedFamily, layout: Layout, code: Text) -> None:
+    def __init__(self, family: PlacedFamily, nl: NlOrder, code: TextForm) -> None:
         super().__init__(family)
-        self._layout = layout
+        self._nl = nl
         self._code = code
 
     def number(self, values: Floats | float) -> Pieces:
@@ -180,7 +178,7 @@ class _Tree(Prefix):
 
     def column(self, symbol: sp.Symbol) -> Pieces:
         """A column, by its place in the file."""
-        return self._code.token(b"v", self._layout.places(self.family, symbol))
+        return self._code.token(b"v", self._nl.places(self.family, symbol))
 
     def node(self, operator: Operator, parts: list[Pieces]) -> Pieces:
         """An operator with its operands; a product is one of pairs, and a sum of two has its own operator."""
@@ -205,11 +203,11 @@ class _Tree(Prefix):
         return self.joined("sum", terms) if terms else self.number(0.0)
 
 
-def _limits(layout: Layout, code: Text) -> Iterator[bytes]:
-    if not layout.rows:
+def _limits(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
+    if not nl.rows:
         return
     yield from code.records(code.token(b"r"))
-    for family in layout.rows:
+    for family in nl.rows:
         kind = {">=": b"2", "<=": b"1", "==": b"4"}[family.family.sense]
         yield from code.records(code.token(kind, family.limit), family.count)
 
@@ -218,14 +216,14 @@ _BOUND: Final = np.array([{"lower": 2, "upper": 1, "free": 3}.get(kind, 0) for k
 """The digit before the bounds of a column, by their kind."""
 
 
-def _bounds(form: Canonical, code: Text) -> Iterator[bytes]:
+def _bounds(form: CanonicalForm, code: TextForm) -> Iterator[bytes]:
     """Bounds in file order, one stretch of one block and of equal digits after the other."""
-    problem, layout = form.problem, form.layout
+    problem, nl = form.problem, form.nl_order
     yield from code.records(code.token(b"b"))
-    for _, run in layout.stretches:
-        columns = layout.order[run]
+    for _, run in nl.stretches:
+        columns = nl.order[run]
         digits = _BOUND[form.bound_kinds[columns]]
-        for part in runs(digits):
+        for part in equal_runs(digits):
             lower, upper = problem.lower[columns[part]], problem.upper[columns[part]]
             digit = int(digits[part.start])
             ends = {0: (lower, upper), 1: (upper,), 2: (lower,), 3: ()}[digit]
@@ -238,22 +236,22 @@ def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:
     return list((linear | {s: 0.0 for s in family.variables if s not in linear}).items())
 
 
-def _gradient(layout: Layout) -> tuple[Ints, Floats]:
+def _gradient(nl: NlOrder) -> tuple[Ints, Floats]:
     """Places and coefficients of G: costs of linear terms, and 0 for columns of nonlinear ones."""
-    problem = layout.problem
+    problem = nl.problem
     costs = np.zeros(problem.n_columns)
     for family in problem.objective:
         if family.degree <= 1:
             for term in family.of_degree(1):
                 np.add.at(costs, term.factors[0], term.coefficient)
     check_coefficients(costs, "the objective")
-    place = np.nonzero(((costs != 0) | layout.in_objective)[layout.order])[0].astype(np.int32)
-    return place, costs[layout.order[place]]
+    place = np.nonzero(((costs != 0) | nl.in_objective)[nl.order])[0].astype(np.int32)
+    return place, costs[nl.order[place]]
 
 
-def _jacobian(layout: Layout, code: Text) -> Iterator[bytes]:
-    problem = layout.problem
-    rows = [(family, _entries(family)) for family in layout.rows]
+def _jacobian(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
+    problem = nl.problem
+    rows = [(family, _entries(family)) for family in nl.rows]
     if rows:
         count = np.zeros(problem.n_columns, dtype=np.int32)
         for family, entries in rows:
@@ -262,16 +260,16 @@ def _jacobian(layout: Layout, code: Text) -> Iterator[bytes]:
                 count[block.slice] += 1 if inside is None else np.bincount(inside, minlength=block.count)
         yield from code.records(code.token(b"k", problem.n_columns - 1))
         yield from code.records(
-            code.token(b"", np.cumsum(count[layout.order])[:-1].astype(np.int32)), problem.n_columns - 1
+            code.token(b"", np.cumsum(count[nl.order])[:-1].astype(np.int32)), problem.n_columns - 1
         )
     first = 0
     for family, entries in rows:
         parts = code.token(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries))
         for symbol, value in entries:
-            parts += code.token(b"", layout.places(family, symbol), np.asarray(value, dtype=np.float64))
+            parts += code.token(b"", nl.places(family, symbol), np.asarray(value, dtype=np.float64))
         yield from code.records(parts, family.count)
         first += family.count
-    place, costs = _gradient(layout)
+    place, costs = _gradient(nl)
     if len(place):
         yield from code.records(code.token(b"G", 0, len(place)))
         yield from code.records(code.token(b"", place, costs), len(place))

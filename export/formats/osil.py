@@ -31,8 +31,8 @@ import sympy as sp
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats, Ints
-from ..writing.canonical import Canonical, coefficient
-from ..writing.expressions import Operator, Prefix
+from ..writing.canonical import CanonicalForm, coefficient
+from ..writing.expressions import Operator, PrefixLanguage
 from ..writing.names import OBJECTIVE, Names
 from ..writing.records import (
     Decimals,
@@ -40,12 +40,12 @@ from ..writing.records import (
     Pieces,
     Texts,
     check_coefficients,
-    number,
-    numbers,
+    number_text,
+    number_texts,
     render,
     words,
 )
-from ..writing.terms import terms
+from ..writing.terms import merged_terms
 
 _HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <osil xmlns="os.optimizationservices.org" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" \
@@ -58,7 +58,7 @@ xsi:schemaLocation="os.optimizationservices.org http://www.optimizationservices.
 """
 
 
-def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
+def generate(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
     """The bytes of the OSiL file, block by block. header: lines that describe the content."""
     problem, names = form.problem, form.names
     description = escape("\n".join(header))
@@ -78,16 +78,16 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     yield b"</instanceData>\n</osil>\n"
 
 
-def ends(values: Floats) -> Texts:
+def infinity_texts(values: Floats) -> Texts:
     """Bounds: numbers, `-INF` or `INF`."""
-    return np.where(np.isinf(values), np.where(values > 0, b"INF", b"-INF"), numbers(values))
+    return np.where(np.isinf(values), np.where(values > 0, b"INF", b"-INF"), number_texts(values))
 
 
 _LETTER: Final = {"continuous": "C", "binary": "B", "integer": "I"}
 
 
 def _variables(block: Block, names: Names, kind: str) -> Iterator[bytes]:
-    lower, upper = (words(end, ends) for end in (block.lower, block.upper))
+    lower, upper = (words(end, infinity_texts) for end in (block.lower, block.upper))
     kind_lower = f'" type="{kind}" lb="'.encode()
     parts: Pieces = [b'<var name="', names.of(block), kind_lower, lower, b'" ub="', upper, b'"/>\n']
     yield from render(parts, block.count)
@@ -109,7 +109,7 @@ def _quadratic_part(problem: Problem, degree: int) -> tuple[Ints, Floats]:
         for term in family.of_degree(degree):
             at.append(np.stack([np.zeros(family.count, np.int32), *term.factors], axis=1).astype(np.int64))
             values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,)))
-    merged = terms(np.concatenate(at), np.concatenate(values), indices=degree + 1, products=degree)
+    merged = merged_terms(np.concatenate(at), np.concatenate(values), indices=degree + 1, products=degree)
     return merged.at[:, 1:], merged.value
 
 
@@ -120,7 +120,7 @@ def _objective(problem: Problem) -> Iterator[bytes]:
     size = f'numberOfObjCoef="{len(cost) + 1}"'
     yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" {size}>\n'.encode()
     yield from render([b'<coef idx="', Decimals(index[:, 0]), b'">', words(cost), b"</coef>\n"], len(cost))
-    yield f'<coef idx="{problem.n_columns}">{number(constant)}</coef>\n</obj>\n</objectives>\n'.encode()
+    yield f'<coef idx="{problem.n_columns}">{number_text(constant)}</coef>\n</obj>\n</objectives>\n'.encode()
 
 
 def _constraints(family: PlacedFamily, names: Names) -> Iterator[bytes]:
@@ -188,11 +188,11 @@ def _nonlinear(problem: Problem) -> Iterator[bytes]:
         return
     yield b'<nonlinearExpressions numberOfNonlinearExpressions="1">\n<nl idx="-1">\n<sum>\n'
     for family in families:
-        yield from render([*_Tree(family).expression(family.family.body), b"\n"], family.count)
+        yield from render([*_OsilExpressions(family).expression(family.family.body), b"\n"], family.count)
     yield b"</sum>\n</nl>\n</nonlinearExpressions>\n"
 
 
-class _Tree(Prefix):
+class _OsilExpressions(PrefixLanguage):
     """Expressions of a family as nodes."""
 
     def number(self, values: Floats | float) -> Pieces:

@@ -24,9 +24,9 @@ from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import IndexSet, pixel_of
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
-from ..writing.canonical import Canonical
+from ..writing.canonical import CanonicalForm
 
-Place = tuple[Any, ...]
+ElementIndex = tuple[Any, ...]
 """(row, column) of a pixel, (row, column, side) of a pair."""
 
 _COMPARE: Final[dict[str, Callable[[Any, Any], Any]]] = {
@@ -64,9 +64,9 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
     """
     model = pyo.ConcreteModel(name=f"{problem.instance.name} {problem.name}")
     point = None if start is None else problem.point(start)
-    form = Canonical(problem)
+    form = CanonicalForm(problem)
     for block in problem.blocks.values():
-        index = places(problem.instance, block.over)
+        index = element_indices(problem.instance, block.over)
         model.add_component(block.name, _variables(block, index, _domain(form, block), point))
     columns = [
         variable for block in problem.blocks.values() for variable in model.component(block.name).values()
@@ -78,7 +78,7 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
     return model
 
 
-def places(instance: Instance, over: IndexSet) -> list[Place]:
+def element_indices(instance: Instance, over: IndexSet) -> list[ElementIndex]:
     """Positions of an index set's elements: (row, column), for a pair of its first pixel, and its side."""
     grid = instance.grid
     at = pixel_of(instance, over)
@@ -88,14 +88,14 @@ def places(instance: Instance, over: IndexSet) -> list[Place]:
     return list(zip(*coordinates, strict=True))
 
 
-def _domain(form: Canonical, block: Block) -> Any:
+def _domain(form: CanonicalForm, block: Block) -> Any:
     """Pyomo's domain of a block; a binary column fixed at 0 or 1 stays binary: bounds are separate."""
     if not block.integer:
         return pyo.Reals
-    return pyo.Binary if form.layout.binary[block.slice].all() else pyo.Integers
+    return pyo.Binary if form.nl_order.binary[block.slice].all() else pyo.Integers
 
 
-def _variables(block: Block, index: list[Place], domain: Any, point: Floats | None) -> pyo.Var:
+def _variables(block: Block, index: list[ElementIndex], domain: Any, point: Floats | None) -> pyo.Var:
     """The variables of a block of columns."""
     ends = (
         [value if math.isfinite(value) else None for value in bound.tolist()]
@@ -108,7 +108,7 @@ def _variables(block: Block, index: list[Place], domain: Any, point: Floats | No
 
 def _constraints(family: PlacedFamily, columns: list[Any]) -> pyo.Constraint:
     """The rows of a family, left and right side as declared."""
-    declared = places(family.problem.instance, family.family.over)
+    declared = element_indices(family.problem.instance, family.family.over)
     index = [declared[element] for element in family.elements.tolist()]
     sides = (
         _values(family, side, columns)
@@ -123,9 +123,9 @@ def _values(family: PlacedFamily, expression: sp.Expr, columns: list[Any]) -> It
     """The expression at each element, over Pyomo variables where a symbol denotes a column."""
     symbols = sorted(expression.free_symbols, key=str)
     evaluate = sp.lambdify(symbols, expression, modules=[_FUNCTIONS, "math"])
-    given = [_arguments(family, symbol, columns) for symbol in symbols]
+    values = [_arguments(family, symbol, columns) for symbol in symbols]
     return (
-        evaluate(*arguments) for arguments in (zip(*given, strict=True) if given else [()] * family.count)
+        evaluate(*arguments) for arguments in (zip(*values, strict=True) if values else [()] * family.count)
     )
 
 

@@ -35,21 +35,21 @@ import numpy as np
 
 from ...models.formulations.families import PlacedFamily
 from ...models.instance.grid import Floats, Ints
-from ..writing.canonical import Canonical, coefficient
+from ..writing.canonical import CanonicalForm, coefficient
 from ..writing.curvature import probtype
-from ..writing.records import Decimals, Piece, number, render, words
+from ..writing.records import Decimals, Piece, number_text, render, words
 
 INFINITY: Final = 1e20
 
 
-def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
+def generate(form: CanonicalForm, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the .qplib file, block by block. header: lines of comment. start: a point (columns,)."""
     problem = form.problem
     yield from _head(form, header)
     yield from _objective(form)
     if problem.rows:
         yield from _rows(form)
-    yield _line(number(INFINITY), "infinity")
+    yield _line(number_text(INFINITY), "infinity")
     if problem.rows:
         yield from _vector(form.row_lower, "left side of a row")
         yield from _vector(form.row_upper, "right side of a row")
@@ -68,7 +68,7 @@ def _line(value: str, comment: str) -> bytes:
     return f"{value} # {comment}\n".encode()
 
 
-def _head(form: Canonical, header: list[str]) -> Iterator[bytes]:
+def _head(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
     problem = form.problem
     values = [problem.instance.name, probtype(problem) or "", "minimize", str(problem.n_columns)]
     values += [str(problem.n_rows)] * bool(problem.rows)
@@ -84,18 +84,18 @@ def _vector(values: Floats, comment: str) -> Iterator[bytes]:
     distinct, count = np.unique(finite, return_counts=True)
     usual = float(distinct[count.argmax()])
     at = np.nonzero(finite != usual)[0]
-    yield _line(number(usual), f"{comment}, where not listed")
+    yield _line(number_text(usual), f"{comment}, where not listed")
     yield _line(str(len(at)), "listed")
     yield from render([Decimals(at + 1), b" ", words(finite[at]), b"\n"], len(at))
 
 
-def _objective(form: Canonical) -> Iterator[bytes]:
+def _objective(form: CanonicalForm) -> Iterator[bytes]:
     if form.problem.objective_degree == 2:
         index, value = form.products()
         yield _line(str(len(value)), "quadratic terms of the objective")
         yield from _products([], index[:, 0], index[:, 1], words(2 * value))
     yield from _vector(form.costs, "linear coefficient of the objective")
-    yield _line(number(form.constant), "constant of the objective")
+    yield _line(number_text(form.constant), "constant of the objective")
 
 
 def _products(before: list[Any], one: Ints, two: Ints, value: Piece) -> Iterator[bytes]:
@@ -105,7 +105,7 @@ def _products(before: list[Any], one: Ints, two: Ints, value: Piece) -> Iterator
     yield from render(parts, len(one))
 
 
-def _rows(form: Canonical) -> Iterator[bytes]:
+def _rows(form: CanonicalForm) -> Iterator[bytes]:
     """Coefficients of the rows: products, if there are any, then linear terms."""
     problem = form.problem
     for degree in (2, 1) if problem.row_degree == 2 else (1,):
@@ -130,7 +130,7 @@ def _row_terms(family: PlacedFamily, degree: int, first: int) -> Iterator[bytes]
     yield from render(linear, family.count)
 
 
-def _names(form: Canonical) -> Iterator[bytes]:
+def _names(form: CanonicalForm) -> Iterator[bytes]:
     problem, names = form.problem, form.names
     yield _line(str(problem.n_columns), "names of variables")
     for block in problem.blocks.values():

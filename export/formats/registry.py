@@ -21,8 +21,8 @@ from ...models.field.field import CrossField
 from ...models.formulations.families import ANY_DEGREE
 from ...models.formulations.problem import Problem, with_products_lifted
 from ...models.instance.grid import Floats
-from ..writing.canonical import Canonical
-from ..writing.sink import is_packed, saving
+from ..writing.canonical import CanonicalForm
+from ..writing.sink import is_packed, pending_file
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,10 @@ class Format:
 
     def is_model(self, name: str) -> bool:
         """Whether the file of that name is the model itself, not a list of names or data beside it."""
-        return _unpacked(Path(name)).endswith(self.suffix)
+        return _unpacked_name(Path(name)).endswith(self.suffix)
 
     def generate(
-        self, form: Canonical, header: list[str], start: Floats | None = None, dialect: str = ""
+        self, form: CanonicalForm, header: list[str], start: Floats | None = None, dialect: str = ""
     ) -> Iterator[bytes]:
         """The bytes of a file, as its writer makes them; the module of the writer is loaded only here."""
         options: dict[str, Any] = {"start": start} if self.starts else {}
@@ -118,7 +118,7 @@ class Written:
 
 
 @cache
-def generator() -> str:
+def program_version() -> str:
     """Name and version of this program, as written to files."""
     try:
         return f"crossfield {version('crossfield')}"
@@ -128,7 +128,7 @@ def generator() -> str:
 
 def format_of(path: str | Path) -> Format:
     """The format of a path by its suffix, in upper or lower case and before any `.gz`. Raises InputError."""
-    suffix = Path(_unpacked(Path(path))).suffix.removeprefix(".")
+    suffix = Path(_unpacked_name(Path(path))).suffix.removeprefix(".")
     if suffix.lower() not in FORMATS:
         raise InputError(
             f"no format has the suffix {suffix!r}; use one of {', '.join(FORMATS)}, with or without .gz",
@@ -137,22 +137,22 @@ def format_of(path: str | Path) -> Format:
     return FORMATS[suffix.lower()]
 
 
-def _unpacked(path: Path) -> str:
+def _unpacked_name(path: Path) -> str:
     """The name of the decompressed file."""
     return path.stem if is_packed(path) else path.name
 
 
-def carried(problem: Problem, entry: Format) -> Problem:
+def problem_in_format(problem: Problem, entry: Format) -> Problem:
     """The problem as the format can hold it: itself, or with products lifted.
 
     Raises UnsupportedByFormatError, naming an equivalent formulation, when neither fits.
     """
-    if _degree(problem) <= entry.degree:
+    if _highest_degree(problem) <= entry.degree:
         return problem
-    if _degree(problem) < ANY_DEGREE:
-        other = with_products_lifted(problem)
-        if _degree(other) <= entry.degree:
-            return other
+    if _highest_degree(problem) < ANY_DEGREE:
+        lifted = with_products_lifted(problem)
+        if _highest_degree(lifted) <= entry.degree:
+            return lifted
     instead = problem.formulation.equivalent
     remedy = f"write {instead}, which is the same problem" if instead else "choose nl or gms"
     limit = "quadratic" if entry.degree == 2 else f"polynomials of degree {entry.degree}"
@@ -161,21 +161,21 @@ def carried(problem: Problem, entry: Format) -> Problem:
     )
 
 
-def _degree(problem: Problem) -> int:
+def _highest_degree(problem: Problem) -> int:
     return max(problem.objective_degree, problem.row_degree)
 
 
-def header(problem: Problem) -> list[str]:
+def header_lines(problem: Problem) -> list[str]:
     """Lines of comment that describe the content of a file."""
     formulation, options = problem.formulation, problem.formulation.options
-    name, kept = f"{formulation.name} ({formulation.declaration.source})", "kept"
+    name, integrality = f"{formulation.name} ({formulation.declaration.source})", "kept"
     if options.relax:
-        name, kept = f"continuous relaxation of {name}", "dropped"
+        name, integrality = f"continuous relaxation of {name}", "dropped"
     norms = f"stroke norm {options.stroke_norm}, beta norm {options.beta_norm}"
     lines = [
-        f"{generator()}: {name}, {problem.problem_class}, {formulation.summary}",
+        f"{program_version()}: {name}, {problem.problem_class}, {formulation.summary}",
         f"instance {problem.instance.name}, gauge {problem.instance.gauge}, sha256 {problem.instance.sha256}",
-        f"facet {options.facet}, {norms}, integrality {kept}",
+        f"facet {options.facet}, {norms}, integrality {integrality}",
     ]
     changes = {"tightened": problem.tightened, "lifted": formulation.lifted}
     return lines + [f"{how}: {text}" for how, text in changes.items() if text]
@@ -224,34 +224,34 @@ def write(
         remedy = f"choose one of {known}" if known else "it has one form, so leave the dialect out"
         raise InputError(f"there is no dialect {chosen!r} of {entry.name}; {remedy}", file=path)
     if start is not None and not entry.starts:
-        holders = ", ".join(name for name, each in FORMATS.items() if each.starts)
+        holders = ", ".join(name for name, holder in FORMATS.items() if holder.starts)
         raise UnsupportedByFormatError(
             f"{entry.name} has no place for a start; choose a format that has one ({holders}), or call "
             "write_problem, which writes a start file for each solver",
             file=path,
         )
-    held = carried(problem, entry)
-    form = Canonical(held)
+    held = problem_in_format(problem, entry)
+    form = CanonicalForm(held)
     point = None if start is None else held.point(start)
     written = Written(entry.name, chosen, held)
-    lines = header(held)
+    lines = header_lines(held)
     files = [(path, entry.generate(form, lines, point, chosen)), *_companions(path, entry.name, form, lines)]
     with ExitStack() as stack:  # the files get their names together, at its end
-        for each, content in files:
-            written.files[each.name] = stack.enter_context(saving(each, content))
+        for file, content in files:
+            written.files[file.name] = stack.enter_context(pending_file(file, content))
     return written
 
 
 def _companions(
-    path: Path, name: str, form: Canonical, lines: list[str]
+    path: Path, name: str, form: CanonicalForm, lines: list[str]
 ) -> Iterator[tuple[Path, Iterator[bytes]]]:
     """Companion files: names of an .nl, never compressed, and data of a .mod, compressed like the model."""
-    stem = Path(_unpacked(path)).stem
+    stem = Path(_unpacked_name(path)).stem
     if name == "nl":
-        yield path.with_name(f"{stem}.row"), form.layout.row_file()
-        yield path.with_name(f"{stem}.col"), form.layout.column_file()
+        yield path.with_name(f"{stem}.row"), form.nl_order.row_file()
+        yield path.with_name(f"{stem}.col"), form.nl_order.column_file()
     if name == "mod":
         from . import ampl
 
         packed = path.suffix if is_packed(path) else ""
-        yield path.with_name(f"{stem}.dat{packed}"), ampl.data(form.problem, lines)
+        yield path.with_name(f"{stem}.dat{packed}"), ampl.generate_data(form.problem, lines)

@@ -15,7 +15,7 @@ from cplex.exceptions import CplexError, CplexSolverError
 
 from ...models.processes.child_program import on_stop
 from ..statuses import CPLEX, CPLEX_STOPPED, Status
-from ..writing.terms import Terms, listed
+from ..writing.terms import Terms, terms_of_entries
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
 from .reading import Meaning, finite, infinite
 
@@ -68,7 +68,7 @@ def _hessian(goal: Any) -> Terms:
     """The quadratic terms, from both triangles of x'Qx/2."""
     lines = goal.get_quadratic() if goal.get_num_quadratic_nonzeros() else []
     entries = [(i, j, q / 2) for i, line in enumerate(lines) for j, q in zip(*line.unpack(), strict=True)]
-    return listed(entries, indices=2, products=2)
+    return terms_of_entries(entries, indices=2, products=2)
 
 
 def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
@@ -80,7 +80,7 @@ def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
         for row, part in triples
         for i, j, a in zip(part.ind1, part.ind2, part.val, strict=True)
     ]
-    return listed(linear, indices=2), listed(cubes, indices=3, products=2)
+    return terms_of_entries(linear, indices=2), terms_of_entries(cubes, indices=3, products=2)
 
 
 def solve(job: Job) -> Outcome:

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ..writing.terms import listed
+from ..writing.terms import terms_of_entries
 from .protocol import Job, Outcome, RefusedError, complete, run_command, run_program
 from .reading import Evaluation, Meaning, Points
 
@@ -71,7 +71,7 @@ def read(path: Path) -> Meaning:
         costs=costs,
         row_lower=row_lower,
         row_upper=row_upper,
-        matrix=listed(rest, indices=2),
+        matrix=terms_of_entries(rest, indices=2),
     )
     return _without_objective(model, path) if path.suffix == ".mod" else model
 

@@ -11,7 +11,7 @@ import gurobipy
 import numpy as np
 
 from ...models.processes.child_program import on_stop
-from ..writing.terms import Terms, listed
+from ..writing.terms import Terms, terms_of_entries
 from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
 from .reading import Meaning, finite
 
@@ -52,7 +52,7 @@ def read(path: Path) -> Meaning:
             costs=model.getAttr("Obj", variables),
             row_lower=np.where(senses == "<", -np.inf, limits),
             row_upper=np.where(senses == ">", np.inf, limits),
-            quadratic=listed(square, indices=2, products=2),
+            quadratic=terms_of_entries(square, indices=2, products=2),
             matrix=matrix,
             row_quadratic=cubes,
         )
@@ -67,7 +67,7 @@ def _rows(model: Any, plain: list[Any], products: list[Any]) -> tuple[Terms, Ter
         cubes += [(place, *product) for product in _products(expression)]
         rest = expression.getLinExpr()
         linear += [(place, rest.getVar(term).index, rest.getCoeff(term)) for term in range(rest.size())]
-    return listed(linear, indices=2), listed(cubes, indices=3, products=2)
+    return terms_of_entries(linear, indices=2), terms_of_entries(cubes, indices=3, products=2)
 
 
 def _products(expression: Any) -> list[tuple[int, int, float]]:

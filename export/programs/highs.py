@@ -10,7 +10,7 @@ import numpy as np
 
 from ...models.errors import OutputError
 from ...models.processes.child_program import is_stopped
-from ..writing.terms import of_triangle, terms
+from ..writing.terms import merged_terms, terms_of_triangle
 from .protocol import Job, Outcome, RefusedError, complete
 from .reading import Meaning, finite
 
@@ -77,10 +77,10 @@ def read(path: Path) -> Meaning:
     if len(lp.integrality_):
         given["integer"] = [kind == highspy.HighsVarType.kInteger for kind in lp.integrality_]
     column, row, value = _columnwise(lp.a_matrix_, lp.num_col_)
-    given["matrix"] = terms(np.stack([row, column], axis=1), value, indices=2)
+    given["matrix"] = merged_terms(np.stack([row, column], axis=1), value, indices=2)
     if hessian.dim_:
         column, row, value = _columnwise(hessian, hessian.dim_)  # the lower triangle of x'Qx/2
-        given["quadratic"] = of_triangle(row, column, value)
+        given["quadratic"] = terms_of_triangle(row, column, value)
     return Meaning.of(list(lp.col_names_), list(lp.row_names_), **given)
 
 

@@ -14,7 +14,7 @@ from typing import Any, Final, Self
 import numpy as np
 
 from ...models.instance.grid import Bools, Floats, Ints
-from ..writing.terms import Terms, terms
+from ..writing.terms import Terms, merged_terms
 
 _INFINITY: Final = 1e20
 _INFINITE_BOUND: Final = 1e19
@@ -80,9 +80,9 @@ class Meaning:
             rows,
             **per_column,
             **per_row,
-            quadratic=terms(back_c[self.quadratic_at], self.quadratic, indices=2, products=2),
-            matrix=terms(matrix, self.matrix, indices=2),
-            row_quadratic=terms(cubes, self.row_quadratic, indices=3, products=2),
+            quadratic=merged_terms(back_c[self.quadratic_at], self.quadratic, indices=2, products=2),
+            matrix=merged_terms(matrix, self.matrix, indices=2),
+            row_quadratic=merged_terms(cubes, self.row_quadratic, indices=3, products=2),
         )
 
 

@@ -17,7 +17,7 @@ import pyscipopt
 from ...models.processes.child_program import on_stop
 from ..statuses import SCIP_GAP, Status, closes, of_scip
 from ..writing.stamps import is_one_column
-from ..writing.terms import Terms, listed
+from ..writing.terms import Terms, terms_of_entries
 from .protocol import Job, Outcome, RefusedError, complete, file_names
 from .reading import Evaluation, Meaning, Points, finite
 
@@ -94,7 +94,7 @@ def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, T
         square += [(place, number[v.name], number[v.name], value) for v, value, _ in squares]
         linear += [(place, number[v.name], cost) for v, _, cost in squares]
         linear += [(place, number[v.name], value) for v, value in rest if v.name in number]
-    return listed(linear, indices=2), listed(square, indices=3, products=2)
+    return terms_of_entries(linear, indices=2), terms_of_entries(square, indices=3, products=2)
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:

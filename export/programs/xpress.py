@@ -14,7 +14,7 @@ with warnings.catch_warnings(action="ignore"):  # it prints which licence it use
 from ...models.processes.child_program import on_stop
 from ...models.storage import replacing
 from ..statuses import XPRESS, Status
-from ..writing.terms import Terms, listed, of_triangle, terms
+from ..writing.terms import Terms, merged_terms, terms_of_entries, terms_of_triangle
 from .protocol import Job, Outcome, RefusedError, TooLargeError
 from .reading import Meaning, finite, infinite
 
@@ -62,7 +62,7 @@ def read(path: Path) -> Meaning:
         row_lower=np.where(kinds == "L", -np.inf, limits),
         row_upper=np.where(kinds == "G", np.inf, limits),
         quadratic=_hessian(model, n),
-        matrix=terms(np.stack([row, column], axis=1), value, indices=2),
+        matrix=merged_terms(np.stack([row, column], axis=1), value, indices=2),
         row_quadratic=_row_products(model),
     )
 
@@ -71,7 +71,7 @@ def _hessian(model: Any, n: int) -> Terms:
     """The quadratic terms, from the upper triangle of x'Qx/2."""
     start, column, value = (np.array(part) for part in model.getMQObj(0, n - 1))
     row = np.repeat(np.arange(n, dtype=np.int32), np.diff(start) if len(value) else 0)
-    return of_triangle(row, column.astype(np.int32), value.astype(float))
+    return terms_of_triangle(row, column.astype(np.int32), value.astype(float))
 
 
 def _row_products(model: Any) -> Terms:
@@ -81,7 +81,7 @@ def _row_products(model: Any) -> Terms:
         for row in model.getQRows()
         for i, j, q in zip(*model.getQRowQMatrixTriplets(row), strict=True)
     ]
-    return listed(entries, indices=3, products=2)
+    return terms_of_entries(entries, indices=3, products=2)
 
 
 def solve(job: Job) -> Outcome:

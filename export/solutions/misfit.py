@@ -13,7 +13,7 @@ import numpy as np
 from ...models.errors import SolutionError
 from ...models.formulations.catalogue import FORMULATIONS, declare
 from ...models.instance.grid import Floats
-from ..writing.canonical import Canonical
+from ..writing.canonical import CanonicalForm
 from .readers.grammar import spellings
 from .readers.text import NamedValues, RawSolution, unknown_names
 
@@ -22,7 +22,7 @@ _NUMBERED: Final = re.compile(rb"(?:x|c|v|r|col|var|column|_C)_?\[?\(?\d+\)?\]?"
 _LIFTED: Final = "z"
 
 
-def check_names(raw: RawSolution, form: Canonical, mapped: NamedValues) -> None:
+def check_names(raw: RawSolution, form: CanonicalForm, mapped: NamedValues) -> None:
     """Raise SolutionError when columns are missing, or most names of the answer are unknown."""
     if mapped.missing or mapped.unknown > len(raw.values) // 2:
         raise SolutionError(_Misfit(raw, form, mapped.values).message)
@@ -33,7 +33,7 @@ class _Misfit:
     """The names of an answer, and the columns of a problem, which do not fit."""
 
     raw: RawSolution
-    form: Canonical
+    form: CanonicalForm
     values: Floats
 
     @property
@@ -106,7 +106,7 @@ def _tags(names: Iterable[bytes]) -> set[str]:
     return {place[1].decode() for place in places if place}
 
 
-def check_range(point: Floats, form: Canonical, largest: float) -> None:
+def check_range(point: Floats, form: CanonicalForm, largest: float) -> None:
     """Raise SolutionError for a value that no column can have, and name the column."""
     wrong = ~(np.abs(point) <= largest)
     if wrong.any():

@@ -21,9 +21,9 @@ from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, with_products_lifted
 from ...models.instance.grid import Floats
 from ...models.previews import table_of
-from ..formats.registry import FORMATS, carried
+from ..formats.registry import FORMATS, problem_in_format
 from ..statuses import Status, closes
-from ..writing.canonical import Canonical
+from ..writing.canonical import CanonicalForm
 from ..writing.stamps import is_identified
 from .misfit import check_names, check_range
 from .readers.registry import read_raw
@@ -391,21 +391,21 @@ def read_solution(
         return _mapped(raw, _form(raw, problem, held or {}), identified=known, tolerance=tolerance)
 
 
-def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Canonical:
+def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> CanonicalForm:
     """The problem that the solver was given: by the manifest, or else by the names of lifted products."""
     if raw.names is None:
-        return Canonical(held[raw.order] if raw.order in held else _carried(problem, raw.order))
+        return CanonicalForm(held[raw.order] if raw.order in held else _carried(problem, raw.order))
     forms = {each.sha256: each for each in held.values()}
     if len(forms) == 1:
-        return Canonical(*forms.values())
+        return CanonicalForm(*forms.values())
     liftable = "p1" in problem.blocks and "z" not in problem.blocks
     named = liftable and np.strings.startswith(raw.names, b"z_").any()
-    return Canonical(with_products_lifted(problem) if named else problem)
+    return CanonicalForm(with_products_lifted(problem) if named else problem)
 
 
 def _carried(problem: Problem, name: str) -> Problem:
     try:
-        return carried(problem, FORMATS[name])
+        return problem_in_format(problem, FORMATS[name])
     except UnsupportedByFormatError as error:
         raise SolutionError(f"is of an .{name} file, and {error}; it is of another problem") from error
 
@@ -425,7 +425,7 @@ def _solution(raw: RawSolution, problem: Problem, point: Floats | None, **facts:
     )
 
 
-def _mapped(raw: RawSolution, form: Canonical, **facts: Any) -> Solution:
+def _mapped(raw: RawSolution, form: CanonicalForm, **facts: Any) -> Solution:
     problem = form.problem
     point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
     check_range(point, form, LARGEST)
@@ -433,7 +433,7 @@ def _mapped(raw: RawSolution, form: Canonical, **facts: Any) -> Solution:
     return _solution(raw, problem, point, rounded=moved, unknown=unknown, **facts)
 
 
-def _by_position(raw: RawSolution, form: Canonical) -> Floats:
+def _by_position(raw: RawSolution, form: CanonicalForm) -> Floats:
     """The point of a file without names; columns in no term, missing in the solver's model, are arbitrary."""
     problem, order = form.problem, form.order(raw.order)
     point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and the column fixed to 1
@@ -441,7 +441,7 @@ def _by_position(raw: RawSolution, form: Canonical) -> Floats:
     return point[: problem.n_columns]
 
 
-def _by_name(raw: RawSolution, form: Canonical) -> tuple[Floats, int]:
+def _by_name(raw: RawSolution, form: CanonicalForm) -> tuple[Floats, int]:
     mapped = values_for(form.column_names, raw)
     check_names(raw, form, mapped)
     return mapped.values, mapped.unknown

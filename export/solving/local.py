@@ -37,12 +37,12 @@ from ...models.storage import make_folder
 from ..bundle.manifest import add_to_manifest
 from ..bundle.problem_files import is_recordable
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
-from ..formats.registry import FORMATS, carried, write
+from ..formats.registry import FORMATS, problem_in_format, write
 from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError, call, part_of
 from ..solutions.solution import Solution, read_solution
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in
 from ..statuses import Status
-from ..writing.sink import save
+from ..writing.sink import save_file
 
 FEASIBLE: Final = 1e-6
 """Violation up to which a start counts as a point of the problem: the solvers' own tolerance."""
@@ -133,7 +133,9 @@ def choose_solver(problem: Problem, name: str | None = None) -> Solver:
     if not present:
         raise MissingSolverError(willing[0].missing)
     formats = {solver.name: FORMATS[taking[solver.name].format] for solver in present}
-    return min(present, key=lambda each: carried(problem, formats[each.name]).formulation.is_weakened)
+    return min(
+        present, key=lambda each: problem_in_format(problem, formats[each.name]).formulation.is_weakened
+    )
 
 
 def choose_format(problem: Problem, solver: str) -> Taking:
@@ -353,7 +355,7 @@ def _write_start_as_answer(
     held: Problem, point: Floats, files: SolveFiles, outcome: Outcome, entry: Solver
 ) -> Solution:
     """Write the feasible start as the solution of a solver that ended without a point, and read it."""
-    save(files.solution, LAYOUTS["highs"](Start(held, point)))
+    save_file(files.solution, LAYOUTS["highs"](Start(held, point)))
     message = f"{entry.name}: stopped at its limit or by Ctrl-C, {_NO_BETTER}"
     return _read_answer(held, files, outcome._replace(status=Status.LIMIT_WITH_POINT, message=message), entry)
 

@@ -11,7 +11,7 @@ from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock
 from ...models.surface.surface import Surface
 from ..bundle.manifest import Manifest
-from ..formats.registry import FORMATS, generator
+from ..formats.registry import FORMATS, program_version
 from ..surfaces.files import SHADED, surface_facts
 from .methods import Candidate
 from .proven import ProvenBound
@@ -97,7 +97,7 @@ class Report:
         return {
             "format": "crossfield-report",
             "version": 1,
-            "generator": generator(),
+            "generator": program_version(),
             "instance": instance.facts(),
             "warnings": list(instance.reading.warnings if instance.reading else ()),
             "kept": self.kept.method,

@@ -22,7 +22,7 @@ from ...models.instance.instance import Instance
 from ...models.storage import make_folder, write_bytes
 from ...models.surface.surface import Surface
 from ...models.surface.trust import right_angle_deviation
-from ..formats.registry import generator
+from ..formats.registry import program_version
 from ..pictures.canvas import pixels_of
 from ..pictures.draw import own_settings
 from ..pictures.layers import strokes_sheet
@@ -159,7 +159,7 @@ def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -
     return {
         "format": "crossfield-surface",
         "version": 1,
-        "generator": generator(),
+        "generator": program_version(),
         "instance": {
             "name": instance.name,
             "source": instance.source,

@@ -7,7 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
-from ..formats.registry import generator
+from ..formats.registry import program_version
 
 
 class Verdict(StrEnum):
@@ -75,7 +75,7 @@ class Verification:
         return {
             "format": "crossfield-verification",
             "version": 2,
-            "generator": generator(),
+            "generator": program_version(),
             "ok": self.ok,
             "versions": self.versions,
             "absent": self.absent,

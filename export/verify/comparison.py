@@ -12,8 +12,8 @@ from ...models.formulations.names import column_names, row_names
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats
 from ..programs.reading import Evaluation, Meaning, Points, places
-from ..writing.canonical import Canonical
-from ..writing.terms import terms
+from ..writing.canonical import CanonicalForm
+from ..writing.terms import merged_terms
 
 VALUES: Final = 1e-9
 """Relative difference up to which values at a point agree: sums may have another order."""
@@ -31,7 +31,7 @@ def names_of_rows(problem: Problem) -> list[str]:
 
 def of_problem(problem: Problem) -> Meaning:
     """The intended content of an LP or MPS file, from the problem's arrays; the last column is fixed to 1."""
-    form = Canonical(problem)
+    form = CanonicalForm(problem)
     n, ones = problem.n_columns, np.ones(1)
     at, value = row_terms(problem.rows, 1)
     products, product = row_terms(problem.rows, 2)
@@ -44,9 +44,9 @@ def of_problem(problem: Problem) -> Meaning:
         costs=np.concatenate([form.costs, form.constant * ones]),
         row_lower=form.row_lower if problem.rows else ones,
         row_upper=form.row_upper if problem.rows else ones,
-        quadratic=terms(*form.products(), indices=2, products=2),
-        matrix=terms(at if problem.rows else [[0, n]], value if problem.rows else [1.0], indices=2),
-        row_quadratic=terms(products, product, indices=3, products=2),
+        quadratic=merged_terms(*form.products(), indices=2, products=2),
+        matrix=merged_terms(at if problem.rows else [[0, n]], value if problem.rows else [1.0], indices=2),
+        row_quadratic=merged_terms(products, product, indices=3, products=2),
     )
 
 
@@ -140,7 +140,7 @@ def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -
         return "other columns are integer"
     if found.discrete is not None and found.discrete != problem.integer.sum():
         return f"{found.discrete} discrete columns instead of {problem.integer.sum()}"
-    form = Canonical(problem)
+    form = CanonicalForm(problem)
     bounds = [
         ("lower", found.lower[c], problem.lower[at]),
         ("upper", found.upper[c], problem.upper[at]),

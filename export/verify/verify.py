@@ -29,7 +29,7 @@ from ...models.processes.deadline import Deadline
 from ...models.processes.limits import Limits
 from ...models.storage import read_bytes, sha256_of, write_bytes
 from ..bundle.manifest import Manifest, read_manifest
-from ..formats.registry import FORMATS, carried
+from ..formats.registry import FORMATS, problem_in_format
 from ..programs.protocol import NotReportedError, RefusedError, TooLargeError
 from ..programs.reading import Points
 from ..solutions.solution import Solution
@@ -131,7 +131,7 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
             path = _unpacked(source, place)
             if not FORMATS[entry["format"]].is_model(path.name):
                 continue
-            held = carried(problem, FORMATS[entry["format"]])
+            held = problem_in_format(problem, FORMATS[entry["format"]])
             stated, holds = entry["lifted"], held.formulation.lifted
             if stated != holds:
                 words = f"the manifest states {stated!r} for it, but it holds {holds!r}; export again"

@@ -19,13 +19,13 @@ from ...models.formulations.families import Block, Coefficient, Monomial, row_si
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
 from .names import Names
-from .nl_layout import Layout
-from .records import Tagged, Texts, check_coefficients, of_bytes
-from .stamps import one_column
+from .nl_order import NlOrder
+from .records import TaggedWords, Texts, check_coefficients, texts_of_bytes
+from .stamps import one_column_name
 
-Kind = Literal["continuous", "binary", "integer"]
+ColumnKind = Literal["continuous", "binary", "integer"]
 
-Order = Literal["nl", "lp", "mps", "mod"]
+ColumnOrder = Literal["nl", "lp", "mps", "mod"]
 """Kinds of files by the order of their columns: .nl has one of its own, LP and MPS put the column fixed to 1
 first and last, and of a .mod GLPK numbers the columns as it meets them."""
 
@@ -34,18 +34,18 @@ BOUND_KINDS: Final = ("fixed", "boxed", "lower", "upper", "free")
 """Kinds of bounds: both ends equal, both finite, one finite, none."""
 
 
-class Bounds(NamedTuple):
+class BlockBounds(NamedTuple):
     """Columns of a block whose bounds are of one kind, and their ends."""
 
     kind: str
-    names: Tagged
+    names: TaggedWords
     lower: Floats
     upper: Floats
 
 
 @dataclass(frozen=True, eq=False)
-class Canonical:
-    """A problem as files hold it, with products lifted if the format needs that (`registry.carried`)."""
+class CanonicalForm:
+    """A problem as files hold it: with products lifted if the format needs that."""
 
     problem: Problem
 
@@ -57,7 +57,7 @@ class Canonical:
     @cached_property
     def column_names(self) -> Texts:
         """Names of the problem's columns, shape (columns,)."""
-        return of_bytes(self.names.all.table)
+        return texts_of_bytes(self.names.all.table)
 
     @cached_property
     def constant(self) -> float:
@@ -71,7 +71,7 @@ class Canonical:
         Solvers repeat it, and it carries the stamp, so that an answer identifies its problem. A model without
         rows gets the row `c_ONE`, which fixes this column too.
         """
-        return one_column(self.problem.stamp)
+        return one_column_name(self.problem.stamp)
 
     @property
     def column_count(self) -> int:
@@ -97,17 +97,19 @@ class Canonical:
     def binary(self) -> Bools:
         """True for binary columns: integers with exactly the bounds [0, 1], shape (columns,).
 
-        The header of an .nl file counts more columns as binary: `layout.binary`.
+        The header of an .nl file counts more columns as binary: `nl_order.binary`.
         """
-        return np.concatenate([block.integer & _zero_to_one(block) for block in self.problem.blocks.values()])
+        return np.concatenate(
+            [block.integer & _is_zero_to_one(block) for block in self.problem.blocks.values()]
+        )
 
-    def kind(self, block: Block) -> Kind:
+    def kind(self, block: Block) -> ColumnKind:
         """The kind of a block of columns; binary only when all of them are."""
         if not block.integer:
             return "continuous"
-        return "binary" if _zero_to_one(block).all() else "integer"
+        return "binary" if _is_zero_to_one(block).all() else "integer"
 
-    def blocks(self, kind: Kind) -> list[Block]:
+    def blocks(self, kind: ColumnKind) -> list[Block]:
         """The nonempty blocks of a kind, in order."""
         return [block for block in self.problem.blocks.values() if block.count and self.kind(block) == kind]
 
@@ -118,14 +120,14 @@ class Canonical:
         low, high = np.isfinite(lower), np.isfinite(upper)
         return np.select([lower == upper, low & high, low, high], [0, 1, 2, 3], 4).astype(np.int8)
 
-    def bounds(self, block: Block) -> Iterator[Bounds]:
+    def bounds(self, block: Block) -> Iterator[BlockBounds]:
         """The bounds of a block, kind by kind."""
         names, kinds = self.names.of(block), self.bound_kinds[block.slice]
         for number, kind in enumerate(BOUND_KINDS):
             at = np.flatnonzero(kinds == number)
             if len(at):
                 chosen = names if len(at) == block.count else names.at(at)
-                yield Bounds(kind, chosen, block.lower[at], block.upper[at])
+                yield BlockBounds(kind, chosen, block.lower[at], block.upper[at])
 
     @cached_property
     def row_lower(self) -> Floats:
@@ -142,25 +144,25 @@ class Canonical:
         return row_sides(self.problem.rows)
 
     @cached_property
-    def layout(self) -> Layout:
+    def nl_order(self) -> NlOrder:
         """Order of columns and rows in the .nl file."""
-        return Layout(self.problem)
+        return NlOrder(self.problem)
 
-    def order(self, file: Order) -> Ints:
+    def order(self, file: ColumnOrder) -> Ints:
         """The problem's column at each place of a file; the column fixed to 1 comes after its last one."""
         if file == "nl":
-            return self.layout.order
+            return self.nl_order.order
         if file == "mod":
-            return _glpk_order(self.problem)
-        own, one = np.arange(self.problem.n_columns, dtype=np.int32), [self.problem.n_columns]
-        return np.concatenate([one, own] if file == "lp" else [own, one]).astype(np.int32)
+            return _glpk_column_order(self.problem)
+        columns, one = np.arange(self.problem.n_columns, dtype=np.int32), [self.problem.n_columns]
+        return np.concatenate([one, columns] if file == "lp" else [columns, one]).astype(np.int32)
 
-    def row_count(self, file: Order) -> int:
+    def row_count(self, file: ColumnOrder) -> int:
         """Number of rows in a file: LP and MPS have at least one, and GLPK counts the objective of a .mod."""
         return self.problem.n_rows + {"nl": 0, "mod": 1}.get(file, not self.problem.rows)
 
 
-def _glpk_order(problem: Problem) -> Ints:
+def _glpk_column_order(problem: Problem) -> Ints:
     """Columns (k,) in the order in which GLPK 5.0 numbers those of our .mod, without an angle in no row.
 
     It numbers the columns of a block as they first occur. Every pair names its second pixel before its first
@@ -170,7 +172,10 @@ def _glpk_order(problem: Problem) -> Ints:
     instance = problem.instance
     grid = instance.grid
     named = np.concatenate([np.stack([grid.second, grid.first], axis=1).ravel(), instance.stroke_index])
-    orders = {"alpha": _first(named), "beta": _first(np.concatenate([named, np.arange(grid.size)]))}
+    orders = {
+        "alpha": _first_occurrences(named),
+        "beta": _first_occurrences(np.concatenate([named, np.arange(grid.size)])),
+    }
     return np.concatenate(
         [
             block.offset + orders.get(name, np.arange(block.count, dtype=np.int64))
@@ -179,15 +184,15 @@ def _glpk_order(problem: Problem) -> Ints:
     ).astype(np.int32)
 
 
-def _first(named: Ints) -> Ints:
+def _first_occurrences(indices: Ints) -> Ints:
     """Every number once, in the order of first occurrence."""
-    numbers, places = np.unique(named, return_index=True)
+    numbers, places = np.unique(indices, return_index=True)
     return numbers[np.argsort(places)]
 
 
-def _zero_to_one(block: Block) -> Bools:
-    found: Bools = (block.lower == 0) & (block.upper == 1)
-    return found
+def _is_zero_to_one(block: Block) -> Bools:
+    zero_to_one: Bools = (block.lower == 0) & (block.upper == 1)
+    return zero_to_one
 
 
 def coefficient(term: Monomial) -> Coefficient:

@@ -8,13 +8,13 @@ import numpy as np
 
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.problem import Problem
-from .canonical import Canonical
+from .canonical import CanonicalForm
 
 NEGLIGIBLE: Final = 1e-9
 """Eigenvalues this small relative to the largest count as zero."""
 
 
-def of_objective(problem: Problem) -> tuple[str, str]:
+def objective_curvature(problem: Problem) -> tuple[str, str]:
     """Curvature of the objective (linear, convex, indefinite or nonconvex) and its reason."""
     degree = problem.objective_degree
     if degree <= 1:
@@ -42,11 +42,11 @@ def _is_convex(family: PlacedFamily) -> bool:
         first, second = map(family.variables.index, term.symbols)
         hessian[:, first, second] += value
         hessian[:, second, first] += value
-    found = np.linalg.eigvalsh(hessian)
-    return bool((found[:, 0] >= -NEGLIGIBLE * np.maximum(found[:, -1], 0.0)).all())
+    eigenvalues = np.linalg.eigvalsh(hessian)
+    return bool((eigenvalues[:, 0] >= -NEGLIGIBLE * np.maximum(eigenvalues[:, -1], 0.0)).all())
 
 
-def of_rows(problem: Problem) -> str:
+def row_curvature(problem: Problem) -> str:
     """Curvature of the rows: none, linear, convex, indefinite or nonconvex."""
     if not problem.rows:
         return "none"
@@ -74,7 +74,7 @@ def probtype(problem: Problem) -> str | None:
 
 
 def _objective_letter(problem: Problem) -> str:
-    kind, _ = of_objective(problem)
+    kind, _ = objective_curvature(problem)
     if kind == "convex":
         index, _ = problem.merged_objective(2)
         return "D" if (index[:, 0] == index[:, 1]).all() else "C"
@@ -82,7 +82,7 @@ def _objective_letter(problem: Problem) -> str:
 
 
 def _variables_letter(problem: Problem) -> str:
-    binary, integer = Canonical(problem).binary, problem.integer
+    binary, integer = CanonicalForm(problem).binary, problem.integer
     if not integer.any():
         return "C"
     if (binary == integer).all():
@@ -93,4 +93,4 @@ def _variables_letter(problem: Problem) -> str:
 def _constraints_letter(problem: Problem) -> str:
     bounded = bool(np.isfinite(problem.lower).any() or np.isfinite(problem.upper).any())
     kinds = {"none": "B" if bounded else "N", "linear": "L", "convex": "C"}
-    return kinds.get(of_rows(problem), "Q")
+    return kinds.get(row_curvature(problem), "Q")

@@ -20,7 +20,7 @@ from ...models.instance.grid import Floats
 from .records import Piece, Pieces
 
 
-class Language(ABC):
+class InfixLanguage(ABC):
     """The form of the leaves of an expression in an algebraic language."""
 
     @abstractmethod
@@ -105,7 +105,7 @@ def _rank(factor: sp.Expr) -> tuple[bool, bool, bool]:
     return not factor.is_Symbol, factor not in SCALARS, str(factor) in VARIABLES
 
 
-def is_data(family: PlacedFamily, expression: sp.Expr) -> bool:
+def is_free_of_columns(family: PlacedFamily, expression: sp.Expr) -> bool:
     """Whether an expression of a family holds no column."""
     return not expression.free_symbols & set(family.variables)
 
@@ -113,7 +113,7 @@ def is_data(family: PlacedFamily, expression: sp.Expr) -> bool:
 Operator = Literal["sum", "product", "negative", "square", "cos"]
 
 
-class Prefix(ABC):
+class PrefixLanguage(ABC):
     """Expressions of a family with operators before operands: one walk for every language of this kind.
 
     Data are evaluated: what holds no column becomes one number, in front of the rest of its sum or product.
@@ -136,7 +136,7 @@ class Prefix(ABC):
 
     def expression(self, expression: sp.Expr) -> Pieces:
         """An expression."""
-        if is_data(self.family, expression):
+        if is_free_of_columns(self.family, expression):
             return self.number(self.family.data(expression))
         if expression.is_Symbol:
             return self.column(expression)
@@ -146,7 +146,7 @@ class Prefix(ABC):
         return self.node("square" if expression.is_Pow else "cos", [self.expression(expression.args[0])])
 
     def _chain(self, expression: sp.Expr) -> Pieces:
-        data = [part for part in expression.args if is_data(self.family, part)]
+        data = [part for part in expression.args if is_free_of_columns(self.family, part)]
         parts = [self.expression(part) for part in expression.args if part not in data]
         if expression.is_Mul and data == [-1]:
             return self.node("negative", [self.joined("product", parts)])
@@ -158,7 +158,7 @@ class Prefix(ABC):
         return self.node(operator, parts) if len(parts) > 1 else parts[0]
 
 
-def wrapped(summands: Sequence[Pieces], width: int, indent: bytes) -> list[Piece]:
+def wrap_lines(summands: Sequence[Pieces], width: int, indent: bytes) -> list[Piece]:
     """The summands with line breaks between them, so that a line exceeds `width` bytes only slightly."""
     pieces: list[Piece] = []
     used = 0

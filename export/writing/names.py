@@ -11,7 +11,7 @@ from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.names import column_names, element_names
 from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SLOTS, IndexSet
-from .records import Tagged, Words
+from .records import TaggedWords, Words
 
 OBJECTIVE: Final = b"obj"
 """Name of the objective row."""
@@ -34,25 +34,25 @@ class Names:
         self._places: dict[IndexSet, Words] = {}
         self._reached: dict[tuple[Any, ...], Words] = {}
 
-    def of(self, block: Block) -> Tagged:
+    def of(self, block: Block) -> TaggedWords:
         """Names of a block's columns in order."""
-        return Tagged(block.name.encode(), self._of(block.over))
+        return TaggedWords(block.name.encode(), self._of(block.over))
 
-    def row(self, family: PlacedFamily) -> Tagged:
+    def row(self, family: PlacedFamily) -> TaggedWords:
         """Names of the rows of a family in order."""
         words = self._of(family.family.over)
-        return Tagged(
+        return TaggedWords(
             family.family.tag.encode(), words if family.covers_index_set else words.at(family.elements)
         )
 
-    def at(self, family: PlacedFamily, symbol: sp.Symbol) -> Tagged:
+    def at(self, family: PlacedFamily, symbol: sp.Symbol) -> TaggedWords:
         """Name of the symbol's column at each element of a family."""
         block, (_, way) = family.block(symbol), SLOTS[family.family.over][symbol]
         key = (family.family.over, way, family.family.only)
         if key not in self._reached:
             words, inside = self._of(block.over), family.inside(symbol)
             self._reached[key] = words if inside is None else words.at(inside)
-        return Tagged(block.name.encode(), self._reached[key])
+        return TaggedWords(block.name.encode(), self._reached[key])
 
     def _of(self, over: IndexSet) -> Words:
         if over not in self._places:

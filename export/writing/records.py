@@ -29,15 +29,15 @@ Texts = NDArray[np.bytes_]
 BLOCK: Final = 8192
 """Records per block: their bytes stay in the processor's cache."""
 
-LEAST: Final = 1e-9
-MOST: Final = 1e15
+LEAST_COEFFICIENT: Final = 1e-9
+COEFFICIENT_LIMIT: Final = 1e15
 """Readers drop or refuse coefficients outside (LEAST, MOST): docs/format-rules.md, W5 and M23."""
 
 _FEW: Final = 100
 """Whole numbers within so small a range are numbered without sorting."""
 
 
-class Part(Protocol):
+class Hole(Protocol):
     """A hole of a record, filled for the records start..stop."""
 
     @property
@@ -66,12 +66,12 @@ class Words:
 
     @cached_property
     def _words(self) -> Cells:
-        return as_cells(np.ascontiguousarray(self.table))
+        return cells_of_rows(np.ascontiguousarray(self.table))
 
     def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
         """The words of these records."""
-        chosen = self._words[start:stop] if self.codes is None else self._words.take(self.codes[start:stop])
-        return chosen, self._padded
+        words = self._words[start:stop] if self.codes is None else self._words.take(self.codes[start:stop])
+        return words, self._padded
 
     def at(self, codes: NDArray[Any]) -> Words:
         """Return this table with other codes."""
@@ -96,11 +96,11 @@ class Decimals:
         out = digits(values, width)
         for place in range(width - least):
             out[values < 10 ** (width - 1 - place), place] = 0
-        return as_cells(out), least < width
+        return cells_of_rows(out), least < width
 
 
 @dataclass(frozen=True, eq=False)
-class Raw:
+class RawValues:
     """Values as little-endian bytes, one per record: for binary files."""
 
     values: NDArray[Any]
@@ -116,7 +116,7 @@ class Raw:
 
 
 @dataclass(frozen=True, eq=False)
-class Tagged:
+class TaggedWords:
     """Words after a tag that all records share: names of one family."""
 
     tag: bytes
@@ -127,24 +127,24 @@ class Tagged:
         """Bytes of the longest one."""
         return len(self.tag) + self.words.width
 
-    def at(self, codes: NDArray[Any]) -> Tagged:
+    def at(self, codes: NDArray[Any]) -> TaggedWords:
         """Return these names with other codes."""
-        return Tagged(self.tag, self.words.at(codes))
+        return TaggedWords(self.tag, self.words.at(codes))
 
 
-Piece = bytes | Part | Tagged
+Piece = bytes | Hole | TaggedWords
 Pieces = Sequence[Piece]
 
 
 @dataclass(frozen=True, eq=False)
-class OnlyWhere:
+class OptionalPieces:
     """Pieces that only some records have."""
 
     present: Bools
     pieces: Pieces
 
 
-def render(parts: Sequence[Piece | OnlyWhere], count: int, *, padded: bool = True) -> Iterator[bytes]:
+def render(parts: Sequence[Piece | OptionalPieces], count: int, *, padded: bool = True) -> Iterator[bytes]:
     """The bytes of `count` records, block by block. padded: drop NUL bytes (never for binary records)."""
     if count == 0 or not parts:
         return
@@ -154,7 +154,7 @@ def render(parts: Sequence[Piece | OnlyWhere], count: int, *, padded: bool = Tru
         yield line[line != 0].tobytes() if padded and gaps else line.tobytes()
 
 
-def filled(parts: Pieces, count: int) -> Bytes:
+def record_matrix(parts: Pieces, count: int) -> Bytes:
     """The records as a matrix of bytes (count, width), padding kept."""
     if count == 0:
         return np.zeros(
@@ -170,14 +170,14 @@ class _Template:
     which is rare.
     """
 
-    def __init__(self, parts: Sequence[Piece | OnlyWhere]) -> None:
-        self._pieces: list[bytes | Part] = []
+    def __init__(self, parts: Sequence[Piece | OptionalPieces]) -> None:
+        self._pieces: list[bytes | Hole] = []
         self._optional: list[tuple[slice, Bools]] = []
         for part in parts:
             first = len(self._pieces)
-            for piece in part.pieces if isinstance(part, OnlyWhere) else (part,):
-                self._pieces += [piece.tag, piece.words] if isinstance(piece, Tagged) else [piece]
-            if isinstance(part, OnlyWhere):
+            for piece in part.pieces if isinstance(part, OptionalPieces) else (part,):
+                self._pieces += [piece.tag, piece.words] if isinstance(piece, TaggedWords) else [piece]
+            if isinstance(part, OptionalPieces):
                 self._optional.append((slice(first, len(self._pieces)), part.present))
         self._parts = {id(piece): piece for piece in self._pieces if not isinstance(piece, bytes)}
         self._widths: list[int] = []
@@ -223,71 +223,71 @@ class _Template:
         return np.ndarray((len(self._matrix),), kind, self._matrix, first, (self._matrix.shape[1],))
 
 
-def as_cells(matrix: Bytes) -> Cells:
+def cells_of_rows(matrix: Bytes) -> Cells:
     """The rows of a matrix of bytes (count, width), each contiguous, as items that NumPy moves as a whole."""
     width = matrix.shape[1]
     kind = f"u{width}" if width in {1, 2, 4, 8} else f"V{width}"
     return matrix.view(kind)[:, 0]
 
 
-def table(words: Sequence[bytes]) -> Bytes:
+def word_table(words: Sequence[bytes]) -> Bytes:
     """Words as a matrix of bytes padded with NUL."""
-    return of_texts(np.array(words, dtype=np.bytes_) if len(words) else np.zeros(0, "S1"))
+    return bytes_of_texts(np.array(words, dtype=np.bytes_) if len(words) else np.zeros(0, "S1"))
 
 
-def of_texts(texts: Texts) -> Bytes:
+def bytes_of_texts(texts: Texts) -> Bytes:
     """An array of texts as a matrix of bytes padded with NUL, as wide as the longest."""
     width = int(np.strings.str_len(texts).max(initial=1))
     return np.ascontiguousarray(texts).view(np.uint8).reshape(len(texts), texts.itemsize)[:, :width]
 
 
-def of_bytes(matrix: Bytes) -> Texts:
-    """The texts in the rows of a matrix of bytes padded with NUL: the inverse of `of_texts`."""
+def texts_of_bytes(matrix: Bytes) -> Texts:
+    """The texts in the rows of a matrix of bytes padded with NUL: the inverse of `bytes_of_texts`."""
     return np.ascontiguousarray(matrix).view(f"S{matrix.shape[1]}").ravel()
 
 
-def number(value: float) -> str:
+def number_text(value: float) -> str:
     """The shortest text that reads back as exactly this double: 3, 0.1, 1e-06."""
     value = float(value)
-    if value.is_integer() and abs(value) < MOST:
+    if value.is_integer() and abs(value) < COEFFICIENT_LIMIT:
         return str(int(value))
     return repr(value)
 
 
-def numbers(values: Floats) -> Texts:
-    """The shortest texts that read back as exactly these doubles, as from `number`."""
-    whole = (np.rint(values) == values) & (np.abs(values) < MOST)
+def number_texts(values: Floats) -> Texts:
+    """The shortest texts that read back as exactly these doubles, as from `number_text`."""
+    are_whole = (np.rint(values) == values) & (np.abs(values) < COEFFICIENT_LIMIT)
     texts = np.zeros(len(values), dtype="S24")
-    for chosen, given in ((whole, values[whole].astype(np.int64)), (~whole, values[~whole])):
-        if len(given):
-            texts[chosen] = repr(given.tolist())[1:-1].encode().split(b", ")
+    for places, some in ((are_whole, values[are_whole].astype(np.int64)), (~are_whole, values[~are_whole])):
+        if len(some):
+            texts[places] = repr(some.tolist())[1:-1].encode().split(b", ")
     return texts
 
 
-def signed(values: Floats) -> Texts:
+def signed_texts(values: Floats) -> Texts:
     """The numbers after their sign and a blank: `+ 3`, `- 0.5`."""
-    return np.strings.add(np.where(values < 0, b"- ", b"+ "), numbers(np.abs(values)))
+    return np.strings.add(np.where(values < 0, b"- ", b"+ "), number_texts(np.abs(values)))
 
 
-def bounds(values: Floats) -> Texts:
+def bound_texts(values: Floats) -> Texts:
     """Numbers, `-inf` or `+inf` (docs/format-rules.md, W4)."""
-    return np.where(values == np.inf, np.bytes_(b"+inf"), numbers(values))
+    return np.where(values == np.inf, np.bytes_(b"+inf"), number_texts(values))
 
 
-def words(values: Floats | float, text: Callable[[Floats], Texts] = numbers) -> bytes | Words:
+def words(values: Floats | float, text: Callable[[Floats], Texts] = number_texts) -> bytes | Words:
     """Numbers as words: literal bytes for one number or equal ones, else a table of the distinct ones."""
-    given = np.asarray(values, dtype=np.float64) + 0.0
-    first = given.ravel()[:1]
-    if len(first) and (given == first).all():
+    doubles = np.asarray(values, dtype=np.float64) + 0.0  # no -0.0
+    first = doubles.ravel()[:1]
+    if len(first) and (doubles == first).all():
         return bytes(text(first)[0])
-    distinct, codes = _distinct(given)
-    return Words(of_texts(text(distinct)), codes)
+    distinct, codes = _distinct_numbers(doubles)
+    return Words(bytes_of_texts(text(distinct)), codes)
 
 
-def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
+def _distinct_numbers(values: Floats) -> tuple[Floats, NDArray[Any]]:
     """Ascending numbers that include all `values`, and the place of each; few whole ones are not sorted."""
     least, most = (float(values.min()), float(values.max())) if len(values) else (0.0, -1.0)
-    few = 0 <= most - least < _FEW and max(-least, most) < MOST
+    few = 0 <= most - least < _FEW and max(-least, most) < COEFFICIENT_LIMIT
     if few and (values == np.rint(values)).all():
         return np.arange(least, most + 1), (values - least).astype(np.uint8)
     distinct, _, codes = np.unique(values, return_index=True, return_inverse=True)
@@ -297,10 +297,10 @@ def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
 def check_coefficients(values: Floats | float, where: str) -> None:
     """Raise UnsupportedByFormatError unless every nonzero coefficient lies in [1e-9, 1e15)."""
     size = np.abs(np.atleast_1d(np.asarray(values, dtype=np.float64)))
-    wrong = ~np.isfinite(size) | (size >= MOST) | ((size < LEAST) & (size > 0))
+    wrong = ~np.isfinite(size) | (size >= COEFFICIENT_LIMIT) | ((size < LEAST_COEFFICIENT) & (size > 0))
     if wrong.any():
         worst = float(size[wrong][0])
-        remedy = _LARGER if worst < LEAST else _SMALLER
+        remedy = _LARGER if worst < LEAST_COEFFICIENT else _SMALLER
         raise UnsupportedByFormatError(
             f"{where} has the coefficient {worst!r}; "
             f"readers drop or refuse values outside [1e-9, 1e15): {remedy}"

@@ -48,15 +48,15 @@ def is_packed(path: Path) -> bool:
     return path.suffix.lower() == ".gz"
 
 
-def save(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
+def save_file(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
     """Write a file, compressed if `is_packed(path)`; return its size and SHA-256. Raises OutputError."""
-    with saving(path, chunks) as facts:
+    with pending_file(path, chunks) as facts:
         return facts
 
 
 @contextmanager
-def saving(path: Path, chunks: Iterable[bytes]) -> Iterator[dict[str, Any]]:
-    """Size and SHA-256 of a file that gets its name at the end of the context, as `save` writes it.
+def pending_file(path: Path, chunks: Iterable[bytes]) -> Iterator[dict[str, Any]]:
+    """Size and SHA-256 of a file that gets its name at the end of the context, as `save_file` writes it.
 
     The bytes are written, under a temporary name, when the context begins. An error inside it leaves no file.
     """
@@ -68,7 +68,7 @@ def saving(path: Path, chunks: Iterable[bytes]) -> Iterator[dict[str, Any]]:
 
     with replacing(path) as stream:
         with _Pipeline(hash_all, stream.writelines) as beside:
-            for share, length in gathered(gzipped(chunks) if is_packed(path) else chunks, SHARE):
+            for share, length in gather_chunks(gzip_chunks(chunks) if is_packed(path) else chunks, SHARE):
                 beside(share, wait=length < SHARE)
                 size += length
         yield {"bytes": size, "sha256": digest.hexdigest()}
@@ -112,14 +112,14 @@ class _Pipeline:
             self._settle(0)
 
 
-def gzipped(chunks: Iterable[bytes]) -> Iterator[bytes]:
+def gzip_chunks(chunks: Iterable[bytes]) -> Iterator[bytes]:
     """The bytes of a gzip file that holds the chunks, in order."""
     check = size = 0
     yield _HEAD
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         waiting: deque[Future[bytes]] = deque()
-        for piece in joined(chunks, PIECE):
-            waiting.append(pool.submit(_deflated, piece))
+        for piece in join_chunks(chunks, PIECE):
+            waiting.append(pool.submit(_deflate_piece, piece))
             check, size = zlib.crc32(piece, check), size + len(piece)
             if len(waiting) > _AHEAD:
                 yield waiting.popleft().result()
@@ -127,12 +127,12 @@ def gzipped(chunks: Iterable[bytes]) -> Iterator[bytes]:
     yield _TAIL + struct.pack("<II", check, size & 0xFFFFFFFF)
 
 
-def joined(chunks: Iterable[bytes], least: int) -> Iterator[bytes]:
+def join_chunks(chunks: Iterable[bytes], least: int) -> Iterator[bytes]:
     """Join chunks to pieces of at least `least` bytes; the last may be shorter."""
-    return (b"".join(parts) for parts, _ in gathered(chunks, least))
+    return (b"".join(parts) for parts, _ in gather_chunks(chunks, least))
 
 
-def gathered(chunks: Iterable[bytes], least: int) -> Iterator[tuple[list[bytes], int]]:
+def gather_chunks(chunks: Iterable[bytes], least: int) -> Iterator[tuple[list[bytes], int]]:
     """Collect chunks in lists of at least `least` bytes, each with its length; the last may be shorter."""
     parts: list[bytes] = []
     length = 0
@@ -146,6 +146,6 @@ def gathered(chunks: Iterable[bytes], least: int) -> Iterator[tuple[list[bytes],
         yield parts, length
 
 
-def _deflated(piece: bytes) -> bytes:
+def _deflate_piece(piece: bytes) -> bytes:
     packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
     return packer.compress(piece) + packer.flush(zlib.Z_FULL_FLUSH)

@@ -26,7 +26,7 @@ _COLUMN: Final = re.compile(rb"(?:\b|\bt_)ONE_([0-9a-f]{11})\b", re.IGNORECASE)
 _OPTION_DIGITS: Final = 7
 
 
-def one_column(stamp: str) -> bytes:
+def one_column_name(stamp: str) -> bytes:
     """Name of the column fixed to 1."""
     return stamp.replace(PREFIX, "ONE_").encode()
 

@@ -13,7 +13,7 @@ from typing import Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.formats.registry import generator
+from crossfield.export.formats.registry import program_version
 from crossfield.export.solving.local import Solvers
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedBySolverError
 from crossfield.models.field.field import Norm
@@ -153,7 +153,7 @@ def _proven(run: Run, watch: Watch, certificates: Path) -> Row:
         make_instance(run.instance, run.turns), norm=_norm(run), limits=limits, jobs=1, stop=watch.late
     )
     cf.write_certificate(proof, _certificate(run, certificates))
-    facts = {"version": generator(), "status": proof.status, "note": proof.ended}
+    facts = {"version": program_version(), "status": proof.status, "note": proof.ended}
     return facts | {"objective": proof.energy, "bound": proof.bound} | watch.row()
 
 

@@ -14,10 +14,10 @@ from ....models.instance.file import read_instance
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import read_certificate
 from ...bundle.starts import Start, complete_start
-from ...formats.nl import Layout
 from ...formats.registry import Written, write
 from ...solutions.readers.ampl import write_ampl_sol
-from ...writing.records import number
+from ...writing.nl_order import NlOrder
+from ...writing.records import number_text
 from ..documents.documents import document_bytes, tightened_by
 from ..ledger.points import BestPoint, KnownField, Provenance, best_point, complete_point
 from ..plan.equivalence import format_notes
@@ -100,9 +100,9 @@ def _write_points(
     notes = ["columns as in the .mps and .lp; those at 0 are left out"]
     yield _file_facts(path.name, "sol", "miplib", notes)
     if "nl" in task.recipe.formats:
-        layout = Layout(best.problem)
+        layout = NlOrder(best.problem)
         path = folder / f"{task.name}.nl.sol"
-        message = f"{best.known.provenance.solver}: objective {number(best.objective)}"
+        message = f"{best.known.provenance.solver}: objective {number_text(best.objective)}"
         code = _SOLVED if proven else _NOT_PROVEN
         point, rows = best.point[layout.order], best.problem.n_rows
         write_ampl_sol(path, message, point, rows, code, stamp=best.problem.stamp)
@@ -113,7 +113,7 @@ def _miplib_lines(best: BestPoint) -> Iterator[bytes]:
     """The lines of a .sol file in MIPLIB's format, with the columns of LP and MPS."""
     problem = complete_start(best.problem, best.known.field).problem
     start = Start(problem, complete_point(problem, best.known.field))
-    yield f"=obj= {number(start.objective)}\n".encode()
+    yield f"=obj= {number_text(start.objective)}\n".encode()
     yield from start.lines(zeros=False)
 
 

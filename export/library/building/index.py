@@ -12,8 +12,8 @@ from ....models.formulations.catalogue import FORMULATIONS
 from ....models.proof import check_certificate
 from ....models.storage import read_bytes, write_bytes
 from ....templates import ENVIRONMENT
-from ...formats.registry import FORMATS, generator
-from ...writing.records import number
+from ...formats.registry import FORMATS, program_version
+from ...writing.records import number_text
 from ..documents import check_point
 from ..documents.checksums import is_intact, write_checksums
 from ..documents.citation import PAPER, REFERENCES, licence_terms, release_facts
@@ -93,7 +93,7 @@ def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, A
     written = {file["format"] for sidecar in sidecars for file in sidecar["files"]}
     return {
         "spec": spec,
-        "generator": generator(),
+        "generator": program_version(),
         "release": release_facts(spec),
         "terms": licence_terms(spec.sketches),
         "references": REFERENCES,
@@ -136,9 +136,9 @@ def _solu_content(sidecars: list[dict[str, Any]]) -> bytes:
     lines = []
     for sidecar in sidecars:
         tag = "=opt=" if sidecar["status"] == "optimal" else "=best="
-        lines.append(f"{tag} {sidecar['name']} {number(sidecar['best']['objective'])}\n")
+        lines.append(f"{tag} {sidecar['name']} {number_text(sidecar['best']['objective'])}\n")
         if sidecar["status"] != "optimal" and sidecar["bound"] is not None:
-            lines.append(f"=bestdual= {sidecar['name']} {number(sidecar['bound'])}\n")
+            lines.append(f"=bestdual= {sidecar['name']} {number_text(sidecar['bound'])}\n")
     return "".join(lines).encode()
 
 
@@ -146,7 +146,7 @@ def _index_document(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any
     return {
         "format": INDEX_FORMAT,
         "version": VERSION,
-        "generator": generator(),
+        "generator": program_version(),
         "release": release_facts(spec),
         "spec": spec.document(),
         "entries": [sidecar["name"] for sidecar in sidecars],

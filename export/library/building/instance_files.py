@@ -11,7 +11,7 @@ from ....models.field.file import field_to_json
 from ....models.instance.file import instance_to_json
 from ....models.instance.instance import Instance
 from ....models.sketch.random_strokes import STROKE_SHARE
-from ...formats.registry import generator
+from ...formats.registry import program_version
 from ..documents.documents import ABOUT_FORMAT, VERSION, about_file, document_bytes
 from ..documents.statistics import instance_sizes
 from ..ledger.points import check_certificate, least_energy
@@ -93,7 +93,7 @@ def _instance_document(instance: Instance, task: InstanceTask, fields: dict[str,
         "family": task.recipe.sketch.name,
         "title": task.recipe.sketch.title,
         "rung": task.recipe.rung,
-        "generator": generator(),
+        "generator": program_version(),
         "source": _source_facts(instance, task.recipe),
         **{key: value for key, value in stated.items() if value},
         "instance": {

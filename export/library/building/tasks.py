@@ -14,7 +14,7 @@ from typing import Any
 
 from ....models.field.file import field_of_json
 from ....models.storage import read_bytes
-from ...formats.registry import generator
+from ...formats.registry import program_version
 from ..documents.documents import files_of_instance
 from ..ledger.known_points import NO_POINTS, InstancePoints, PointSource
 from ..ledger.ledger import Ledger, Record
@@ -66,7 +66,7 @@ class InstanceTask:
         fields = [[hashlib.sha256(field.data).hexdigest(), asdict(field.provenance)] for field in self.fields]
         given = [self.given.sha256] if self.given and self.given.sha256 else []
         proofs = [[proof.file, asdict(proof.provenance)] for proof in self.proofs]
-        return digest([generator(), self.recipe.document(), fields, *given, *proofs])
+        return digest([program_version(), self.recipe.document(), fields, *given, *proofs])
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class EntryTask:
         files = {name: hashlib.sha256(data).hexdigest() for name, data in self.files.items()}
         records = [asdict(record) for record in self.records]
         recipe = self.recipe.document()
-        return digest([generator(), recipe, self.about, files, records, fields, self.relatives])
+        return digest([program_version(), recipe, self.about, files, records, fields, self.relatives])
 
     @property
     def certificate(self) -> dict[str, Any] | None:

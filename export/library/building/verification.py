@@ -18,7 +18,7 @@ from typing import Any, Final
 from ....models.errors import CrossfieldError, InputError
 from ....models.processes.deadline import Progress, silent
 from ....models.storage import read_bytes
-from ...formats.registry import generator
+from ...formats.registry import program_version
 from ..documents.check_point import BadInputError, check
 from ..documents.checksums import SUMS, is_intact, read_checksums
 from ..documents.documents import INDEX, Library, existing_folder, read_library
@@ -117,8 +117,8 @@ def _find_differences(
     try:
         library = read_library(folder)
         stated = library.document["generator"]
-        if stated != generator():
-            what = f"was made by {stated}, so {generator()} cannot make it again to compare it"
+        if stated != program_version():
+            what = f"was made by {stated}, so {program_version()} cannot make it again to compare it"
             yield Defect(INDEX, what, f"verify with {stated}")
             return
         with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:

@@ -22,7 +22,7 @@ from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes
-from ...formats.registry import generator
+from ...formats.registry import program_version
 from ...solutions.readers.registry import read_raw
 from ...solutions.solution import read_solution
 from ...solvers_table import SOLVERS
@@ -122,7 +122,7 @@ def submit(
     """
     facts.record({"name": "cf_none", "problem_sha256": "0" * 64}, 0.0).check()
     library = read_library(existing_folder(folder))
-    if library.document["generator"] != generator():
+    if library.document["generator"] != program_version():
         builder = library.document["generator"]
         raise InputError(f"was built by {builder}; submit with that version, or build it again", file=folder)
     with library_lock(library.folder, "a submission", progress):

@@ -11,8 +11,8 @@ from ....models.formulations.families import PlacedFamily
 from ....models.formulations.problem import Problem
 from ....models.instance.grid import Floats
 from ....models.instance.instance import Instance
-from ...writing.canonical import Canonical
-from ...writing.curvature import of_objective, of_rows
+from ...writing.canonical import CanonicalForm
+from ...writing.curvature import objective_curvature, row_curvature
 
 
 def instance_sizes(instance: Instance) -> dict[str, int]:
@@ -32,9 +32,9 @@ def problem_counts(problem: Problem) -> dict[str, int]:
 
 
 def _columns(problem: Problem) -> dict[str, int]:
-    form = Canonical(problem)
+    form = CanonicalForm(problem)
     binary, integer = form.binary, problem.integer
-    nonlinear = form.layout.in_objective | form.layout.in_rows
+    nonlinear = form.nl_order.in_objective | form.nl_order.in_rows
     return {
         "variables": problem.n_columns,
         "continuous": int((~integer).sum()),
@@ -83,8 +83,8 @@ def _terms(problem: Problem) -> dict[str, int]:
 
 def problem_curvature(problem: Problem) -> dict[str, Any]:
     """Return the curvature of objective and rows, and the reason for the former."""
-    objective, reason = of_objective(problem)
-    return {"objective": objective, "constraints": of_rows(problem), "reason": reason}
+    objective, reason = objective_curvature(problem)
+    return {"objective": objective, "constraints": row_curvature(problem), "reason": reason}
 
 
 def tangent_bound(problem: Problem, point: Floats) -> float | None:
@@ -92,7 +92,7 @@ def tangent_bound(problem: Problem, point: Floats) -> float | None:
 
     f(x) >= f(x0) + g (x - x0), whose least value over the box is found coordinate by coordinate.
     """
-    if problem.rows or problem.integer.any() or of_objective(problem)[0] != "convex":
+    if problem.rows or problem.integer.any() or objective_curvature(problem)[0] != "convex":
         return None
     slope = np.zeros(problem.n_columns)
     index, cost = problem.merged_objective(1)

@@ -20,7 +20,7 @@ from ....models.instance.angles import QUARTER
 from ....models.instance.grid import Floats
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import Certificate, read_certificate
-from ...formats.registry import generator
+from ...formats.registry import program_version
 from .grades import FEASIBLE
 
 METHOD: Final = "prove"
@@ -52,7 +52,7 @@ class KnownField:
 
 def provenance_by(method: str) -> Provenance:
     """Return the provenance of a field that crossfield found by a method."""
-    name, _, version = generator().partition(" ")
+    name, _, version = program_version().partition(" ")
     return Provenance(f"{name} ({method})", version)
 
 

@@ -8,8 +8,8 @@ from typing import Any
 from ....models.errors import UnsupportedByFormatError
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem
-from ...formats.registry import FORMATS, carried
-from ...writing.canonical import Canonical
+from ...formats.registry import FORMATS, problem_in_format
+from ...writing.canonical import CanonicalForm
 from .recipe import EntryRecipe, entry_name
 
 
@@ -34,11 +34,11 @@ def equivalent_entries(recipe: EntryRecipe, names: Collection[str]) -> list[dict
 def format_notes(problem: Problem, name: str) -> list[str]:
     """Return the changes that the file of a format makes; empty if it refuses the problem."""
     try:
-        held = carried(problem, FORMATS[name])
+        held = problem_in_format(problem, FORMATS[name])
     except UnsupportedByFormatError:
         return []
     lifting = held.formulation.lifted
     notes = [f"lifted: {lifting}; the class there is {held.problem_class}"] if lifting else []
-    if name in {"lp", "mps", "osil"} and Canonical(held).constant:
+    if name in {"lp", "mps", "osil"} and CanonicalForm(held).constant:
         notes.append("the constant of the objective is the cost of the column that is fixed to 1")
     return notes

@@ -25,7 +25,7 @@ import numpy as np
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ...statuses import GLPK, Status
-from ...writing.canonical import Order
+from ...writing.canonical import ColumnOrder
 from .grammar import Form, place_of_entry, shown
 from .text import Cursor, RawSolution, Reader, entries, fault, without_point
 
@@ -89,7 +89,7 @@ def _comments(cursor: Cursor) -> dict[bytes, bytes]:
     return comments
 
 
-def _order(comments: dict[bytes, bytes]) -> Order:
+def _order(comments: dict[bytes, bytes]) -> ColumnOrder:
     if comments.get(b"Objective", b"").startswith(_GOAL_OF_MOD):
         return "mod"
     return "mps" if comments.get(b"Problem") else "lp"

@@ -32,7 +32,7 @@ from .grammar import (
 )
 
 if TYPE_CHECKING:  # the driver of a solver needs neither the writers nor the formulations
-    from ...writing.canonical import Order
+    from ...writing.canonical import ColumnOrder
 
 Bytes = NDArray[np.bytes_]
 
@@ -77,7 +77,7 @@ class RawSolution:
     values: Floats
     omits_zeros: bool = False
     rows: int | None = None
-    order: Order = "nl"
+    order: ColumnOrder = "nl"
     bound: float | None = None
     of_rows: Bytes | None = None
     stamps: frozenset[str] = frozenset()

@@ -10,7 +10,7 @@ from cases import make_field, make_instance, make_problem
 from crossfield.export.bundle.manifest import read_manifest
 from crossfield.export.bundle.problem_files import write_problem
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.writing.canonical import Canonical
+from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.errors import InstanceError, SolutionError
 from crossfield.models.formulations.problem import with_products_lifted
 
@@ -36,7 +36,7 @@ def test_values_without_names_follow_the_file_that_the_manifest_lists(tmp_path):
     }  # fmt: skip
     point = with_products_lifted(problem).point(make_field(problem.instance))
     for file in ("lp", "mps"):
-        path = raw_of_glpk(tmp_path / "x.sol", Canonical(with_products_lifted(problem)), file, point)
+        path = raw_of_glpk(tmp_path / "x.sol", CanonicalForm(with_products_lifted(problem)), file, point)
         for found in (read_solution(path, problem, held=held), read_solution(path, problem)):
             np.testing.assert_array_equal(found.point, point)
         with pytest.raises(SolutionError, match="the problem has"):
@@ -46,7 +46,7 @@ def test_values_without_names_follow_the_file_that_the_manifest_lists(tmp_path):
 def test_values_without_names_of_a_file_that_cannot_hold_the_problem_are_refused(tmp_path):
     problem = make_problem("milp-mccormick", make_instance())
     path = raw_of_glpk(
-        tmp_path / "x.sol", Canonical(problem), "lp", problem.point(make_field(problem.instance))
+        tmp_path / "x.sol", CanonicalForm(problem), "lp", problem.point(make_field(problem.instance))
     )
     parity = make_problem("minlp-parity", problem.instance)
     path.write_text(path.read_text().replace(problem.stamp, parity.stamp))

@@ -21,13 +21,13 @@ import pytest
 from cases import CASES, make_field, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.bundle.manifest import read_manifest
 from crossfield.export.bundle.problem_files import write_all, write_problem
-from crossfield.export.formats.registry import DEFAULTS, FORMATS, carried, write
+from crossfield.export.formats.registry import DEFAULTS, FORMATS, problem_in_format, write
 from crossfield.export.programs import glpk as glpk_program
 from crossfield.export.programs import scip as scip_program
 from crossfield.export.programs.reading import Points
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
-from crossfield.export.writing.canonical import Canonical
+from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.export.writing.curvature import probtype
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -45,7 +45,7 @@ LINEAR = [label for label in FREE if problem_of(label).problem_class == "MILP"]
 
 
 def held(label: str, name: str) -> Problem:
-    return carried(problem_of(label), FORMATS[name])
+    return problem_in_format(problem_of(label), FORMATS[name])
 
 
 def written(problem: Problem, path: Path, **given: Any) -> str:
@@ -287,7 +287,7 @@ KINDS = {
 
 @for_each("formulation", KINDS)
 def test_qplib_types(formulation: str):
-    problem = carried(make_problem(formulation, make_instance("full")), FORMATS["qplib"])
+    problem = problem_in_format(make_problem(formulation, make_instance("full")), FORMATS["qplib"])
     assert probtype(problem) == KINDS[formulation]
 
 
@@ -323,7 +323,7 @@ def test_a_start_has_its_place(name: str, tmp_path: Path):
     text = written(problem, tmp_path / f"model.{name}", start=field)
     labels = names(problem)[0]
     if name == "bar":
-        labels = [*labels, Canonical(problem).one.decode()]
+        labels = [*labels, CanonicalForm(problem).one.decode()]
         point = np.append(point, 1.0)
         found = dict(re.findall(r"(\w+): (\S+);", text[text.index("STARTING_POINT") :]))
         assert {key: float(value) for key, value in found.items()} == dict(

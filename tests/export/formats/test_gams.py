@@ -16,7 +16,7 @@ from crossfield.export.formats.registry import write
 from crossfield.export.programs import gams as gams_program
 from crossfield.export.solving.local import solve
 from crossfield.export.verify.comparison import evaluation_difference
-from crossfield.export.writing.canonical import Canonical
+from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
@@ -31,7 +31,7 @@ SOLVED = ["milp-mccormick gauge=strokes", "qp-fixed gauge=strokes", "milp-mccorm
 
 
 def text_of(problem: Problem, **options: np.ndarray) -> bytes:
-    return b"".join(gams.generate(Canonical(problem), HEADER, **options))
+    return b"".join(gams.generate(CanonicalForm(problem), HEADER, **options))
 
 
 def run_gams(folder: Path, text: bytes, *options: str) -> dict[str, float]:
@@ -130,7 +130,9 @@ def test_golden_file():
     """A small model that people can read; the other tests check its meaning."""
     instance = Instance("golden", [[True, True], [True, False]], [[0, 1]], [2.5], [0.5])
     text = b"".join(
-        gams.generate(Canonical(make_problem("minlp-quartic", instance)), ["minlp-quartic on three pixels"])
+        gams.generate(
+            CanonicalForm(make_problem("minlp-quartic", instance)), ["minlp-quartic on three pixels"]
+        )
     )
     assert text == (GOLDEN / "minlp-quartic.gms").read_bytes()
     assert text.count(b"\n") < 80

@@ -6,7 +6,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.bundle.problem_files import write_all
-from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.export.solving.local import choose_solver
 from crossfield.export.verify.checks import Verdict
 from crossfield.export.verify.verify import compared, verify
@@ -82,7 +82,9 @@ def test_a_solver_is_chosen_that_reads_the_products(two):
     problem = cf.formulate(two, "minlp-quartic", relax=True)
     assert choose_solver(problem).formats[0] == "nl"
     assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
-    assert carried(cf.formulate(two, "minlp-quartic"), FORMATS["mps"]).formulation.is_weakened is False
+    assert (
+        problem_in_format(cf.formulate(two, "minlp-quartic"), FORMATS["mps"]).formulation.is_weakened is False
+    )
 
 
 @pytest.mark.slow

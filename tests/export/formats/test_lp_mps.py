@@ -10,9 +10,9 @@ import places
 import pytest
 from cases import CASES, LOW_DEGREE, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.formats import lp, mps
-from crossfield.export.formats.registry import FORMATS, carried, header, write
+from crossfield.export.formats.registry import FORMATS, header_lines, problem_in_format, write
 from crossfield.export.verify.comparison import difference
-from crossfield.export.writing.canonical import Canonical
+from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names, row_names
@@ -29,11 +29,11 @@ both = pytest.mark.parametrize("suffix", GENERATE)
 
 def held(label: str) -> Problem:
     """The problem of a case as LP and MPS hold it."""
-    return carried(problem_of(label), FORMATS["lp"])
+    return problem_in_format(problem_of(label), FORMATS["lp"])
 
 
 def text_of(problem: Problem, suffix: str) -> str:
-    return b"".join(GENERATE[suffix](Canonical(problem), header(problem))).decode("ascii")
+    return b"".join(GENERATE[suffix](CanonicalForm(problem), header_lines(problem))).decode("ascii")
 
 
 def assert_same(model: Model, expected: Model) -> None:
@@ -112,11 +112,11 @@ def test_names_suit_every_reader(label: str):
     for each in problems:
         names = names_of(column_names(each)) + (names_of(row_names(each)) if each.rows else [])
         assert (
-            len({name.lower() for name in [*names, Canonical(each).one.decode(), "obj", "c_one"]})
+            len({name.lower() for name in [*names, CanonicalForm(each).one.decode(), "obj", "c_one"]})
             == each.n_columns + each.n_rows + 3
         )
         assert all(re.fullmatch(r"[a-df-hj-mo-z][a-z0-9_]{0,14}", name) for name in names)
-        assert re.fullmatch(r"ONE_[0-9a-f]{11}", Canonical(each).one.decode())
+        assert re.fullmatch(r"ONE_[0-9a-f]{11}", CanonicalForm(each).one.decode())
 
 
 @for_each("name", FORMULATIONS)
@@ -146,7 +146,7 @@ def test_text_is_plain(label: str, suffix: str):
     assert all(line == line.rstrip() for line in lines)
     body = [line for line in lines if line[0] not in "\\*"]
     assert not any(re.search(r"(^|\s)-0(\.0*)?(\s|$)|nan|\+ ?-|- ?-", line) for line in body)
-    assert len([line for line in lines if line[0] in "\\*"]) == len(header(held(label)))
+    assert len([line for line in lines if line[0] in "\\*"]) == len(header_lines(held(label)))
 
 
 @for_each("label", LOW_DEGREE)
@@ -159,7 +159,7 @@ def test_lp_keeps_to_the_common_subset(label: str):
     assert not {"Generals", "Binaries"} & set(sections) or problem.integer.any()
     assert {"Minimize", "Subject To", "Bounds", "End"} <= set(sections)
     parts = dict(re.findall(r"^(\w[\w ]*)\n((?: .*\n)*)", text, re.MULTILINE))
-    names = [Canonical(problem).one.decode(), *names_of(column_names(problem))]
+    names = [CanonicalForm(problem).one.decode(), *names_of(column_names(problem))]
 
     linear, _, products = parts["Minimize"].partition(" + [\n")
     assert re.findall(r"[+-] \S+ ([A-Za-z]\w+)\n", linear) == names
@@ -204,7 +204,7 @@ def test_mps_keeps_to_the_common_subset(label: str):
     assert all(len(line) == 3 for line in columns)
     assert [line[0] for line in columns if line[1] == "obj"] == [
         *names_of(column_names(problem)),
-        Canonical(problem).one.decode(),
+        CanonicalForm(problem).one.decode(),
     ]
     markers = [line[2] for line in columns if line[1] == "'MARKER'"]
     assert markers == ["'INTORG'", "'INTEND'"] * (len(markers) // 2)
@@ -247,7 +247,7 @@ def test_golden_files(file: str, pixels: int, tmp_path: Path):
     instance = Instance("golden", mask, np.array([[0, 1]]), np.array([2.5]), np.array([0.5]))
     name, suffix = file.split(".")
     problem = make_problem(name, instance)
-    text = b"".join(GENERATE[suffix](Canonical(problem), ["for people to read"]))
+    text = b"".join(GENERATE[suffix](CanonicalForm(problem), ["for people to read"]))
     assert text == (GOLDEN / file).read_bytes()
     expected = of_problem(problem)
     assert_same(by_scip(GOLDEN / file).ordered(expected.columns, expected.rows), expected)

@@ -16,7 +16,8 @@ from crossfield.export.formats.registry import write
 from crossfield.export.programs import casadi as casadi_program
 from crossfield.export.programs import scip as scip_program
 from crossfield.export.verify.comparison import evaluation_difference
-from crossfield.export.writing.canonical import Canonical
+from crossfield.export.writing.canonical import CanonicalForm
+from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
 from loops import for_each
@@ -27,13 +28,13 @@ GOLDEN = places.GOLDEN
 
 
 def save(problem: Problem, path: Path, *, binary: bool = False, start: np.ndarray | None = None) -> Path:
-    path.write_bytes(b"".join(nl.generate(Canonical(problem), binary=binary, start=start)))
+    path.write_bytes(b"".join(nl.generate(CanonicalForm(problem), binary=binary, start=start)))
     return path
 
 
 def values_at(problem: Problem, point: np.ndarray) -> tuple[float, np.ndarray]:
     """Objective, and rows in file order without their constants."""
-    layout = nl.Layout(problem)
+    layout = NlOrder(problem)
     rows = [family.values(point) + family.limit for family in layout.rows]
     return problem.objective_value(point), np.concatenate([*rows, np.zeros(0)])
 
@@ -47,7 +48,7 @@ def test_casadi_sees_the_problem(label: str, tmp_path: Path):
     found = casadi_program.evaluate(tmp_path / "model.nl", points)
     assert evaluation_difference(found, problem, points) == ""
     start = by_casadi(tmp_path / "model.nl").start
-    np.testing.assert_array_equal(start, problem.point(field)[nl.Layout(problem).order])
+    np.testing.assert_array_equal(start, problem.point(field)[NlOrder(problem).order])
 
 
 @pytest.mark.slow
@@ -56,7 +57,7 @@ def test_casadi_sees_the_problem(label: str, tmp_path: Path):
 def test_the_solver_library_sees_the_problem(label: str, tmp_path: Path):
     """Values at random points, text and binary by turns, and once the derivatives; 15 digits come back."""
     problem = problem_of(label)
-    order = nl.Layout(problem).order
+    order = NlOrder(problem).order
     main = "gauge=" in label
     for turn, point in enumerate(points_of(problem, 20 if main else 4)):
         path = save(problem, tmp_path / "model.nl", start=point, binary=turn % 2 == 1)
@@ -108,7 +109,7 @@ def test_header_agrees_with_the_writer_of_pyomo(label: str):
     alone = grid.size - len(
         {*grid.first.tolist(), *grid.second.tolist(), *problem.instance.stroke_index.tolist()}
     )
-    ours = b"".join(nl.generate(Canonical(problem))).decode().splitlines()
+    ours = b"".join(nl.generate(CanonicalForm(problem))).decode().splitlines()
     theirs = [line.partition("#")[0].split() for line in pyomo_text(problem)[:10]]
     mine = [line.split() for line in ours[:10]]
     assert mine[0] == ["g4", "1", "1", "0", str(int(problem.sha256[:7], 16))]
@@ -122,7 +123,7 @@ def test_header_agrees_with_the_writer_of_pyomo(label: str):
 @for_each("label", CASES)
 def test_text_keeps_to_the_common_subset(label: str):
     problem = problem_of(label)
-    text = b"".join(nl.generate(Canonical(problem), start=points_of(problem)[0])).decode("ascii")
+    text = b"".join(nl.generate(CanonicalForm(problem), start=points_of(problem)[0])).decode("ascii")
     lines = text.splitlines()
     assert "#" not in text
     assert "\r" not in text
@@ -137,8 +138,8 @@ def test_text_keeps_to_the_common_subset(label: str):
     entries = [line for line in lines if line[0] in "JG"]
     assert all(int(line.split()[1]) > 0 for line in entries)
     assert sum(int(line.split()[1]) for line in entries if line[0] == "J") == int(lines[7].split()[0])
-    order = np.argsort(nl.Layout(problem).group, kind="stable")
-    assert (nl.Layout(problem).order == order).all()
+    order = np.argsort(NlOrder(problem).group, kind="stable")
+    assert (NlOrder(problem).order == order).all()
 
 
 def test_names_stand_in_file_order_and_the_objective_comes_last(tmp_path: Path):
@@ -158,7 +159,7 @@ def test_names_stand_in_file_order_and_the_objective_comes_last(tmp_path: Path):
 def test_binary_holds_the_numbers_themselves():
     problem = problem_of("milp-mccormick gauge=strokes")
     point = points_of(problem)[0]
-    data = b"".join(nl.generate(Canonical(problem), binary=True, start=point))
+    data = b"".join(nl.generate(CanonicalForm(problem), binary=True, start=point))
     head = data.split(b"\n", 10)
     assert head[0] == b"b4 1 1 0 %d" % int(problem.sha256[:7], 16)
     assert head[5].split() == [b"0", b"0", b"1", b"1"]
@@ -166,7 +167,7 @@ def test_binary_holds_the_numbers_themselves():
     place = data.index(b"x" + struct.pack("<i", problem.n_columns)) + 5
     entries = np.frombuffer(data[place : place + 12 * problem.n_columns], dtype="<i4, <f8")
     np.testing.assert_array_equal(entries["f0"], np.arange(problem.n_columns))
-    np.testing.assert_array_equal(entries["f1"], point[nl.Layout(problem).order])
+    np.testing.assert_array_equal(entries["f1"], point[NlOrder(problem).order])
 
 
 def test_golden_file():
@@ -178,7 +179,7 @@ def test_golden_file():
     """
     instance = Instance("golden", np.ones((1, 2), bool), np.array([[0, 1]]), np.array([2.5]), np.array([0.5]))
     problem = make_problem("minlp-cubic", instance)
-    assert b"".join(nl.generate(Canonical(problem))) == (GOLDEN / "minlp-cubic.nl").read_bytes()
+    assert b"".join(nl.generate(CanonicalForm(problem))) == (GOLDEN / "minlp-cubic.nl").read_bytes()
     read = by_casadi(GOLDEN / "minlp-cubic.nl")
     a, b, x, y, p1, p2 = 0.5, 2.0, 0.25, -0.125, 1, 0
     smooth = 2 * ((a - b + np.pi / 2 * (p1 + 2 * p2)) ** 2 + ((1 - 2 * p1) * x - y) ** 2)

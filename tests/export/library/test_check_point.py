@@ -18,7 +18,7 @@ import numpy as np
 import places
 import pytest
 from cases import LOW_DEGREE, make_field, make_instance, names_of, points_of, problem_of
-from crossfield.export.formats.registry import FORMATS, carried, write
+from crossfield.export.formats.registry import FORMATS, problem_in_format, write
 from crossfield.export.library.documents import check_point
 from crossfield.export.library.documents.check_point import BadInputError, check
 from crossfield.export.library.documents.standalone import standalone_program
@@ -69,7 +69,7 @@ def label(finding, name):
 
 @for_each("case", LOW_DEGREE)
 def test_objective_and_violations_are_those_of_the_problem(case, tmp_path):
-    problem = carried(problem_of(case), FORMATS["mps"])
+    problem = problem_in_format(problem_of(case), FORMATS["mps"])
     write(problem_of(case), tmp_path / "m.mps.gz")
     for point in points_of(problem, count=2):
         found = check(str(tmp_path / "m.mps.gz"), save_point(tmp_path / "p.sol", problem, point))
@@ -83,7 +83,7 @@ def test_objective_and_violations_are_those_of_the_problem(case, tmp_path):
 def test_the_complete_point_of_a_field_is_feasible_also_without_its_zeros(name, tmp_path):
     field = make_field(make_instance("full"))
     whole = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
-    problem = carried(whole, FORMATS["mps"])
+    problem = problem_in_format(whole, FORMATS["mps"])
     write(whole, tmp_path / "m.mps")
     found = check(
         str(tmp_path / "m.mps"), save_point(tmp_path / "p.sol", problem, problem.point(field), zeros=False)

@@ -11,7 +11,7 @@ from crossfield.export.library.documents.statistics import problem_counts
 from crossfield.export.library.site.study import hessian_blocks, hessian_pattern, jacobian_pattern
 from crossfield.export.pictures.marks import FAMILIES, STROKE
 from crossfield.export.pictures.sparsity import CELLS, Parts, Pattern, sparsity_picture
-from crossfield.export.writing.canonical import Canonical
+from crossfield.export.writing.canonical import CanonicalForm
 from loops import for_each
 from oracles import by_casadi
 
@@ -32,7 +32,7 @@ def differentiated(problem, path):
     rng = np.random.default_rng(4)
     found = both(rng.normal(size=x.shape[0]), rng.normal(size=g.shape[0]))
     jacobian, second = (np.array(ca.DM(part)) for part in found)
-    layout = Canonical(problem).layout
+    layout = CanonicalForm(problem).nl_order
     starts = dict(zip(layout.rows, np.cumsum([0, *(each.count for each in layout.rows)]), strict=False))
     rows = [starts[each] + at for each in problem.rows for at in range(each.count)]
     return jacobian[rows][:, layout.place], second[layout.place][:, layout.place]

@@ -6,10 +6,10 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.formats.nl import Layout
 from crossfield.export.programs.casadi import FEASIBLE, Watch, ca, read_nl
 from crossfield.export.programs.casadi import solve_model as solve
 from crossfield.export.programs.protocol import RefusedError
+from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.processes import child_program
 
 
@@ -18,7 +18,7 @@ def relaxed(tmp_path):
     """A relaxed problem with rows, its model with the greedy field as start, and the order of its columns."""
     problem = cf.formulate(cf.sample("skew", 6), "miqcp-bilinear", relax=True)
     cf.write(problem, tmp_path / "model.nl", start=cf.greedy_field(problem.instance))
-    return problem, read_nl(tmp_path / "model.nl"), Layout(problem).order
+    return problem, read_nl(tmp_path / "model.nl"), NlOrder(problem).order
 
 
 @pytest.fixture

@@ -15,13 +15,13 @@ import pytest
 from answers import FILES, GOOD, TINY, WITH_POINT, problem, problem_of
 from cases import make_field, make_instance
 from crossfield.export.cli.app import invoke, read_command
-from crossfield.export.formats.nl import Layout
 from crossfield.export.formats.registry import write
 from crossfield.export.library.documents import check_point
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.solution import AGREEMENT, LARGEST, TOLERANCE, Solution, read_solution
 from crossfield.export.statuses import Status
+from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.errors import InstanceError, SolutionError
 from crossfield.models.formulations.problem import formulate
 
@@ -208,7 +208,7 @@ def test_values_of_an_ampl_file_without_a_claim_count_if_they_are_feasible(
     bad[: len(instance.theta)] += 1
     for values in (point, bad):
         path = tmp_path / "x.sol"
-        write_ampl_sol(path, "some words", values[Layout(held).order], held.n_rows, code, stamp=held.stamp)
+        write_ampl_sol(path, "some words", values[NlOrder(held).order], held.n_rows, code, stamp=held.stamp)
         exit_code, facts, complaint, written = reading(path)
         if code in {470, 500} and values is point:
             assert (exit_code, written, facts["status"], facts["claimed"]) == (0, True, "feasible", status)
@@ -271,7 +271,7 @@ def answers(tmp_path_factory):
     for style in (0, 4):
         model.writeSolution(str(folder / "x.sol"), style)
         found[f"highs {style}"] = ((folder / "x.sol").read_bytes(), milp)
-    point = read_solution(folder / "x.sol", milp).point[Layout(milp).order]
+    point = read_solution(folder / "x.sol", milp).point[NlOrder(milp).order]
     path = write_ampl_sol(folder / "a.sol", "optimal solution found", point, milp.n_rows, 0)
     found["ampl text"] = (path.read_bytes(), milp)
     found["ampl binary"] = (binary_sol(b"optimal solution found", milp, point), milp)

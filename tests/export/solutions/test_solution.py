@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from cases import make_field, make_instance
-from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.solution import ROUND, read_solution
 from crossfield.export.statuses import Status
+from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names
@@ -40,7 +40,7 @@ def by_name(path, names, values, *, objective=1.0, status="Optimal"):
 
 
 def by_position(path, problem, point):
-    return write_ampl_sol(path, "solved", point[Layout(problem).order], problem.n_rows, 0)
+    return write_ampl_sol(path, "solved", point[NlOrder(problem).order], problem.n_rows, 0)
 
 
 @for_each("name", FORMULATIONS)

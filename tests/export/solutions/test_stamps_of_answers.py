@@ -19,7 +19,7 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import read_raw
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.writing.nl_layout import Layout
+from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.problem import formulate, with_windows
 from crossfield.models.formulations.windows import Windows
@@ -135,7 +135,7 @@ def by_ampl_library(model, answer):
     cf.write(problem, mps)
     by_highs(mps, answer, 0)
     point = read_solution(answer, problem).point
-    write_ampl_sol(answer, "optimal solution found", point[Layout(problem).order], problem.n_rows, 0)
+    write_ampl_sol(answer, "optimal solution found", point[NlOrder(problem).order], problem.n_rows, 0)
     answer.write_text(re.sub(r"(?<=Options\n)3\n1\n1\n0\n", options, answer.read_text()))
 
 

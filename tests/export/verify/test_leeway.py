@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.export.verify.leeway import saved
 from crossfield.export.verify.verify import random_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -23,7 +23,9 @@ def following(problem: Problem) -> np.ndarray:
 @pytest.mark.parametrize("name", NAMES)
 def test_no_less_than_what_was_saved(name: str):
     problem = formulate(sample("skew", 4), name)
-    for held in (problem, carried(problem, FORMATS["lp"])) if name != "minlp-parity" else (problem,):
+    for held in (
+        (problem, problem_in_format(problem, FORMATS["lp"])) if name != "minlp-parity" else (problem,)
+    ):
         follows, rng = following(held), np.random.default_rng(2)
         point = held.point(random_field(held, 1))
         energy = held.objective_value(point)

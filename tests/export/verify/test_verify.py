@@ -15,7 +15,7 @@ from cases import make_field, make_instance
 from crossfield.export.bundle.manifest import read_manifest
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.app import invoke
-from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.export.solutions.solution import Solution
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
 from crossfield.export.solving.local import SolveFiles, Solvers
@@ -98,7 +98,7 @@ def test_every_file_means_the_problem(verified: Callable[[str], Verification], p
 
 def refuses(path: Path, solver: str) -> bool:
     problem = read_manifest(path.with_suffix(".manifest.json")).problem()
-    held = carried(problem, FORMATS[path.suffix[1:]])
+    held = problem_in_format(problem, FORMATS[path.suffix[1:]])
     return solver in SOLVERS and SOLVERS[solver].refusal(held, "read") is not None
 
 
@@ -340,7 +340,7 @@ def test_claims_are_true(
         optimum = min(f.objective for f in found if f.objective is not None)
         shutil.copytree(verification.folder, tmp_path, dirs_exist_ok=True)
         assert not proves(
-            solvers, carried(problem, FORMATS[taking.format]), tmp_path / path.name, solver, optimum
+            solvers, problem_in_format(problem, FORMATS[taking.format]), tmp_path / path.name, solver, optimum
         )
 
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 import re
 
 from cases import LOW_DEGREE, make_field, make_instance, make_problem, problem_of
-from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.export.writing.canonical import Canonical
+from crossfield.export.formats.registry import FORMATS, problem_in_format
+from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.formulations.problem import with_integers_fixed
 from loops import for_each
 
 
-def lines_of(form: Canonical, name: str) -> list[str]:
+def lines_of(form: CanonicalForm, name: str) -> list[str]:
     text = b"".join(FORMATS[name].generate(form, [], None, "")).decode()
     return text.splitlines()
 
 
-def named(form: Canonical, file: str) -> list[str]:
+def named(form: CanonicalForm, file: str) -> list[str]:
     """Names of columns in the form's order for a file."""
     names = [name.decode() for name in form.column_names] + [form.one.decode()]
     return [names[column] for column in form.order(file)]
@@ -24,7 +24,7 @@ def named(form: Canonical, file: str) -> list[str]:
 
 @for_each("label", LOW_DEGREE)
 def test_columns_stand_in_lp_and_mps_in_the_order_of_the_form(label: str):
-    form = Canonical(carried(problem_of(label), FORMATS["lp"]))
+    form = CanonicalForm(problem_in_format(problem_of(label), FORMATS["lp"]))
     lp, mps = lines_of(form, "lp"), lines_of(form, "mps")
     limits = lp[lp.index("Bounds") + 1 :]
     assert [m[1] for line in limits if (m := re.search(r"<= (\w+) <=", line))] == named(form, "lp")
@@ -35,10 +35,10 @@ def test_columns_stand_in_lp_and_mps_in_the_order_of_the_form(label: str):
 def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():
     """All formats follow this rule except .nl, whose header counts all integers within [0, 1]."""
     problem = make_problem("milp-mccormick", make_instance())
-    form = Canonical(problem)
+    form = CanonicalForm(problem)
     p1 = problem.blocks["p1"]
     assert form.kind(p1) == "binary"
     assert "Binaries" in lines_of(form, "lp")
-    held = Canonical(with_integers_fixed(problem, make_field(problem.instance)))
+    held = CanonicalForm(with_integers_fixed(problem, make_field(problem.instance)))
     assert held.kind(held.problem.blocks["p1"]) == "continuous"
     assert "Binaries" not in lines_of(held, "lp")

@@ -12,19 +12,20 @@ from cases import make_field, make_instance, make_problem, points_of
 from crossfield.export.formats import nl
 from crossfield.export.formats.registry import FORMATS, write
 from crossfield.export.writing import records
-from crossfield.export.writing.canonical import Canonical
+from crossfield.export.writing.canonical import CanonicalForm
+from crossfield.export.writing.nl_order import NlOrder
 from crossfield.export.writing.records import (
     Decimals,
-    OnlyWhere,
-    Raw,
-    Tagged,
+    OptionalPieces,
+    RawValues,
+    TaggedWords,
     Words,
     check_coefficients,
     digits,
-    number,
+    number_text,
     render,
-    signed,
-    table,
+    signed_texts,
+    word_table,
     words,
 )
 from crossfield.models.errors import UnsupportedByFormatError
@@ -50,10 +51,10 @@ def text(parts, count, **options) -> bytes:
 
 @given(st.sampled_from(NASTY) | FINITE)
 def test_any_number_survives_and_none_is_longer_than_needed(value):
-    assert float(number(value)) == value
-    assert not number(value).startswith("-0") or value != 0
-    assert len(number(value)) <= len(repr(value))
-    sign, rest = words(value, signed).decode().split(" ")
+    assert float(number_text(value)) == value
+    assert not number_text(value).startswith("-0") or value != 0
+    assert len(number_text(value)) <= len(repr(value))
+    sign, rest = words(value, signed_texts).decode().split(" ")
     assert sign in "+-"
     assert not rest.startswith(("+", "-"))
     assert float(sign + rest) == value
@@ -61,7 +62,7 @@ def test_any_number_survives_and_none_is_longer_than_needed(value):
 
 def test_numbers_look_as_people_write_them():
     given = [0.0, -0.0, 3.0, -2.0, 0.5, 1e-6, 1e22, 1e14]
-    assert [number(value) for value in given] == [
+    assert [number_text(value) for value in given] == [
         "0",
         "0",
         "3",
@@ -71,9 +72,9 @@ def test_numbers_look_as_people_write_them():
         "1e+22",
         "100000000000000",
     ]
-    assert signed(np.array(given[:4])).tolist() == [b"+ 0", b"+ 0", b"+ 3", b"- 2"]
-    assert number(np.float64(0.1)) == "0.1"
-    assert number(np.int32(7)) == "7"
+    assert signed_texts(np.array(given[:4])).tolist() == [b"+ 0", b"+ 0", b"+ 3", b"- 2"]
+    assert number_text(np.float64(0.1)) == "0.1"
+    assert number_text(np.int32(7)) == "7"
 
 
 @given(st.lists(FINITE, min_size=1, max_size=30))
@@ -81,8 +82,8 @@ def test_words_are_the_numbers_of_an_array(values):
     found = words(np.array(values))
     lines = text([found, b"\n"], len(values)).decode().splitlines()
     assert [float(line) for line in lines] == values
-    assert lines == [number(value + 0.0) for value in values]
-    assert words(values[0]) == number(values[0]).encode()
+    assert lines == [number_text(value + 0.0) for value in values]
+    assert words(values[0]) == number_text(values[0]).encode()
 
 
 # parts by hand
@@ -104,7 +105,11 @@ def test_any_decimals(values):
 
 
 def test_raw_values_keep_their_zero_bytes():
-    parts = [b"x", Raw(np.array([1, 0, 256], dtype="<i4")), Raw(np.array([0.5, -0.0, 1e300], dtype="<f8"))]
+    parts = [
+        b"x",
+        RawValues(np.array([1, 0, 256], dtype="<i4")),
+        RawValues(np.array([0.5, -0.0, 1e300], dtype="<f8")),
+    ]
     expected = b"".join(b"x" + struct.pack("<id", i, d) for i, d in [(1, 0.5), (0, -0.0), (256, 1e300)])
     assert text(parts, 3, padded=False) == expected
 
@@ -115,15 +120,17 @@ def test_raw_values_keep_their_zero_bytes():
 def test_whole_numbers_close_together_are_words_too(steps, first):
     """They are numbered without sorting, where that is exact."""
     values = first + np.array(steps, dtype=float)
-    assert text([words(values), b" "], len(values)).decode().split() == [number(value) for value in values]
+    assert text([words(values), b" "], len(values)).decode().split() == [
+        number_text(value) for value in values
+    ]
 
 
 def test_a_tag_stands_before_every_word():
-    key = Words(table([b"_1", b"_2", b"_3"]), None)
-    name = Tagged(b"alpha", key)
+    key = Words(word_table([b"_1", b"_2", b"_3"]), None)
+    name = TaggedWords(b"alpha", key)
     assert name.width == 7
     assert (
-        text([name, b"=", Tagged(b"p", key.at(np.array([2, 0, 1]))), b";"], 3)
+        text([name, b"=", TaggedWords(b"p", key.at(np.array([2, 0, 1]))), b";"], 3)
         == b"alpha_1=p_3;alpha_2=p_1;alpha_3=p_2;"
     )
     assert text([name.at(np.array([2])), b"!"], 1) == b"alpha_3!"
@@ -133,15 +140,15 @@ def test_a_tag_stands_before_every_word():
 def test_any_records_lack_any_pieces(present, whole):
     """Neighbours, first and last piece, all of them, words of several lengths between; whole: no more."""
     count = len(present)
-    key = Words(table([b"%d" % 7**at for at in range(count)]), None)
+    key = Words(word_table([b"%d" % 7**at for at in range(count)]), None)
     first, second, third, last = np.array(present).T
     middle = [] if whole else [b"-", key]
     parts = [
-        OnlyWhere(first, [b"(", key]),
-        OnlyWhere(second, [Tagged(b"t", key), b","]),
+        OptionalPieces(first, [b"(", key]),
+        OptionalPieces(second, [TaggedWords(b"t", key), b","]),
         *middle,
-        OnlyWhere(third, [b"!"]),
-        OnlyWhere(last, [key.at(np.arange(count)[::-1]), b";"]),
+        OptionalPieces(third, [b"!"]),
+        OptionalPieces(last, [key.at(np.arange(count)[::-1]), b";"]),
     ]
     expected = b"".join(
         b"(%d" % 7**at * a
@@ -246,7 +253,7 @@ def test_points_of_any_size_are_starting_points():
     """Starting values are not coefficients: none is refused, each survives."""
     problem = make_problem("qp-fixed", make_instance("row"))
     point = points_of(problem)[0] * 10.0 ** np.arange(-150, 150, 30)
-    lines = b"".join(nl.generate(Canonical(problem), start=point)).decode().splitlines()
+    lines = b"".join(nl.generate(CanonicalForm(problem), start=point)).decode().splitlines()
     at = lines.index(f"x{problem.n_columns}")
     found = [float(line.split()[1]) for line in lines[at + 1 : at + 1 + problem.n_columns]]
-    np.testing.assert_array_equal(found, point[nl.Layout(problem).order])
+    np.testing.assert_array_equal(found, point[NlOrder(problem).order])

@@ -15,7 +15,7 @@ from cases import make_instance, make_problem
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.formats.registry import write
 from crossfield.export.writing import sink
-from crossfield.export.writing.sink import gzipped, joined, save
+from crossfield.export.writing.sink import gzip_chunks, join_chunks, save_file
 from hypothesis import given
 from hypothesis import strategies as st
 from loops import for_each
@@ -33,7 +33,7 @@ def cut(data: bytes, length: int) -> list[bytes]:
 def test_count_and_hash_are_those_of_the_file(length, share, tmp_path, monkeypatch):
     monkeypatch.setattr(sink, "SHARE", share)
     for name in ("a.lp", "a.lp.gz"):
-        facts = save(tmp_path / name, cut(TEXT, length))
+        facts = save_file(tmp_path / name, cut(TEXT, length))
         data = (tmp_path / name).read_bytes()
         assert facts == {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
         assert (gzip.decompress(data) if name.endswith("gz") else data) == TEXT
@@ -49,11 +49,11 @@ def begun():
 FULL = """
 import resource, sys, threading
 from pathlib import Path
-from crossfield.export.writing.sink import SHARE, save
+from crossfield.export.writing.sink import SHARE, save_file
 from crossfield.models.errors import OutputError
 resource.setrlimit(resource.RLIMIT_FSIZE, (3 * SHARE, 3 * SHARE))
 try:
-    save(Path(sys.argv[1]), (bytes(SHARE) for _ in range(int(sys.argv[2]))))
+    save_file(Path(sys.argv[1]), (bytes(SHARE) for _ in range(int(sys.argv[2]))))
 except OutputError as error:
     print(error, threading.active_count())
 """
@@ -71,7 +71,7 @@ def test_a_disk_that_takes_no_more_is_an_error_of_output_and_leaves_nothing(shar
 
 @given(st.lists(st.binary(max_size=50), max_size=30), st.integers(1, 60))
 def test_pieces_hold_the_chunks(chunks, least):
-    pieces = list(joined(chunks, least))
+    pieces = list(join_chunks(chunks, least))
     assert b"".join(pieces) == b"".join(chunks)
     assert all(len(piece) >= least for piece in pieces[:-1])
 
@@ -80,16 +80,16 @@ def test_pieces_hold_the_chunks(chunks, least):
 def test_a_compressed_file_of_many_pieces_is_one_stream(piece, monkeypatch):
     """Strict: one gzip member and nothing after it, which readers by zlib's inflate alone need."""
     monkeypatch.setattr(sink, "PIECE", piece)
-    packed = b"".join(gzipped(cut(TEXT, 100)))
+    packed = b"".join(gzip_chunks(cut(TEXT, 100)))
     reader = zlib.decompressobj(16 + zlib.MAX_WBITS)
     assert reader.decompress(packed) == TEXT
     assert reader.eof
     assert reader.unused_data == b""
-    assert packed == b"".join(gzipped(cut(TEXT, 100)))
+    assert packed == b"".join(gzip_chunks(cut(TEXT, 100)))
 
 
 def test_nothing_is_a_compressed_file_too():
-    assert gzip.decompress(b"".join(gzipped([]))) == b""
+    assert gzip.decompress(b"".join(gzip_chunks([]))) == b""
 
 
 @pytest.mark.parametrize("suffix", ["lp", "mps"])
@@ -113,7 +113,7 @@ def test_a_failure_leaves_no_file_and_no_thread(tmp_path, monkeypatch, begun):
         for share in (1, sink.SHARE):
             monkeypatch.setattr(sink, "SHARE", share)
             with pytest.raises(RuntimeError, match="no more"):
-                save(tmp_path / name, chunks())
+                save_file(tmp_path / name, chunks())
     assert list(tmp_path.iterdir()) == []
     assert begun() == 0
 

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 from cases import CASES, LOW_DEGREE, MASKS, make_field, make_instance, make_problem, points_of, problem_of
-from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -32,7 +32,7 @@ def by_terms(terms, count, point):
 @pytest.mark.slow
 @for_each("label", POLYNOMIAL)
 def test_terms_give_the_values_of_every_family(label):
-    for problem in (problem_of(label), carried(problem_of(label), FORMATS["lp"])):
+    for problem in (problem_of(label), problem_in_format(problem_of(label), FORMATS["lp"])):
         for point in points_of(problem, 5):
             for family in (*problem.objective, *problem.rows):
                 np.testing.assert_allclose(
@@ -46,7 +46,7 @@ def test_terms_give_the_values_of_every_family(label):
 
 @for_each("label", POLYNOMIAL)
 def test_merged_objective_gives_its_value(label):
-    for problem in (problem_of(label), carried(problem_of(label), FORMATS["lp"])):
+    for problem in (problem_of(label), problem_in_format(problem_of(label), FORMATS["lp"])):
         merged = [problem.merged_objective(degree) for degree in range(problem.objective_degree + 1)]
         for index, coefficient in merged[1:]:
             assert (coefficient != 0).all()
@@ -91,7 +91,7 @@ def test_p1_and_p2_reach_every_useful_jump_and_no_other(shape, gauge):
 def test_a_field_is_a_feasible_point_and_comes_back(label):
     problem = problem_of(label)
     field = make_field(problem.instance)  # also the one whose jumps are data or fixed
-    for each in (problem, carried(problem, FORMATS["lp"]) if label in LOW_DEGREE else problem):
+    for each in (problem, problem_in_format(problem, FORMATS["lp"]) if label in LOW_DEGREE else problem):
         point = each.point(field)
         assert each.violation(point).worst < 1e-12
         back = each.field(point)
@@ -128,7 +128,7 @@ def test_convex_means_convex():
     and only there.
     """
     for label in LOW_DEGREE:
-        problem = carried(problem_of(label), FORMATS["lp"])
+        problem = problem_in_format(problem_of(label), FORMATS["lp"])
         if problem.row_degree > 1:
             assert not problem.convex
             continue

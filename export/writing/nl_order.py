@@ -24,7 +24,7 @@ from .records import render
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class NlOrder:
     """Order of columns and rows in a .nl file.
 
     order: column of the problem at each place of the file; place: the inverse. rows: families in file order.
@@ -50,28 +50,27 @@ class Layout:
     @cached_property
     def in_objective(self) -> Bools:
         """True for columns in nonlinear terms of the objective."""
-        found = np.zeros(self.problem.n_columns, dtype=bool)
+        columns = np.zeros(self.problem.n_columns, dtype=bool)
         for family in self.nonlinear_objective:
             for symbol in family.variables:
-                found[family.column_of(symbol)] = True
-        return found
+                columns[family.column_of(symbol)] = True
+        return columns
 
     @cached_property
     def in_rows(self) -> Bools:
         """True for columns in nonlinear terms of rows."""
-        found = np.zeros(self.problem.n_columns, dtype=bool)
+        columns = np.zeros(self.problem.n_columns, dtype=bool)
         for family in self.nonlinear_rows:
             for term in nonlinear_terms(family):
                 for factor in term.factors:
-                    found[factor] = True
-        return found
+                    columns[factor] = True
+        return columns
 
     @cached_property
     def binary(self) -> Bools:
         """True for integer columns within [0, 1], fixed ones too: the header counts them as binary (N1)."""
         problem = self.problem
-        found: Bools = problem.integer & (problem.lower >= 0) & (problem.upper <= 1)
-        return found
+        return problem.integer & (problem.lower >= 0) & (problem.upper <= 1)
 
     @cached_property
     def group(self) -> NDArray[np.int8]:
@@ -98,7 +97,7 @@ class Layout:
         """Runs of places that hold columns of one block, in file order."""
         blocks = [block for block in self.problem.blocks.values() if block.count]
         number = np.repeat(np.arange(len(blocks), dtype=np.int8), [block.count for block in blocks])
-        return [(blocks[number[self.order[run.start]]], run) for run in runs(number[self.order])]
+        return [(blocks[number[self.order[run.start]]], run) for run in equal_runs(number[self.order])]
 
     def places(self, family: PlacedFamily, symbol: sp.Symbol) -> Ints:
         """Place in the file of the symbol's column at each element of a family."""
@@ -120,7 +119,7 @@ class Layout:
         yield OBJECTIVE + b"\n"
 
 
-def runs(values: NDArray[Any]) -> list[slice]:
+def equal_runs(values: NDArray[Any]) -> list[slice]:
     """Stretches of equal values."""
     cuts = [0, *(np.nonzero(np.diff(values))[0] + 1).tolist(), len(values)]
     return [slice(first, last) for first, last in pairwise(cuts)]
