@@ -334,7 +334,7 @@ class _Cover:
         if not front.any():
             depth = ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
             front = free & (depth == depth.max())
-        row, column = np.nonzero(front)
+        row, column = np.argwhere(front).T
         size = 2 * self.separation * self.fine
         key = np.floor(row / size) * (self.shape[1] + 1) + np.floor(column / size)
         chosen = np.unique(key, return_index=True)[1]

@@ -226,7 +226,7 @@ class Problem:
         if family.only is None:
             return np.arange(count_elements(self.instance, family.over), dtype=np.int32)
         name, parity = family.only
-        return np.nonzero(self.data[name] & 1 == parity)[0].astype(np.int32)
+        return np.flatnonzero(self.data[name] & 1 == parity).astype(np.int32)
 
     @property
     def n_rows(self) -> int:

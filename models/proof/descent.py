@@ -369,7 +369,7 @@ def _is_too_large(dual: Dual, lattice: Lattice) -> bool:
     """Whether the next level of a dual is beyond what memory, checker or digits of an angle allow."""
     tables = int(table_sizes(lattice, dual.quads).sum())
     many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
-    many = many or max(lattice.alpha_count.max(), lattice.beta_count.max()) > MOST_COUNT
+    many = many or bool(max(lattice.alpha_count.max(), lattice.beta_count.max()) > MOST_COUNT)
     return many or lattice.h < np.pi / 2 / _FINEST
 
 

@@ -105,7 +105,7 @@ def min_plus_between(left: Floats, right: Floats, ends: RowEnds) -> Floats:
         return out
     for begin in range(0, rows, 4):
         row = min(begin, rows - 4)
-        low, high = ends[0][row : row + 4].min(), ends[1][row : row + 4].max()
+        low, high = int(ends[0][row : row + 4].min()), int(ends[1][row : row + 4].max())
         first, end = _finite_columns(left, row)
         for y in range(first, end, 4):
             _lower_four(out, left, right, (row, min(y, terms - 4)), (low, low, high))

@@ -102,7 +102,7 @@ class Patch:
         number[self.pixels] = np.arange(len(self.pixels))
         pairs = self.instance.pair_terms.degree(grid.size)[at]
         inside = self.terms.degree(len(self.pixels))
-        return np.nonzero((number[at] >= 0) & (inside[number[at]] == pairs))[0].astype(np.int32)
+        return np.flatnonzero((number[at] >= 0) & (inside[number[at]] == pairs)).astype(np.int32)
 
     @cached_property
     def stroke_pixels(self) -> Ints:
