@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
-from crossfield.export.pictures.draw import own_settings
+from crossfield.export.pictures.draw import fixed_settings
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
@@ -191,7 +191,7 @@ FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float]]] = {
 def draw(folder: Path) -> None:
     """Write every figure as SVG, with equal bytes each time."""
     for name, (paint, width, height) in FIGURES.items():
-        with own_settings(STYLE):
+        with fixed_settings(STYLE):
             figure = Figure(figsize=(width, height), layout="constrained")
             paint(figure)
             figure.savefig(folder / f"math_{name}.svg", metadata={"Date": None, "Creator": None})

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
-from crossfield.export.pictures.draw import own_settings
+from crossfield.export.pictures.draw import fixed_settings
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.grid import Bools, Floats, Grid
 from crossfield.models.proof.lattice import block_starts, checkerboard_offsets
@@ -61,7 +61,7 @@ def draw_maps(proof: Proof, boxes: Floats, path: Path) -> None:
     titles.append(f"after the last level\nbound {proof.bound:.4f} = energy")
     rows = -(-len(values) // COLUMNS)
     norm = LogNorm(10.0 ** np.floor(np.log10(values[-1].min())), 1.0)
-    with own_settings(STYLE):
+    with fixed_settings(STYLE):
         figure = Figure(figsize=(11.5, 2.75 * rows + 0.2), layout="constrained")
         axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for place, (each, title) in zip(axes, zip(values, titles, strict=True), strict=False):
@@ -115,7 +115,7 @@ def draw_strips(proof: Proof, path: Path) -> list[int]:
     drawn = instance.stroke_index
     pixels = (int(drawn[np.argsort(late[drawn])[len(drawn) // 2]]), int(np.argmax(late)))
     names = ("on a stroke", "decided last")
-    with own_settings(STYLE):
+    with fixed_settings(STYLE):
         figure = Figure(figsize=(2.0 * len(levels) + 0.7, 4.5), layout="constrained")
         axes = figure.subplots(2, len(levels), squeeze=False)
         for row, (pixel, name) in enumerate(zip(pixels, names, strict=True)):

@@ -15,9 +15,9 @@ from typing import Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.pictures.underlay import read_underlay
-from crossfield.export.shading.colours import coloured, eight_bit, lit, matcap
+from crossfield.export.shading.colours import colour_normals, matcap, shade_by_light, to_eight_bit
 from crossfield.export.shading.raster import raster
-from crossfield.export.surfaces.files import over, strokes
+from crossfield.export.surfaces.files import draw_strokes, lay_over
 from crossfield.models.instance.grid import Floats
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.surface import Surface
@@ -88,7 +88,7 @@ def strip(surface: Surface, drawing: str | Path, path: Path) -> Path:
     scale = max(1, WIDTH // (4 * surface.instance.grid.width))
     found = raster(surface.instance, surface.normals, scale)
     joined = np.concatenate([*_cells(row, scale), matcap(found)], axis=1)
-    picture = Image.fromarray(eight_bit(over(joined, np.ones(joined.shape))[..., :3]))
+    picture = Image.fromarray(to_eight_bit(lay_over(joined, np.ones(joined.shape))[..., :3]))
     picture.save(path, optimize=True)
     return path
 
@@ -100,8 +100,12 @@ def _cells(row: Row, scale: int) -> list[Floats]:
     found = raster(instance, row.surface.normals, scale)
     faint = np.ones((*found.opacity.shape, 4)) * (0.94, 0.94, 0.94, 1.0)
     faint[..., 3] = found.opacity
-    cells = [over(strokes(instance, drawing, scale), faint), coloured(found), lit(found)]
-    return cells if row.truth is None else [*cells, lit(raster(instance, row.truth, scale))]
+    cells = [
+        lay_over(draw_strokes(instance, drawing, scale), faint),
+        colour_normals(found),
+        shade_by_light(found),
+    ]
+    return cells if row.truth is None else [*cells, shade_by_light(raster(instance, row.truth, scale))]
 
 
 def known_rows() -> list[Row]:

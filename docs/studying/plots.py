@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
-from crossfield.export.pictures.draw import own_settings
+from crossfield.export.pictures.draw import fixed_settings
 from matplotlib.figure import Figure
 
 from .errors import medians
@@ -41,7 +41,7 @@ Bars = tuple[list[float], list[float], list[float]]
 @contextmanager
 def open_panels(path: Path, panels: int, high: float = 3.4, wide: float = 10.0) -> Iterator[Any]:
     """The axes of adjacent panels; the file is written at the end of the context."""
-    with own_settings(_STYLE):
+    with fixed_settings(_STYLE):
         figure = Figure(figsize=(wide, high), layout="constrained")
         figure.get_layout_engine().set(w_pad=0.1)
         yield np.atleast_1d(figure.subplots(1, panels))

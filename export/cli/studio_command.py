@@ -38,7 +38,7 @@ def studio_command(
     in the page; save them as session files. Needs the extra `studio`.
     """
     try:
-        from ..studio.server import LOOPBACK, listening, serve
+        from ..studio.server import LOOPBACK, listen, serve
     except ModuleNotFoundError as error:
         raise InputError(
             f"studio needs the package {error.name}; pip install 'crossfield[studio]'"
@@ -47,7 +47,7 @@ def studio_command(
         show("reading the drawing")
         first = None if drawing is None else _read_strokes(drawing)
     token = secrets.token_urlsafe(24)
-    with listening(port) as place:
+    with listen(port) as place:
         address = f"http://{LOOPBACK}:{place.getsockname()[1]}/{token}/"
         print_line(address)
         if not no_browser:
@@ -62,17 +62,17 @@ def _read_strokes(drawing: str) -> dict[str, Any]:
     from ...models.sketch.drawing_file import read_file
     from ...models.sketch.samples import SAMPLES, sample_svg
     from ..studio.document import Document
-    from ..studio.opening import opened
+    from ..studio.opening import open_drawing
 
     path = Path(drawing)
     if not path.is_file() and drawing in SAMPLES:
-        return opened(sample_svg(drawing).encode(), f"{drawing}.svg")
+        return open_drawing(sample_svg(drawing).encode(), f"{drawing}.svg")
     data = read_file(path)
     with naming(path):
         if data.lstrip().startswith(b"{"):
             Document.of_bytes(data)
             return {"document": json.loads(data)}
-        found = opened(data, path.name)
+        found = open_drawing(data, path.name)
     if found["spatial"]:  # the page reads it again from other sides
         found["file"] = {"name": path.name, "data": base64.b64encode(data).decode()}
     return found

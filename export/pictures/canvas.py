@@ -15,7 +15,7 @@ _SIDE: Final = 400.0  # points of the longer side of the page
 _TIP: Final = 1e-3  # of a pixel: else a side could be rounded down by a pixel
 
 
-def page_of(sheet: Sheet) -> Any:
+def draw_sheet(sheet: Sheet) -> Any:
     """A matplotlib figure that is the page of the layers, to its edges."""
     from matplotlib.figure import Figure
 
@@ -23,21 +23,21 @@ def page_of(sheet: Sheet) -> Any:
     scale = _SIDE / max(width, height)
     figure = Figure(figsize=(scale * width / 72, scale * height / 72), facecolor="white")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    cover(axes, x, y, width, height)
+    set_coordinates(axes, x, y, width, height)
     if sheet.drawing is not None and sheet.drawing.ink is not None:
         (high, wide), side = sheet.drawing.ink.shape, sheet.drawing.scale
-        smooth_image(axes, ink_colours()[sheet.drawing.ink], (0.0, side * wide, side * high, 0.0))
+        draw_smooth_image(axes, ink_colours()[sheet.drawing.ink], (0.0, side * wide, side * high, 0.0))
     for layer in sheet.layers:
         if layer.shown:
             paint(axes, layer.parts, scale, layer.opacity)
     return figure
 
 
-def pixels_of(sheet: Sheet, width: int, height: int) -> NDArray[np.uint8]:
+def render_sheet(sheet: Sheet, width: int, height: int) -> NDArray[np.uint8]:
     """Red, green, blue and opacity (height, width, 4) of the layers on a page without paper."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    figure = page_of(sheet)
+    figure = draw_sheet(sheet)
     figure.patch.set_visible(False)
     dots = 72 * max(width, height) / _SIDE
     figure.set_dpi(dots)
@@ -47,7 +47,7 @@ def pixels_of(sheet: Sheet, width: int, height: int) -> NDArray[np.uint8]:
     return np.array(canvas.buffer_rgba(), dtype=np.uint8)
 
 
-def cover(axes: Any, x: float, y: float, width: float, height: float) -> None:
+def set_coordinates(axes: Any, x: float, y: float, width: float, height: float) -> None:
     """Give axes the coordinates of a picture, y down, without frame and ticks."""
     axes.set_xlim(x, x + width)
     axes.set_ylim(y + height, y)
@@ -64,7 +64,7 @@ def paint(
     """
     for mark in marks:
         if isinstance(mark, Lines):
-            _lines(axes, mark, scale, opacity, snap=snap)
+            _paint_lines(axes, mark, scale, opacity, snap=snap)
         elif isinstance(mark, Dots):
             axes.scatter(
                 *mark.centres.T,
@@ -76,15 +76,15 @@ def paint(
                 clip_on=False,
             )
         elif isinstance(mark, Area):
-            _area(axes, mark)
+            _paint_area(axes, mark)
 
 
-def smooth_image(axes: Any, image: Any, extent: tuple[float, float, float, float]) -> None:
+def draw_smooth_image(axes: Any, image: Any, extent: tuple[float, float, float, float]) -> None:
     """Draw colours with opacity (h, w, 4), smooth at any size. extent: left, right, bottom, top."""
     axes.imshow(image, extent=extent, aspect="auto", interpolation="hanning", interpolation_stage="rgba")
 
 
-def _lines(axes: Any, part: Lines, scale: float, opacity: float, *, snap: bool) -> None:
+def _paint_lines(axes: Any, part: Lines, scale: float, opacity: float, *, snap: bool) -> None:
     from matplotlib.path import Path
 
     vertices, codes = [], []
@@ -93,23 +93,25 @@ def _lines(axes: Any, part: Lines, scale: float, opacity: float, *, snap: bool) 
         curve = Path.LINETO if line.shape[1] == 2 else Path.CURVE4
         codes += [np.array([Path.MOVETO]), np.full(len(vertices[-1]), curve)]
     if codes:
-        _path(
+        _add_path(
             axes, Path(np.concatenate(vertices), np.concatenate(codes)), fill=False, edgecolor=part.colour,
             linewidth=scale * part.width, alpha=opacity * part.opacity, capstyle="round",
             joinstyle="round", snap=snap,
         )  # fmt: skip
 
 
-def _area(axes: Any, part: Area) -> None:
+def _paint_area(axes: Any, part: Area) -> None:
     from matplotlib.path import Path
 
     corners = part.boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3], [0, 1]]].reshape(-1, 2)
     codes = np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], len(part.boxes))
     if len(corners):
-        _path(axes, Path(corners, codes), facecolor=part.colour, linewidth=0, alpha=part.opacity, zorder=0.5)
+        _add_path(
+            axes, Path(corners, codes), facecolor=part.colour, linewidth=0, alpha=part.opacity, zorder=0.5
+        )
 
 
-def _path(axes: Any, path: Any, **style: Any) -> None:
+def _add_path(axes: Any, path: Any, **style: Any) -> None:
     from matplotlib.patches import PathPatch
 
     axes.add_patch(PathPatch(path, clip_on=False, **style))

@@ -22,25 +22,25 @@ from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
 from ...models.surface.surface import Surface
-from ..shading.colours import coloured, lit, matcap
+from ..shading.colours import colour_normals, matcap, shade_by_light
 from . import panels
-from .canvas import cover, page_of
-from .layers import sheet
-from .svg import svg_of
+from .canvas import draw_sheet, set_coordinates
+from .layers import field_sheet
+from .svg import sheet_svg
 from .underlay import Underlay, read_underlay
 
-Panel = Callable[[Any, panels.Picture], None]
+DrawPanel = Callable[[Any, panels.PanelContent], None]
 
 
 @dataclass(frozen=True)
-class Kind:
+class PictureKind:
     """A kind of picture: description, panels with headings; no panels: the layers on the page of a drawing.
 
     size: points of the longer side of a panel. bar: points to the right for a colour bar. legend: keys below.
     """
 
     description: str
-    panels: tuple[tuple[str, Panel], ...]
+    panels: tuple[tuple[str, DrawPanel], ...]
     size: float = 340.0
     bar: float = 0.0
     legend: bool = False
@@ -50,18 +50,22 @@ class Kind:
 LAYERS: Final = "layers"
 
 KINDS: Final = {
-    "instance": Kind("mask and strokes of an instance", (("", panels.draw_instance),), needs_field=False),
-    "crosses": Kind(
+    "instance": PictureKind(
+        "mask and strokes of an instance", (("", panels.draw_instance),), needs_field=False
+    ),
+    "crosses": PictureKind(
         "crosses on the pixels, one in several on large grids", (("", panels.draw_crosses),), legend=True
     ),
-    "field": Kind(
+    "field": PictureKind(
         "evenly spaced streamlines of both line families, with singularities",
         (("", panels.draw_streamlines),),
         legend=True,
     ),
-    "angle": Kind("map of the angle between the two lines", (("", panels.draw_angle),), bar=52.0),
-    "energy": Kind("map of the smoothness energy of each pixel", (("", panels.draw_energy),), bar=58.0),
-    "overview": Kind(
+    "angle": PictureKind("map of the angle between the two lines", (("", panels.draw_angle),), bar=52.0),
+    "energy": PictureKind(
+        "map of the smoothness energy of each pixel", (("", panels.draw_energy),), bar=58.0
+    ),
+    "overview": PictureKind(
         "instance, crosses, streamlines and angle map in a row, with counts and energies",
         (
             ("instance", panels.draw_instance),
@@ -73,16 +77,18 @@ KINDS: Final = {
         bar=50.0,
         legend=True,
     ),
-    LAYERS: Kind("the field in the coordinates of its drawing, on top of it with --underlay", ()),
+    LAYERS: PictureKind("the field in the coordinates of its drawing, on top of it with --underlay", ()),
 }
 """Kinds of pictures of instances and fields by name."""
 
-_SHADED, _MATCAP, _NORMALS = (partial(panels.draw_surface, colours) for colours in (lit, matcap, coloured))
+_SHADED, _MATCAP, _NORMALS = (
+    partial(panels.draw_surface, colours) for colours in (shade_by_light, matcap, colour_normals)
+)
 SURFACE_KINDS: Final = {
-    "shaded": Kind("surface in the light of a lamp", (("", _SHADED),)),
-    "matcap": Kind("surface in the material of a glazed ball", (("", _MATCAP),)),
-    "normals": Kind("map of the normals of a surface as colours", (("", _NORMALS),)),
-    "relief": Kind(
+    "shaded": PictureKind("surface in the light of a lamp", (("", _SHADED),)),
+    "matcap": PictureKind("surface in the material of a glazed ball", (("", _MATCAP),)),
+    "normals": PictureKind("map of the normals of a surface as colours", (("", _NORMALS),)),
+    "relief": PictureKind(
         "strokes, normal map, shaded surface and matcap in a row",
         (
             ("strokes", panels.draw_instance),
@@ -158,14 +164,14 @@ def draw(
         raise InputError(
             f"a picture cannot be written as {path.suffix!r}; use one of {', '.join(SUFFIXES)}", file=path
         )
-    kind = kind or _fitting(what, suffix, underlaid=underlay is not None)
-    chosen = _kind(kind, what)
+    kind = kind or _default_kind(what, suffix, underlaid=underlay is not None)
+    chosen = _find_kind(kind, what)
     if kind == LAYERS and isinstance(what, CrossField):
-        return write_bytes(path, _layers(what, suffix, underlay))
+        return write_bytes(path, _draw_layers(what, suffix, underlay))
     if underlay is not None:
         raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}, or leave it out")
-    with own_settings():
-        return write_bytes(path, _saved(_page(what, chosen), suffix))
+    with fixed_settings():
+        return write_bytes(path, _save_figure(_draw_panels(what, chosen), suffix))
 
 
 @check_arguments
@@ -183,12 +189,12 @@ def preview(what: CrossField | Instance | Surface) -> bytes:
         A PNG.
 
     """
-    kind = _kind(_fitting(what, ".png", underlaid=False), what)
-    with own_settings():
-        return _saved(_page(what, kind), ".png", dots=_PREVIEW_DOTS)
+    kind = _find_kind(_default_kind(what, ".png", underlaid=False), what)
+    with fixed_settings():
+        return _save_figure(_draw_panels(what, kind), ".png", dots=_PREVIEW_DOTS)
 
 
-def _fitting(what: Subject, suffix: str, *, underlaid: bool) -> str:
+def _default_kind(what: Subject, suffix: str, *, underlaid: bool) -> str:
     """The default kind of picture."""
     if isinstance(what, Surface):
         return "shaded"
@@ -197,18 +203,18 @@ def _fitting(what: Subject, suffix: str, *, underlaid: bool) -> str:
     return LAYERS if suffix == ".svg" or underlaid else "field"
 
 
-def _layers(field: CrossField, suffix: str, underlay: str | Path | Underlay | None) -> bytes:
+def _draw_layers(field: CrossField, suffix: str, underlay: str | Path | Underlay | None) -> bytes:
     if isinstance(underlay, str | Path):
         underlay = read_underlay(underlay, on=field.instance)
-    layers = sheet(field, underlay)
+    layers = field_sheet(field, underlay)
     if suffix == ".svg":
-        return svg_of(layers)
-    with own_settings():
-        return _saved(page_of(layers), suffix)
+        return sheet_svg(layers)
+    with fixed_settings():
+        return _save_figure(draw_sheet(layers), suffix)
 
 
 @contextmanager
-def own_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
+def fixed_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
     """Constant settings of matplotlib, whatever the user's are, and some more."""
     import matplotlib as mpl
 
@@ -218,13 +224,13 @@ def own_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
         yield
 
 
-def _saved(figure: Any, suffix: str, *, dots: int = _DOTS) -> bytes:
+def _save_figure(figure: Any, suffix: str, *, dots: int = _DOTS) -> bytes:
     stream = io.BytesIO()
     figure.savefig(stream, format=suffix[1:], dpi=dots, metadata=SUFFIXES[suffix])
     return stream.getvalue()
 
 
-def _kind(kind: str, what: Subject) -> Kind:
+def _find_kind(kind: str, what: Subject) -> PictureKind:
     table, other = (SURFACE_KINDS, KINDS) if isinstance(what, Surface) else (KINDS, SURFACE_KINDS)
     if kind in other and isinstance(what, Surface):
         raise InputError(f"pictures of kind {kind} show a field; choose one of {', '.join(table)}")
@@ -240,27 +246,27 @@ def _kind(kind: str, what: Subject) -> Kind:
     return table[kind]
 
 
-def _page(what: Subject, kind: Kind) -> Any:
+def _draw_panels(what: Subject, kind: PictureKind) -> Any:
     """The figure: panels in a row, headings above, legend and caption below; every length in points."""
     from matplotlib.figure import Figure
 
     instance = what if isinstance(what, Instance) else what.instance
     field = what if isinstance(what, CrossField) else None
-    picture = panels.Picture(instance, field, kind.size, what if isinstance(what, Surface) else None)
+    picture = panels.PanelContent(instance, field, kind.size, what if isinstance(what, Surface) else None)
     height, width = (side * picture.unit for side in picture.instance.mask.shape)
     above = _EDGE + _LINE * any(heading for heading, _ in kind.panels)
     below = _EDGE + _LINE * (1 + kind.legend)
     pitch, count = max(width, _NARROWEST) + _GAP, len(kind.panels)
     row = count * pitch - _GAP + kind.bar
     caption = _caption(picture, full=count > 1)
-    keys = panels.legend_of(picture) if kind.legend else []
+    keys = panels.legend_keys(picture) if kind.legend else []
     words = _CHARACTER * max(len(caption), sum(len(key.get_label()) + 8 for key in keys))
     page = np.array([max(row, words) + 2 * _EDGE, above + height + below])
     figure = Figure(figsize=tuple(page / _POINTS), facecolor="white")
     for number, (heading, panel) in enumerate(kind.panels):
         corner = np.array([(page[0] - row) / 2 + number * pitch + (pitch - _GAP - width) / 2, below])
         axes = figure.add_axes((*(corner / page), *(np.array([width, height]) / page)))
-        cover(axes, 0.0, 0.0, width, height)
+        set_coordinates(axes, 0.0, 0.0, width, height)
         axes.set_title(heading, fontsize=8, pad=4)
         panel(axes, picture)
     figure.text(0.5, _EDGE / page[1], caption, ha="center", va="bottom", color="#444444")
@@ -272,14 +278,14 @@ def _page(what: Subject, kind: Kind) -> Any:
     return figure
 
 
-def _caption(picture: panels.Picture, *, full: bool) -> str:
+def _caption(picture: panels.PanelContent, *, full: bool) -> str:
     instance = picture.instance
     parts = [
         f"{instance.grid.width} × {instance.grid.height} pixels",
         f"{len(instance.theta)} stroke pixel{'' if len(instance.theta) == 1 else 's'}",
     ]
     if picture.field is not None:
-        parts.append(counted(picture.field))
+        parts.append(count_singularities(picture.field))
     if picture.field is not None and full:
         squared, absolute = (picture.field.energy(norm).total for norm in (2, 1))
         parts.append(f"energy {squared:.4g} (2-norm), {absolute:.4g} (1-norm)")
@@ -288,7 +294,7 @@ def _caption(picture: panels.Picture, *, full: bool) -> str:
     return "  ·  ".join(parts)
 
 
-def counted(field: CrossField) -> str:
+def count_singularities(field: CrossField) -> str:
     """The number of singularities by index, as 3 singularities (2 of +1/4, 1 of −1/2)."""
     values, counts = np.unique(np.round(4 * field.singularities.index).astype(int), return_counts=True)
     if not len(values):

@@ -16,8 +16,8 @@ from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.cover import Box
 from ...models.sketch.curves import lines_as_cubics
-from ..shading.raster import drawn_border
-from .marks import FAMILIES, Frame, Layer, Lines, Sheet, runs
+from ..shading.raster import border_width
+from .marks import FAMILIES, GridFrame, Layer, Lines, Sheet, split_runs
 from .streamlines import streamlines
 from .underlay import INK, Underlay
 
@@ -36,15 +36,15 @@ _DRAWN_BORDER: Final = 0.15  # more where strokes are the border: they run throu
 _MOST_CROSSES: Final = 64  # along a side; of more, one in several
 
 
-def sheet(field: CrossField, drawing: Underlay | None = None) -> Sheet:
+def field_sheet(field: CrossField, drawing: Underlay | None = None) -> Sheet:
     """The layers of a field, over its drawing if given; crosses are hidden at first."""
-    place = Place(field.instance)
+    place = SheetPlace(field.instance)
     every = int(np.ceil(max(field.instance.mask.shape) / _MOST_CROSSES))
     layers = (
-        *(() if drawing is None else (_drawn(drawing, place),)),
-        Layer("strokes", _strokes(place), shown=drawing is None, opacity=0.45),
+        *(() if drawing is None else (_drawing_layer(drawing, place),)),
+        Layer("strokes", _stroke_lines(place), shown=drawing is None, opacity=0.45),
         Layer("crosses", tuple(place.frame.crosses(field, _CROSS * place.unit, every)), shown=False),
-        *_streamlines(field, place),
+        *_streamline_layers(field, place),
         Layer("singularities", tuple(place.frame.singularities(field, _DOT * place.unit))),
     )
     return Sheet(place.page if drawing is None else drawing.page, layers, drawing)
@@ -52,15 +52,15 @@ def sheet(field: CrossField, drawing: Underlay | None = None) -> Sheet:
 
 def strokes_sheet(instance: Instance, drawing: Underlay | None = None) -> Sheet:
     """The strokes of the drawing, or of the instance, on the part of the page that the grid covers."""
-    place = Place(instance)
-    layer = Layer("strokes", _strokes(place)) if drawing is None else _drawn(drawing, place)
+    place = SheetPlace(instance)
+    layer = Layer("strokes", _stroke_lines(place)) if drawing is None else _drawing_layer(drawing, place)
     size = instance.pixel_size
     page = (*instance.origin, size * instance.grid.width, size * instance.grid.height)
     return Sheet(page, (layer,), drawing)
 
 
 @dataclass(frozen=True)
-class Place:
+class SheetPlace:
     """Coordinates and lengths of an instance on its drawing."""
 
     instance: Instance
@@ -71,9 +71,9 @@ class Place:
         return float(self.instance.pixel_size * max(self.instance.mask.shape) / UNITS)
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> GridFrame:
         """The coordinates of the drawing."""
-        return Frame(self.instance, self.instance.origin, self.instance.pixel_size)
+        return GridFrame(self.instance, self.instance.origin, self.instance.pixel_size)
 
     @property
     def page(self) -> Box:
@@ -89,7 +89,7 @@ class Place:
         return x, y, width, height
 
 
-def _drawn(drawing: Underlay, place: Place) -> Layer:
+def _drawing_layer(drawing: Underlay, place: SheetPlace) -> Layer:
     """The curves of a drawing; many over each other are drawn thinner."""
     every = [piece for found in drawing.curves.values() for piece in found]
     length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)
@@ -98,28 +98,30 @@ def _drawn(drawing: Underlay, place: Place) -> Layer:
     return Layer("drawing", tuple(lines))
 
 
-def _strokes(place: Place) -> tuple[Lines, ...]:
+def _stroke_lines(place: SheetPlace) -> tuple[Lines, ...]:
     return tuple(place.frame.strokes(INK["black"], _BELOW * place.unit))
 
 
-def _streamlines(field: CrossField, place: Place) -> list[Layer]:
+def _streamline_layers(field: CrossField, place: SheetPlace) -> list[Layer]:
     """Evenly spaced lines, a layer for each family; u is above."""
     from scipy import ndimage
 
     scale = max(field.instance.mask.shape) / UNITS
     found = streamlines(field, _SPACING * scale)
     blurred = ndimage.gaussian_filter(np.pad(field.instance.mask, 1).astype(np.float64), _BLUR)
-    depth = blurred - _BORDER - _DRAWN_BORDER * drawn_border(field.instance)
+    depth = blurred - _BORDER - _DRAWN_BORDER * border_width(field.instance)
     layers = []
     for family, name in ((1, "streamlines-v"), (0, "streamlines-u")):
-        inside = [part for line in found for run in runs(line, family) for part in trimmed(run, depth)]
-        smooth = [fitted(part, _TOLERANCE * scale) for part in inside if _length(part) >= _LEAST * scale]
+        inside = [
+            part for line in found for run in split_runs(line, family) for part in cut_at_border(run, depth)
+        ]
+        smooth = [fit_cubics(part, _TOLERANCE * scale) for part in inside if _length(part) >= _LEAST * scale]
         lines = Lines(FAMILIES[family], _LINE * place.unit, list(map(place.frame.at, smooth)), single=True)
         layers.append(Layer(name, (lines,)))
     return layers
 
 
-def trimmed(line: Floats, depth: Floats) -> list[Floats]:
+def cut_at_border(line: Floats, depth: Floats) -> list[Floats]:
     """The parts of a line (k, 2), y up, where the depth is positive: they end on a smooth border."""
     from scipy import ndimage
 
@@ -132,7 +134,7 @@ def trimmed(line: Floats, depth: Floats) -> list[Floats]:
     return parts[0 if at[0] > 0 else 1 :: 2]
 
 
-def fitted(points: Floats, tolerance: float) -> Floats:
+def fit_cubics(points: Floats, tolerance: float) -> Floats:
     """Control points (m, 4, 2) of smooth cubics, end to end, that pass points (k, 2) within the tolerance.
 
     They are a smoothing spline, periodic for a closed line, that begins and ends at the first and last point.

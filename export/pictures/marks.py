@@ -13,7 +13,7 @@ from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.cover import Box
-from .streamlines import Streamline, combed, streamlines
+from .streamlines import Streamline, align_labels, streamlines
 from .underlay import Underlay
 
 FAMILIES: Final = ("#00798c", "#e1812c")
@@ -63,7 +63,7 @@ class Area:
 
 
 @dataclass(frozen=True)
-class Text:
+class Label:
     """A line of text. anchor: `start`, `middle` or `end`, the part at (x, y). turned: degrees, clockwise."""
 
     text: str
@@ -73,7 +73,7 @@ class Text:
     turned: float = 0.0
 
 
-Mark = Lines | Dots | Area | Text
+Mark = Lines | Dots | Area | Label
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class Sheet:
 
 
 @dataclass(frozen=True)
-class Frame:
+class GridFrame:
     """Coordinates of a picture, y down: where the grid's top left corner is, and the side of a pixel."""
 
     instance: Instance
@@ -122,7 +122,7 @@ class Frame:
 
     def crosses(self, field: CrossField, width: float, every: int = 1) -> list[Lines]:
         """A cross on each pixel, or on one in several in both directions; u and v keep their colours."""
-        field = combed(field)
+        field = align_labels(field)
         grid = field.instance.grid
         chosen = (grid.rows % every == every // 2) & (grid.columns % every == every // 2)
         centre = np.stack([grid.columns, -grid.rows], axis=1)[chosen]
@@ -135,7 +135,11 @@ class Frame:
         """Lines of both families, evenly spaced; lengths in units of the picture."""
         found = streamlines(field, spacing / self.pixel)
         return [
-            Lines(colour, width, [straight(self.at(run)) for line in found for run in runs(line, family)])
+            Lines(
+                colour,
+                width,
+                [straight_line(self.at(run)) for line in found for run in split_runs(line, family)],
+            )
             for family, colour in enumerate(FAMILIES)
         ]
 
@@ -158,13 +162,13 @@ class Frame:
 
     def area(self, colour: str, chosen: Bools) -> Area:
         """The chosen pixels, bool [height, width]."""
-        return Area(colour, boxes(chosen) * self.pixel + np.tile(self.corner, 2))
+        return Area(colour, cover_by_boxes(chosen) * self.pixel + np.tile(self.corner, 2))
 
     def _pieces(self, centre: Floats, arm: Floats) -> Floats:
         return self.at(np.stack([centre - arm, centre + arm], axis=1))[:, None]
 
 
-def straight(points: Floats) -> Floats:
+def straight_line(points: Floats) -> Floats:
     """The pieces (k - 1, 2, 2) of a polyline (k, 2)."""
     return np.stack([points[:-1], points[1:]], axis=1)
 
@@ -174,13 +178,13 @@ def segments(ends: Iterable[Iterable[float]]) -> list[Floats]:
     return [np.array(each, dtype=np.float64).reshape(1, 2, 2) for each in ends]
 
 
-def boxes(chosen: Bools) -> Floats:
+def cover_by_boxes(chosen: Bools) -> Floats:
     """The chosen cells of an image as boxes (k, 4): left, top, right, bottom; neighbours in a row are one."""
     row, column = np.nonzero(np.diff(np.pad(chosen, ((0, 0), (1, 1))).astype(np.int8), axis=1))
     return np.stack([column[::2], row[::2], column[1::2], row[::2] + 1], axis=1).astype(np.float64)
 
 
-def runs(line: Streamline, family: int) -> list[Floats]:
+def split_runs(line: Streamline, family: int) -> list[Floats]:
     """The stretches of a line on which it belongs to a family; neighbouring stretches share a point."""
     limits = np.concatenate([[0], np.flatnonzero(np.diff(line.families)) + 1, [len(line.points)]])
     stretches = (

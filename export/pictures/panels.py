@@ -13,8 +13,8 @@ from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
 from ..shading.raster import Raster, raster
-from .canvas import paint, smooth_image
-from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, Frame, Lines
+from .canvas import draw_smooth_image, paint
+from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, GridFrame, Lines
 
 COLLAPSED: Final = "#b9a3d6"
 OUTSIDE: Final = "#ececec"
@@ -25,7 +25,7 @@ SPACING: Final = 6.5  # points between streamlines of one family in a panel of f
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class PanelContent:
     """Contents and size of a panel, in points of the longer side of the grid."""
 
     instance: Instance
@@ -34,9 +34,9 @@ class Picture:
     surface: Surface | None = None
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> GridFrame:
         """The coordinates of the axes."""
-        return Frame(self.instance, (0.0, 0.0), self.unit)
+        return GridFrame(self.instance, (0.0, 0.0), self.unit)
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
@@ -60,7 +60,7 @@ class Picture:
         return self.field
 
 
-def draw_instance(axes: Any, picture: Picture) -> None:
+def draw_instance(axes: Any, picture: PanelContent) -> None:
     """Mask and strokes, and the gaps in the outline that were bridged when the drawing was read."""
     frame, reading = picture.frame, picture.instance.reading
     openings = () if reading is None else reading.openings
@@ -68,52 +68,54 @@ def draw_instance(axes: Any, picture: Picture) -> None:
     gaps = [scale * (np.array(ends) - origin)[None] for ends in openings]
     paint(axes, [frame.area(OUTSIDE, ~picture.instance.mask)])
     paint(axes, frame.strokes(STROKE, max(1.1 * picture.ink, min(0.22 * picture.unit, 2.6))))
-    _border(axes, picture)
+    _draw_border(axes, picture)
     paint(axes, [Lines(OPENING, 2.6 * picture.ink, gaps)])
 
 
-def draw_crosses(axes: Any, picture: Picture) -> None:
+def draw_crosses(axes: Any, picture: PanelContent) -> None:
     """Crosses on the pixels, at least some points apart."""
-    _under(axes, picture)
+    _draw_background(axes, picture)
     every = int(np.ceil(7.5 * picture.ink / picture.unit))
     paint(axes, picture.frame.crosses(picture.crosses, 0.9 * picture.ink, every))
-    _singularities(axes, picture)
+    _draw_singularities(axes, picture)
 
 
-def draw_streamlines(axes: Any, picture: Picture) -> None:
+def draw_streamlines(axes: Any, picture: PanelContent) -> None:
     """Evenly spaced streamlines of both families, singularities and degenerate pixels."""
     field = picture.crosses
-    _under(axes, picture)
+    _draw_background(axes, picture)
     paint(axes, [picture.frame.area(COLLAPSED, field.image(field.degenerate) > 0)])
     paint(axes, picture.frame.streamlines(field, 0.85 * picture.ink, SPACING * picture.ink))
-    _singularities(axes, picture)
+    _draw_singularities(axes, picture)
 
 
-def draw_angle(axes: Any, picture: Picture) -> None:
+def draw_angle(axes: Any, picture: PanelContent) -> None:
     """The angle between the two lines in degrees."""
     field = picture.crosses
     degrees = field.image(np.degrees(field.angle_between))
-    image = _image(axes, picture, degrees, vmin=0.0, vmax=90.0, cmap="magma")
-    _border(axes, picture)
-    _singularities(axes, picture)
-    _bar(axes, image, picture, "angle between the lines", ticks=[0, 30, 60, 90], format="%d°")
+    image = _draw_image(axes, picture, degrees, vmin=0.0, vmax=90.0, cmap="magma")
+    _draw_border(axes, picture)
+    _draw_singularities(axes, picture)
+    _draw_colour_bar(axes, image, picture, "angle between the lines", ticks=[0, 30, 60, 90], format="%d°")
 
 
-def draw_energy(axes: Any, picture: Picture) -> None:
+def draw_energy(axes: Any, picture: PanelContent) -> None:
     """The smoothness energy of each pixel, on a square-root scale."""
     from matplotlib.colors import PowerNorm
 
     field = picture.crosses
     energy = field.pixel_energy
     top = float(energy.max()) if energy.max() > 1e-12 else 1.0
-    image = _image(axes, picture, field.image(energy), norm=PowerNorm(0.5, vmin=0.0, vmax=top), cmap="Reds")
-    _border(axes, picture)
-    _singularities(axes, picture)
+    image = _draw_image(
+        axes, picture, field.image(energy), norm=PowerNorm(0.5, vmin=0.0, vmax=top), cmap="Reds"
+    )
+    _draw_border(axes, picture)
+    _draw_singularities(axes, picture)
     ticks = [share**2 * top for share in (0, 0.25, 0.5, 0.75, 1)]
-    _bar(axes, image, picture, "smoothness energy in rad²", ticks=ticks, format="%.2g")
+    _draw_colour_bar(axes, image, picture, "smoothness energy in rad²", ticks=ticks, format="%.2g")
 
 
-def legend_of(picture: Picture) -> list[Any]:
+def legend_keys(picture: PanelContent) -> list[Any]:
     """Keys of the marks in a picture of a field."""
     from matplotlib.lines import Line2D
 
@@ -134,27 +136,27 @@ def legend_of(picture: Picture) -> list[Any]:
     return keys
 
 
-def _under(axes: Any, picture: Picture) -> None:
+def _draw_background(axes: Any, picture: PanelContent) -> None:
     """The strokes, faintly, and the border."""
     paint(axes, picture.frame.strokes(FAINT, 2.6 * picture.ink, 0.8))
-    _border(axes, picture)
+    _draw_border(axes, picture)
 
 
-def _border(axes: Any, picture: Picture) -> None:
+def _draw_border(axes: Any, picture: PanelContent) -> None:
     paint(axes, [picture.frame.sides(BORDER, 0.5 * picture.ink)], snap=True)
 
 
-def _singularities(axes: Any, picture: Picture) -> None:
+def _draw_singularities(axes: Any, picture: PanelContent) -> None:
     paint(axes, picture.frame.singularities(picture.crosses, 2.75 * picture.ink))
 
 
-def _image(axes: Any, picture: Picture, values: Floats, **style: Any) -> Any:
+def _draw_image(axes: Any, picture: PanelContent, values: Floats, **style: Any) -> Any:
     return axes.imshow(
         values, extent=picture.extent, origin="upper", interpolation="nearest", aspect="auto", **style
     )
 
 
-def _bar(axes: Any, image: Any, picture: Picture, label: str, **style: Any) -> None:
+def _draw_colour_bar(axes: Any, image: Any, picture: PanelContent, label: str, **style: Any) -> None:
     """A colour bar to the right of the axes, in room that the page has left there."""
     inset = axes.inset_axes([1 + 9 / picture.size, 0.0, 8 / picture.size, 1.0])
     bar = axes.figure.colorbar(image, cax=inset, **style)
@@ -166,9 +168,9 @@ def _bar(axes: Any, image: Any, picture: Picture, label: str, **style: Any) -> N
     inset.tick_params(labelsize=6.5, length=2, width=0.5)
 
 
-def draw_surface(colours: Callable[[Raster], Floats], axes: Any, picture: Picture) -> None:
+def draw_surface(colours: Callable[[Raster], Floats], axes: Any, picture: PanelContent) -> None:
     """The surface in colours of its raster, smooth at any size."""
     assert picture.surface is not None
     scale = max(1, round(_DOTS_PER_POINT * picture.unit))
     image = colours(raster(picture.instance, picture.surface.normals, scale))
-    smooth_image(axes, image, picture.extent)
+    draw_smooth_image(axes, image, picture.extent)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.instance.grid import Bools
-from .marks import FAMILIES, PAPER, STROKE, Area, Lines, Mark, Text, boxes, segments, straight
-from .web import CUT, EDGE, SIDE, picture, wide
+from .marks import FAMILIES, PAPER, STROKE, Area, Label, Lines, Mark, cover_by_boxes, segments, straight_line
+from .web import CUT, EDGE, SIDE, marks_picture, text_width
 
 Places = NDArray[np.int64]
 
@@ -28,7 +28,7 @@ _LEVELS: Final = 4
 
 
 @dataclass(frozen=True)
-class Parts:
+class MatrixParts:
     """Rows or columns of a matrix by kind: names, and how many there are of each."""
 
     names: tuple[str, ...]
@@ -47,11 +47,11 @@ class Parts:
 
 
 @dataclass(frozen=True)
-class Pattern:
+class SparsityPattern:
     """The entries of a matrix: their rows and columns, shape (k,), and which stand in nonlinear terms."""
 
-    down: Parts
-    across: Parts
+    down: MatrixParts
+    across: MatrixParts
     rows: Places
     columns: Places
     curved: Bools
@@ -67,31 +67,31 @@ class Pattern:
         return -(-max(self.down.total, self.across.total, 1) // CELLS)
 
 
-def sparsity_picture(pattern: Pattern) -> bytes:
+def sparsity_picture(pattern: SparsityPattern) -> bytes:
     """The picture of a pattern: cells of linear and of nonlinear entries, cut into its parts, with names."""
     height, width = (-(-parts.total // pattern.bin) for parts in (pattern.down, pattern.across))
     unit = SIDE / max(height, width)
     right, bottom = width * unit, height * unit
     scale = unit / pattern.bin
-    above, beside = _names(pattern.across, scale), _names(pattern.down, scale)
+    above, beside = _place_names(pattern.across, scale), _place_names(pattern.down, scale)
     cuts = [(scale * at, 0.0, scale * at, bottom) for at in accumulate(pattern.across.counts[:-1])]
     cuts += [(0.0, scale * at, right, scale * at) for at in accumulate(pattern.down.counts[:-1])]
-    frame = straight(np.array([(0, 0), (right, 0), (right, bottom), (0, bottom), (0, 0)]))
+    frame = straight_line(np.array([(0, 0), (right, 0), (right, bottom), (0, bottom), (0, 0)]))
     marks: list[Mark] = [
         Area(PAPER, np.array([[0.0, 0.0, right, bottom]])),
-        *_cells(pattern, height, width, unit),
+        *_cell_areas(pattern, height, width, unit),
         Lines(CUT, 0.7, segments(cuts)),
         Lines(EDGE, 0.7, [frame]),
-        *(Text(name, at, -4, turned=-60) for at, name in above),
-        *(Text(name, -4, at + 3.5, "end") for at, name in beside),
+        *(Label(name, at, -4, turned=-60) for at, name in above),
+        *(Label(name, -4, at + 3.5, "end") for at, name in beside),
     ]
-    left = _EDGE + max(wide(name) for _, name in beside)
-    top = _EDGE + 0.9 * max(wide(name) for _, name in above)
-    end = max(right + _BELOW, *(at + 0.5 * wide(name) + _EDGE for at, name in above))
-    return picture(-left, -top, end, bottom + _BELOW, marks)
+    left = _EDGE + max(text_width(name) for _, name in beside)
+    top = _EDGE + 0.9 * max(text_width(name) for _, name in above)
+    end = max(right + _BELOW, *(at + 0.5 * text_width(name) + _EDGE for at, name in above))
+    return marks_picture(-left, -top, end, bottom + _BELOW, marks)
 
 
-def _cells(pattern: Pattern, height: int, width: int, unit: float) -> list[Area]:
+def _cell_areas(pattern: SparsityPattern, height: int, width: int, unit: float) -> list[Area]:
     """Cells by kind and strength."""
     found = []
     for colour, chosen in ((FAMILIES[0], ~pattern.curved), (STROKE, pattern.curved)):
@@ -100,12 +100,13 @@ def _cells(pattern: Pattern, height: int, width: int, unit: float) -> list[Area]
         # The square root keeps a cell with one entry of a thousand visible.
         level = np.ceil(_LEVELS * np.sqrt(counts / max(int(counts.max(initial=1)), 1))).astype(int)
         found += [
-            Area(colour, unit * boxes(level == each), each / _LEVELS) for each in np.unique(level[level > 0])
+            Area(colour, unit * cover_by_boxes(level == each), each / _LEVELS)
+            for each in np.unique(level[level > 0])
         ]
     return found
 
 
-def _names(parts: Parts, scale: float) -> list[tuple[float, str]]:
+def _place_names(parts: MatrixParts, scale: float) -> list[tuple[float, str]]:
     """The middle of each part and its name, where there is room from one name to the next."""
     found: list[tuple[float, str]] = []
     for name, count, end in zip(parts.names, parts.counts, accumulate(parts.counts), strict=True):

@@ -60,11 +60,11 @@ def streamlines(field: CrossField, separation: float) -> list[Streamline]:
     least = max(field.instance.mask.shape) / _DENSEST
     if not (np.isfinite(separation) and separation >= least):
         raise InputError(f"the separation is {separation} pixels; it must be a number of at least {least:g}")
-    crosses = _Crosses(combed(field))
+    crosses = _Crosses(align_labels(field))
     cover = _Cover(crosses, separation)
     lines: list[Streamline] = []
     for seeds, families in cover.fronts():
-        candidates = _through(crosses, cover, seeds, families)
+        candidates = _trace_through(crosses, cover, seeds, families)
         for number in sorted(range(len(seeds)), key=lambda k: -round(candidates[k].length, 6)):
             seed, family = seeds[number], int(families[number])
             if cover.covered(seed, family):
@@ -75,15 +75,15 @@ def streamlines(field: CrossField, separation: float) -> list[Streamline]:
                 cover.give_up(seed, family)
             else:
                 cover.add(line)
-                lines.append(Streamline(_points(line.z), line.family))
+                lines.append(Streamline(_as_points(line.z), line.family))
     return lines
 
 
-def _points(z: Positions) -> Floats:
+def _as_points(z: Positions) -> Floats:
     return np.stack([z.real, z.imag], axis=1)
 
 
-def combed(field: CrossField) -> CrossField:
+def align_labels(field: CrossField) -> CrossField:
     """The same crosses with labels that agree between neighbours: p is even but on cuts.
 
     Singularities and holes force cuts. In each 4-connected part the line that carries most stroke weight
@@ -94,7 +94,7 @@ def combed(field: CrossField) -> CrossField:
     instance = field.instance
     part = ndimage.label(instance.mask)[0][instance.mask].astype(np.int64) - 1
     nearer = double_angle(field.u_angle) - double_angle(field.v_angle)  # positive product: nearer to u
-    vector = _lowest_vector(field, part, nearer[:, 0])
+    vector = _lowest_eigenvector(field, part, nearer[:, 0])
     at = instance.stroke_index
     carried = np.sign(vector[at]) * instance.w * np.sum(double_angle(instance.theta) * nearer[at], axis=1)
     strokes = np.round(np.bincount(part[at], carried, part.max() + 1), 9)
@@ -104,7 +104,7 @@ def combed(field: CrossField) -> CrossField:
     return CrossField(instance, *step_labels(instance.grid, field.alpha, field.beta, field.p, exchanged))
 
 
-def _lowest_vector(field: CrossField, part: _Array, start: Floats) -> Floats:
+def _lowest_eigenvector(field: CrossField, part: _Array, start: Floats) -> Floats:
     """The lowest eigenvector of the signed Laplacian with signs (-1)^p, by inverse iteration."""
     # Its signs say which labels are exchanged; its zero lines, the cuts, are short and smooth. A start that
     # changes its sign with the labels makes the result independent of them.
@@ -199,7 +199,7 @@ class _Walk:
         if self.closed or not len(self.z):
             return self
         along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self.z)))])
-        pairs = cKDTree(_points(self.z)).query_pairs(distance, output_type="ndarray")
+        pairs = cKDTree(_as_points(self.z)).query_pairs(distance, output_type="ndarray")
         pairs = pairs[along[pairs[:, 1]] - along[pairs[:, 0]] > 3 * distance]
         age = np.abs(along - along[self.seed])
         bad = np.zeros(len(self.z), dtype=bool)
@@ -207,9 +207,9 @@ class _Walk:
         return self.without(bad)
 
 
-def _through(crosses: _Crosses, cover: _Cover, seeds: Positions, families: Labels) -> list[_Walk]:
+def _trace_through(crosses: _Crosses, cover: _Cover, seeds: Positions, families: Labels) -> list[_Walk]:
     """The lines through the seeds, traced to both sides."""
-    halves = _halves(crosses, cover, np.tile(seeds, 2), np.concatenate([families, families + 2]))
+    halves = _trace_halves(crosses, cover, np.tile(seeds, 2), np.concatenate([families, families + 2]))
     lines = []
     for (ahead, headed, closed), (behind, left, _) in zip(
         halves[: len(seeds)], halves[len(seeds) :], strict=True
@@ -221,7 +221,7 @@ def _through(crosses: _Crosses, cover: _Cover, seeds: Positions, families: Label
     return lines
 
 
-def _halves(
+def _trace_halves(
     crosses: _Crosses, cover: _Cover, seeds: Positions, labels: Labels
 ) -> list[tuple[Positions, Positions, bool]]:
     """One half line from each seed by the midpoint rule, all at once: positions, headings, closed."""

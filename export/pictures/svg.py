@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.instance.grid import Floats
-from .marks import Area, Dots, Layer, Lines, Mark, Sheet, Text
+from .marks import Area, Dots, Label, Layer, Lines, Mark, Sheet
 from .underlay import Underlay, ink_colours, size_in_units
 
 LABEL: Final = "#555e68"
@@ -29,15 +29,15 @@ _SPACES: Final = (
 _FONT: Final = 'font-family="system-ui,sans-serif" font-size="10"'
 
 
-def svg_of(sheet: Sheet) -> bytes:
+def sheet_svg(sheet: Sheet) -> bytes:
     """The file of a sheet, its layers as layers of a drawing program."""
     size = size_in_units(sheet.page) if sheet.drawing is None else sheet.drawing.size
-    return _document(_SPACES, sheet, size, [*_body(sheet, _FINENESS)])
+    return _svg_document(_SPACES, sheet, size, [*_svg_body(sheet, _FINENESS)])
 
 
-def web_svg_of(sheet: Sheet, dark: dict[str, str]) -> bytes:
+def web_sheet_svg(sheet: Sheet, dark: dict[str, str]) -> bytes:
     """The file of a sheet for a browser. dark: colours of dark mode by those that they replace."""
-    body = list(_body(sheet, _COARSE))
+    body = list(_svg_body(sheet, _COARSE))
     text = "".join(body)
     rules = "".join(
         f'[{what}="{light}"]{{{what}:{night}}}'
@@ -46,45 +46,47 @@ def web_svg_of(sheet: Sheet, dark: dict[str, str]) -> bytes:
         if f'{what}="{light}"' in text
     )
     style = f"<style>@media (prefers-color-scheme:dark){{{rules}}}</style>"
-    return _document('xmlns="http://www.w3.org/2000/svg"', sheet, size_in_units(sheet.page), [style, *body])
+    return _svg_document(
+        'xmlns="http://www.w3.org/2000/svg"', sheet, size_in_units(sheet.page), [style, *body]
+    )
 
 
-def _document(spaces: str, sheet: Sheet, size: tuple[str, str], body: list[str]) -> bytes:
+def _svg_document(spaces: str, sheet: Sheet, size: tuple[str, str], body: list[str]) -> bytes:
     box = " ".join(f"{value:.12g}" for value in sheet.page)
     opening = f'<svg {spaces} viewBox="{box}" width="{size[0]}" height="{size[1]}">'
     return "\n".join(['<?xml version="1.0" encoding="UTF-8"?>', opening, *body, "</svg>", ""]).encode()
 
 
-def _body(sheet: Sheet, fineness: float) -> Iterator[str]:
+def _svg_body(sheet: Sheet, fineness: float) -> Iterator[str]:
     step = 10.0 ** -np.ceil(np.log10(fineness / max(sheet.page[2:])))
     for layer in sheet.layers:
-        parts = [line for part in layer.parts for line in _mark(part, step)]
+        parts = [line for part in layer.parts for line in _mark_elements(part, step)]
         if layer.name:
-            yield from _group(layer, sheet.drawing if layer.name == "drawing" else None, parts)
+            yield from _layer_group(layer, sheet.drawing if layer.name == "drawing" else None, parts)
         else:
             yield from parts
 
 
-def _group(layer: Layer, drawing: Underlay | None, parts: list[str]) -> Iterator[str]:
+def _layer_group(layer: Layer, drawing: Underlay | None, parts: list[str]) -> Iterator[str]:
     yield (
         f'<g id="{layer.name}" inkscape:groupmode="layer" inkscape:label="{layer.name}" '
-        f'style="display:{"inline" if layer.shown else "none"}"{_faded(layer.opacity)}>'
+        f'style="display:{"inline" if layer.shown else "none"}"{_opacity_attribute(layer.opacity)}>'
     )
     if drawing is not None and drawing.ink is not None:
-        yield _image(drawing.ink, drawing.scale)
+        yield _ink_image(drawing.ink, drawing.scale)
     yield from parts
     yield "</g>"
 
 
-def _mark(part: Mark, step: float) -> Iterator[str]:
+def _mark_elements(part: Mark, step: float) -> Iterator[str]:
     if isinstance(part, Lines):
-        return _lines(part, step)
+        return _line_elements(part, step)
     if isinstance(part, Dots):
-        return _dots(part, step)
-    return _area(part, step) if isinstance(part, Area) else _text(part)
+        return _dot_elements(part, step)
+    return _area_element(part, step) if isinstance(part, Area) else _text_element(part)
 
 
-def _image(ink: NDArray[np.uint8], scale: float) -> str:
+def _ink_image(ink: NDArray[np.uint8], scale: float) -> str:
     """The ink of a bitmap on nothing, as PNG with a palette inside the file."""
     from PIL import Image
 
@@ -98,12 +100,12 @@ def _image(ink: NDArray[np.uint8], scale: float) -> str:
     )
 
 
-def _lines(part: Lines, step: float) -> Iterator[str]:
+def _line_elements(part: Lines, step: float) -> Iterator[str]:
     pen = (
         f'fill="none" stroke="{part.colour}" stroke-width="{part.width:.4g}" stroke-linecap="round" '
-        f'stroke-linejoin="round"{_faded(part.opacity)}'
+        f'stroke-linejoin="round"{_opacity_attribute(part.opacity)}'
     )
-    data = [_path(line, step) for line in part.lines]
+    data = [_path_data(line, step) for line in part.lines]
     if part.single:
         yield f"<g {pen}>"
         yield from (f'<path d="{each}"/>' for each in data)
@@ -112,19 +114,19 @@ def _lines(part: Lines, step: float) -> Iterator[str]:
         yield f'<path {pen} d="{"".join(data)}"/>'
 
 
-def _path(line: Floats, step: float) -> str:
+def _path_data(line: Floats, step: float) -> str:
     """Path data of pieces that are end to end: rounded first, then written as differences."""
     whole = np.round(line / step) + 0.0
     moves = (whole[:, 1:] - whole[:, :1]).reshape(-1) * step
     letter = "l" if line.shape[1] == 2 else "c"
-    return f"M{_numbers(whole[0, 0] * step)}{letter}{_numbers(moves)}"
+    return f"M{_format_numbers(whole[0, 0] * step)}{letter}{_format_numbers(moves)}"
 
 
-def _numbers(values: Floats) -> str:
+def _format_numbers(values: Floats) -> str:
     return " ".join(f"{value:.12g}" for value in values + 0.0).replace(" -", "-")
 
 
-def _dots(part: Dots, step: float) -> Iterator[str]:
+def _dot_elements(part: Dots, step: float) -> Iterator[str]:
     yield f'<g fill="{part.colour}" stroke="#ffffff" stroke-width="{part.rim:.4g}">'
     rounded = np.round(part.centres / step) * step + 0.0
     for (x, y), radius in zip(rounded.tolist(), part.radii.tolist(), strict=True):
@@ -132,7 +134,7 @@ def _dots(part: Dots, step: float) -> Iterator[str]:
     yield "</g>"
 
 
-def _area(part: Area, step: float) -> Iterator[str]:
+def _area_element(part: Area, step: float) -> Iterator[str]:
     """One path: sides are rounded before they are subtracted, so that neighbours share theirs."""
     sides = np.round(part.boxes / step) + 0.0
     boxes = step * np.concatenate([sides[:, :2], sides[:, 2:] - sides[:, :2]], axis=1)
@@ -140,10 +142,10 @@ def _area(part: Area, step: float) -> Iterator[str]:
         f"M{x:.12g} {y:.12g}h{wide:.12g}v{high:.12g}h-{wide:.12g}z" for x, y, wide, high in boxes.tolist()
     )
     if data:
-        yield f'<path fill="{part.colour}"{_faded(part.opacity)} d="{data}"/>'
+        yield f'<path fill="{part.colour}"{_opacity_attribute(part.opacity)} d="{data}"/>'
 
 
-def _text(part: Text) -> Iterator[str]:
+def _text_element(part: Label) -> Iterator[str]:
     x, y = f"{part.x:.5g}", f"{part.y:.5g}"
     turn = f' transform="rotate({part.turned:g} {x} {y})"' if part.turned else ""
     yield (
@@ -152,5 +154,5 @@ def _text(part: Text) -> Iterator[str]:
     )
 
 
-def _faded(opacity: float) -> str:
+def _opacity_attribute(opacity: float) -> str:
     return f' opacity="{opacity:.2g}"' if opacity < 1 else ""

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
-from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE, Area, Frame, Layer, Lines, Mark, Sheet
-from .svg import LABEL, web_svg_of
+from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE, Area, GridFrame, Layer, Lines, Mark, Sheet
+from .svg import LABEL, web_sheet_svg
 
 SIDE: Final = 320.0
 CROSSES_UP_TO: Final = 12  # longer side of a grid with crosses at all pixels; larger ones have streamlines
@@ -41,51 +41,51 @@ _CELLS_FROM: Final = 9.0  # units of a pixel from which on its sides are drawn
 
 def instance_picture(instance: Instance) -> bytes:
     """Mask, pixels and strokes: the more reliable a stroke, the stronger its line."""
-    frame = _frame(instance)
+    frame = _web_frame(instance)
     width = float(np.clip(0.2 * frame.pixel, 2.0, 6.0))
-    return _page(frame, [*_ground(frame), *frame.strokes(STROKE, width)])
+    return _page_around_mask(frame, [*_mask_marks(frame), *frame.strokes(STROKE, width)])
 
 
 def thumbnail(instance: Instance) -> bytes:
     """Silhouette and strokes with lines that are visible at the height of a line of text."""
-    frame = _frame(instance)
-    return _page(frame, [frame.area(_SHADE, instance.mask), *frame.strokes(STROKE, 12.0)])
+    frame = _web_frame(instance)
+    return _page_around_mask(frame, [frame.area(_SHADE, instance.mask), *frame.strokes(STROKE, 12.0)])
 
 
 def field_picture(field: CrossField) -> bytes:
     """Crosses or, on a larger grid, streamlines over faint strokes; singularities red (+) and blue (-)."""
-    frame = _frame(field.instance)
+    frame = _web_frame(field.instance)
     few = max(field.instance.mask.shape) <= CROSSES_UP_TO
     lines = (
         frame.crosses(field, min(0.07 * frame.pixel, 2.6)) if few else frame.streamlines(field, 1.3, _SPACING)
     )
     strokes = frame.strokes(_FAINT, float(np.clip(0.3 * frame.pixel, 2.6, 9.0)))
-    return _page(frame, [*_ground(frame), *strokes, *lines, *frame.singularities(field, 4.6)])
+    return _page_around_mask(frame, [*_mask_marks(frame), *strokes, *lines, *frame.singularities(field, 4.6)])
 
 
-def picture(left: float, top: float, right: float, bottom: float, marks: Iterable[Mark]) -> bytes:
+def marks_picture(left: float, top: float, right: float, bottom: float, marks: Iterable[Mark]) -> bytes:
     """The SVG of marks on a page between these sides, with colours for both modes."""
     x, y, width, height = (round(value, 1) for value in (left, top, right - left, bottom - top))
-    return web_svg_of(Sheet((x, y, width, height), (Layer("", tuple(marks)),)), _NIGHT)
+    return web_sheet_svg(Sheet((x, y, width, height), (Layer("", tuple(marks)),)), _NIGHT)
 
 
-def wide(text: str) -> float:
+def text_width(text: str) -> float:
     """Room for a line of text in the units of the picture, whatever font the reader has."""
     return _CHARACTER * len(text)
 
 
-def _frame(instance: Instance) -> Frame:
-    return Frame(instance, (0.0, 0.0), SIDE / float(np.ptp(np.argwhere(instance.mask), axis=0).max() + 1))
+def _web_frame(instance: Instance) -> GridFrame:
+    return GridFrame(instance, (0.0, 0.0), SIDE / float(np.ptp(np.argwhere(instance.mask), axis=0).max() + 1))
 
 
-def _ground(frame: Frame) -> list[Area | Lines]:
+def _mask_marks(frame: GridFrame) -> list[Area | Lines]:
     """The mask, its pixels where they are large enough, and its outline."""
     cells = [frame.sides(GRID, 0.8, between=True)] if frame.pixel >= _CELLS_FROM else []
     return [frame.area(PAPER, frame.instance.mask), *cells, frame.sides(EDGE, 1.2)]
 
 
-def _page(frame: Frame, marks: Iterable[Mark]) -> bytes:
+def _page_around_mask(frame: GridFrame, marks: Iterable[Mark]) -> bytes:
     inside = np.argwhere(frame.instance.mask)[:, ::-1]
     left, top = (frame.pixel * inside.min(axis=0) - _MARGIN).tolist()
     right, bottom = (frame.pixel * (inside.max(axis=0) + 1) + _MARGIN).tolist()
-    return picture(left, top, right, bottom, marks)
+    return marks_picture(left, top, right, bottom, marks)

@@ -17,7 +17,7 @@ from ...models.arguments import check_fields
 from ...models.errors import InputError
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
-from .raster import Raster, raster, scale_of
+from .raster import Raster, choose_scale, raster
 
 Bytes = NDArray[np.uint8]
 
@@ -83,7 +83,9 @@ class Light:
 UPPER_LEFT: Final = Light()  # the default lamp
 
 
-def lit(raster: Raster, light: Light = UPPER_LEFT, colour: tuple[float, float, float] = CLAY) -> Floats:
+def shade_by_light(
+    raster: Raster, light: Light = UPPER_LEFT, colour: tuple[float, float, float] = CLAY
+) -> Floats:
     """Red, green, blue and opacity (h, w, 4) in [0, 1], encoded for screens (sRGB), of a dull surface."""
     lamp = np.maximum(raster.normals @ light.direction, 0.0)
     fill = np.maximum(raster.normals @ light.opposite.direction, 0.0)
@@ -100,10 +102,10 @@ def with_opacity(energy: Floats, raster: Raster) -> Floats:
 
 def matcap(raster: Raster) -> Floats:
     """Red, green, blue and opacity (h, w, 4) in [0, 1], encoded for screens."""
-    return with_opacity(ball(raster.normals), raster)
+    return with_opacity(ball_normals(raster.normals), raster)
 
 
-def ball(normals: Floats) -> Floats:
+def ball_normals(normals: Floats) -> Floats:
     """Light (..., 3) from the ball to the viewer at these unit normals (..., 3)."""
     key, fill = (vector / np.linalg.norm(vector) for vector in (_KEY, _WALL))
     viewer = np.array([0.0, 0.0, 1.0])
@@ -121,19 +123,19 @@ def normal_map(instance: Instance, normals: Floats, scale: int = 1) -> Bytes:
 
     scale: texels per pixel of the grid; at 1, each has its own normal, otherwise they are smooth.
     """
-    if scale_of(instance, scale) > 1:
-        return eight_bit(coloured(raster(instance, normals, scale)))
+    if choose_scale(instance, scale) > 1:
+        return to_eight_bit(colour_normals(raster(instance, normals, scale)))
     image = np.zeros((*instance.mask.shape, 3))
     image[..., 2] = 1.0
     image[instance.mask] = normals
-    return eight_bit(coloured(Raster(image, instance.mask.astype(np.float64))))
+    return to_eight_bit(colour_normals(Raster(image, instance.mask.astype(np.float64))))
 
 
-def coloured(found: Raster) -> Floats:
+def colour_normals(found: Raster) -> Floats:
     """Red, green, blue and opacity (h, w, 4) in [0, 1] of the normals."""
     return np.concatenate([(found.normals + 1) / 2, found.opacity[..., None]], axis=-1)
 
 
-def eight_bit(values: Floats) -> Bytes:
+def to_eight_bit(values: Floats) -> Bytes:
     """Numbers in [0, 1] rounded to one of 256 values."""
     return np.round(255 * values).astype(np.uint8)

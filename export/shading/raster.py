@@ -39,10 +39,10 @@ class Raster:
 
 
 def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Raster:
-    """The normals of a surface, (n, 3) at the pixels of the grid, at a scale as in `scale_of`."""
+    """The normals of a surface, (n, 3) at the pixels of the grid, at a scale as in `choose_scale`."""
     from scipy import ndimage
 
-    scale = scale_of(instance, scale)
+    scale = choose_scale(instance, scale)
     mask = np.pad(instance.mask, _REACH)
     image = np.zeros((*mask.shape, 3))
     image[mask] = normals
@@ -56,8 +56,10 @@ def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Ras
     viewer = np.array([0.0, 0.0, 1.0])
     unit = np.where(length > 1e-9, summed / np.maximum(length, 1e-9), viewer)
     lines = _lines(mask)
-    thin = spread((_thin(mask) | ndimage.binary_dilation(lines, np.ones((3, 3)))).astype(np.float64))
-    within = _DRAWN * drawn_border(instance) * (1 - thin)
+    thin = spread(
+        (_find_thin_parts(mask) | ndimage.binary_dilation(lines, np.ones((3, 3)))).astype(np.float64)
+    )
+    within = _DRAWN * border_width(instance) * (1 - thin)
     solid = mask.astype(np.float64)
     blurred = ndimage.gaussian_filter(solid, _BLUR, mode="constant")
     narrow = spread(solid + _RAISED * lines) - _SLOPE * within
@@ -70,7 +72,7 @@ def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Ras
     return Raster(unit, opacity[1:-1, 1:-1])
 
 
-def scale_of(instance: Instance, scale: int | None) -> int:
+def choose_scale(instance: Instance, scale: int | None) -> int:
     """Picture pixels per pixel of the grid, by default for a longer side of SIDE. Raises InputError."""
     height, width = instance.mask.shape
     if scale is None:
@@ -97,7 +99,7 @@ def _splines(count: int, scale: int) -> Any:
     return sparse.csr_array(entries, shape=(len(place), count))
 
 
-def _thin(mask: Bools) -> Bools:
+def _find_thin_parts(mask: Bools) -> Bools:
     """Pixels in or next to a part of the mask, or a gap in it, too thin for 3 x 3 pixels, but not a tip."""
     from scipy import ndimage
 
@@ -118,7 +120,7 @@ def _lines(mask: Bools) -> Bools:
     return np.asarray(single & (np.bincount(part.ravel()) > _BUMP)[part])
 
 
-def drawn_border(instance: Instance) -> float:
+def border_width(instance: Instance) -> float:
     """The part of the pixels at the border of the mask that carry strokes, 0 to 1."""
     from scipy import ndimage
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 from ...models.processes.child import Child, KilledError
 from ...models.processes.deadline import Over, never
 from .session import OvertakenError
-from .views import ready
+from .views import load_module
 
 KINDS: Final = ("fields", "surfaces", "files", "proofs")
 _MOST_TABS: Final = 100  # whose newest edits are remembered
@@ -29,7 +29,7 @@ class Desk(AbstractContextManager["Desk"]):
         self._newest: OrderedDict[str, int] = OrderedDict()
         self._lock = threading.Lock()
         for kind in ("fields", "surfaces"):  # the first edit should not wait for imports
-            self.submit(kind, ready)
+            self.submit(kind, load_module)
 
     def __exit__(self, *_: object) -> None:
         """End all processes."""

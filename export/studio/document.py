@@ -95,16 +95,16 @@ class Document:
         low, high = SIZES
         found = cls(
             name=name_from_text(str(given.get("name", ""))[:200]) or "drawing",
-            page=_page(given.get("page")),
-            strokes=_each(given, "strokes", _stroke),
-            mask=_each(given, "mask", _edit),
-            hints=_each(given, "hints", _hint),
+            page=_read_page(given.get("page")),
+            strokes=_read_list(given, "strokes", _read_stroke),
+            mask=_read_list(given, "mask", _read_edit),
+            hints=_read_list(given, "hints", _read_hint),
             flip=given.get("flip") is True,
-            size=int(_number(given.get("size"), "size", low, high)),
-            stroke_weight=_number(
+            size=int(_read_number(given.get("size"), "size", low, high)),
+            stroke_weight=_read_number(
                 given.get("stroke_weight", STROKE_WEIGHT), "stroke_weight", 0.0, _MOST_WEIGHT
             ),
-            silhouette=_one_of(given.get("silhouette", "none"), "silhouette", Silhouette),
+            silhouette=_read_choice(given.get("silhouette", "none"), "silhouette", Silhouette),
         )
         if sum(len(stroke.points) for stroke in found.strokes) > MAX_SEGMENTS:
             raise InputError(f"the drawing has more than {MAX_SEGMENTS} points; simplify it")
@@ -142,7 +142,7 @@ class Document:
         return np.array([stroke.weight for stroke in self.strokes])
 
 
-def _each(
+def _read_list(
     given: Mapping[str, Any], key: str, read: Callable[[dict[str, Any], str], _Read]
 ) -> tuple[_Read, ...]:
     entries = given.get(key, [])
@@ -153,32 +153,32 @@ def _each(
     return tuple(read(entry, f"{key}, entry {number}") for number, entry in enumerate(entries, start=1))
 
 
-def _stroke(entry: dict[str, Any], where: str) -> Stroke:
-    weight = _number(entry.get("weight", 1.0), f"{where}, weight", 0.0, 1.0)
+def _read_stroke(entry: dict[str, Any], where: str) -> Stroke:
+    weight = _read_number(entry.get("weight", 1.0), f"{where}, weight", 0.0, 1.0)
     return Stroke(
-        _points(entry.get("points"), where),
-        _one_of(entry.get("mark"), f"{where}, mark", Mark),
+        _read_points(entry.get("points"), where),
+        _read_choice(entry.get("mark"), f"{where}, mark", Mark),
         max(weight, 0.05),
     )
 
 
-def _edit(entry: dict[str, Any], where: str) -> MaskEdit:
-    radius = _number(entry.get("radius", 0.0), f"{where}, radius", 0.0, FARTHEST)
-    kind = _one_of(entry.get("kind"), f"{where}, kind", EditKind)
-    return MaskEdit(kind, _points(entry.get("points"), where), radius)
+def _read_edit(entry: dict[str, Any], where: str) -> MaskEdit:
+    radius = _read_number(entry.get("radius", 0.0), f"{where}, radius", 0.0, FARTHEST)
+    kind = _read_choice(entry.get("kind"), f"{where}, kind", EditKind)
+    return MaskEdit(kind, _read_points(entry.get("points"), where), radius)
 
 
-def _hint(entry: dict[str, Any], where: str) -> PlacedHint:
-    number = partial(_number, most=FARTHEST)
+def _read_hint(entry: dict[str, Any], where: str) -> PlacedHint:
+    number = partial(_read_number, most=FARTHEST)
     return PlacedHint(
         number(entry.get("x"), f"{where}, x", least=-FARTHEST),
         number(entry.get("y"), f"{where}, y", least=-FARTHEST),
-        _number(entry.get("slant"), f"{where}, slant", 0.0, 89.0),
-        _number(entry.get("tilt"), f"{where}, tilt", -720.0, 720.0),
+        _read_number(entry.get("slant"), f"{where}, slant", 0.0, 89.0),
+        _read_number(entry.get("tilt"), f"{where}, tilt", -720.0, 720.0),
     )
 
 
-def _points(given: Any, where: str) -> Floats:
+def _read_points(given: Any, where: str) -> Floats:
     """Points (k, 2) from a flat list x, y, x, y, ..."""
     try:
         points = np.array(given, dtype=np.float64)
@@ -189,15 +189,15 @@ def _points(given: Any, where: str) -> Floats:
     return points.reshape(-1, 2)
 
 
-def _page(given: Any) -> tuple[float, float, float, float]:
-    values = _points(given, "page").ravel()
+def _read_page(given: Any) -> tuple[float, float, float, float]:
+    values = _read_points(given, "page").ravel()
     if len(values) != 4 or not (values[2:] > 0).all():
         raise InputError("page of the session must be x, y, width and height")
     x, y, width, height = values.tolist()
     return x, y, width, height
 
 
-def _number(given: Any, where: str, least: float, most: float) -> float:
+def _read_number(given: Any, where: str, least: float, most: float) -> float:
     if isinstance(given, bool) or not isinstance(given, (int, float)) or not math.isfinite(given):
         raise InputError(f"{where} of the session is {shortened(given)}, not a number")
     if not least <= given <= most:
@@ -205,7 +205,7 @@ def _number(given: Any, where: str, least: float, most: float) -> float:
     return float(given)
 
 
-def _one_of(given: Any, where: str, choice: Any) -> Any:
+def _read_choice(given: Any, where: str, choice: Any) -> Any:
     if given not in get_args(choice):
         raise InputError(
             f"{where} of the session is {shortened(given)!r}; it must be {' or '.join(get_args(choice))}"

@@ -16,9 +16,9 @@ from ...models.instance.file import write_instance
 from ..bundle.problem_files import write_all
 from ..pictures.draw import draw
 from ..shading.colours import normal_map
-from ..surfaces.files import png_of, write_surface
+from ..surfaces.files import encode_png, write_surface
 from .document import Document, Stroke
-from .session import drawn, field_of, surface_of
+from .session import compute_field, compute_surface, read_drawn
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # of files in an archive: same drawing, same bytes
 _COLOURS: Final = {"line": "red", "cut": "black"}
@@ -32,17 +32,17 @@ class Download:
     write: Callable[[Document, Path, str, str], Any]
 
 
-def _drawing(document: Document, folder: Path) -> Path:
+def _write_drawing(document: Document, folder: Path) -> Path:
     path = folder / f"{document.name}.svg"
-    path.write_bytes(svg_of(document))
+    path.write_bytes(drawing_svg(document))
     return path
 
 
-def svg_of(document: Document) -> bytes:
+def drawing_svg(document: Document) -> bytes:
     """The visible strokes as SVG: curvature lines in red, strokes that cut in black."""
     x, y, width, height = (f"{value:.12g}" for value in document.page)
     thick = f"{max(document.page[2:]) / 400:.4g}"
-    paths = [_path(document.strokes[number]) for number in document.visible]
+    paths = [_stroke_svg(document.strokes[number]) for number in document.visible]
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
         f'viewBox="{x} {y} {width} {height}" fill="none" stroke-width="{thick}">'
@@ -50,60 +50,60 @@ def svg_of(document: Document) -> bytes:
     return "\n".join([head, *paths, "</svg>", ""]).encode()
 
 
-def _path(stroke: Stroke) -> str:
+def _stroke_svg(stroke: Stroke) -> str:
     points = " ".join(f"{value:.12g}" for value in stroke.points.ravel())
     return f'<polyline stroke="{_COLOURS[stroke.mark]}" points="{points}"/>'
 
 
-def _layers(document: Document, folder: Path, *_: str) -> None:
+def _write_layers(document: Document, folder: Path, *_: str) -> None:
     with tempfile.TemporaryDirectory() as other:
-        underlay = _drawing(document, Path(other))
-        draw(field_of(document)[1], folder / f"{document.name}.layers.svg", underlay=underlay)
+        underlay = _write_drawing(document, Path(other))
+        draw(compute_field(document)[1], folder / f"{document.name}.layers.svg", underlay=underlay)
 
 
-def _normals(document: Document, folder: Path, *_: str) -> None:
-    found = surface_of(document, field_of(document)[1])
+def _write_normals(document: Document, folder: Path, *_: str) -> None:
+    found = compute_surface(document, compute_field(document)[1])
     texels = normal_map(found.instance, found.normals, max(1, 1024 // max(found.instance.mask.shape)))
-    (folder / f"{document.name}.normals.png").write_bytes(png_of(texels))
+    (folder / f"{document.name}.normals.png").write_bytes(encode_png(texels))
 
 
-def _surface(document: Document, folder: Path, *_: str) -> None:
+def _write_surface(document: Document, folder: Path, *_: str) -> None:
     with tempfile.TemporaryDirectory() as other:
-        underlay = _drawing(document, Path(other))
-        write_surface(surface_of(document, field_of(document)[1]), folder, drawing=underlay)
+        underlay = _write_drawing(document, Path(other))
+        write_surface(compute_surface(document, compute_field(document)[1]), folder, drawing=underlay)
 
 
-def _solver(document: Document, folder: Path, formulation: str, form: str) -> None:
-    found, field = field_of(document)
+def _write_solver_files(document: Document, folder: Path, formulation: str, form: str) -> None:
+    found, field = compute_field(document)
     manifests = write_all(found.instance, folder, formulations=[formulation], formats=[form], start=field)
     for reason in manifests[0].document["refused"].values():
         raise InputError(reason)
 
 
 DOWNLOADS: Final = {
-    "drawing": Download("Drawing (SVG)", lambda document, folder, *_: _drawing(document, folder)),
-    "layers": Download("Field in layers (SVG)", _layers),
+    "drawing": Download("Drawing (SVG)", lambda document, folder, *_: _write_drawing(document, folder)),
+    "layers": Download("Field in layers (SVG)", _write_layers),
     "overview": Download(
         "Overview (PNG)",
         lambda document, folder, *_: draw(
-            field_of(document)[1], folder / f"{document.name}.png", kind="overview"
+            compute_field(document)[1], folder / f"{document.name}.png", kind="overview"
         ),
     ),
-    "normals": Download("Normal map (PNG)", _normals),
-    "surface": Download("Surface (OBJ, heights, pictures)", _surface),
+    "normals": Download("Normal map (PNG)", _write_normals),
+    "surface": Download("Surface (OBJ, heights, pictures)", _write_surface),
     "field": Download(
         "Field (NPZ)",
         lambda document, folder, *_: write_field(
-            field_of(document)[1], folder / f"{document.name}.field.npz"
+            compute_field(document)[1], folder / f"{document.name}.field.npz"
         ),
     ),
     "instance": Download(
         "Instance (JSON)",
         lambda document, folder, *_: write_instance(
-            drawn(document).instance, folder / f"{document.name}.json"
+            read_drawn(document).instance, folder / f"{document.name}.json"
         ),
     ),
-    "solver": Download("Solver files", _solver),
+    "solver": Download("Solver files", _write_solver_files),
 }
 """The entries of the menu by name."""
 
@@ -119,10 +119,10 @@ def download(data: bytes, what: str, formulation: str = "", form: str = "") -> t
         files = sorted(path for path in folder.rglob("*") if path.is_file())
         if len(files) == 1:
             return files[0].name, files[0].read_bytes()
-        return f"{document.name}.{what}.zip", _archive(files, folder)
+        return f"{document.name}.{what}.zip", _pack_files(files, folder)
 
 
-def _archive(files: list[Path], folder: Path) -> bytes:
+def _pack_files(files: list[Path], folder: Path) -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in files:

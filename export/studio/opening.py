@@ -29,7 +29,7 @@ _Pixel = tuple[int, int]
 _Way = list[_Pixel]
 
 
-def opened(data: bytes, file_name: str, view: str | None = None) -> dict[str, Any]:
+def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[str, Any]:
     """Name, page and strokes of a drawing, as in a document. Raises InputError.
 
     view: direction of a .curves file, as for `read_sketch`. `spatial` states whether it has one.
@@ -40,7 +40,7 @@ def opened(data: bytes, file_name: str, view: str | None = None) -> dict[str, An
     suffix = f".{suffix.lower()}" if dot else ""
     spatial = detect_file_kind(data, suffix) == "curves"
     drawing = parse_drawing(data, suffix, _THINNED // 4, view=view if spatial else None)
-    page, strokes = _of_picture(drawing) if isinstance(drawing, Bitmap) else _of_curves(drawing)
+    page, strokes = _trace_picture(drawing) if isinstance(drawing, Bitmap) else _strokes_of_curves(drawing)
     return {
         "name": name_from_text(stem or file_name),
         "page": list(page),
@@ -49,12 +49,12 @@ def opened(data: bytes, file_name: str, view: str | None = None) -> dict[str, An
     }
 
 
-def _stroke(points: Floats, *, line: bool) -> dict[str, Any]:
+def _stroke_document(points: Floats, *, line: bool) -> dict[str, Any]:
     rounded = np.round(points, 3).ravel().tolist()
     return {"points": rounded, "mark": "line" if line else "cut", "weight": 1}
 
 
-def _of_curves(curves: Curves) -> tuple[Box, list[dict[str, Any]]]:
+def _strokes_of_curves(curves: Curves) -> tuple[Box, list[dict[str, Any]]]:
     """Page and strokes of curves: their unbroken runs as polylines."""
     left, top, right, bottom = curves.box
     page = curves.page or (left, top, max(right - left, 1e-6), max(bottom - top, 1e-6))
@@ -62,32 +62,32 @@ def _of_curves(curves: Curves) -> tuple[Box, list[dict[str, Any]]]:
     run = run_numbers(curves.points, curves.curve)[owner]
     starts = np.flatnonzero(np.diff(run, prepend=-1))
     strokes = [
-        _stroke(np.concatenate([part[:, 0], part[-1:, 1]]), line=bool(line))
+        _stroke_document(np.concatenate([part[:, 0], part[-1:, 1]]), line=bool(line))
         for part, line in zip(np.split(segments, starts[1:]), curves.line[owner[starts]], strict=True)
     ]
     return page, strokes
 
 
-def _of_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
+def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
     """Page and strokes of a picture: the middle lines of its ink, from one end or junction to the next."""
     reduced = max(1.0, max(picture.ink.shape) / _THINNED)
     rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in picture.ink.shape)
     small = block_means(picture.ink, rows, columns)
     red = block_means(picture.red * picture.ink, rows, columns) / np.maximum(small, 1e-6)
     line = thin_shape(small * max(1.0, reduced / picture.stroke_width) > _INK)
-    ways = [np.array(way) for way in _ways(line)]
+    ways = [np.array(way) for way in _trace_ways(line)]
     ways = [way for way in ways if len(way) >= _SHORTEST] or ways
     is_red = np.array([np.median(red[tuple(way.T)]) > _RED for way in ways], dtype=bool)
     as_lines = is_red if is_red.any() and not is_red.all() else np.ones(len(ways), dtype=bool)
     scale = reduced * picture.reduction
     strokes = [
-        _stroke(scale * (_smoothed(way)[:, ::-1] + 0.5), line=bool(marked))
+        _stroke_document(scale * (_smooth(way)[:, ::-1] + 0.5), line=bool(marked))
         for way, marked in zip(ways, as_lines, strict=True)
     ]
     return (0.0, 0.0, float(picture.width), float(picture.height)), strokes
 
 
-def _smoothed(way: NDArray[np.int64]) -> Floats:
+def _smooth(way: NDArray[np.int64]) -> Floats:
     """The pixels of a way as a smooth line with the same ends, with half of its points."""
     even = ndimage.gaussian_filter1d(way.astype(np.float64), _SMOOTH, axis=0, mode="nearest")
     if (way[0] == way[-1]).all():
@@ -97,7 +97,7 @@ def _smoothed(way: NDArray[np.int64]) -> Floats:
     return np.concatenate([even[:-1:2], even[-1:]])
 
 
-def _ways(line: Bools) -> list[_Way]:
+def _trace_ways(line: Bools) -> list[_Way]:
     """The pixels of a thinned drawing as ways from one end or junction to the next, each link once."""
     there: set[_Pixel] = {(row, column) for row, column in np.argwhere(line).tolist()}
     links = {pixel: _neighbours(pixel, there) for pixel in there}

@@ -9,7 +9,7 @@ from typing import Any, Final
 from ...models.processes.child_program import is_stopped
 from ...models.processes.limits import Limits
 from .document import Document
-from .session import field_of
+from .session import compute_field
 
 SECONDS: Final = 120.0  # of a proof
 _LINE: Final = re.compile(r"energy ([-+.\deE]+), bound ([-+.\deE]+)")
@@ -19,13 +19,13 @@ def prove_step(data: bytes) -> dict[str, Any]:
     """Energy, bound and gap of a document's instance; progress is written to the standard output."""
     from ...models.proof.prove import prove
 
-    _, field = field_of(Document.of_bytes(data))
+    _, field = compute_field(Document.of_bytes(data))
     proof = prove(
         field.instance,
         start=field,
         limits=Limits(SECONDS, gap=0.0, threads=1),
         jobs=1,
-        progress=_printed,
+        progress=_print_progress,
         stop=is_stopped,
     )
     return {
@@ -39,12 +39,12 @@ def prove_step(data: bytes) -> dict[str, Any]:
     }
 
 
-def _printed(line: str) -> None:
+def _print_progress(line: str) -> None:
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
 
 
-def progress_of(text: str) -> dict[str, Any] | None:
+def read_progress(text: str) -> dict[str, Any] | None:
     """Energy, bound and gap in the last line of progress with both, or None."""
     lines = _LINE.findall(text)
     if not lines:

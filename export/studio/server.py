@@ -35,8 +35,8 @@ from ..formats.registry import FORMATS
 from .desk import Desk
 from .document import SIZES
 from .files import DOWNLOADS, download
-from .opening import opened
-from .proving import progress_of, prove_step
+from .opening import open_drawing
+from .proving import prove_step, read_progress
 from .session import OvertakenError
 from .views import field_step, lines_step, surface_step
 
@@ -152,24 +152,24 @@ class Page:
     async def sample(self, request: Request) -> Response:
         """The strokes of a built-in sketch."""
         name = request.path_params["name"]
-        return await _answered(lambda: opened(sample_svg(name).encode(), f"{name}.svg"))
+        return await _answered(lambda: open_drawing(sample_svg(name).encode(), f"{name}.svg"))
 
     async def open(self, request: Request) -> Response:
         """The strokes of a file that the browser sends."""
         data = await _body(request)
         name, view = request.query_params.get("name", ""), request.query_params.get("view")
-        return await _answered(lambda: opened(data, name[:200], view))
+        return await _answered(lambda: open_drawing(data, name[:200], view))
 
     async def compute(self, request: Request) -> Response:
         """Field, streamlines and surface of a document, as lines of JSON while they are computed."""
         data, stop = await self._edit(request)
-        size, lines = _whole(request, "size"), "lines" in request.query_params
-        return _stream(self._computed(data, size, stop, lines=lines))
+        size, lines = _parse_number(request, "size"), "lines" in request.query_params
+        return _stream_response(self._computed(data, size, stop, lines=lines))
 
     async def prove(self, request: Request) -> Response:
         """Energy and bound of a document, as lines of JSON while they improve."""
         data, stop = await self._edit(request)
-        return _stream(self._proven(data, stop))
+        return _stream_response(self._proven(data, stop))
 
     async def stop(self, request: Request) -> Response:
         """End the work on earlier edits of a page."""
@@ -180,11 +180,15 @@ class Page:
         """A file of a document."""
         data, query = await _body(request), request.query_params
         wanted = query.get("what", ""), query.get("formulation", ""), query.get("format", "")
-        return await _answered(lambda: _file(self.desk.submit("files", download, data, *wanted).result()))
+        return await _answered(
+            lambda: _file_response(self.desk.submit("files", download, data, *wanted).result())
+        )
 
     async def _edit(self, request: Request) -> tuple[bytes, Over]:
         data = await _body(request)
-        return data, self.desk.begin(request.query_params.get("page", "")[:64], _whole(request, "edit"))
+        return data, self.desk.begin(
+            request.query_params.get("page", "")[:64], _parse_number(request, "edit")
+        )
 
     def _computed(self, data: bytes, size: int, stop: Over, *, lines: bool) -> Iterator[dict[str, Any]]:
         early, fine = None, Event()
@@ -217,14 +221,14 @@ class Page:
                 with suppress(TimeoutError):
                     proof.exception(_TICK)
                 text = log.read_text("utf-8", "replace") if log.exists() else ""
-                progress = progress_of(text[-10_000:])
+                progress = read_progress(text[-10_000:])
                 if progress is not None and progress != shown:
                     shown = progress
                     yield progress
             yield proof.result()
 
 
-def _whole(request: Request, name: str) -> int:
+def _parse_number(request: Request, name: str) -> int:
     """A whole number in the address, 0 for anything else."""
     text = request.query_params.get(name, "")
     return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0
@@ -252,13 +256,13 @@ async def _answered(work: Callable[[], Any]) -> Response:
     return found if isinstance(found, Response) else JSONResponse(found)
 
 
-def _file(found: tuple[str, bytes]) -> Response:
+def _file_response(found: tuple[str, bytes]) -> Response:
     name, content = found
     headers = {"content-disposition": f'attachment; filename="{name}"'}
     return Response(content, media_type="application/octet-stream", headers=headers)
 
 
-def _stream(steps: Iterator[dict[str, Any]]) -> Response:
+def _stream_response(steps: Iterator[dict[str, Any]]) -> Response:
     """A response with a line of JSON per step; an error is the last line."""
 
     def lines() -> Iterator[bytes]:
@@ -285,13 +289,13 @@ async def _refused(_: Request, error: Exception) -> Response:
     return JSONResponse({"message": str(error)}, 422)
 
 
-def application(desk: Desk, port: int, token: str, first: dict[str, Any] | None = None) -> ASGIApp:
+def build_application(desk: Desk, port: int, token: str, first: dict[str, Any] | None = None) -> ASGIApp:
     """The server behind its guard."""
     routes = [Mount(f"/{token}", routes=Page(desk, first).routes())]
     return Guard(Starlette(routes=routes, exception_handlers={CrossfieldError: _refused}), port, token)
 
 
-def listening(port: int) -> socket.socket:
+def listen(port: int) -> socket.socket:
     """A socket on this machine only; port 0 chooses a free one. Raises InputError for a port in use."""
     place = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -308,7 +312,7 @@ def listening(port: int) -> socket.socket:
 def serve(place: socket.socket, token: str, first: dict[str, Any] | None) -> None:
     """Serve the page until Ctrl-C."""
     with Desk() as desk:
-        app = application(desk, place.getsockname()[1], token, first)
+        app = build_application(desk, place.getsockname()[1], token, first)
         config = uvicorn.Config(
             app,
             log_level="warning",
@@ -319,10 +323,10 @@ def serve(place: socket.socket, token: str, first: dict[str, Any] | None) -> Non
             timeout_graceful_shutdown=5,
         )
         with suppress(KeyboardInterrupt):
-            _Ending(config, desk).run(sockets=[place])
+            _EndingServer(config, desk).run(sockets=[place])
 
 
-class _Ending(uvicorn.Server):
+class _EndingServer(uvicorn.Server):
     """A server that ends the work first, so that no answer keeps it running."""
 
     def __init__(self, config: uvicorn.Config, desk: Desk) -> None:

@@ -41,7 +41,7 @@ class OvertakenError(CrossfieldError):
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnInstance:
     """An instance, the kind (h, w) of each pixel, the gaps with whether they are open, and its strokes.
 
     strokes: number of the stroke and of the stroke pixel for each pair of them, (k, 2).
@@ -53,14 +53,14 @@ class Drawn:
     strokes: Ints
 
 
-def drawn(document: Document, size: int | None = None) -> Drawn:
+def read_drawn(document: Document, size: int | None = None) -> DrawnInstance:
     """The instance of a document. size: instead of that of the document. Raises InputError."""
     curves = document.curves()
     frame = fit_frame(curves.box, size or document.size, margin=True)
     covers = curves.covers(frame)
     mask, reading = find_mask(curves, covers, frame)
-    edited, gaps = _edited(document.mask, mask, covers.walls, reading, frame)
-    left_out = edited | _enclosed(~edited & ~covers.walls)
+    edited, gaps = _edit_mask(document.mask, mask, covers.walls, reading, frame)
+    left_out = edited | _enclosed_parts(~edited & ~covers.walls)
     mask = edited & ~covers.cuts
     if document.silhouette == "outer":
         covers, mask = drop_silhouette(covers, mask)
@@ -74,10 +74,10 @@ def drawn(document: Document, size: int | None = None) -> Drawn:
     pairs = np.stack([owner, number[row, column]], axis=1)
     pairs = pairs[pairs[:, 1] >= 0].astype(np.int32)
     kinds = np.select([covers.cuts, mask, left_out], [STROKE, IN, LEFT_OUT], OUT).astype(np.int32)
-    return Drawn(_weighted(instance, document.weights, pairs), kinds, gaps, pairs)
+    return DrawnInstance(_scale_weights(instance, document.weights, pairs), kinds, gaps, pairs)
 
 
-def _weighted(instance: Instance, weights: Floats, pairs: Ints) -> Instance:
+def _scale_weights(instance: Instance, weights: Floats, pairs: Ints) -> Instance:
     """The instance with reliabilities scaled by the mean weight of the strokes in each pixel."""
     if (weights == 1).all():
         return instance
@@ -86,7 +86,7 @@ def _weighted(instance: Instance, weights: Floats, pairs: Ints) -> Instance:
     return replace(instance, w=instance.w * np.where(mean > 0, mean, 1.0))
 
 
-def _edited(
+def _edit_mask(
     edits: tuple[MaskEdit, ...], solve: Bools, walls: Bools, found: Reading, frame: Frame
 ) -> tuple[Bools, tuple[tuple[Floats, bool], ...]]:
     """The mask after the edits in their order, and the gaps with whether they are open."""
@@ -98,37 +98,37 @@ def _edited(
             kept[(away == away.min()) & (away <= NEAR * frame.pixel)] ^= True
     left = np.zeros_like(solve)
     if not kept.all():
-        left = _mostly(solve & ~_closed(walls, ends[kept], frame), solve & ~walls)
+        left = _mostly_chosen_parts(solve & ~_close_walls(walls, ends[kept], frame), solve & ~walls)
     mask = solve & ~left
     cells, _ = ndimage.label(~walls)
     for edit in edits:
         if edit.kind == "toggle":
-            cell = _cell(cells, edit.points[0], frame)
+            cell = _find_cell(cells, edit.points[0], frame)
             gone = (mask & cell).any()
             mask, left = (
-                (mask & ~cell, left | cell) if gone else (mask | cell | _rim(cell, walls), left & ~cell)
+                (mask & ~cell, left | cell) if gone else (mask | cell | _find_rim(cell, walls), left & ~cell)
             )
         elif edit.kind != "gap":
-            brushed = _brushed(edit, frame)
+            brushed = _brushed_pixels(edit, frame)
             mask = mask | brushed if edit.kind == "paint" else mask & ~brushed
     # Strokes that only bound areas without a field would be thin parts of their own.
-    mask = mask & ~(_rim(left, walls) & ~_rim(mask & ~walls, walls))
+    mask = mask & ~(_find_rim(left, walls) & ~_find_rim(mask & ~walls, walls))
     return mask, tuple(zip(ends, (~kept).tolist(), strict=True))
 
 
-def _mostly(chosen: Bools, area: Bools) -> Bools:
+def _mostly_chosen_parts(chosen: Bools, area: Bools) -> Bools:
     """The connected parts of an area of which more than half is chosen."""
     label, count = ndimage.label(area)
     share = ndimage.mean(chosen, label, np.arange(count + 1))
     return np.asarray((share > 0.5)[label] & area)
 
 
-def _rim(area: Bools, walls: Bools) -> Bools:
+def _find_rim(area: Bools, walls: Bools) -> Bools:
     """The pixels of strokes next to an area."""
     return np.asarray(ndimage.binary_dilation(area, np.ones((3, 3), dtype=bool)) & walls)
 
 
-def _closed(walls: Bools, bridges: Floats, frame: Frame) -> Bools:
+def _close_walls(walls: Bools, bridges: Floats, frame: Frame) -> Bools:
     """The region inside of the walls and these bridges (m, 2, 2)."""
     closed = walls.copy()
     if len(bridges):
@@ -137,15 +137,15 @@ def _closed(walls: Bools, bridges: Floats, frame: Frame) -> Bools:
     return enclosed_region(closed)
 
 
-def _cell(cells: Ints, point: Floats, frame: Frame) -> Bools:
+def _find_cell(cells: Ints, point: Floats, frame: Frame) -> Bools:
     """The area between strokes that contains a point; nothing for the outside and on a stroke."""
     column, row = np.floor((point - (frame.x, frame.y)) / frame.pixel).astype(int)
     inside = 0 <= row < frame.height and 0 <= column < frame.width and cells[row, column] > 0
     cell: Bools = cells == (cells[row, column] if inside else -1)
-    return cell if _enclosed(cell).any() else np.zeros_like(cell)
+    return cell if _enclosed_parts(cell).any() else np.zeros_like(cell)
 
 
-def _enclosed(area: Bools) -> Bools:
+def _enclosed_parts(area: Bools) -> Bools:
     """The parts of an area that do not reach the edge of the grid."""
     label, count = ndimage.label(area)
     free = np.ones(count + 1, dtype=bool)
@@ -153,7 +153,7 @@ def _enclosed(area: Bools) -> Bools:
     return np.asarray(free[label])
 
 
-def _brushed(edit: MaskEdit, frame: Frame) -> Bools:
+def _brushed_pixels(edit: MaskEdit, frame: Frame) -> Bools:
     """The pixels whose middles a brush passes over, at least the pixels under its path."""
     points = (edit.points - (frame.x, frame.y)) / frame.pixel
     steps = np.maximum(np.ceil(2 * np.hypot(*np.diff(points, axis=0).T)).astype(int), 1)
@@ -170,7 +170,7 @@ def _brushed(edit: MaskEdit, frame: Frame) -> Bools:
     return np.asarray(ndimage.distance_transform_edt(free) <= edit.radius / frame.pixel)
 
 
-class _Kept(OrderedDict[object, Any]):
+class _ResultCache(OrderedDict[object, Any]):
     """The last few results of work that no edit has ended."""
 
     def found(self, key: object, work: Callable[[], _Result]) -> _Result:
@@ -186,13 +186,13 @@ class _Kept(OrderedDict[object, Any]):
         return kept
 
 
-_FIELDS: Final = _Kept()
-_SURFACES: Final = _Kept()
+_FIELDS: Final = _ResultCache()
+_SURFACES: Final = _ResultCache()
 
 
-def field_of(document: Document, size: int | None = None) -> tuple[Drawn, CrossField]:
+def compute_field(document: Document, size: int | None = None) -> tuple[DrawnInstance, CrossField]:
     """The instance of a document and its bend field. Raises OvertakenError."""
-    found = drawn(document, size)
+    found = read_drawn(document, size)
     instance = found.instance
     return found, _FIELDS.found(
         instance.sha256,
@@ -200,7 +200,7 @@ def field_of(document: Document, size: int | None = None) -> tuple[Drawn, CrossF
     )
 
 
-def hints_of(document: Document, instance: Instance) -> list[Hint]:
+def hints_on_mask(document: Document, instance: Instance) -> list[Hint]:
     """The hints of a document at pixels of the mask; those outside have no effect."""
     hints = []
     for hint in document.hints:
@@ -212,9 +212,9 @@ def hints_of(document: Document, instance: Instance) -> list[Hint]:
     return hints
 
 
-def surface_of(document: Document, field: CrossField) -> Surface:
+def compute_surface(document: Document, field: CrossField) -> Surface:
     """The surface of a document's field, with its hints. Raises OvertakenError."""
-    hints, flip = tuple(hints_of(document, field.instance)), document.flip
+    hints, flip = tuple(hints_on_mask(document, field.instance)), document.flip
     return _SURFACES.found(
         (field.instance.sha256, hints, flip),
         lambda: surface(field, hints, flip=flip, stop=is_stopped),

@@ -11,12 +11,12 @@ from ...models.field.field import FAR, CrossField
 from ...models.processes.child_program import is_stopped
 from ...models.surface.surface import Surface
 from ...models.surface.trust import OFF, UNFIT, right_angle_deviation
-from ..pictures.draw import counted
-from ..pictures.marks import runs
+from ..pictures.draw import count_singularities
+from ..pictures.marks import split_runs
 from ..pictures.streamlines import streamlines
 from ..shading.raster import raster
 from .document import Document
-from .session import Drawn, OvertakenError, field_of, surface_of
+from .session import DrawnInstance, OvertakenError, compute_field, compute_surface
 
 SIDE: Final = 480  # pixels of the longer side of a shaded picture
 _FINE: Final = 32767  # steps of a part of a normal: 8 bits would show as bands
@@ -25,23 +25,23 @@ _LEAST: Final = 2  # stroke pixels of a stroke about which there is a doubt
 _MOST: Final = 5  # strokes in doubt at a time, of those with at least half as many wrong pixels as the worst
 
 
-def ready() -> None:
+def load_module() -> None:
     """Do nothing: this module is imported where the call arrives."""
 
 
-def packed(values: np.ndarray[Any, Any], kind: str) -> str:
+def encode_array(values: np.ndarray[Any, Any], kind: str) -> str:
     """The numbers in little-endian order as base64."""
     return base64.b64encode(values.astype(np.dtype(kind).newbyteorder("<")).tobytes()).decode()
 
 
-def field_step(data: bytes, size: int | None = None) -> tuple[dict[str, Any], Drawn, CrossField]:
+def field_step(data: bytes, size: int | None = None) -> tuple[dict[str, Any], DrawnInstance, CrossField]:
     """Instance and field of a document, and what the page shows of them. Raises InputError."""
     document = Document.of_bytes(data)
-    found, field = field_of(document, size)
+    found, field = compute_field(document, size)
     return _field_view(document, found, field), found, field
 
 
-def _field_view(document: Document, found: Drawn, field: CrossField) -> dict[str, Any]:
+def _field_view(document: Document, found: DrawnInstance, field: CrossField) -> dict[str, Any]:
     instance, (x, y), spots = found.instance, found.instance.origin, field.singularities
     pixel = instance.pixel_size
     shape, deviation = field.shape, field.stroke_deviation
@@ -50,32 +50,32 @@ def _field_view(document: Document, found: Drawn, field: CrossField) -> dict[str
         "size": max(instance.mask.shape),
         "wanted": document.size,
         "frame": {"x": x, "y": y, "pixel": pixel, "rows": len(found.kinds), "columns": found.kinds.shape[1]},
-        "kinds": packed(found.kinds, "u1"),
+        "kinds": encode_array(found.kinds, "u1"),
         "gaps": [{"ends": ends.tolist(), "open": is_open} for ends, is_open in found.gaps],
         "warnings": list(instance.reading.warnings) if instance.reading else [],
-        "mask": packed(instance.mask, "u1"),
-        "u": packed(field.u_angle, "f4"),
-        "v": packed(field.v_angle, "f4"),
+        "mask": encode_array(instance.mask, "u1"),
+        "u": encode_array(field.u_angle, "f4"),
+        "v": encode_array(field.v_angle, "f4"),
         "singularities": [
             [x + pixel * (column + 1.0), y + pixel * (row + 1.0), index]
             for row, column, index in zip(
                 spots.row.tolist(), spots.column.tolist(), spots.index.tolist(), strict=True
             )
         ],
-        "suspects": _suspects(found, deviation > FAR),
+        "suspects": _find_suspects(found, deviation > FAR),
         "numbers": {
             "pixels": instance.grid.size,
             "strokes": len(instance.theta),
             "deviation": float(np.degrees(shape.mean_deviation)),
             "most_deviation": float(np.degrees(shape.most_deviation)),
             "energy": field.energy(2).total,
-            "singularities": counted(field),
+            "singularities": count_singularities(field),
         },
-        **same_elsewhere(document, found),
+        **equivalent_commands(document, found),
     }
 
 
-def _suspects(found: Drawn, wrong: np.ndarray[Any, Any]) -> list[int]:
+def _find_suspects(found: DrawnInstance, wrong: np.ndarray[Any, Any]) -> list[int]:
     """Numbers of the few worst strokes with a doubt at most of their pixels."""
     # Once these are marked as cuts, field and surface change, and others are often no longer in doubt.
     stroke, at = found.strokes.T
@@ -94,7 +94,7 @@ def lines_step(found: CrossField) -> dict[str, Any]:
         [
             np.round([x, y] + pixel * (points * [1, -1] + 0.5), 3).ravel().tolist()
             for line in lines
-            for points in runs(line, family)
+            for points in split_runs(line, family)
         ]
         for family in (0, 1)
     ]
@@ -103,14 +103,14 @@ def lines_step(found: CrossField) -> dict[str, Any]:
     return {"stage": "lines", "size": max(found.instance.mask.shape), "families": families}
 
 
-def surface_step(data: bytes, found: Drawn, field: CrossField) -> dict[str, Any]:
+def surface_step(data: bytes, found: DrawnInstance, field: CrossField) -> dict[str, Any]:
     """The data of the surface of a field for the page."""
     document = Document.of_bytes(data)
-    lifted = surface_of(document, field)
+    lifted = compute_surface(document, field)
     return _surface_view(found, lifted)
 
 
-def _surface_view(found: Drawn, lifted: Surface) -> dict[str, Any]:
+def _surface_view(found: DrawnInstance, lifted: Surface) -> dict[str, Any]:
     instance, field = lifted.instance, lifted.field
     longer = max(instance.mask.shape)
     picture = raster(instance, lifted.normals, max(1, SIDE // longer))
@@ -122,23 +122,23 @@ def _surface_view(found: Drawn, lifted: Surface) -> dict[str, Any]:
         "size": longer,
         "width": width,
         "height": height,
-        "normals": packed(np.round(_FINE * picture.normals[..., :2]), "i2"),
-        "opacity": packed(np.round(255 * picture.opacity), "u1"),
-        "confidence": packed(np.round(255 * lifted.confidence), "u1"),
-        "mask": packed(instance.mask, "u1"),
+        "normals": encode_array(np.round(_FINE * picture.normals[..., :2]), "i2"),
+        "opacity": encode_array(np.round(255 * picture.opacity), "u1"),
+        "confidence": encode_array(np.round(255 * lifted.confidence), "u1"),
+        "mask": encode_array(instance.mask, "u1"),
         "rows": instance.mask.shape[0],
         "columns": instance.mask.shape[1],
         "doubts": list(lifted.doubts),
         "freedom": list(lifted.freedom),
-        "suspects": _suspects(found, unfit[instance.stroke_index]) if unfit.mean() > UNFIT / 2 else [],
+        "suspects": _find_suspects(found, unfit[instance.stroke_index]) if unfit.mean() > UNFIT / 2 else [],
     }
 
 
-def same_elsewhere(document: Document, found: Drawn) -> dict[str, list[str]]:
+def equivalent_commands(document: Document, found: DrawnInstance) -> dict[str, list[str]]:
     """Commands and Python lines that compute the same from the downloaded instance and drawing."""
-    from .session import hints_of
+    from .session import hints_on_mask
 
-    name, hints = document.name, hints_of(document, found.instance)
+    name, hints = document.name, hints_on_mask(document, found.instance)
     angles = [
         (h.row, h.column, round(float(np.degrees(h.slant)), 4), round(float(np.degrees(h.tilt)), 4))
         for h in hints

@@ -23,12 +23,12 @@ from ...models.storage import make_folder, write_bytes
 from ...models.surface.surface import Surface
 from ...models.surface.trust import right_angle_deviation
 from ..formats.registry import program_version
-from ..pictures.canvas import pixels_of
-from ..pictures.draw import own_settings
+from ..pictures.canvas import render_sheet
+from ..pictures.draw import fixed_settings
 from ..pictures.layers import strokes_sheet
 from ..pictures.underlay import Underlay, read_underlay
-from ..shading.colours import UPPER_LEFT, Light, eight_bit, lit, matcap, normal_map
-from ..shading.raster import raster, scale_of
+from ..shading.colours import UPPER_LEFT, Light, matcap, normal_map, shade_by_light, to_eight_bit
+from ..shading.raster import choose_scale, raster
 
 SHADED: Final = "shaded.png"
 DRAWING: Final = "drawing.png"
@@ -98,21 +98,21 @@ def write_surface(
     """
     if drawing is not None and not isinstance(drawing, Underlay):
         drawing = read_underlay(drawing, on=surface.instance)
-    fine = scale_of(surface.instance, scale)
+    fine = choose_scale(surface.instance, scale)
     folder = make_folder(folder)
     (folder / REPORT).unlink(missing_ok=True)
     found = raster(surface.instance, surface.normals, fine)
-    shaded, ink = lit(found, light), strokes(surface.instance, drawing, fine)
+    shaded, ink = shade_by_light(found, light), draw_strokes(surface.instance, drawing, fine)
     paper = np.broadcast_to((*_PAPER, 1.0), ink.shape)
     pictures = {
         "normals.png": normal_map(surface.instance, surface.normals, scale or 1),
-        SHADED: eight_bit(shaded),
-        "matcap.png": eight_bit(matcap(found)),
-        "overlay.png": eight_bit(over(ink, shaded)),
-        DRAWING: eight_bit(over(ink, paper)[..., :3]),
+        SHADED: to_eight_bit(shaded),
+        "matcap.png": to_eight_bit(matcap(found)),
+        "overlay.png": to_eight_bit(lay_over(ink, shaded)),
+        DRAWING: to_eight_bit(lay_over(ink, paper)[..., :3]),
     }
     for name, picture in pictures.items():
-        write_bytes(folder / name, png_of(picture))
+        write_bytes(folder / name, encode_png(picture))
     heights = io.BytesIO()
     np.save(heights, surface.heights, allow_pickle=False)
     write_bytes(folder / "heights.npy", heights.getvalue())
@@ -125,10 +125,12 @@ def write_surface(
 
 def write_shaded(surface: Surface, path: str | Path) -> Path:
     """Write a PNG of the surface in the light of a lamp, and return its path. Raises OutputError."""
-    return write_bytes(path, png_of(eight_bit(lit(raster(surface.instance, surface.normals)))))
+    return write_bytes(
+        path, encode_png(to_eight_bit(shade_by_light(raster(surface.instance, surface.normals))))
+    )
 
 
-def png_of(picture: NDArray[np.uint8]) -> bytes:
+def encode_png(picture: NDArray[np.uint8]) -> bytes:
     """A picture (h, w, 3 or 4) of red, green, blue and optional opacity as PNG."""
     from PIL import Image
 
@@ -137,15 +139,15 @@ def png_of(picture: NDArray[np.uint8]) -> bytes:
     return stream.getvalue()
 
 
-def strokes(instance: Instance, drawing: Underlay | None, scale: int) -> Floats:
+def draw_strokes(instance: Instance, drawing: Underlay | None, scale: int) -> Floats:
     """Red, green, blue and opacity (h, w, 4) in [0, 1] of the strokes of the drawing, or of the instance."""
     height, width = (side * scale for side in instance.mask.shape)
-    with own_settings():
-        drawn: Floats = pixels_of(strokes_sheet(instance, drawing), width, height) / 255.0
+    with fixed_settings():
+        drawn: Floats = render_sheet(strokes_sheet(instance, drawing), width, height) / 255.0
     return drawn
 
 
-def over(above: Floats, below: Floats) -> Floats:
+def lay_over(above: Floats, below: Floats) -> Floats:
     """One picture (h, w, 4) laid over another, both with opacity as fourth value."""
     front, back = above[..., 3:], below[..., 3:] * (1 - above[..., 3:])
     opacity = front + back
@@ -211,15 +213,15 @@ def to_obj(surface: Surface, materials: str) -> bytes:
         [
             f"# {instance.name}: quad k is pixel k = 1, 2, ... of the mask, row by row; y up, z to you\n",
             f"mtllib {materials}\n",
-            _lines("v", points),
-            _lines("vt", texture),
-            _lines("vn", normals / np.linalg.norm(normals, axis=1, keepdims=True)),
+            _obj_lines("v", points),
+            _obj_lines("vt", texture),
+            _obj_lines("vn", normals / np.linalg.norm(normals, axis=1, keepdims=True)),
             f"usemtl {_MATERIAL}\ns 1\n",
             *("f " + " ".join(f"{k}/{k}/{k}" for k in face) + "\n" for face in faces.tolist()),
         ]
     ).encode()
 
 
-def _lines(lead: str, table: np.ndarray[Any, Any]) -> str:
+def _obj_lines(lead: str, table: np.ndarray[Any, Any]) -> str:
     form = lead + " {:.6f}" * table.shape[1] + "\n"
     return "".join(form.format(*row) for row in (np.round(table, 6) + 0.0).tolist())

@@ -24,7 +24,7 @@ from ....models.processes.deadline import Progress, silent
 from ....models.storage import make_folder, neighbour, read_bytes, remove_dead, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS
-from ...pictures.draw import counted
+from ...pictures.draw import count_singularities
 from ...pictures.web import field_picture, instance_picture, thumbnail
 from ..building.index import SOLU
 from ..building.table import role_of
@@ -155,7 +155,7 @@ def _draw_pictures(folder: Path, shown: InstancePages, target: Path) -> None:
         name = f"{file.removesuffix('.json')}.svg"
         write_bytes(target / name, field_picture(field))
         caption, facts = "; ".join(_ROLES[role] for role in roles), shown.about["fields"][roles[0]]
-        shown.pictures.append(FieldPicture(tuple(roles), caption, facts, name, counted(field)))
+        shown.pictures.append(FieldPicture(tuple(roles), caption, facts, name, count_singularities(field)))
 
 
 def _write_pages(

@@ -20,7 +20,7 @@ from ....models.formulations.families import PlacedFamily
 from ....models.formulations.latex import latex
 from ....models.formulations.problem import Problem
 from ....models.storage import write_bytes
-from ...pictures.sparsity import Parts, Pattern, Places, sparsity_picture
+from ...pictures.sparsity import MatrixParts, Places, SparsityPattern, sparsity_picture
 from ..documents.documents import Library, problem_of
 from .formulas import lines_of
 
@@ -37,8 +37,8 @@ class EntryStudy:
 
     latex: str
     lines: tuple[dict[str, str], ...]
-    matrix: Pattern | None
-    hessian: Pattern | None
+    matrix: SparsityPattern | None
+    hessian: SparsityPattern | None
     blocks: dict[str, float] | None
 
 
@@ -62,7 +62,7 @@ def study_entry(library: Library, entry: dict[str, Any], pictures: Path) -> Entr
     )
 
 
-def jacobian_pattern(problem: Problem) -> Pattern:
+def jacobian_pattern(problem: Problem) -> SparsityPattern:
     """Return the entries of the Jacobian of the rows by family, with nonlinear ones marked."""
     rows: list[Places] = [np.zeros(0, np.int64)]
     columns: list[Places] = [np.zeros(0, np.int64)]
@@ -75,22 +75,22 @@ def jacobian_pattern(problem: Problem) -> Pattern:
             curved.append(np.full(family.count, symbol in nonlinear))
         offset += family.count
     families = [(family.family.tag, family.count) for family in problem.rows]
-    down = Parts(tuple(tag for tag, _ in families), tuple(count for _, count in families))
-    return Pattern(down, _columns(problem), *map(np.concatenate, (rows, columns, curved)))
+    down = MatrixParts(tuple(tag for tag, _ in families), tuple(count for _, count in families))
+    return SparsityPattern(down, _columns(problem), *map(np.concatenate, (rows, columns, curved)))
 
 
-def hessian_pattern(problem: Problem) -> Pattern:
+def hessian_pattern(problem: Problem) -> SparsityPattern:
     """Return the entries of the Hessian of the Lagrangian, both triangles."""
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *_pairs(problem)])
     both = np.concatenate([pairs, pairs[:, ::-1]])
     keys = np.unique(both[:, 0] * problem.n_columns + both[:, 1])
     parts = _columns(problem)
-    return Pattern(
+    return SparsityPattern(
         parts, parts, keys // problem.n_columns, keys % problem.n_columns, np.ones(len(keys), bool)
     )
 
 
-def hessian_blocks(pattern: Pattern) -> dict[str, float]:
+def hessian_blocks(pattern: SparsityPattern) -> dict[str, float]:
     """Return number and sizes of the blocks of a Hessian among the columns of nonlinear terms."""
     used, place = np.unique(np.concatenate([pattern.rows, pattern.columns]), return_inverse=True)
     ends = place[: pattern.entries], place[pattern.entries :]
@@ -101,9 +101,9 @@ def hessian_blocks(pattern: Pattern) -> dict[str, float]:
     return {"count": int(count), "least": least, "greatest": greatest, "average": len(used) / int(count)}
 
 
-def _columns(problem: Problem) -> Parts:
+def _columns(problem: Problem) -> MatrixParts:
     shown = [block for block in problem.blocks.values() if block.count]
-    return Parts(tuple(block.name for block in shown), tuple(block.count for block in shown))
+    return MatrixParts(tuple(block.name for block in shown), tuple(block.count for block in shown))
 
 
 def _nonlinear(family: PlacedFamily) -> set[sp.Symbol]:

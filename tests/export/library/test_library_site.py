@@ -18,7 +18,7 @@ from browsing import CONTRAST, find, served, show, sideways
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.documents.documents import problem_of
 from crossfield.export.library.site.site import count, write_site
-from crossfield.export.pictures.draw import counted
+from crossfield.export.pictures.draw import count_singularities
 from crossfield.export.pictures.marks import FAMILIES, NEGATIVE, POSITIVE, STROKE
 from crossfield.models.errors import InputError, InstanceError, OutputError
 from crossfield.models.field.file import read_field
@@ -389,7 +389,7 @@ def test_pictures_hold_the_strokes_and_the_singularities(library, site):
         index = field.singularities.index
         dots = {each.get("fill"): len(each) for each in drawn if each.tag.endswith("}g")}
         assert (dots.get(POSITIVE, 0), dots.get(NEGATIVE, 0)) == (sum(index > 0), sum(index < 0))
-        assert counted(field).startswith(f"{len(index) or 'no'} singularit")
+        assert count_singularities(field).startswith(f"{len(index) or 'no'} singularit")
 
 
 def text_of(site, entry):

@@ -10,7 +10,7 @@ from cases import CASES, make_instance, make_problem, problem_of
 from crossfield.export.library.documents.statistics import problem_counts
 from crossfield.export.library.site.study import hessian_blocks, hessian_pattern, jacobian_pattern
 from crossfield.export.pictures.marks import FAMILIES, STROKE
-from crossfield.export.pictures.sparsity import CELLS, Parts, Pattern, sparsity_picture
+from crossfield.export.pictures.sparsity import CELLS, MatrixParts, SparsityPattern, sparsity_picture
 from crossfield.export.writing.canonical import CanonicalForm
 from loops import for_each
 from oracles import by_casadi
@@ -92,8 +92,8 @@ def test_a_small_matrix_is_drawn_entry_by_entry_with_the_names_of_its_parts():
 def test_a_large_matrix_is_binned_and_its_picture_stays_small():
     side, rng = 200_000, np.random.default_rng(1)
     rows, columns = (np.sort(rng.integers(0, side, 1_000_000)) for _ in "ij")
-    parts = Parts(("one", "other"), (side // 2, side // 2))
-    pattern = Pattern(parts, parts, rows, columns, np.zeros(len(rows), bool))
+    parts = MatrixParts(("one", "other"), (side // 2, side // 2))
+    pattern = SparsityPattern(parts, parts, rows, columns, np.zeros(len(rows), bool))
     picture = sparsity_picture(pattern)
     drawn, names = cells_of(picture, pattern)
     assert CELLS <= drawn["linear"] <= CELLS**2

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from crossfield.export.pictures.draw import draw
-from crossfield.export.pictures.layers import Place, fitted, trimmed
+from crossfield.export.pictures.layers import SheetPlace, cut_at_border, fit_cubics
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import sample
@@ -65,8 +65,8 @@ def test_crosses_are_there_but_not_shown_and_ends_are_round(drawn):
 
 
 def test_the_page_begins_at_zero_unless_the_field_reaches_beyond_it():
-    assert Place(level(pixel_size=1, origin=(-0.5, 3.0)).instance).page == (0.0, 0.0, 9.5, 9.0)
-    assert Place(level(pixel_size=1, origin=(-50.0, 3.0)).instance).page == (-50.0, 3.0, 10.0, 6.0)
+    assert SheetPlace(level(pixel_size=1, origin=(-0.5, 3.0)).instance).page == (0.0, 0.0, 9.5, 9.0)
+    assert SheetPlace(level(pixel_size=1, origin=(-50.0, 3.0)).instance).page == (-50.0, 3.0, 10.0, 6.0)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_smooth_curves_pass_the_points_without_a_corner(seed, count, closed):
     points = np.stack([radius * np.cos(t), radius * np.sin(t)], axis=1)
     if closed:
         points[-1] = points[0]
-    curves = fitted(points, 0.1)
+    curves = fit_cubics(points, 0.1)
     assert (curves[1:, 0] == curves[:-1, 3]).all()
     assert (curves[0, 0] == points[0]).all()
     assert (curves[-1, 3] == points[-1]).all()
@@ -121,7 +121,7 @@ def test_smooth_curves_pass_the_points_without_a_corner(seed, count, closed):
 def test_a_straight_line_is_one_curve_however_its_points_lie():
     for t in ([0, 1e-9, 1, 2, 3], [0, 1, 2, 2 + 1e-6], [0, 1e-3, 1, 1, 5, 5.01]):
         points = np.outer(t, [3.0, 4.0]) + 1
-        (curve,) = fitted(points, 1e-6)
+        (curve,) = fit_cubics(points, 1e-6)
         assert curve == pytest.approx(np.linspace(points[0], points[-1], 4))
 
 
@@ -129,10 +129,10 @@ def test_lines_are_cut_where_the_depth_ends():
     depth = np.full((5, 12), -1.0)
     depth[:, 3:6] = depth[:, 8:10] = 1.0
     line = np.stack([np.linspace(0, 10, 41), np.full(41, -1.0)], axis=1)
-    parts = trimmed(line, depth)
+    parts = cut_at_border(line, depth)
     assert [(part[0, 0], part[-1, 0]) for part in parts] == [
         (pytest.approx(1.5), pytest.approx(4.5)),
         (pytest.approx(6.5), pytest.approx(8.5)),
     ]
-    assert trimmed(line[:3], depth) == []
-    assert len(trimmed(line[8:12], depth)) == 1
+    assert cut_at_border(line[:3], depth) == []
+    assert len(cut_at_border(line[8:12], depth)) == 1

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from crossfield.export.pictures.streamlines import CLOSEST, combed, streamlines
+from crossfield.export.pictures.streamlines import CLOSEST, align_labels, streamlines
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField, field_in_windows
 from crossfield.models.instance.instance import Instance
@@ -174,13 +174,13 @@ def test_lines_end_where_the_two_lines_are_one():
 
 def test_combing_keeps_the_crosses_and_cuts_only_where_it_must():
     smooth = random_labels(waves(square(20)), 2)
-    calm = combed(smooth)
+    calm = align_labels(smooth)
     assert (calm.p % 2 == 0).all()
     np.testing.assert_allclose(
         smooth.cross_error(calm.alpha + calm.beta, calm.alpha + np.pi / 2 - calm.beta), 0, atol=1e-7
     )
     assert calm.energy().smooth == pytest.approx(smooth.energy().smooth)
-    single = combed(quarter(24, 0.25))
+    single = align_labels(quarter(24, 0.25))
     assert 8 <= (single.p % 2 == 1).sum() <= 30  # from the middle to the border
     np.testing.assert_array_equal(single.singularities.index, [0.25])
 

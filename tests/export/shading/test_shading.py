@@ -4,10 +4,10 @@ import io
 
 import numpy as np
 import pytest
-from crossfield.export.shading.colours import CLAY, Light, lit, matcap, normal_map
-from crossfield.export.shading.colours import ball as matcap_ball
+from crossfield.export.shading.colours import CLAY, Light, matcap, normal_map, shade_by_light
+from crossfield.export.shading.colours import ball_normals as matcap_ball
 from crossfield.export.shading.raster import Raster, raster
-from crossfield.export.surfaces.files import png_of
+from crossfield.export.surfaces.files import encode_png
 from crossfield.models.errors import InputError
 from PIL import Image
 from shapes import ball, ball_normals, disc, plane, surface_of
@@ -31,7 +31,7 @@ def test_a_normal_map_is_half_of_the_normals_and_one_right_red_up_green():
     assert np.abs(texels[mask][:, :3] - 255 * (ball_normals(surface) + 1) / 2).max() < 8
     assert texels[12, 20, 0] > 180 > texels[12, 3, 0] + 100
     assert texels[3, 12, 1] > 180 > texels[20, 12, 1] + 100
-    read = Image.open(io.BytesIO(png_of(texels.astype(np.uint8))))
+    read = Image.open(io.BytesIO(encode_png(texels.astype(np.uint8))))
     assert (np.asarray(read) == texels).all()
 
 
@@ -111,15 +111,15 @@ def test_light_comes_back_with_the_cosine_and_mirrored_light_is_mirrored():
     for azimuth, elevation in ((0.3, 0.4), (2.2, 1.5), (-1.0, 0.0)):
         light = Light(azimuth, elevation)
         assert np.linalg.norm(light.direction) == pytest.approx(1)
-        facing = lit(Raster(light.direction[None, None], one), light)
-        away = lit(Raster((light.direction * (-1, -1, 1))[None, None], one), light)
+        facing = shade_by_light(Raster(light.direction[None, None], one), light)
+        away = shade_by_light(Raster((light.direction * (-1, -1, 1))[None, None], one), light)
         assert (facing >= away).all()
-    frontal = lit(Raster(np.array([[[0.0, 0.0, 1.0]]]), one), Light(0.0, np.pi / 2))[0, 0]
+    frontal = shade_by_light(Raster(np.array([[[0.0, 0.0, 1.0]]]), one), Light(0.0, np.pi / 2))[0, 0]
     assert frontal[:3] == pytest.approx(encoded(1.09 + 0.08 * np.sqrt(0.5)))
-    side = lit(Raster(np.array([[[0.8, 0.0, 0.6]]]), one), Light(np.pi, 0.0))[0, 0]
+    side = shade_by_light(Raster(np.array([[[0.8, 0.0, 0.6]]]), one), Light(np.pi, 0.0))[0, 0]
     assert side[:3] == pytest.approx(encoded(0.04 + 0.06 + 0.08 * 0.8))  # in the lamp's shade
     found = fine(ball(16), 4)
-    left, right = lit(found, Light(2.0, 0.7)), lit(found, Light(np.pi - 2.0, 0.7))
+    left, right = shade_by_light(found, Light(2.0, 0.7)), shade_by_light(found, Light(np.pi - 2.0, 0.7))
     assert np.abs(left - right[:, ::-1]).max() < 1e-9
     rows, columns = np.nonzero(left[..., 0] == left[found.opacity == 1][:, 0].max())
     assert rows.mean() < 32

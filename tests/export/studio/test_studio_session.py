@@ -12,8 +12,8 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.studio.document import Document
 from crossfield.export.studio.files import download
-from crossfield.export.studio.opening import opened
-from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, drawn, hints_of
+from crossfield.export.studio.opening import open_drawing
+from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, hints_on_mask, read_drawn
 from crossfield.export.studio.views import field_step
 from crossfield.models.sketch.samples import sample_svg
 from PIL import Image, ImageDraw
@@ -61,45 +61,45 @@ def test_other_bytes_are_refused(data):
 def test_a_drawing_without_a_curvature_line_asks_for_one():
     cuts = [stroke | {"mark": "cut"} for stroke in PEBBLE["strokes"]]
     with pytest.raises(cf.NoStrokeError, match="draw one"):
-        drawn(document(strokes=cuts))
+        read_drawn(document(strokes=cuts))
 
 
 def test_the_instance_is_that_of_the_downloaded_drawing(tmp_path):
     name, svg = download(changed(), "drawing")
     (tmp_path / name).write_bytes(svg)
-    assert cf.read_sketch(tmp_path / name, size=16).sha256 == drawn(document()).instance.sha256
+    assert cf.read_sketch(tmp_path / name, size=16).sha256 == read_drawn(document()).instance.sha256
 
 
 def test_the_weight_of_a_stroke_scales_its_reliability():
     light = [stroke | {"weight": 0.5} for stroke in PEBBLE["strokes"]]
-    before, after = drawn(document()).instance, drawn(document(strokes=light)).instance
+    before, after = read_drawn(document()).instance, read_drawn(document(strokes=light)).instance
     assert np.allclose(after.w, before.w / 2)
 
 
 def test_a_brush_changes_the_mask_where_it_passed():
     path = {"points": [25, 25, 35, 25], "radius": 8}
-    before = drawn(document()).instance.mask
-    without = drawn(document(mask=[{"kind": "erase", **path}])).instance.mask
-    again = drawn(document(mask=[{"kind": "erase", **path}, {"kind": "paint", **path}])).instance.mask
+    before = read_drawn(document()).instance.mask
+    without = read_drawn(document(mask=[{"kind": "erase", **path}])).instance.mask
+    again = read_drawn(document(mask=[{"kind": "erase", **path}, {"kind": "paint", **path}])).instance.mask
     assert 0 < (before & ~without).sum() < before.sum() / 3
     assert not (without & ~before).any()
     assert (again == before).all()
 
 
 def test_a_brush_never_covers_a_stroke_that_cuts():
-    over = drawn(document(mask=[{"kind": "paint", "points": [0, 10, 120, 10], "radius": 6}]))
+    over = read_drawn(document(mask=[{"kind": "paint", "points": [0, 10, 120, 10], "radius": 6}]))
     assert (over.kinds == STROKE).any()
     assert not (over.instance.mask & (over.kinds == STROKE)).any()
 
 
 def test_a_click_excludes_an_area_between_strokes_and_includes_it_again():
-    before = drawn(document())
-    without = drawn(document(mask=click(30, 25)))
+    before = read_drawn(document())
+    without = read_drawn(document(mask=click(30, 25)))
     gone = before.instance.mask & ~without.instance.mask
     assert 0.1 < gone.sum() / before.instance.mask.sum() < 0.4
     assert (without.kinds[gone] == LEFT_OUT).mean() > 0.9  # the rest is a stroke's corner
     assert (before.kinds[gone] == IN).all()
-    assert drawn(document(mask=click(30, 25) * 2)).instance.sha256 == before.instance.sha256
+    assert read_drawn(document(mask=click(30, 25) * 2)).instance.sha256 == before.instance.sha256
 
 
 def test_an_enclosed_area_that_was_left_out_is_included_by_a_click():
@@ -107,12 +107,12 @@ def test_an_enclosed_area_that_was_left_out_is_included_by_a_click():
         PEBBLE
         | {
             key: value
-            for key, value in opened(sample_svg("ring").encode(), "ring.svg").items()
+            for key, value in open_drawing(sample_svg("ring").encode(), "ring.svg").items()
             if key in PEBBLE
         }
         | {"size": 32}
     )
-    found = drawn(ring)
+    found = read_drawn(ring)
     rows, columns = np.nonzero(found.kinds == LEFT_OUT)
     assert len(rows)
     x, y = found.instance.origin
@@ -123,7 +123,7 @@ def test_an_enclosed_area_that_was_left_out_is_included_by_a_click():
         "size": 32, "page": list(ring.page), "mask": click(*point),
         "strokes": [{"points": s.points.ravel().tolist(), "mark": s.mark} for s in ring.strokes],
     })  # fmt: skip
-    assert drawn(edits).instance.mask.sum() > found.instance.mask.sum()
+    assert read_drawn(edits).instance.mask.sum() > found.instance.mask.sum()
 
 
 OPEN = [
@@ -135,25 +135,25 @@ OPEN = [
 
 
 def test_a_bridged_gap_is_opened_and_closed_by_a_click():
-    closed = drawn(document(strokes=OPEN, size=64))
+    closed = read_drawn(document(strokes=OPEN, size=64))
     ((ends, is_open),) = closed.gaps
     assert not is_open
-    opened_ = drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap")))
+    opened_ = read_drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap")))
     assert [gap for _, gap in opened_.gaps] == [True]
     instance = opened_.instance
     above = int((30 - instance.origin[1]) / instance.pixel_size)
     assert closed.instance.mask[:above].any()
     assert not instance.mask[:above].any()
     assert instance.mask[above:].any()
-    again = drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap") * 2))
+    again = read_drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap") * 2))
     assert again.instance.sha256 == closed.instance.sha256
 
 
 def test_hints_are_placed_on_pixels_and_those_outside_are_left_out():
     hints = [{"x": 30, "y": 25, "slant": 40, "tilt": 90}, {"x": -9, "y": 500, "slant": 40, "tilt": 90}]
     given = document(hints=hints)
-    instance = drawn(given).instance
-    (hint,) = hints_of(given, instance)
+    instance = read_drawn(given).instance
+    (hint,) = hints_on_mask(given, instance)
     x, y = instance.origin
     assert (hint.column, hint.row) == (
         int((30 - x) / instance.pixel_size),
@@ -223,7 +223,7 @@ def picture():
 
 
 def test_a_picture_is_traced_to_strokes_with_marks():
-    found = opened(picture(), "photo.png")
+    found = open_drawing(picture(), "photo.png")
     assert found["page"] == [0, 0, 200, 160]
     lines = [np.reshape(s["points"], (-1, 2)) for s in found["strokes"] if s["mark"] == "line"]
     cuts = [np.reshape(s["points"], (-1, 2)) for s in found["strokes"] if s["mark"] == "cut"]
@@ -244,8 +244,8 @@ def test_a_picture_is_traced_to_strokes_with_marks():
 )
 def test_files_that_are_no_drawing_are_refused(data, name, words):
     with pytest.raises(cf.CrossfieldError, match=words):
-        opened(data, name)
+        open_drawing(data, name)
 
 
 def test_the_name_of_a_file_is_no_path():
-    assert opened(sample_svg("skew").encode(), "../../etc/passwd.svg")["name"] == "etc_passwd"
+    assert open_drawing(sample_svg("skew").encode(), "../../etc/passwd.svg")["name"] == "etc_passwd"
