@@ -147,7 +147,6 @@ def _index_document(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any
         "format": INDEX_FORMAT,
         "version": VERSION,
         "generator": program_version(),
-        "release": release_facts(spec),
         "spec": spec.document(),
         "entries": [sidecar["name"] for sidecar in sidecars],
     }

@@ -31,7 +31,7 @@ REFERENCES: Final = (
 
 
 def release_facts(spec: Spec) -> dict[str, Any]:
-    """Return the release as in library.json: title, authors, and stated version and date."""
+    """Return what is cited: title, authors, and stated version and date."""
     return {"title": spec.title, **({"authors": []} if spec.release is None else spec.release.document())}
 
 

@@ -172,6 +172,7 @@ def _write_pages(
         families.setdefault(instance.about["family"], []).append(instance)
     common = {
         "library": library.document,
+        "release": library.document["spec"].get("release", {}),
         "entries": library.entries,
         "instances": shown,
         "instance_of": {entry["name"]: instance for instance in shown for entry in instance.entries},

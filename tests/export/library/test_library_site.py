@@ -107,8 +107,8 @@ def detailed(library, tmp_path_factory):
     programs += [{"solver": "Bonmin", "version": "2", "via": f"{INSTANCE}_cubic"}]
     solved = {"by": "agreement", "programs": programs}
     change(folder / f"{INSTANCE}_quartic.json", status="optimal", solved=solved)
-    release = {"version": "1.2", "date": "2026-11-22", "authors": ["the authors"], "title": "t"}
-    change(folder / "library.json", release=release)
+    release = {"version": "1.2", "date": "2026-11-22", "authors": ["the authors"]}
+    change(folder / "library.json", spec__release=release)
     seal(folder)
     write_site(folder, folder.parent / "site")
     return folder.parent / "site"
