@@ -158,7 +158,7 @@ class Model:
         return expression
 
 
-def parse_table(parser: Lark, transformer: Arithmetic, text: str) -> Any:
+def parse_text(parser: Lark, transformer: Arithmetic, text: str) -> Any:
     """What the transformer makes of the text; raises WrongTextError."""
     try:
         return transformer.transform(parser.parse(text))

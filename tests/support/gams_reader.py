@@ -11,7 +11,17 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from algebraic import ARITHMETIC, Arithmetic, Column, Expression, Model, Row, WrongTextError, parsed, power
+from algebraic import (
+    ARITHMETIC,
+    Arithmetic,
+    Column,
+    Expression,
+    Model,
+    Row,
+    WrongTextError,
+    parse_text,
+    power,
+)
 from lark import Lark, Token
 
 GRAMMAR = r"""
@@ -133,7 +143,7 @@ def _parser() -> Lark:
 
 def read(text: str) -> GamsModel:
     """The model that a text hands to the solver."""
-    return _Reader().run(parsed(_parser(), _Statements(), _without_controls(text)))
+    return _Reader().run(parse_text(_parser(), _Statements(), _without_controls(text)))
 
 
 def _without_controls(text: str) -> str:

@@ -4,7 +4,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.processes.compilation import crew
-from crossfield.models.proof import work
+from crossfield.models.proof import descent
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
@@ -29,7 +29,7 @@ def test_shares_that_are_carried_on_rise_faster():
 def test_where_no_finer_level_fits_the_rest_goes_to_the_search(monkeypatch, tmp_path):
     """The bound rises once more on the labels that are left, and the certificate has one more level."""
     instance = cf.sample("ring", 12)
-    monkeypatch.setattr(work, "MOST_LABELS", 30_000)
+    monkeypatch.setattr(descent, "MOST_LABELS", 30_000)
     proof = cf.prove(instance, jobs=1)
     assert proof.ended == "labels"
     assert [round(np.pi / 2 / level.h) for level in proof.levels] == [16, 32, 32]
