@@ -48,10 +48,10 @@ class CrossfieldError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the message unchanged: the constructor would shorten it again, file included."""
-        return _unpickled, (type(self), self.args), self.__dict__
+        return _rebuild_error, (type(self), self.args), self.__dict__
 
 
-def _unpickled(kind: type[CrossfieldError], args: tuple[str, ...]) -> CrossfieldError:
+def _rebuild_error(kind: type[CrossfieldError], args: tuple[str, ...]) -> CrossfieldError:
     error = kind.__new__(kind)
     error.args = args
     return error

@@ -35,7 +35,7 @@ def available_memory(root: Path = Path("/")) -> int | None:
         machine = 1024 * int(re.findall(r"^MemAvailable:\s*(\d+) kB", text, re.MULTILINE)[0])
     except (OSError, ValueError, IndexError):
         return _all_memory()
-    return min([machine, *_left_in_groups(root)])
+    return min([machine, *_free_in_groups(root)])
 
 
 def _all_memory() -> int | None:
@@ -45,7 +45,7 @@ def _all_memory() -> int | None:
         return None
 
 
-def _left_in_groups(root: Path) -> Iterator[int]:
+def _free_in_groups(root: Path) -> Iterator[int]:
     """Free bytes of each control group with a limit, versions 2 and 1, from the inside out."""
     try:
         lines = (root / "proc/self/cgroup").read_text("utf-8").splitlines()
@@ -55,13 +55,13 @@ def _left_in_groups(root: Path) -> Iterator[int]:
         _, controllers, path = line.split(":", 2)
         if not controllers:
             names = ("memory.max", "memory.current", "inactive_file")
-            yield from _left(root / "sys/fs/cgroup", path, *names)
+            yield from _free_in_group(root / "sys/fs/cgroup", path, *names)
         elif "memory" in controllers.split(","):
             names = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
-            yield from _left(root / "sys/fs/cgroup/memory", path, *names)
+            yield from _free_in_group(root / "sys/fs/cgroup/memory", path, *names)
 
 
-def _left(top: Path, path: str, limit: str, used: str, cache: str) -> Iterator[int]:
+def _free_in_group(top: Path, path: str, limit: str, used: str, cache: str) -> Iterator[int]:
     """Free bytes of the group at a path below `top` and of its parents; cached files count as free."""
     inner = top / path.lstrip("/")
     for folder in (inner, *inner.parents):

@@ -216,12 +216,12 @@ def merge_monomials(index: Ints, coefficient: Floats, scale: Floats, columns: in
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]
     _, place, rank = np.unique(key, return_index=True, return_inverse=True)
-    total, largest = (_sums(values, rank, len(place)) for values in (coefficient, scale))
+    total, largest = (_sums_by_rank(values, rank, len(place)) for values in (coefficient, scale))
     nonzero = exceeds_noise(total, largest)
     return index[place[nonzero]], total[nonzero]
 
 
-def _sums(values: Floats, rank: NDArray[np.intp], count: int) -> Floats:
+def _sums_by_rank(values: Floats, rank: NDArray[np.intp], count: int) -> Floats:
     return np.bincount(rank, weights=values, minlength=count).astype(np.float64, copy=False)
 
 

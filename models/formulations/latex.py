@@ -42,7 +42,7 @@ def latex(formulation: Formulation) -> str:
 
 def _domain(variable: Variable, formulation: Formulation) -> str:
     """A line with the domain of a variable."""
-    name, lower, upper = (expression(e) for e in (_own(variable), variable.lower, variable.upper))
+    name, lower, upper = (expression(e) for e in (_symbol_of(variable), variable.lower, variable.upper))
     if variable.integer and not formulation.options.relax:
         between = [] if variable.upper - variable.lower == 1 else [r"\ldots"]
         domain = rf"{name} \in \{{{', '.join([lower, *between, upper])}\}}"
@@ -55,7 +55,7 @@ def _domain(variable: Variable, formulation: Formulation) -> str:
     return rf"& {domain} && {_FOR[variable.over]}"
 
 
-def _own(variable: Variable) -> sp.Symbol:
+def _symbol_of(variable: Variable) -> sp.Symbol:
     """The symbol that denotes the variable itself."""
     return next(symbol for symbol, slot in SLOTS[variable.over].items() if slot == (variable.name, "itself"))
 

@@ -58,7 +58,7 @@ def whole_numbers(values: Any, name: str, error: type[CrossfieldError] = Instanc
     return array.astype(np.int32)
 
 
-def _mask(values: Any) -> Bools:
+def _boolean_array(values: Any) -> Bools:
     """The values as booleans. Raises InstanceError unless they are True and False, or 1 and 0."""
     booleans = isinstance(values, np.ndarray) and values.dtype.kind == "b"
     array = values if booleans else float_array(values, "mask", InstanceError)
@@ -154,7 +154,7 @@ class Instance(Pictured):
     def __post_init__(self) -> None:
         """Store read-only copies in the documented types, then check every rule."""
         check_fields(self, InstanceError)
-        self._freeze("mask", _mask(self.mask))
+        self._freeze("mask", _boolean_array(self.mask))
         self._freeze("stroke_pixels", whole_numbers(self.stroke_pixels, "stroke_pixels"))
         for name in ("theta", "w"):
             self._freeze(name, float_array(getattr(self, name), name, InstanceError))

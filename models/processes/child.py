@@ -177,10 +177,10 @@ class Child(AbstractContextManager["Child"]):
                 if answer is _ENDED:
                     if watch.asked:
                         raise KilledError("ended on a request to stop", interrupted=watch.interrupted)
-                    raise WorkerError(self._how_it_ended())
+                    raise WorkerError(self._describe_end())
                 return answer
 
-    def _how_it_ended(self) -> str:
+    def _describe_end(self) -> str:
         process = self._process
         if process is None:
             return "the work was ended before its time"
@@ -266,11 +266,11 @@ class _Watch:
             raise KilledError("did not stop when it was interrupted and was killed", interrupted=True)
         if self.kill.passed():
             raise KilledError("did not stop at its time limit and was killed", interrupted=self.interrupted)
-        if self.asked < self._reasons():
+        if self.asked < self._stops_due():
             self.asked += 1
             self.ask()
 
-    def _reasons(self) -> int:
+    def _stops_due(self) -> int:
         """Return how many requests to stop are due by now."""
         late = int(self.deadline.passed())
         if self.patience is None:

@@ -21,8 +21,8 @@ from .job_counts import check_jobs
 
 _Part = TypeVar("_Part")
 _Work = TypeVar("_Work", bound=Callable[..., Any])
-_MADE: Final[list[Any]] = []
-_KEPT: Final[set[Any]] = set()  # those that were cached on disk when somebody asked
+_DISPATCHERS: Final[list[Any]] = []
+_CACHED: Final[set[Any]] = set()  # those that were cached on disk when somebody asked
 _ANY_ORDER: Final = {"reassoc", "nnan", "nsz"}
 _PARTS: Final = 2  # of shared work for each thread: one that takes longer than expected then costs less
 
@@ -30,23 +30,23 @@ _PARTS: Final = 2  # of shared work for each thread: one that takes longer than 
 def compiled(work: _Work) -> _Work:
     """The function compiled on its first call, and cached on disk where a folder is writable."""
     dispatcher = compiled_if_needed(work)
-    _MADE.append(dispatcher)
+    _DISPATCHERS.append(dispatcher)
     return dispatcher
 
 
 def compiled_in_any_order(work: _Work) -> _Work:
     """As `compiled`, for a function without nan whose result does not depend on the order of its terms."""
-    dispatcher = _made(work, fastmath=_ANY_ORDER)
-    _MADE.append(dispatcher)
+    dispatcher = _make_dispatcher(work, fastmath=_ANY_ORDER)
+    _DISPATCHERS.append(dispatcher)
     return dispatcher
 
 
 def compiled_if_needed(work: _Work, *, in_any_order: bool = False) -> _Work:
     """As `compiled`, for a function that is not compiled in advance."""
-    return _made(work, fastmath=_ANY_ORDER if in_any_order else False)
+    return _make_dispatcher(work, fastmath=_ANY_ORDER if in_any_order else False)
 
 
-def _made(work: _Work, *, fastmath: bool | set[str]) -> _Work:
+def _make_dispatcher(work: _Work, *, fastmath: bool | set[str]) -> _Work:
     dispatcher: Any = numba.njit(error_model="numpy", nogil=True, fastmath=fastmath)(work)
     with suppress(RuntimeError):  # no folder is writable
         dispatcher.enable_caching()
@@ -55,13 +55,15 @@ def _made(work: _Work, *, fastmath: bool | set[str]) -> _Work:
 
 def is_all_compiled() -> bool:
     """Whether each function of `compiled` is cached on disk where possible: it then only has to be loaded."""
-    _KEPT.update(dispatcher for dispatcher in _MADE if dispatcher not in _KEPT and _is_cached(dispatcher))
-    return len(_KEPT) == len(_MADE)
+    _CACHED.update(
+        dispatcher for dispatcher in _DISPATCHERS if dispatcher not in _CACHED and _is_cached(dispatcher)
+    )
+    return len(_CACHED) == len(_DISPATCHERS)
 
 
 def cache_folder() -> Path:
     """The folder with the cache of the first function. Raises IndexError without a function."""
-    return Path(_MADE[0].stats.cache_path)
+    return Path(_DISPATCHERS[0].stats.cache_path)
 
 
 def _is_cached(dispatcher: Any) -> bool:

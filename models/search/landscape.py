@@ -232,7 +232,7 @@ class Landscape:
     def turn_gains(self) -> Floats:
         """Change of the energy when one stroke passes to line v by the shorter turn, (t,); inf if unknown."""
         instance, g, at = self.patch.instance, self._inverse, self.patch.stroke_pixels
-        beta_at, (off, side) = at + len(self.patch.pixels), self._leaning()
+        beta_at, (off, side) = at + len(self.patch.pixels), self._shorter_turns()
         alphas, betas, mixed = g[at, at], g[beta_at, beta_at], 2 * g[at, beta_at]
         u, v = off + self._x[beta_at], off - HALF * side - self._x[beta_at]
         with np.errstate(all="ignore"):
@@ -244,7 +244,7 @@ class Landscape:
         gains[~believed] = np.inf
         return gains
 
-    def _leaning(self) -> tuple[Floats, Ints]:
+    def _shorter_turns(self) -> tuple[Floats, Ints]:
         """Offsets alpha - theta of the patch's strokes, and the directions of the shorter turns, (t,)."""
         off = self._x[self.patch.stroke_pixels] - self.patch.instance.target[self.patch.strokes]
         return off, np.where(off < 0, -1, 1).astype(np.int32)
@@ -252,19 +252,19 @@ class Landscape:
     def turn(self, stroke: int) -> None:
         """Let line v carry the stroke with this place in `turn_gains`, by the shorter turn."""
         quarters = np.zeros(len(self.patch.pixels), dtype=np.int32)
-        quarters[self.patch.stroke_pixels[stroke]] = self._leaning()[1][stroke]
+        quarters[self.patch.stroke_pixels[stroke]] = self._shorter_turns()[1][stroke]
         self.change(*self.patch.turn_steps(quarters))
 
     def change(self, pairs: Ints, steps: Ints) -> None:
         """Add steps (c,) to the jumps of the patch's pairs with those local numbers, each at most once."""
         try:
-            self._follow(pairs, steps)
+            self._update_for_change(pairs, steps)
         except np.linalg.LinAlgError:
             self.energy = np.nan  # which is not an energy, so that everything is solved anew
         self.p[self.patch.pairs[pairs]] += steps
         self._settle()
 
-    def _follow(self, pairs: Ints, steps: Ints) -> None:
+    def _update_for_change(self, pairs: Ints, steps: Ints) -> None:
         """Update energy, angles and inverse after a change of jumps."""
         self._fresh = False
         push, gain = self._push_of(pairs, steps)

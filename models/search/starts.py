@@ -96,27 +96,27 @@ def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
     return best
 
 
-def _polyvector(hold: float, instance: Instance, _: Over) -> FreeField:
+def _polyvector_state(hold: float, instance: Instance, _: Over) -> FreeField:
     return FreeField.of(polyvector_field(instance, hold=hold, tolerance=_FAINT))
 
 
-def _greedy(hold: float, instance: Instance, over: Over) -> FreeField:
+def _greedy_state(hold: float, instance: Instance, over: Over) -> FreeField:
     """The greedy field of a hold: with a smaller hold, contradictory strokes make fewer vortices."""
     light = rough_greedy(replace(instance, stroke_coefficient=hold * instance.stroke_coefficient), over)
     return FreeField(instance, light.alpha, light.beta, light.p)
 
 
 _STRATEGIES: Final[tuple[_Strategy, ...]] = (
-    partial(_polyvector, 0.1),
-    partial(_greedy, 0.3),
-    partial(_polyvector, 1.0),
-    partial(_polyvector, 0.03),
-    partial(_greedy, 1.0),
-    partial(_polyvector, 0.3),
-    partial(_greedy, 0.1),
-    partial(_polyvector, 0.01),
-    partial(_polyvector, 100.0),
-    partial(_greedy, 0.03),
+    partial(_polyvector_state, 0.1),
+    partial(_greedy_state, 0.3),
+    partial(_polyvector_state, 1.0),
+    partial(_polyvector_state, 0.03),
+    partial(_greedy_state, 1.0),
+    partial(_polyvector_state, 0.3),
+    partial(_greedy_state, 0.1),
+    partial(_polyvector_state, 0.01),
+    partial(_polyvector_state, 100.0),
+    partial(_greedy_state, 0.03),
 )
 """Pairs of a strategy and a factor of the stroke weights, in the order of their additional benefit."""
 
