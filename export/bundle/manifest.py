@@ -74,7 +74,7 @@ class Manifest:
             )
         return problem
 
-    def held(self, problem: Problem) -> dict[str, Problem]:
+    def problems_by_format(self, problem: Problem) -> dict[str, Problem]:
         """The problem in each format, as its files hold it: the same, or with its products lifted."""
         return {
             file["format"]: with_products_lifted(problem) if file["lifted"] else problem

@@ -150,7 +150,11 @@ def write_all(
         return {key: value for key, value in options.items() if key not in unfit}
 
     formats = tuple(formats)
-    _check_formats(formats, dialects or {}, [declare(each.name, **chosen(each)) for each in declarations])
+    _check_formats(
+        formats,
+        dialects or {},
+        [declare(declaration.name, **chosen(declaration)) for declaration in declarations],
+    )
     folder, manifests = make_folder(folder), []
     for declaration in declarations:
         progress(declaration.name)

@@ -113,12 +113,12 @@ def _objective_variables(start: Start) -> dict[str, float]:
     if problem.objective_degree < 2:
         return {}
     curved = sum(float(np.sum(family.values(point))) for family in problem.objective if family.degree > 1)
-    found = {"nlobjvar": curved}
+    variables = {"nlobjvar": curved}
     if problem.objective_degree == 2:
         index, cost = problem.merged_objective(1)
         squares = start.objective - float(point[index[:, 0]] @ cost) - start.form.constant
-        found |= {"quadobjvar": squares, "qmatrixvar": squares}
-    return found
+        variables |= {"quadobjvar": squares, "qmatrixvar": squares}
+    return variables
 
 
 def _slx_file(start: Start) -> Iterator[bytes]:

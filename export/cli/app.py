@@ -105,7 +105,7 @@ def run_command(
     limits = Limits(time_limit, threads=threads)
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = sketch.instance(source, quiet=printing.quiet)
+        instance = sketch.read(source, quiet=printing.quiet)
     if not (printing.quiet or printing.as_json):
         print_line(plan_sentence(limits))
     with show_progress(quiet=printing.quiet) as show:
@@ -137,7 +137,7 @@ def instance_command(
     require_suffix(output, (".json", ".npz", ".png"))
     with show_progress() as show:
         show("reading the sketch")
-        instance = sketch.instance(source).with_weights(skew_weight=skew_weight)
+        instance = sketch.read(source).with_weights(skew_weight=skew_weight)
         instance = instance if gauge is None else instance.with_gauge(gauge)
         (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
     print_line(f"{output}: {instance.summary}")
@@ -172,7 +172,7 @@ def export_command(
     formats = check_names(file_format or list(DEFAULTS), FORMATS, "format")
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = SketchOptions(size).instance(source, quiet=printing.quiet)
+        instance = SketchOptions(size).read(source, quiet=printing.quiet)
         field, jumps_of, windows = read_start(start, instance), None, None
         if tightened is not None:
             from ...models.proof.certificate import read_certificate
@@ -279,11 +279,11 @@ def list_command(*, as_json: options.Json = False) -> None:
     """List samples, formulations, formats, solvers and methods, and their combinations."""
     from .tables import tables
 
-    found = tables()
+    content = tables()
     if as_json:
-        print_json({name: rows for name, (_, rows) in found.items()})
+        print_json({name: rows for name, (_, rows) in content.items()})
     else:
-        show_lists(found)
+        show_lists(content)
 
 
 app.add_typer(library, name="library")

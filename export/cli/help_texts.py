@@ -111,9 +111,9 @@ def _hide_type_of_flag(option: Any) -> Any:
 class Group(TyperGroup):
     """Commands with common options."""
 
-    def __init__(self, *args: Any, **given: Any) -> None:
-        super().__init__(*args, **given)
-        self.params = [_hide_type_of_flag(each) for each in self.params]
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.params = [_hide_type_of_flag(parameter) for parameter in self.params]
 
     def get_help_option(self, ctx: Any) -> Any:
         """The option --help."""
@@ -123,13 +123,13 @@ class Group(TyperGroup):
 class Command(TyperCommand):
     """Command whose help is filled from the tables when it is shown; brackets are printed as they are."""
 
-    def __init__(self, *args: Any, **given: Any) -> None:
-        super().__init__(*args, **given)
-        for option in (each for each in self.params if each.param_type_name == "option"):
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        for option in (parameter for parameter in self.params if parameter.param_type_name == "option"):
             option.rich_help_panel = option.rich_help_panel or _find_panel(option)  # type: ignore[attr-defined]
             _hide_type_of_flag(option)
         order = ["", *PANELS]
-        self.params.sort(key=lambda each: order.index(getattr(each, "rich_help_panel", None) or ""))
+        self.params.sort(key=lambda parameter: order.index(getattr(parameter, "rich_help_panel", None) or ""))
 
     def get_help_option(self, ctx: Any) -> Any:
         """The option --help, in its panel."""

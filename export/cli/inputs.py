@@ -40,7 +40,7 @@ def read_described_problem(path: Path) -> tuple[Problem, Mapping[str, Problem] |
             return problem_of(path.parent, read_sidecar(path)), None
         raise
     problem = manifest.problem()
-    return problem, manifest.held(problem)
+    return problem, manifest.problems_by_format(problem)
 
 
 def read_field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:

@@ -36,14 +36,14 @@ def _expand_option_groups(function: Callable[..., None]) -> Callable[..., None]:
     ]
 
     @wraps(function)
-    def wrapped(*arguments: Any, **given: Any) -> None:
+    def wrapped(*arguments: Any, **values: Any) -> None:
         for name, group in groups.items():
-            names = [field.name for field in fields(group) if field.name in given]
-            given[name] = group(**{each: given.pop(each) for each in names})
-        function(*arguments, **given)
+            names = [field.name for field in fields(group) if field.name in values]
+            values[name] = group(**{option: values.pop(option) for option in names})
+        function(*arguments, **values)
 
     wrapped.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    wrapped.__annotations__ = {each.name: each.annotation for each in parameters}
+    wrapped.__annotations__ = {option.name: option.annotation for option in parameters}
     return wrapped
 
 

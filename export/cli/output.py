@@ -143,7 +143,7 @@ def show_table(
             print_line("\n".join(_wrap(text, width) for text in named) + "\n")
         return
     if header:
-        shown.insert(1, ["-" * each for each in widths])
+        shown.insert(1, ["-" * column_width for column_width in widths])
     right = [name in numbers for name in columns]
     lines = [gap.join(parts).rstrip() for row in shown for parts in _wrap_row(row, widths, right)]
     print_line("\n".join([*lines, ""] if header else lines))
@@ -193,14 +193,14 @@ def show_report(report: Report, folder: Path) -> None:
     for candidate in report.candidates:
         if candidate.solution and (answer := _describe_gap(report.facts(candidate))):
             print_line(f"  {candidate.method} {answer}")
-    kept, best = report.facts(report.kept), report.facts(report.best)
+    kept_facts, best_facts = report.facts(report.kept), report.facts(report.best)
     print_line(f"* kept: {folder / 'field.npz'} (.json, .rawfield)")
-    quantile = f"{kept['stroke_deviation_90_percent_degrees']:.1f}°"
-    far = f"{kept['strokes_beyond_10_degrees']:.0%}"
+    quantile = f"{kept_facts['stroke_deviation_90_percent_degrees']:.1f}°"
+    far = f"{kept_facts['strokes_beyond_10_degrees']:.0%}"
     print_line(f"  90% of its stroke pixels are at most {quantile} off, and {far} more than 10°")
-    words = ", proven optimal" if best.get("proven_optimal") else ""
+    words = ", proven optimal" if best_facts.get("proven_optimal") else ""
     print_line(f"  least 2-norm energy{words}: {report.best.method}, {folder / 'lowest.npz'}")
-    _print_proof(report, best)
+    _print_proof(report, best_facts)
     if report.interrupted in ("", "surface"):
         print_line(f"  pictures: {folder / 'overview.png'} and others in the same folder")
         print_line(f"  layers in the coordinates of the drawing: {folder / 'overlay.svg'}")

@@ -56,7 +56,7 @@ def prove_command(
 
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = SketchOptions(size).instance(source, quiet=printing.quiet)
+        instance = SketchOptions(size).read(source, quiet=printing.quiet)
         proof = prove(
             instance,
             norm=NORMS[norm],
@@ -146,6 +146,8 @@ def _check_certificate(path: Path, printing: options.PrintOptions) -> None:
 
     with show_progress(quiet=printing.quiet) as show:
         show("checking the certificate")
-        found = read_certificate(path)
+        certificate = read_certificate(path)
 
-    printing.show_facts(found.field.instance.summary, proof_facts(found), "the certificate is valid")
+    printing.show_facts(
+        certificate.field.instance.summary, proof_facts(certificate), "the certificate is valid"
+    )

@@ -56,7 +56,7 @@ def shade_command(
                 file=source,
             )
         if saved is None:
-            field = _compute_field(sketch.instance(source, quiet=printing.quiet), show)
+            field = _compute_field(sketch.read(source, quiet=printing.quiet), show)
             underlay = underlay or find_drawing(source)
         else:
             field = saved

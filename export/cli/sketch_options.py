@@ -78,7 +78,7 @@ class SketchOptions:
         """Whether an option decides which strokes of a drawing are curvature lines."""
         return self.silhouette != "none" or bool(self.curvature) or self.view is not None
 
-    def instance(self, what: str, *, quiet: bool = False) -> Instance:
+    def read(self, what: str, *, quiet: bool = False) -> Instance:
         """Instance of a sketch file, a built-in sample or an instance file, small enough for the memory.
 
         Prints the warnings of the reader unless quiet. Raises InputError, and InstanceError for a weight that
@@ -86,17 +86,17 @@ class SketchOptions:
         """
         path = Path(what)
         is_saved = path.is_file() and path.suffix.lower() in {".json", ".npz"}
-        instance = self._saved(path) if is_saved else self._read(path)
+        instance = self._read_instance(path) if is_saved else self._read_drawing(path)
         instance = instance.with_weights(stroke_weight=self.stroke_weight)
         print_warnings(instance, quiet=quiet)
         return instance
 
-    def _read(self, path: Path) -> Instance:
+    def _read_drawing(self, path: Path) -> Instance:
         from ...models.sketch.read import DEFAULT_SIZE, read_sketch
         from ...models.sketch.samples import SAMPLES
 
         if not path.is_file() and str(path) in SAMPLES:
-            return self._sample(str(path))
+            return self._make_sample(str(path))
         if not path.exists():
             raise InputError(
                 "there is no such file and no such sample; `crossfield list` lists the samples", file=path
@@ -110,7 +110,7 @@ class SketchOptions:
             view=self.view,
         )
 
-    def _sample(self, name: str) -> Instance:
+    def _make_sample(self, name: str) -> Instance:
         from ...models.sketch.read import DEFAULT_SIZE
         from ...models.sketch.samples import sample
 
@@ -123,7 +123,7 @@ class SketchOptions:
         size = DEFAULT_SIZE if self.size is None else self.size
         return sample(name, size, silhouette=self.silhouette)
 
-    def _saved(self, path: Path) -> Instance:
+    def _read_instance(self, path: Path) -> Instance:
         from ...models.instance.file import read_instance
         from ...models.memory import check_memory
 

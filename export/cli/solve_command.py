@@ -47,7 +47,7 @@ def solve_command(
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = SketchOptions(size).instance(source, quiet=printing.quiet)
+        instance = SketchOptions(size).read(source, quiet=printing.quiet)
         request = Request(
             instance,
             output,
@@ -104,7 +104,7 @@ def _solve_by_method(name: str, request: Request) -> tuple[Candidate, ProvenBoun
         return candidate, None, "", target
     certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
     try:
-        return candidate, ProvenBound.by(candidate.proof, certificate), "", target
+        return candidate, ProvenBound.write(candidate.proof, certificate), "", target
     except SolverError as error:
         remove_file(certificate)  # it is of an earlier proof
         return candidate, None, str(error), target
@@ -122,7 +122,7 @@ def _solve_by_solver(
     (name,) = full_formulation_names([name])
     instance, deadline = request.instance, Deadline.after(request.limits.time_limit)
     request.progress("greedy start")
-    start = request.begin(deadline)
+    start = request.starting_field(deadline)
     problem = formulate(instance, name, p=jumps_as_data(instance, name, start), relax=relax)
     limits = request.limits.until(deadline)
     request.progress(f"solving {name}, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far")

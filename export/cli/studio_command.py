@@ -70,9 +70,9 @@ def _read_strokes(drawing: str) -> dict[str, Any]:
     data = read_file(path)
     with naming(path):
         if data.lstrip().startswith(b"{"):
-            Document.of_bytes(data)
+            Document.from_bytes(data)
             return {"document": json.loads(data)}
-        found = open_drawing(data, path.name)
-    if found["spatial"]:  # the page reads it again from other sides
-        found["file"] = {"name": path.name, "data": base64.b64encode(data).decode()}
-    return found
+        strokes = open_drawing(data, path.name)
+    if strokes["spatial"]:  # the page reads it again from other sides
+        strokes["file"] = {"name": path.name, "data": base64.b64encode(data).decode()}
+    return strokes

@@ -23,7 +23,10 @@ def tables() -> Tables:
     return {
         "samples": (
             ("name", "kind", "description"),
-            [{"name": each.name, "kind": each.kind, "description": each.description} for each in samples()],
+            [
+                {"name": entry.name, "kind": entry.kind, "description": entry.description}
+                for entry in samples()
+            ],
         ),
         "formulations": (
             ("name", "short", "paper", "class", "summary", *FORMATS),
@@ -92,7 +95,7 @@ def _format_row(name: str) -> Row:
 
 def _solver_row(problem: Problem, relaxed: bool) -> Row:
     taking = {name: choose_format(problem, name) for name in BUNDLED}
-    answers = {name: "yes" if each.answer == "yes" else each.reason for name, each in taking.items()}
+    answers = {name: "yes" if answer.answer == "yes" else answer.reason for name, answer in taking.items()}
     return {"formulation": f"{problem.name}, relaxed" if relaxed else problem.name} | answers
 
 

@@ -31,23 +31,27 @@ def verify_command(
 
     programs = check_names(program, PROGRAMS, "program")
     with show_progress(quiet=printing.quiet) as show:
-        found = verify(folder, seconds=solve, programs=programs, progress=show)
-    printing.show(found.document(), lambda: _show_verification(found))
-    for check in found.bad:
+        verification = verify(folder, seconds=solve, programs=programs, progress=show)
+    printing.show(verification.document(), lambda: _show_verification(verification))
+    for check in verification.bad:
         print_notice(f"{check.file}: {check.program}: {check.verdict}: {check.reason}")
-    if not found.ok:
+    if not verification.ok:
         raise typer.Exit(1)
 
 
-def _show_verification(found: Verification) -> None:
+def _show_verification(verification: Verification) -> None:
     """Print the number of files by program, step and verdict, and the absent programs."""
-    verdicts = list(dict.fromkeys(check.verdict for check in found.checks))
+    verdicts = list(dict.fromkeys(check.verdict for check in verification.checks))
     columns = ("program", "step", *map(str, verdicts))
     rows = []
-    for program, step in dict.fromkeys((check.program, check.step) for check in found.checks):
-        mine = [f.verdict for f in found.checks if (f.program, f.step) == (program, step)]
+    for program, step in dict.fromkeys((check.program, check.step) for check in verification.checks):
+        mine = [
+            result.verdict
+            for result in verification.checks
+            if (result.program, result.step) == (program, step)
+        ]
         rows.append([program, step, *(str(mine.count(verdict) or "-") for verdict in verdicts)])
-    show_table(f"files in {found.folder}", columns, rows, numbers=columns[2:])
-    for why in found.absent.values():
+    show_table(f"files in {verification.folder}", columns, rows, numbers=columns[2:])
+    for why in verification.absent.values():
         print_line(f"not used: {why}")
-    print_line(f"reasons and numbers: {found.folder / 'verify.json'}")
+    print_line(f"reasons and numbers: {verification.folder / 'verify.json'}")

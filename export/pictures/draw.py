@@ -218,9 +218,9 @@ def fixed_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
     """Constant settings of matplotlib, whatever the user's are, and some more."""
     import matplotlib as mpl
 
-    own = {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": 7.5, "path.simplify": False}
-    kept = {key: value for key, value in mpl.rcParamsDefault.items() if not key.startswith("backend")}
-    with mpl.rc_context(kept | own | (more or {})):
+    settings = {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": 7.5, "path.simplify": False}
+    defaults = {key: value for key, value in mpl.rcParamsDefault.items() if not key.startswith("backend")}
+    with mpl.rc_context(defaults | settings | (more or {})):
         yield
 
 
@@ -231,10 +231,10 @@ def _save_figure(figure: Any, suffix: str, *, dots: int = _DOTS) -> bytes:
 
 
 def _find_kind(kind: str, what: Subject) -> PictureKind:
-    table, other = (SURFACE_KINDS, KINDS) if isinstance(what, Surface) else (KINDS, SURFACE_KINDS)
-    if kind in other and isinstance(what, Surface):
+    table, other_table = (SURFACE_KINDS, KINDS) if isinstance(what, Surface) else (KINDS, SURFACE_KINDS)
+    if kind in other_table and isinstance(what, Surface):
         raise InputError(f"pictures of kind {kind} show a field; choose one of {', '.join(table)}")
-    if kind in other:
+    if kind in other_table:
         raise InputError(f"pictures of kind {kind} show a surface, which `crossfield shade` makes of a field")
     if kind not in table:
         raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(table)}")
@@ -299,9 +299,9 @@ def count_singularities(field: CrossField) -> str:
     values, counts = np.unique(np.round(4 * field.singularities.index).astype(int), return_counts=True)
     if not len(values):
         return "no singularity"
-    each = [
+    parts = [
         f"{count} of {'−' if value < 0 else '+'}{Fraction(abs(value), 4)}"
         for value, count in zip(values[::-1].tolist(), counts[::-1].tolist(), strict=True)
     ]
     total = int(counts.sum())
-    return f"{total} singularit{'y' if total == 1 else 'ies'} ({', '.join(each)})"
+    return f"{total} singularit{'y' if total == 1 else 'ies'} ({', '.join(parts)})"

@@ -91,10 +91,10 @@ class SheetPlace:
 
 def _drawing_layer(drawing: Underlay, place: SheetPlace) -> Layer:
     """The curves of a drawing; many over each other are drawn thinner."""
-    every = [piece for found in drawing.curves.values() for piece in found]
+    every = [piece for curves in drawing.curves.values() for piece in curves]
     length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)
     width = _BELOW * place.unit / np.sqrt(max(length / (_MUCH * UNITS * place.unit), 1.0))
-    lines = (Lines(INK[name], width, found) for name, found in drawing.curves.items() if found)
+    lines = (Lines(INK[name], width, curves) for name, curves in drawing.curves.items() if curves)
     return Layer("drawing", tuple(lines))
 
 
@@ -107,13 +107,16 @@ def _streamline_layers(field: CrossField, place: SheetPlace) -> list[Layer]:
     from scipy import ndimage
 
     scale = max(field.instance.mask.shape) / UNITS
-    found = streamlines(field, _SPACING * scale)
+    lines_of_field = streamlines(field, _SPACING * scale)
     blurred = ndimage.gaussian_filter(np.pad(field.instance.mask, 1).astype(np.float64), _BLUR)
     depth = blurred - _BORDER - _DRAWN_BORDER * border_width(field.instance)
     layers = []
     for family, name in ((1, "streamlines-v"), (0, "streamlines-u")):
         inside = [
-            part for line in found for run in split_runs(line, family) for part in cut_at_border(run, depth)
+            part
+            for line in lines_of_field
+            for run in split_runs(line, family)
+            for part in cut_at_border(run, depth)
         ]
         smooth = [fit_cubics(part, _TOLERANCE * scale) for part in inside if _length(part) >= _LEAST * scale]
         lines = Lines(FAMILIES[family], _LINE * place.unit, list(map(place.frame.at, smooth)), single=True)
@@ -157,7 +160,9 @@ def fit_cubics(points: Floats, tolerance: float) -> Floats:
             break
         smoothing /= 4
     knots, coordinates, degree = spline
-    pieces = [BPoly.from_power_basis(PPoly.from_spline((knots, each, degree))).c.T for each in coordinates]
+    pieces = [
+        BPoly.from_power_basis(PPoly.from_spline((knots, values, degree))).c.T for values in coordinates
+    ]
     curves: Floats = np.stack(pieces, axis=-1)[np.diff(knots) > 0]
     curves[0, 1] += points[0] - curves[0, 0]
     curves[-1, 2] += points[-1] - curves[-1, 3]

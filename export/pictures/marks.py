@@ -116,8 +116,10 @@ class GridFrame:
         pieces = self._pieces(np.stack([column, -row], axis=1), arm)
         level = np.ceil(_LEVELS * instance.w).astype(int)
         return [
-            Lines(colour, width, list(pieces[level == each]), opacity=opacity * (0.2 + 0.8 * each / _LEVELS))
-            for each in np.unique(level).tolist()
+            Lines(
+                colour, width, list(pieces[level == grade]), opacity=opacity * (0.2 + 0.8 * grade / _LEVELS)
+            )
+            for grade in np.unique(level).tolist()
         ]
 
     def crosses(self, field: CrossField, width: float, every: int = 1) -> list[Lines]:
@@ -133,25 +135,25 @@ class GridFrame:
 
     def streamlines(self, field: CrossField, width: float, spacing: float) -> list[Lines]:
         """Lines of both families, evenly spaced; lengths in units of the picture."""
-        found = streamlines(field, spacing / self.pixel)
+        lines = streamlines(field, spacing / self.pixel)
         return [
             Lines(
                 colour,
                 width,
-                [straight_line(self.at(run)) for line in found for run in split_runs(line, family)],
+                [straight_line(self.at(run)) for line in lines for run in split_runs(line, family)],
             )
             for family, colour in enumerate(FAMILIES)
         ]
 
     def singularities(self, field: CrossField, radius: float) -> list[Dots]:
         """Red (+) and blue (-) dots, larger from an index of 1/2 on, smaller where there are many."""
-        found = field.singularities
-        centre = self.at(np.stack([found.column + 0.5, -found.row - 0.5], axis=1))
-        crowd = float(np.clip(_CROWD / np.sqrt(max(len(found.index), 1)), 0.4, 1.0))
-        radii = np.where(np.abs(found.index) < 0.5, 1.0, 1.4) * crowd * radius
+        singular = field.singularities
+        centre = self.at(np.stack([singular.column + 0.5, -singular.row - 0.5], axis=1))
+        crowd = float(np.clip(_CROWD / np.sqrt(max(len(singular.index), 1)), 0.4, 1.0))
+        radii = np.where(np.abs(singular.index) < 0.5, 1.0, 1.4) * crowd * radius
         return [
             Dots(colour, centre[some], radii[some], 0.25 * crowd * radius)
-            for colour, some in ((POSITIVE, found.index > 0), (NEGATIVE, found.index < 0))
+            for colour, some in ((POSITIVE, singular.index > 0), (NEGATIVE, singular.index < 0))
             if some.any()
         ]
 
@@ -175,7 +177,7 @@ def straight_line(points: Floats) -> Floats:
 
 def segments(ends: Iterable[Iterable[float]]) -> list[Floats]:
     """Straight lines, each given as (x, y, x, y)."""
-    return [np.array(each, dtype=np.float64).reshape(1, 2, 2) for each in ends]
+    return [np.array(segment, dtype=np.float64).reshape(1, 2, 2) for segment in ends]
 
 
 def cover_by_boxes(chosen: Bools) -> Floats:
@@ -190,13 +192,16 @@ def split_runs(line: Streamline, family: int) -> list[Floats]:
     stretches = (
         (line.points[first : stop + 1], line.families[first]) for first, stop in pairwise(limits.tolist())
     )
-    return [points for points, found in stretches if found == family and len(points) > 1]
+    return [points for points, family_of_run in stretches if family_of_run == family and len(points) > 1]
 
 
 def _sides(mask: Bools, *, between: bool) -> Floats:
     """Sides of pixels as segments (k, 2, 2), y down: between pixels of the padded mask, or at its border."""
-    found = []
-    for one, other, step in ((mask[1:, :], mask[:-1, :], (1, 0)), (mask[:, 1:], mask[:, :-1], (0, 1))):
-        end = np.argwhere(one & other if between else one != other)[:, ::-1]
-        found.append(np.stack([end - step, end], axis=1))
-    return np.concatenate(found).astype(np.float64)
+    sides = []
+    for pixels, neighbours, step in (
+        (mask[1:, :], mask[:-1, :], (1, 0)),
+        (mask[:, 1:], mask[:, :-1], (0, 1)),
+    ):
+        end = np.argwhere(pixels & neighbours if between else pixels != neighbours)[:, ::-1]
+        sides.append(np.stack([end - step, end], axis=1))
+    return np.concatenate(sides).astype(np.float64)

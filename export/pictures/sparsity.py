@@ -42,8 +42,8 @@ class MatrixParts:
     @property
     def summary(self) -> str:
         """All parts with their counts: `90 alpha, 90 beta`."""
-        each = zip(self.names, self.counts, strict=True)
-        return ", ".join(f"{count:,} {name}".replace(",", "\u202f") for name, count in each)
+        parts = zip(self.names, self.counts, strict=True)
+        return ", ".join(f"{count:,} {name}".replace(",", "\u202f") for name, count in parts)
 
 
 @dataclass(frozen=True)
@@ -93,24 +93,24 @@ def sparsity_picture(pattern: SparsityPattern) -> bytes:
 
 def _cell_areas(pattern: SparsityPattern, height: int, width: int, unit: float) -> list[Area]:
     """Cells by kind and strength."""
-    found = []
+    areas = []
     for colour, chosen in ((FAMILIES[0], ~pattern.curved), (STROKE, pattern.curved)):
         counts = np.zeros((height, width), dtype=np.int64)
         np.add.at(counts, (pattern.rows[chosen] // pattern.bin, pattern.columns[chosen] // pattern.bin), 1)
         # The square root keeps a cell with one entry of a thousand visible.
         level = np.ceil(_LEVELS * np.sqrt(counts / max(int(counts.max(initial=1)), 1))).astype(int)
-        found += [
-            Area(colour, unit * cover_by_boxes(level == each), each / _LEVELS)
-            for each in np.unique(level[level > 0])
+        areas += [
+            Area(colour, unit * cover_by_boxes(level == grade), grade / _LEVELS)
+            for grade in np.unique(level[level > 0])
         ]
-    return found
+    return areas
 
 
 def _place_names(parts: MatrixParts, scale: float) -> list[tuple[float, str]]:
     """The middle of each part and its name, where there is room from one name to the next."""
-    found: list[tuple[float, str]] = []
+    placed: list[tuple[float, str]] = []
     for name, count, end in zip(parts.names, parts.counts, accumulate(parts.counts), strict=True):
         at = (end - count / 2) * scale
-        if not found or at - found[-1][0] >= _LINE:
-            found.append((at, name))
-    return found
+        if not placed or at - placed[-1][0] >= _LINE:
+            placed.append((at, name))
+    return placed

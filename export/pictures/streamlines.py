@@ -44,7 +44,7 @@ class Streamline:
     """A line of a cross field.
 
     points: (k, 2), x and y in pixel units, y up; the last is the first again if the line is closed.
-    families: (k,), 0 or 1 at each point: the line is nearer to u or to v of the combed field there.
+    families: (k,), 0 or 1 at each point: the line is nearer to u or to v there, once labels are aligned.
     """
 
     points: Floats
@@ -67,10 +67,10 @@ def streamlines(field: CrossField, separation: float) -> list[Streamline]:
         candidates = _trace_through(crosses, cover, seeds, families)
         for number in sorted(range(len(seeds)), key=lambda k: -round(candidates[k].length, 6)):
             seed, family = seeds[number], int(families[number])
-            if cover.covered(seed, family):
+            if cover.is_covered(seed, family):
                 continue
             line = candidates[number]
-            line = line.without(cover.blocked(line.z, line.family)).apart(CLOSEST * separation)
+            line = line.without(cover.is_blocked(line.z, line.family)).apart(CLOSEST * separation)
             if line.length < _SHORTEST * separation:
                 cover.give_up(seed, family)
             else:
@@ -134,7 +134,7 @@ class _Crosses:
     """
 
     def __init__(self, field: CrossField) -> None:
-        mask, found = field.instance.mask, field.singularities
+        mask, singular = field.instance.mask, field.singularities
         lines = np.exp(1j * np.stack([field.u_angle, field.v_angle], axis=1))
         leftwards = np.round(lines.real, 9) + 1e-12 * lines.imag < 0  # upright ones: downwards
         lines[leftwards] *= -1
@@ -143,7 +143,7 @@ class _Crosses:
         self.inside: Bools = np.pad(mask, 1)
         self.open: Bools = np.pad(field.image(field.degenerate, 1.0) == 0, 1)
         self.singular = np.zeros(np.add(mask.shape, 1), dtype=bool)
-        self.singular[found.row + 1, found.column + 1] = True
+        self.singular[singular.row + 1, singular.column + 1] = True
 
     def pixel(self, z: Positions) -> tuple[Labels, Labels]:
         """Row and column in padded tables of the pixels that hold the positions."""
@@ -163,7 +163,7 @@ class _Crosses:
         total = np.sum(weight * chosen[..., 0], axis=0)
         return np.asarray(total / np.maximum(np.abs(total), 1e-12))
 
-    def allowed(self, z: Positions, target: Positions) -> Bools:
+    def is_allowed(self, z: Positions, target: Positions) -> Bools:
         """Which lines may go from z to a target: not where pixels meet only in a corner."""
         (row, column), (new_row, new_column) = self.pixel(z), self.pixel(target)
         cell = np.floor(-target.imag).astype(np.int64) + 1, np.floor(target.real).astype(np.int64) + 1
@@ -226,7 +226,7 @@ def _trace_halves(
 ) -> list[tuple[Positions, Positions, bool]]:
     """One half line from each seed by the midpoint rule, all at once: positions, headings, closed."""
     near = CLOSEST * cover.separation
-    line = np.flatnonzero(crosses.allowed(seeds, seeds))
+    line = np.flatnonzero(crosses.is_allowed(seeds, seeds))
     z, step, way = seeds[line], np.full(len(line), min(0.5 * cover.separation, _LONGEST)), np.zeros(len(line))
     heading = crosses.heading(z, crosses.directions[*crosses.pixel(z), labels[line]])
     begun = np.zeros_like(seeds)
@@ -236,8 +236,8 @@ def _trace_halves(
     while len(line):
         middle = crosses.heading(z + step / 2 * heading, heading)
         target = z + step * middle
-        fine = crosses.allowed(z, target)
-        fine[fine] &= ~cover.blocked(
+        fine = crosses.is_allowed(z, target)
+        fine[fine] &= ~cover.is_blocked(
             target[fine], crosses.nearest(crosses.pixel(target[fine]), middle[fine]) % 2
         )
         z, way = np.where(fine, target, z), way + np.where(fine, step, 0.0)
@@ -281,11 +281,11 @@ class _Cover:
         row, column = np.floor(places).astype(np.int64)
         return np.clip(row, 0, self.shape[0] - 1), np.clip(column, 0, self.shape[1] - 1)
 
-    def blocked(self, z: Positions, family: Labels) -> Bools:
+    def is_blocked(self, z: Positions, family: Labels) -> Bools:
         """True where a line of a family at z would be too near to another one."""
         return np.asarray(self.near[family, *self._raster(z)])
 
-    def covered(self, z: complex, family: int) -> bool:
+    def is_covered(self, z: complex, family: int) -> bool:
         """True where a line may no longer start at z."""
         row, column = self._raster(np.array(z))
         return bool(self.wide[family, row, column] or self.shut[family, row, column])

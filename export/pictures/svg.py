@@ -108,7 +108,7 @@ def _line_elements(part: Lines, step: float) -> Iterator[str]:
     data = [_path_data(line, step) for line in part.lines]
     if part.single:
         yield f"<g {pen}>"
-        yield from (f'<path d="{each}"/>' for each in data)
+        yield from (f'<path d="{path}"/>' for path in data)
         yield "</g>"
     elif data:
         yield f'<path {pen} d="{"".join(data)}"/>'
@@ -116,10 +116,10 @@ def _line_elements(part: Lines, step: float) -> Iterator[str]:
 
 def _path_data(line: Floats, step: float) -> str:
     """Path data of pieces that are end to end: rounded first, then written as differences."""
-    whole = np.round(line / step) + 0.0
-    moves = (whole[:, 1:] - whole[:, :1]).reshape(-1) * step
+    steps = np.round(line / step) + 0.0
+    moves = (steps[:, 1:] - steps[:, :1]).reshape(-1) * step
     letter = "l" if line.shape[1] == 2 else "c"
-    return f"M{_format_numbers(whole[0, 0] * step)}{letter}{_format_numbers(moves)}"
+    return f"M{_format_numbers(steps[0, 0] * step)}{letter}{_format_numbers(moves)}"
 
 
 def _format_numbers(values: Floats) -> str:

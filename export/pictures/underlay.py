@@ -65,9 +65,9 @@ def read_underlay(what: str | Path, *, on: Instance) -> Underlay:
         content = parse_drawing(data, path.suffix, DEFAULT_SIZE, view=on.view)
         frame = Frame(*on.origin, on.pixel_size, *on.mask.shape)
         if isinstance(content, Bitmap):
-            drawing, drawn = _of_ink(content), _inked(content, frame)
+            drawing, drawn = _underlay_of_ink(content), _pixels_with_ink(content, frame)
         else:
-            drawing, drawn = _of_curves(content, data), _covered(content, frame)
+            drawing, drawn = _underlay_of_curves(content, data), _pixels_under_curves(content, frame)
         near = ndimage.binary_dilation(drawn, np.ones((3, 3), dtype=bool))
         share = near[tuple(on.stroke_pixels.T)].mean()
         if share < _SAME:
@@ -78,7 +78,7 @@ def read_underlay(what: str | Path, *, on: Instance) -> Underlay:
     return drawing
 
 
-def _covered(curves: Curves, frame: Frame) -> Bools:
+def _pixels_under_curves(curves: Curves, frame: Frame) -> Bools:
     """The pixels of a grid that a curve touches, shape (h, w)."""
     segments, curve, _ = curves.segments(frame)
     _, row, column = curve_pixels(segments, curve, frame, 0.0)
@@ -87,7 +87,7 @@ def _covered(curves: Curves, frame: Frame) -> Bools:
     return drawn
 
 
-def _inked(picture: Bitmap, frame: Frame) -> Bools:
+def _pixels_with_ink(picture: Bitmap, frame: Frame) -> Bools:
     """The pixels of a grid with ink, shape (h, w)."""
     at = (np.argwhere(picture.ink > _INK)[:, ::-1] + 0.5) * picture.reduction
     column, row = np.floor((at - (frame.x, frame.y)) / frame.pixel).astype(int).T
@@ -97,16 +97,16 @@ def _inked(picture: Bitmap, frame: Frame) -> Bools:
     return drawn
 
 
-def _of_curves(curves: Curves, data: bytes) -> Underlay:
+def _underlay_of_curves(curves: Curves, data: bytes) -> Underlay:
     left, top, right, bottom = curves.box
     x, y, width, height = curves.page or (0.0, 0.0, 0.0, 0.0)
     left, top = min(left, x), min(top, y)
     page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
     starts = np.flatnonzero(np.diff(run_numbers(curves.points, curves.curve), prepend=-1))
-    found: dict[str, list[Floats]] = {name: [] for name in INK}
+    runs_by_colour: dict[str, list[Floats]] = {name: [] for name in INK}
     for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):
-        found["red" if red else "black"].append(run[:, [0, 3]] if are_straight(run) else run)
-    return Underlay(page, found, _size(data, curves.page, page))
+        runs_by_colour["red" if red else "black"].append(run[:, [0, 3]] if are_straight(run) else run)
+    return Underlay(page, runs_by_colour, _page_size(data, curves.page, page))
 
 
 def size_in_units(page: Box) -> tuple[str, str]:
@@ -114,7 +114,7 @@ def size_in_units(page: Box) -> tuple[str, str]:
     return f"{page[2]:.12g}", f"{page[3]:.12g}"
 
 
-def _size(data: bytes, declared: Box | None, page: Box) -> tuple[str, str]:
+def _page_size(data: bytes, declared: Box | None, page: Box) -> tuple[str, str]:
     """Width and height of the page of a sketch, at the millimetres per unit that an SVG declares."""
     from defusedxml.ElementTree import iterparse
 
@@ -131,7 +131,7 @@ def _size(data: bytes, declared: Box | None, page: Box) -> tuple[str, str]:
     )
 
 
-def _of_ink(picture: Bitmap) -> Underlay:
+def _underlay_of_ink(picture: Bitmap) -> Underlay:
     level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
     ink = (level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)).astype(np.uint8)
     page = (0.0, 0.0, float(picture.width), float(picture.height))

@@ -131,9 +131,9 @@ def normal_map(instance: Instance, normals: Floats, scale: int = 1) -> Bytes:
     return to_eight_bit(colour_normals(Raster(image, instance.mask.astype(np.float64))))
 
 
-def colour_normals(found: Raster) -> Floats:
+def colour_normals(picture: Raster) -> Floats:
     """Red, green, blue and opacity (h, w, 4) in [0, 1] of the normals."""
-    return np.concatenate([(found.normals + 1) / 2, found.opacity[..., None]], axis=-1)
+    return np.concatenate([(picture.normals + 1) / 2, picture.opacity[..., None]], axis=-1)
 
 
 def to_eight_bit(values: Floats) -> Bytes:

@@ -124,7 +124,7 @@ def choose_solver(problem: Problem, name: str | None = None) -> Solver:
     taking = {solver.name: choose_format(problem, solver.name) for solver in candidates}
     willing = [solver for solver in candidates if taking[solver.name].answer == "yes"]
     if not willing:
-        reasons = ", ".join(f"{solver} ({found.reason})" for solver, found in taking.items())
+        reasons = ", ".join(f"{solver} ({answer.reason})" for solver, answer in taking.items())
         raise UnsupportedBySolverError(
             f"{problem.name} is {_describe_class(problem)}, which is not for {reasons}; "
             "`crossfield list` shows the problems that each solver takes; or relax it"
@@ -134,7 +134,7 @@ def choose_solver(problem: Problem, name: str | None = None) -> Solver:
         raise MissingSolverError(willing[0].missing)
     formats = {solver.name: FORMATS[taking[solver.name].format] for solver in present}
     return min(
-        present, key=lambda each: problem_in_format(problem, formats[each.name]).formulation.is_weakened
+        present, key=lambda solver: problem_in_format(problem, formats[solver.name]).formulation.is_weakened
     )
 
 
@@ -145,12 +145,12 @@ def choose_format(problem: Problem, solver: str) -> Taking:
     """
     entry = SOLVERS[solver]
     readable = [name for name in entry.formats if name in PROGRAMS[entry.program].formats]
-    found = [takes_in(problem, solver, name) for name in readable]
+    answers = [takes_in(problem, solver, name) for name in readable]
     local = entry.proves == "local"
-    for taking in found:
+    for taking in answers:
         if taking.answer == "yes" or (local and taking.answer == "local"):
             return taking._replace(answer="yes")
-    return found[0]
+    return answers[0]
 
 
 def _describe_class(problem: Problem) -> str:
@@ -304,23 +304,23 @@ class Solvers:
             ) from error
         finally:
             files.start.unlink(missing_ok=True)
-        found = _read_answer(held, files, outcome, entry)
-        unsolved = found.status == Status.LIMIT_WITHOUT_POINT
+        solution = _read_answer(held, files, outcome, entry)
+        unsolved = solution.status == Status.LIMIT_WITHOUT_POINT
         if unsolved and point is not None and held.violation(point).worst <= FEASIBLE:
-            found = _write_start_as_answer(held, point, files, outcome, entry)
+            solution = _write_start_as_answer(held, point, files, outcome, entry)
         return replace(
-            found,
+            solution,
             interrupted=interrupted,
             seconds=time.perf_counter() - begin,
-            start_returned=_is_start(found.point, point),
+            start_returned=_is_start(solution.point, point),
         )
 
 
 @contextmanager
-def _open_folder(given: str | Path | None = None) -> Iterator[Path]:
+def _open_folder(path: str | Path | None = None) -> Iterator[Path]:
     """The given folder, or one that is deleted afterwards."""
-    if given is not None:
-        yield make_folder(given).resolve()
+    if path is not None:
+        yield make_folder(path).resolve()
         return
     with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as temporary:
         yield Path(temporary).resolve()

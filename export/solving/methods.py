@@ -95,12 +95,12 @@ class Request:
         """Return the end of the time limit, counted from now."""
         return Deadline.after(self.limits.time_limit, self.clock)
 
-    def over(self) -> Over:
+    def stop_at_limit(self) -> Over:
         """Return a function that states whether the time limit, from now on, or the caller ends the work."""
         deadline = self.deadline()
         return lambda: deadline.passed() or self.stop()
 
-    def begin(self, deadline: Deadline) -> CrossField:
+    def starting_field(self, deadline: Deadline) -> CrossField:
         """The field to start from; the greedy one is improved for no more than half of the time."""
         return self.start or first_field(self.instance, deadline.share(_STARTING).passed)
 
@@ -120,13 +120,13 @@ class Method:
 
 def _find_greedy(request: Request) -> Iterator[Candidate]:
     request.progress("greedy field")
-    over = request.over()
+    over = request.stop_at_limit()
     yield _time_candidate("greedy", lambda: greedy_field(request.instance, stop=over))
 
 
 def _find_power(request: Request) -> Iterator[Candidate]:
     request.progress("power field")
-    over = request.over()
+    over = request.stop_at_limit()
     power = _time_candidate("power", lambda: power_field(request.instance))
     yield power
     yield _time_candidate("power + QP", lambda: fit_in_box(power.field, over))
@@ -134,7 +134,7 @@ def _find_power(request: Request) -> Iterator[Candidate]:
 
 def _find_polyvector(request: Request) -> Iterator[Candidate]:
     request.progress("PolyVector field")
-    over = request.over()
+    over = request.stop_at_limit()
     yield _time_candidate("polyvector", lambda: polyvector_field(request.instance))
     if not over():
         yield _time_candidate("polyvector + QP", lambda: polyvector_start(request.instance, over))
@@ -143,9 +143,9 @@ def _find_polyvector(request: Request) -> Iterator[Candidate]:
 def _find_bend(request: Request) -> Iterator[Candidate]:
     request.progress("bend field")
     deadline, start = request.deadline(), request.start
-    own = deadline if start is None else deadline.share(_STARTING)
+    limit = deadline if start is None else deadline.share(_STARTING)
     hard = polyvector_field(request.instance, hold=max(HOLDS))
-    yield _time_candidate("bend", lambda: bend_field(hard, stop=_stop_between_steps(request, own)))
+    yield _time_candidate("bend", lambda: bend_field(hard, stop=_stop_between_steps(request, limit)))
     if start is not None:
         yield _time_candidate(
             "start + bend", lambda: bend_field(start, stop=_stop_between_steps(request, deadline))
@@ -161,7 +161,7 @@ def _stop_between_steps(request: Request, deadline: Deadline) -> Over:
 def _find_by_search(request: Request) -> Iterator[Candidate]:
     begin, deadline = time.perf_counter(), request.deadline()
     request.progress("search: starting fields")
-    found = search(
+    result = search(
         request.instance,
         limits=request.limits.until(deadline),
         jobs=_count_processes(request),
@@ -169,13 +169,13 @@ def _find_by_search(request: Request) -> Iterator[Candidate]:
         progress=_report_search(request, deadline),
         stop=request.stop,
     )
-    yield _search_candidate("search", found, begin, rounds=found.rounds)
+    yield _search_candidate("search", result, begin, rounds=result.rounds)
 
 
-def _search_candidate(method: str, found: Search, begin: float, **counts: int) -> Candidate:
+def _search_candidate(method: str, result: Search, begin: float, **counts: int) -> Candidate:
     """The candidate of a search that began at a time of the performance counter."""
-    seconds, interrupted = time.perf_counter() - begin, found.ended == "interrupted"
-    return Candidate(method, found.field, seconds, interrupted=interrupted, counts=tuple(counts.items()))
+    seconds, interrupted = time.perf_counter() - begin, result.ended == "interrupted"
+    return Candidate(method, result.field, seconds, interrupted=interrupted, counts=tuple(counts.items()))
 
 
 def _count_processes(request: Request) -> int:
@@ -218,7 +218,7 @@ def _find_by_proof(request: Request) -> Iterator[Candidate]:
 
 def _find_in_two_stages(request: Request) -> Iterator[Candidate]:
     deadline = request.deadline()
-    start = request.begin(jumps_until(deadline))
+    start = request.starting_field(jumps_until(deadline))
     begin, limits = time.perf_counter(), request.limits.until(jumps_until(deadline))
     request.progress(
         f"HiGHS: MILP for the jumps, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far"
@@ -293,8 +293,8 @@ METHODS: Final = {
 
 def _time_candidate(method: str, find: Callable[[], CrossField]) -> Candidate:
     begin = time.perf_counter()
-    found = find()
-    return Candidate(method, found, time.perf_counter() - begin)
+    field = find()
+    return Candidate(method, field, time.perf_counter() - begin)
 
 
 def _solution_candidate(method: str, solution: Solution) -> Candidate:

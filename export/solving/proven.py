@@ -31,7 +31,7 @@ class ProvenBound:
     certificate: Path
 
     @classmethod
-    def by(cls, proof: Proof, path: Path) -> ProvenBound:
+    def write(cls, proof: Proof, path: Path) -> ProvenBound:
         """Return the result of a proof, with its certificate at `path`. Errors are those of `certify`."""
         return cls(certify(proof, path).bound, path)
 

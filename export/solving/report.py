@@ -63,7 +63,7 @@ class Report:
     @property
     def kept(self) -> Candidate:
         """The field that is kept and drawn: the bend field, or the best one without it."""
-        return next((each for each in self.candidates if each.method == KEPT), self.best)
+        return next((candidate for candidate in self.candidates if candidate.method == KEPT), self.best)
 
     @property
     def field(self) -> CrossField:

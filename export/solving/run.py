@@ -45,8 +45,8 @@ COMPILING: Final = "compiling"
 def plan_sentence(limits: Limits) -> str:
     """A sentence on the time limit of a run's searches, in all and each."""
     timed = [method.name for method in METHODS.values() if method.timed]
-    each = ", ".join(f"{name} {limits.time_limit:g}" for name in timed)
-    return f"at most {len(timed) * limits.time_limit:g} s: {each}; files and pictures on top"
+    limits_of_methods = ", ".join(f"{name} {limits.time_limit:g}" for name in timed)
+    return f"at most {len(timed) * limits.time_limit:g} s: {limits_of_methods}; files and pictures on top"
 
 
 @check_arguments
@@ -112,7 +112,7 @@ def run(
 
     """
     should_stop = stop_function(stop)
-    drawn = None if drawing is None else read_underlay(drawing, on=instance)
+    underlay = None if drawing is None else read_underlay(drawing, on=instance)
     limits, folder = Limits.bounded(limits), make_folder(folder)
     progress(plan_sentence(limits))
     watch = Stopwatch()
@@ -135,7 +135,7 @@ def run(
     watch.lap("fields")
     report = _write_certificate(report, folder / CERTIFICATE)
     watch.lap("certificate")
-    report, pictures = _draw_all(report, folder, drawn, request, watch)
+    report, pictures = _draw_all(report, folder, underlay, request, watch)
     report = replace(report, stages=watch.stages)
     names |= pictures | ({CERTIFICATE} if report.proven else set())
     _write_report(report, folder, names)
@@ -174,7 +174,9 @@ class _Results:
     @property
     def ranked(self) -> tuple[Candidate, ...]:
         """The fields by 2-norm energy, lowest first; of those equal up to rounding, the first found."""
-        return tuple(sorted(self.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}")))
+        return tuple(
+            sorted(self.candidates, key=lambda candidate: float(f"{candidate.field.energy(2).total:.9g}"))
+        )
 
 
 def _compile_functions(request: Request) -> str:
@@ -214,7 +216,7 @@ def _write_certificate(report: Report, path: Path) -> Report:
     if proof is None:
         return report
     try:
-        return replace(report, proven=ProvenBound.by(proof, path))
+        return replace(report, proven=ProvenBound.write(proof, path))
     except CrossfieldError as error:
         report.failures["certificate"] = str(error)
     except KeyboardInterrupt:
@@ -223,7 +225,7 @@ def _write_certificate(report: Report, path: Path) -> Report:
 
 
 def _draw_all(
-    report: Report, folder: Path, drawn: Underlay | None, request: Request, watch: Stopwatch
+    report: Report, folder: Path, underlay: Underlay | None, request: Request, watch: Stopwatch
 ) -> tuple[Report, set[str]]:
     """Draw the kept field and its surface, unless the run was interrupted; return the names of the pictures.
 
@@ -236,7 +238,7 @@ def _draw_all(
             return request.stop() or pressed()
 
         if not report.interrupted:
-            report = _draw_field(report, new, drawn, request.progress, stop)
+            report = _draw_field(report, new, underlay, request.progress, stop)
             watch.lap("pictures")
         if not report.interrupted:
             report = _draw_surface(report, new, request.progress, stop)
@@ -245,7 +247,7 @@ def _draw_all(
 
 
 def _draw_field(
-    report: Report, folder: Path, drawn: Underlay | None, progress: Progress, stop: Over
+    report: Report, folder: Path, underlay: Underlay | None, progress: Progress, stop: Over
 ) -> Report:
     """Draw the kept field; return the report, marked where Ctrl-C or the caller ended that."""
     from ..pictures.draw import LAYERS, draw
@@ -262,7 +264,7 @@ def _draw_field(
             if stop():
                 return ended
             progress(f"drawing {name}")
-            draw(report.kept.field, folder / name, kind=LAYERS, underlay=drawn)
+            draw(report.kept.field, folder / name, kind=LAYERS, underlay=underlay)
     except KeyboardInterrupt:
         return ended
     return report

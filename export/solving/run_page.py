@@ -55,7 +55,7 @@ def write_page(
         report=report,
         seconds=f"{report['seconds']:.0f}",
         bound=report["proof"] and f"{report['proof']['bound_2_norm']:.6g}",
-        layers=[each for each in _LAYERS if each[0] != "drawing" or 'id="drawing"' in overlay],
+        layers=[entry for entry in _LAYERS if entry[0] != "drawing" or 'id="drawing"' in overlay],
         overlay=overlay,
         overview=_embed_picture(folder / "overview.png") if "overview.png" in names else "",
         shaded=_embed_picture(folder / "shaded.png") if "shaded.png" in names else "",
@@ -64,7 +64,7 @@ def write_page(
             [facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""), *table_cells(facts)]
             for facts in report["methods"]
         ],
-        sets=sorted(map(_describe_set, manifests), key=lambda each: not each["solve"]),
+        sets=sorted(map(_describe_set, manifests), key=lambda entry: not entry["solve"]),
         files=[(name, meaning) for name, meaning in _FILES.items() if name in names | {REPORT}],
     )
     write_bytes(folder / PAGE, text.encode())
@@ -99,9 +99,9 @@ def _describe_set(manifest: Manifest) -> dict[str, Any]:
         "columns": counts["columns"],
         "rows": counts["rows"],
         "files": [
-            _describe_file(each)
-            for each in document["files"]
-            if FORMATS[each["format"]].is_model(each["name"])
+            _describe_file(file)
+            for file in document["files"]
+            if FORMATS[file["format"]].is_model(file["name"])
         ],
         "refused": list(document["refused"].values()),
     }

@@ -78,37 +78,37 @@ class Document:
     silhouette: Silhouette
 
     @classmethod
-    def of_bytes(cls, data: bytes) -> Document:
+    def from_bytes(cls, data: bytes) -> Document:
         """Read a document from JSON. Raises InputError that names the faulty entry."""
         try:
-            return cls.of(parse_json(data.decode()))
+            return cls.from_json(parse_json(data.decode()))
         except (UnicodeDecodeError, InstanceError) as error:
             raise InputError(f"the drawing is not a session of crossfield: {shortened(error)}") from error
 
     @classmethod
-    def of(cls, given: Any) -> Document:
+    def from_json(cls, content: Any) -> Document:
         """Check a parsed document. Raises InputError that names the faulty entry."""
-        if not isinstance(given, dict) or given.get("format") != FORMAT:
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise InputError("this is not a session of crossfield; open a file that the page saved")
-        if given.get("version") != VERSION:
-            raise InputError(f"the session has version {shortened(given.get('version'))}, not {VERSION}")
+        if content.get("version") != VERSION:
+            raise InputError(f"the session has version {shortened(content.get('version'))}, not {VERSION}")
         low, high = SIZES
-        found = cls(
-            name=name_from_text(str(given.get("name", ""))[:200]) or "drawing",
-            page=_read_page(given.get("page")),
-            strokes=_read_list(given, "strokes", _read_stroke),
-            mask=_read_list(given, "mask", _read_edit),
-            hints=_read_list(given, "hints", _read_hint),
-            flip=given.get("flip") is True,
-            size=int(_read_number(given.get("size"), "size", low, high)),
+        document = cls(
+            name=name_from_text(str(content.get("name", ""))[:200]) or "drawing",
+            page=_read_page(content.get("page")),
+            strokes=_read_list(content, "strokes", _read_stroke),
+            mask=_read_list(content, "mask", _read_edit),
+            hints=_read_list(content, "hints", _read_hint),
+            flip=content.get("flip") is True,
+            size=int(_read_number(content.get("size"), "size", low, high)),
             stroke_weight=_read_number(
-                given.get("stroke_weight", STROKE_WEIGHT), "stroke_weight", 0.0, _MOST_WEIGHT
+                content.get("stroke_weight", STROKE_WEIGHT), "stroke_weight", 0.0, _MOST_WEIGHT
             ),
-            silhouette=_read_choice(given.get("silhouette", "none"), "silhouette", Silhouette),
+            silhouette=_read_choice(content.get("silhouette", "none"), "silhouette", Silhouette),
         )
-        if sum(len(stroke.points) for stroke in found.strokes) > MAX_SEGMENTS:
+        if sum(len(stroke.points) for stroke in document.strokes) > MAX_SEGMENTS:
             raise InputError(f"the drawing has more than {MAX_SEGMENTS} points; simplify it")
-        return found
+        return document
 
     @property
     def visible(self) -> Ints:
@@ -143,9 +143,9 @@ class Document:
 
 
 def _read_list(
-    given: Mapping[str, Any], key: str, read: Callable[[dict[str, Any], str], _Read]
+    content: Mapping[str, Any], key: str, read: Callable[[dict[str, Any], str], _Read]
 ) -> tuple[_Read, ...]:
-    entries = given.get(key, [])
+    entries = content.get(key, [])
     if not isinstance(entries, list) or len(entries) > MAX_ELEMENTS:
         raise InputError(f"{key} of the session must be a list of at most {MAX_ELEMENTS} entries")
     if not all(isinstance(entry, dict) for entry in entries):
@@ -178,10 +178,10 @@ def _read_hint(entry: dict[str, Any], where: str) -> PlacedHint:
     )
 
 
-def _read_points(given: Any, where: str) -> Floats:
+def _read_points(value: Any, where: str) -> Floats:
     """Points (k, 2) from a flat list x, y, x, y, ..."""
     try:
-        points = np.array(given, dtype=np.float64)
+        points = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         points = np.empty(0)
     if points.ndim != 1 or not len(points) or len(points) % 2 or not (np.abs(points) <= FARTHEST).all():
@@ -189,25 +189,25 @@ def _read_points(given: Any, where: str) -> Floats:
     return points.reshape(-1, 2)
 
 
-def _read_page(given: Any) -> tuple[float, float, float, float]:
-    values = _read_points(given, "page").ravel()
+def _read_page(value: Any) -> tuple[float, float, float, float]:
+    values = _read_points(value, "page").ravel()
     if len(values) != 4 or not (values[2:] > 0).all():
         raise InputError("page of the session must be x, y, width and height")
     x, y, width, height = values.tolist()
     return x, y, width, height
 
 
-def _read_number(given: Any, where: str, least: float, most: float) -> float:
-    if isinstance(given, bool) or not isinstance(given, (int, float)) or not math.isfinite(given):
-        raise InputError(f"{where} of the session is {shortened(given)}, not a number")
-    if not least <= given <= most:
-        raise InputError(f"{where} of the session is {given:g}; it must be between {least:g} and {most:g}")
-    return float(given)
+def _read_number(value: Any, where: str, least: float, most: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InputError(f"{where} of the session is {shortened(value)}, not a number")
+    if not least <= value <= most:
+        raise InputError(f"{where} of the session is {value:g}; it must be between {least:g} and {most:g}")
+    return float(value)
 
 
-def _read_choice(given: Any, where: str, choice: Any) -> Any:
-    if given not in get_args(choice):
+def _read_choice(value: Any, where: str, choice: Any) -> Any:
+    if value not in get_args(choice):
         raise InputError(
-            f"{where} of the session is {shortened(given)!r}; it must be {' or '.join(get_args(choice))}"
+            f"{where} of the session is {shortened(value)!r}; it must be {' or '.join(get_args(choice))}"
         )
-    return given
+    return value

@@ -56,26 +56,26 @@ def _stroke_svg(stroke: Stroke) -> str:
 
 
 def _write_layers(document: Document, folder: Path, *_: str) -> None:
-    with tempfile.TemporaryDirectory() as other:
-        underlay = _write_drawing(document, Path(other))
+    with tempfile.TemporaryDirectory() as temporary:
+        underlay = _write_drawing(document, Path(temporary))
         draw(compute_field(document)[1], folder / f"{document.name}.layers.svg", underlay=underlay)
 
 
 def _write_normals(document: Document, folder: Path, *_: str) -> None:
-    found = compute_surface(document, compute_field(document)[1])
-    texels = normal_map(found.instance, found.normals, max(1, 1024 // max(found.instance.mask.shape)))
+    solid = compute_surface(document, compute_field(document)[1])
+    texels = normal_map(solid.instance, solid.normals, max(1, 1024 // max(solid.instance.mask.shape)))
     (folder / f"{document.name}.normals.png").write_bytes(encode_png(texels))
 
 
 def _write_surface(document: Document, folder: Path, *_: str) -> None:
-    with tempfile.TemporaryDirectory() as other:
-        underlay = _write_drawing(document, Path(other))
+    with tempfile.TemporaryDirectory() as temporary:
+        underlay = _write_drawing(document, Path(temporary))
         write_surface(compute_surface(document, compute_field(document)[1]), folder, drawing=underlay)
 
 
 def _write_solver_files(document: Document, folder: Path, formulation: str, form: str) -> None:
-    found, field = compute_field(document)
-    manifests = write_all(found.instance, folder, formulations=[formulation], formats=[form], start=field)
+    drawn, field = compute_field(document)
+    manifests = write_all(drawn.instance, folder, formulations=[formulation], formats=[form], start=field)
     for reason in manifests[0].document["refused"].values():
         raise InputError(reason)
 
@@ -112,7 +112,7 @@ def download(data: bytes, what: str, formulation: str = "", form: str = "") -> t
     """Name and content of the file of an entry; several files are one archive. Raises InputError."""
     if what not in DOWNLOADS:
         raise InputError(f"there is no download {shortened(what)!r}; choose one of {', '.join(DOWNLOADS)}")
-    document = Document.of_bytes(data)
+    document = Document.from_bytes(data)
     with tempfile.TemporaryDirectory(prefix="crossfield-") as name:
         folder = Path(name)
         DOWNLOADS[what].write(document, folder, formulation, form)

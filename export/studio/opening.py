@@ -107,7 +107,7 @@ def _trace_ways(line: Bools) -> list[_Way]:
         way = [first, second]
         used.update({(first, second), (second, first)})
         while len(links[way[-1]]) == 2:
-            after = next((each for each in links[way[-1]] if (way[-1], each) not in used), None)
+            after = next((pixel for pixel in links[way[-1]] if (way[-1], pixel) not in used), None)
             if after is None:
                 break
             used.update({(way[-1], after), (after, way[-1])})
@@ -116,7 +116,12 @@ def _trace_ways(line: Bools) -> list[_Way]:
 
     # Ends and junctions first; what is left are closed ways.
     order = sorted(there, key=lambda pixel: (len(links[pixel]) == 2, pixel))
-    return [walk(pixel, other) for pixel in order for other in links[pixel] if (pixel, other) not in used]
+    return [
+        walk(pixel, neighbour)
+        for pixel in order
+        for neighbour in links[pixel]
+        if (pixel, neighbour) not in used
+    ]
 
 
 def _neighbours(pixel: _Pixel, there: set[_Pixel]) -> list[_Pixel]:

@@ -19,7 +19,7 @@ def prove_step(data: bytes) -> dict[str, Any]:
     """Energy, bound and gap of a document's instance; progress is written to the standard output."""
     from ...models.proof.prove import prove
 
-    _, field = compute_field(Document.of_bytes(data))
+    _, field = compute_field(Document.from_bytes(data))
     proof = prove(
         field.instance,
         start=field,

@@ -96,8 +96,8 @@ class Guard:
         elsewhere = request.headers.get("sec-fetch-site", "none") not in {"none", "same-origin"}
         if elsewhere or origin not in {None, f"http://{host}"}:
             return "This request comes from another page."
-        given = request.url.path.split("/")[1]
-        if not secrets.compare_digest(given.encode(), self._token.encode()):
+        token = request.url.path.split("/")[1]
+        if not secrets.compare_digest(token.encode(), self._token.encode()):
             return (
                 "This address belongs to an earlier server, or lacks the token of the running one. Use the "
                 "address that `crossfield studio` printed. Pages of an earlier server can still save."
@@ -164,12 +164,12 @@ class Page:
         """Field, streamlines and surface of a document, as lines of JSON while they are computed."""
         data, stop = await self._edit(request)
         size, lines = _parse_number(request, "size"), "lines" in request.query_params
-        return _stream_response(self._computed(data, size, stop, lines=lines))
+        return _stream_response(self._compute_views(data, size, stop, lines=lines))
 
     async def prove(self, request: Request) -> Response:
         """Energy and bound of a document, as lines of JSON while they improve."""
         data, stop = await self._edit(request)
-        return _stream_response(self._proven(data, stop))
+        return _stream_response(self._report_proof(data, stop))
 
     async def stop(self, request: Request) -> Response:
         """End the work on earlier edits of a page."""
@@ -190,30 +190,30 @@ class Page:
             request.query_params.get("page", "")[:64], _parse_number(request, "edit")
         )
 
-    def _computed(self, data: bytes, size: int, stop: Over, *, lines: bool) -> Iterator[dict[str, Any]]:
+    def _compute_views(self, data: bytes, size: int, stop: Over, *, lines: bool) -> Iterator[dict[str, Any]]:
         early, fine = None, Event()
         if size > _FINE:
             with suppress(NoStrokeError):  # on so coarse a grid
-                view, found, field = self.desk.submit("fields", field_step, data, COARSE, stop=stop).result()
+                view, drawn, field = self.desk.submit("fields", field_step, data, COARSE, stop=stop).result()
                 yield view
                 early = self.desk.submit(
-                    "surfaces", surface_step, data, found, field, stop=lambda: stop() or fine.is_set()
+                    "surfaces", surface_step, data, drawn, field, stop=lambda: stop() or fine.is_set()
                 )
         finer = self.desk.submit("fields", field_step, data, stop=stop)
         if early is not None:
             wait({early, finer}, return_when=FIRST_COMPLETED)
             if early.done() and early.exception() is None:
                 yield early.result()
-        view, found, field = finer.result()
+        view, drawn, field = finer.result()
         fine.set()
         yield view
-        surface = self.desk.submit("surfaces", surface_step, data, found, field, stop=stop)
+        surface = self.desk.submit("surfaces", surface_step, data, drawn, field, stop=stop)
         if lines:
             yield self.desk.submit("fields", lines_step, field, stop=stop).result()
         yield surface.result()
         yield {"stage": "done"}
 
-    def _proven(self, data: bytes, stop: Over) -> Iterator[dict[str, Any]]:
+    def _report_proof(self, data: bytes, stop: Over) -> Iterator[dict[str, Any]]:
         with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
             log = Path(folder) / "progress"
             proof, shown = self.desk.submit("proofs", prove_step, data, stop=stop, log=log), None
@@ -252,12 +252,12 @@ async def _body(request: Request) -> bytes:
 
 async def _answered(work: Callable[[], Any]) -> Response:
     """The result of work as a response, or its error as a message."""
-    found = await run_in_threadpool(work)
-    return found if isinstance(found, Response) else JSONResponse(found)
+    answer = await run_in_threadpool(work)
+    return answer if isinstance(answer, Response) else JSONResponse(answer)
 
 
-def _file_response(found: tuple[str, bytes]) -> Response:
-    name, content = found
+def _file_response(download: tuple[str, bytes]) -> Response:
+    name, content = download
     headers = {"content-disposition": f'attachment; filename="{name}"'}
     return Response(content, media_type="application/octet-stream", headers=headers)
 

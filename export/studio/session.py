@@ -87,18 +87,18 @@ def _scale_weights(instance: Instance, weights: Floats, pairs: Ints) -> Instance
 
 
 def _edit_mask(
-    edits: tuple[MaskEdit, ...], solve: Bools, walls: Bools, found: Reading, frame: Frame
+    edits: tuple[MaskEdit, ...], solve: Bools, walls: Bools, reading: Reading, frame: Frame
 ) -> tuple[Bools, tuple[tuple[Floats, bool], ...]]:
     """The mask after the edits in their order, and the gaps with whether they are open."""
-    ends = np.array(found.openings).reshape(-1, 2, 2)
-    kept = np.ones(len(ends), dtype=bool)
+    ends = np.array(reading.openings).reshape(-1, 2, 2)
+    closed = np.ones(len(ends), dtype=bool)
     for edit in edits:
         if edit.kind == "gap" and len(ends):
             away = np.hypot(*(ends.mean(axis=1) - edit.points[0]).T)
-            kept[(away == away.min()) & (away <= NEAR * frame.pixel)] ^= True
+            closed[(away == away.min()) & (away <= NEAR * frame.pixel)] ^= True
     left = np.zeros_like(solve)
-    if not kept.all():
-        left = _mostly_chosen_parts(solve & ~_close_walls(walls, ends[kept], frame), solve & ~walls)
+    if not closed.all():
+        left = _mostly_chosen_parts(solve & ~_close_walls(walls, ends[closed], frame), solve & ~walls)
     mask = solve & ~left
     cells, _ = ndimage.label(~walls)
     for edit in edits:
@@ -113,7 +113,7 @@ def _edit_mask(
             mask = mask | brushed if edit.kind == "paint" else mask & ~brushed
     # Strokes that only bound areas without a field would be thin parts of their own.
     mask = mask & ~(_find_rim(left, walls) & ~_find_rim(mask & ~walls, walls))
-    return mask, tuple(zip(ends, (~kept).tolist(), strict=True))
+    return mask, tuple(zip(ends, (~closed).tolist(), strict=True))
 
 
 def _mostly_chosen_parts(chosen: Bools, area: Bools) -> Bools:
@@ -173,7 +173,7 @@ def _brushed_pixels(edit: MaskEdit, frame: Frame) -> Bools:
 class _ResultCache(OrderedDict[object, Any]):
     """The last few results of work that no edit has ended."""
 
-    def found(self, key: object, work: Callable[[], _Result]) -> _Result:
+    def get_or_compute(self, key: object, work: Callable[[], _Result]) -> _Result:
         """The result for a key, computed if it is new. Raises OvertakenError."""
         if key not in self:
             result = work()
@@ -182,8 +182,8 @@ class _ResultCache(OrderedDict[object, Any]):
             self[key] = result
             while len(self) > _MOST_KEPT:
                 self.popitem(last=False)
-        kept: _Result = self[key]
-        return kept
+        latest: _Result = self[key]
+        return latest
 
 
 _FIELDS: Final = _ResultCache()
@@ -192,9 +192,9 @@ _SURFACES: Final = _ResultCache()
 
 def compute_field(document: Document, size: int | None = None) -> tuple[DrawnInstance, CrossField]:
     """The instance of a document and its bend field. Raises OvertakenError."""
-    found = read_drawn(document, size)
-    instance = found.instance
-    return found, _FIELDS.found(
+    drawn = read_drawn(document, size)
+    instance = drawn.instance
+    return drawn, _FIELDS.get_or_compute(
         instance.sha256,
         lambda: bend_field(polyvector_field(instance, hold=max(HOLDS)), stop=is_stopped),
     )
@@ -215,7 +215,7 @@ def hints_on_mask(document: Document, instance: Instance) -> list[Hint]:
 def compute_surface(document: Document, field: CrossField) -> Surface:
     """The surface of a document's field, with its hints. Raises OvertakenError."""
     hints, flip = tuple(hints_on_mask(document, field.instance)), document.flip
-    return _SURFACES.found(
+    return _SURFACES.get_or_compute(
         (field.instance.sha256, hints, flip),
         lambda: surface(field, hints, flip=flip, stop=is_stopped),
     )

@@ -36,22 +36,22 @@ def encode_array(values: np.ndarray[Any, Any], kind: str) -> str:
 
 def field_step(data: bytes, size: int | None = None) -> tuple[dict[str, Any], DrawnInstance, CrossField]:
     """Instance and field of a document, and what the page shows of them. Raises InputError."""
-    document = Document.of_bytes(data)
-    found, field = compute_field(document, size)
-    return _field_view(document, found, field), found, field
+    document = Document.from_bytes(data)
+    drawn, field = compute_field(document, size)
+    return _field_view(document, drawn, field), drawn, field
 
 
-def _field_view(document: Document, found: DrawnInstance, field: CrossField) -> dict[str, Any]:
-    instance, (x, y), spots = found.instance, found.instance.origin, field.singularities
+def _field_view(document: Document, drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
+    instance, (x, y), spots = drawn.instance, drawn.instance.origin, field.singularities
     pixel = instance.pixel_size
     shape, deviation = field.shape, field.stroke_deviation
     return {
         "stage": "field",
         "size": max(instance.mask.shape),
         "wanted": document.size,
-        "frame": {"x": x, "y": y, "pixel": pixel, "rows": len(found.kinds), "columns": found.kinds.shape[1]},
-        "kinds": encode_array(found.kinds, "u1"),
-        "gaps": [{"ends": ends.tolist(), "open": is_open} for ends, is_open in found.gaps],
+        "frame": {"x": x, "y": y, "pixel": pixel, "rows": len(drawn.kinds), "columns": drawn.kinds.shape[1]},
+        "kinds": encode_array(drawn.kinds, "u1"),
+        "gaps": [{"ends": ends.tolist(), "open": is_open} for ends, is_open in drawn.gaps],
         "warnings": list(instance.reading.warnings) if instance.reading else [],
         "mask": encode_array(instance.mask, "u1"),
         "u": encode_array(field.u_angle, "f4"),
@@ -62,7 +62,7 @@ def _field_view(document: Document, found: DrawnInstance, field: CrossField) -> 
                 spots.row.tolist(), spots.column.tolist(), spots.index.tolist(), strict=True
             )
         ],
-        "suspects": _find_suspects(found, deviation > FAR),
+        "suspects": _find_suspects(drawn, deviation > FAR),
         "numbers": {
             "pixels": instance.grid.size,
             "strokes": len(instance.theta),
@@ -71,25 +71,25 @@ def _field_view(document: Document, found: DrawnInstance, field: CrossField) -> 
             "energy": field.energy(2).total,
             "singularities": count_singularities(field),
         },
-        **equivalent_commands(document, found),
+        **equivalent_commands(document, drawn),
     }
 
 
-def _find_suspects(found: DrawnInstance, wrong: np.ndarray[Any, Any]) -> list[int]:
+def _find_suspects(drawn: DrawnInstance, wrong: np.ndarray[Any, Any]) -> list[int]:
     """Numbers of the few worst strokes with a doubt at most of their pixels."""
     # Once these are marked as cuts, field and surface change, and others are often no longer in doubt.
-    stroke, at = found.strokes.T
+    stroke, at = drawn.strokes.T
     count = np.bincount(stroke) if len(stroke) else np.zeros(1)
     off = np.bincount(stroke, wrong[at], len(count))
     off[(count < _LEAST) | (off <= count / 2)] = 0
     worst = np.argsort(-off, kind="stable")[:_MOST]
-    return sorted(int(each) for each in worst if off[each] >= max(off.max() / 2, 1))
+    return sorted(int(number) for number in worst if off[number] >= max(off.max() / 2, 1))
 
 
-def lines_step(found: CrossField) -> dict[str, Any]:
+def lines_step(field: CrossField) -> dict[str, Any]:
     """Streamlines of a field in the units of the drawing, as flat lists x, y, x, y, ... of each family."""
-    (x, y), pixel = found.instance.origin, found.instance.pixel_size
-    lines = streamlines(found, max(max(found.instance.mask.shape) / _SPACING, 0.8))
+    (x, y), pixel = field.instance.origin, field.instance.pixel_size
+    lines = streamlines(field, max(max(field.instance.mask.shape) / _SPACING, 0.8))
     families = [
         [
             np.round([x, y] + pixel * (points * [1, -1] + 0.5), 3).ravel().tolist()
@@ -100,17 +100,17 @@ def lines_step(found: CrossField) -> dict[str, Any]:
     ]
     if is_stopped():
         raise OvertakenError("a newer edit replaced this one")
-    return {"stage": "lines", "size": max(found.instance.mask.shape), "families": families}
+    return {"stage": "lines", "size": max(field.instance.mask.shape), "families": families}
 
 
-def surface_step(data: bytes, found: DrawnInstance, field: CrossField) -> dict[str, Any]:
+def surface_step(data: bytes, drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     """The data of the surface of a field for the page."""
-    document = Document.of_bytes(data)
+    document = Document.from_bytes(data)
     lifted = compute_surface(document, field)
-    return _surface_view(found, lifted)
+    return _surface_view(drawn, lifted)
 
 
-def _surface_view(found: DrawnInstance, lifted: Surface) -> dict[str, Any]:
+def _surface_view(drawn: DrawnInstance, lifted: Surface) -> dict[str, Any]:
     instance, field = lifted.instance, lifted.field
     longer = max(instance.mask.shape)
     picture = raster(instance, lifted.normals, max(1, SIDE // longer))
@@ -130,15 +130,15 @@ def _surface_view(found: DrawnInstance, lifted: Surface) -> dict[str, Any]:
         "columns": instance.mask.shape[1],
         "doubts": list(lifted.doubts),
         "freedom": list(lifted.freedom),
-        "suspects": _find_suspects(found, unfit[instance.stroke_index]) if unfit.mean() > UNFIT / 2 else [],
+        "suspects": _find_suspects(drawn, unfit[instance.stroke_index]) if unfit.mean() > UNFIT / 2 else [],
     }
 
 
-def equivalent_commands(document: Document, found: DrawnInstance) -> dict[str, list[str]]:
+def equivalent_commands(document: Document, drawn: DrawnInstance) -> dict[str, list[str]]:
     """Commands and Python lines that compute the same from the downloaded instance and drawing."""
     from .session import hints_on_mask
 
-    name, hints = document.name, hints_on_mask(document, found.instance)
+    name, hints = document.name, hints_on_mask(document, drawn.instance)
     angles = [
         (h.row, h.column, round(float(np.degrees(h.slant)), 4), round(float(np.degrees(h.tilt)), 4))
         for h in hints

@@ -101,13 +101,13 @@ def write_surface(
     fine = choose_scale(surface.instance, scale)
     folder = make_folder(folder)
     (folder / REPORT).unlink(missing_ok=True)
-    found = raster(surface.instance, surface.normals, fine)
-    shaded, ink = shade_by_light(found, light), draw_strokes(surface.instance, drawing, fine)
+    normals = raster(surface.instance, surface.normals, fine)
+    shaded, ink = shade_by_light(normals, light), draw_strokes(surface.instance, drawing, fine)
     paper = np.broadcast_to((*_PAPER, 1.0), ink.shape)
     pictures = {
         "normals.png": normal_map(surface.instance, surface.normals, scale or 1),
         SHADED: to_eight_bit(shaded),
-        "matcap.png": to_eight_bit(matcap(found)),
+        "matcap.png": to_eight_bit(matcap(normals)),
         "overlay.png": to_eight_bit(lay_over(ink, shaded)),
         DRAWING: to_eight_bit(lay_over(ink, paper)[..., :3]),
     }

@@ -30,7 +30,7 @@ def raw_of_glpk(path, form, file, point):
 def test_values_without_names_follow_the_file_that_the_manifest_lists(tmp_path):
     problem = make_problem("minlp-cubic", make_instance())
     manifest = read_manifest(write_problem(problem, tmp_path).path)
-    held = manifest.held(problem)
+    held = manifest.problems_by_format(problem)
     assert {name: form.sha256 == problem.sha256 for name, form in held.items()} == {
         "nl": True, "gms": True, "lp": False, "mps": False,
     }  # fmt: skip

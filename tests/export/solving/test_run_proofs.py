@@ -63,7 +63,7 @@ def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
 def test_the_reason_of_a_missing_certificate_is_the_true_one(tmp_path, ended, words):
     proof = replace(cf.prove(cf.sample("skew", 4), work=1), bound=0.0, levels=(), ended=ended)
     with pytest.raises(cf.SolverError, match=words):
-        ProvenBound.by(proof, tmp_path / "certificate.npz")
+        ProvenBound.write(proof, tmp_path / "certificate.npz")
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from studios import CONTRADICTING, PEBBLE, changed
 
 
 def document(**parts):
-    return Document.of_bytes(changed(**parts))
+    return Document.from_bytes(changed(**parts))
 
 
 def click(x, y, kind="toggle"):
@@ -55,7 +55,7 @@ def test_a_faulty_document_is_refused_with_its_place(parts, place):
 @pytest.mark.parametrize("data", [b"", b"[]", b"\xff", b"[" * 100_000, b'{"format": "crossfield-studio"}'])
 def test_other_bytes_are_refused(data):
     with pytest.raises(cf.InputError, match="session"):
-        Document.of_bytes(data)
+        Document.from_bytes(data)
 
 
 def test_a_drawing_without_a_curvature_line_asks_for_one():
@@ -103,7 +103,7 @@ def test_a_click_excludes_an_area_between_strokes_and_includes_it_again():
 
 
 def test_an_enclosed_area_that_was_left_out_is_included_by_a_click():
-    ring = Document.of(
+    ring = Document.from_json(
         PEBBLE
         | {
             key: value
@@ -119,7 +119,7 @@ def test_an_enclosed_area_that_was_left_out_is_included_by_a_click():
     pixel = found.instance.pixel_size
     middle = len(rows) // 2
     point = [x + pixel * (columns[middle] + 0.5), y + pixel * (rows[middle] + 0.5)]
-    edits = Document.of(PEBBLE | {
+    edits = Document.from_json(PEBBLE | {
         "size": 32, "page": list(ring.page), "mask": click(*point),
         "strokes": [{"points": s.points.ravel().tolist(), "mark": s.mark} for s in ring.strokes],
     })  # fmt: skip
