@@ -15,21 +15,6 @@ KINDS = {
     "instance": ("theta", read_instance, lambda path: write_instance(INSTANCE, path)),
 }
 
-ONLY_OTHERWISE_PACKED = {
-    "bytes before",
-    "bytes before, counted",
-    "bytes after",
-    "a comment",
-    "two archives",
-    "a member that is not listed",
-    "fewer members than listed",
-    "a split archive",
-    "a 64-bit end record",
-    "sizes after the member",
-    "more than a stream",
-}
-"""Archives with the same arrays between other bytes."""
-
 
 @pytest.fixture(params=KINDS)
 def kind(request, tmp_path):
@@ -47,16 +32,12 @@ def test_what_numpy_writes_is_read(kind):
         assert getattr(found, "instance", found).sha256 == INSTANCE.sha256
 
 
-def test_forged_archives_are_refused_unless_their_arrays_are_the_same(kind, subtests):
+def test_forged_archives_are_refused(kind, subtests):
     name, read, path = kind
     good = path.read_bytes()
     for what, forge in forged(name).items():
         with subtests.test(what):
             path.write_bytes(forge(good))
-            if what in ONLY_OTHERWISE_PACKED:
-                found = read(path)
-                assert getattr(found, "instance", found).sha256 == INSTANCE.sha256
-                continue
             with pytest.raises(InstanceError, match=r"it\.npz: ") as refusal:
                 read(path)
             assert "\n" not in str(refusal.value)

@@ -258,12 +258,7 @@ def test_a_forged_archive_is_refused_or_has_the_arrays_that_numpy_loads(written,
                 assert set(loaded) == set(unpacked) == set(arrays)
                 for name in loaded:
                     np.testing.assert_array_equal(loaded[name], unpacked[name])
-    assert accepted <= {
-        "bytes before", "bytes before, counted", "bytes after", "a comment", "two archives",
-        "a member that is not listed", "fewer members than listed", "a split archive",
-        "a 64-bit end record", "sizes after the member", "a larger member than there is",
-        "more than a stream", "a header with a key twice",
-    }  # fmt: skip
+    assert accepted <= {"a larger member than there is", "a header with a key twice"}
 
 
 @pytest.mark.parametrize("second", ["head.NPY", "HEAD.npy", "head.bin", "head.npy"])
