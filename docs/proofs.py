@@ -172,7 +172,7 @@ def pictures(request: Request) -> Iterator[tuple[str, Facts]]:
     """The pictures of the crosses left at every level."""
     proof = prove(sample(PICTURED, SIZE), limits=Limits(request.seconds, gap=0))
     certificate = write_certificate(proof, request.work / f"{PICTURED}.certificate.npz")
-    proof_pictures.draw_maps(proof, certificate.verdict.boxes, DOCS / "pictures" / "proof_levels.png")
+    proof_pictures.draw_maps(proof, certificate.proven.boxes, DOCS / "pictures" / "proof_levels.png")
     pixels = proof_pictures.draw_strips(proof, DOCS / "pictures" / "proof_strips.png")
     yield PICTURED, {"levels": len(proof.levels), "status": proof.status, "pixels": pixels}
 

@@ -113,7 +113,7 @@ def _write_proof(proof: Proof, folder: Path) -> tuple[dict[str, Any], Crossfield
 def _proven_facts(proof: Proof, certificate: Certificate | None) -> tuple[dict[str, Any], list[float]]:
     """Facts that are proven, and the bound of each level, as the checker confirms them."""
     if certificate is not None:
-        return proof_facts(certificate), certificate.verdict.levels
+        return proof_facts(certificate), certificate.proven.levels
     return proof_facts(proof) | {"status": UNPROVEN, "bound": 0.0, "gap": 1.0, "forced_jumps": 0}, []
 
 

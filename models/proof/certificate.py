@@ -21,10 +21,10 @@ from ..instance.file import instance_arrays, instance_of_arrays
 from ..instance.instance import Instance
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
-from .check_certificate import Verdict
+from .check_certificate import ProvenClaim
 from .record import Claim, LevelRecord, Proof
 
-REFUSALS: Final = (check_certificate.RefusedError, check_certificate.UnreadableError)
+REFUSALS: Final = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 """Errors of the checker for a proof that does not hold."""
 
 _PREFIX: Final = "instance_"
@@ -42,23 +42,23 @@ class Certificate(Claim):
         Its energy in the norm.
     bound
         Proven lower bound of the energy of all fields.
-    verdict
+    proven
         Findings of the checker.
 
     """
 
-    verdict: Verdict
+    proven: ProvenClaim
 
     @property
     def norm(self) -> Norm:
         """The norm of the energy."""
-        norm: Norm = self.verdict.norm
+        norm: Norm = self.proven.norm
         return norm
 
     @property
     def forced(self) -> int:
         """The number of pairs whose jump equals the field's in every field that could be better."""
-        return self.verdict.forced
+        return self.proven.forced
 
 
 @check_arguments
@@ -93,33 +93,35 @@ def write_certificate(proof: Proof, path: str | Path) -> Certificate:
     if not proof.levels:
         raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
     try:
-        checked = proof if proof.verdict is not None else checked_proof(proof)
+        checked = proof if proof.proven is not None else check_proof(proof)
     except REFUSALS as error:
         raise InputError(f"would hold a proof that is not valid: {error}", file=path) from error
     except MemoryError as error:
         raise SolverError("is not written: its check takes more memory than there is", file=path) from error
-    verdict = cast("Verdict", checked.verdict)
-    write_bytes(path, pack_arrays(_head(checked) | _arrays(checked) | cast("Arrays", checked.pieces)))
-    return Certificate(checked.field, checked.energy, checked.bound, verdict)
+    proven = cast("ProvenClaim", checked.proven)
+    write_bytes(
+        path, pack_arrays(_head_arrays(checked) | _proof_arrays(checked) | cast("Arrays", checked.pieces))
+    )
+    return Certificate(checked.field, checked.energy, checked.bound, proven)
 
 
-def checked_proof(proof: Proof) -> Proof:
+def check_proof(proof: Proof) -> Proof:
     """The proof with the checker's findings, and with the bound and the forced jumps that it confirms.
 
     Raises one of `REFUSALS` for a proof that does not hold.
     """
-    arrays = _head(replace(proof, bound=0.0)) | _arrays(proof)
+    arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
     passed = check_certificate.pass_levels(arrays)
-    pieces = _pieces(proof, passed)
-    verdict = check_certificate.conclude(arrays | pieces, passed)
-    ended = "optimal" if verdict.status == "optimal" else proof.ended
-    checked = replace(proof, bound=verdict.bound, forced=verdict.forced, ended=ended)
-    object.__setattr__(checked, "verdict", verdict)
+    pieces = _last_step_arrays(proof, passed)
+    proven = check_certificate.check_last_step(arrays | pieces, passed)
+    ended = "optimal" if proven.status == "optimal" else proof.ended
+    checked = replace(proof, bound=proven.bound, forced=proven.forced, ended=ended)
+    object.__setattr__(checked, "proven", proven)
     object.__setattr__(checked, "pieces", pieces)
     return checked
 
 
-def _head(proof: Proof) -> Arrays:
+def _head_arrays(proof: Proof) -> Arrays:
     """The head of a certificate, with the claim of a proof."""
     head = {
         "format": check_certificate.FORMAT,
@@ -133,7 +135,7 @@ def _head(proof: Proof) -> Arrays:
     return {"head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)}
 
 
-def _arrays(proof: Proof) -> Arrays:
+def _proof_arrays(proof: Proof) -> Arrays:
     """The arrays of a proof's certificate without its head and the pieces of the last steps."""
     field, first = proof.field, proof.levels[0]
     arrays = {_PREFIX + name: array for name, array in instance_arrays(field.instance).items()}
@@ -144,30 +146,30 @@ def _arrays(proof: Proof) -> Arrays:
         slopes[first.instance.stroke_index] = first.slopes
         arrays["slopes"] = slopes
     for number, level in enumerate(proof.levels):
-        arrays |= {f"level_{number}_{name}": array for name, array in _of_level(level).items()}
+        arrays |= {f"level_{number}_{name}": array for name, array in _level_arrays(level).items()}
     return arrays
 
 
-def _of_level(level: LevelRecord) -> Arrays:
+def _level_arrays(level: LevelRecord) -> Arrays:
     ranges = (level.alpha_first, level.alpha_count, level.beta_first, level.beta_count)
     return {
         "h": np.array([level.h]),
         "ranges": np.stack(ranges, axis=1).astype(np.int32),
         "allowed": np.packbits(level.allowed),
-        **level.messages,
+        **level.shares,
         **level.tables,
     }
 
 
-def _pieces(proof: Proof, passed: check_certificate.PassedLevels) -> Arrays:
+def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels) -> Arrays:
     """The cuts and the multipliers of the last step; none where it is not convex."""
-    from .forced import pieces_of  # loads solvers
+    from .forced import last_step_pieces  # loads solvers
 
-    sketch, last = passed.sketch, passed.last
-    if last is not None and check_certificate.is_convex(sketch, last):
-        cuts, multipliers = pieces_of(proof.levels[0], last, proof.energy)
+    terms, last = passed.terms, passed.last
+    if last is not None and check_certificate.is_convex(terms, last):
+        cuts, multipliers = last_step_pieces(proof.levels[0], last, proof.energy)
     else:
-        cuts, multipliers = np.zeros(0, np.int32), np.zeros((0, 2 * (len(sketch.first) + len(sketch.white))))
+        cuts, multipliers = np.zeros(0, np.int32), np.zeros((0, 2 * (len(terms.first) + len(terms.white))))
     return {"cuts": cuts, "multipliers": multipliers}
 
 
@@ -199,26 +201,26 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
     """
     path = Path(path)
     try:
-        arrays = check_certificate.unpack(read_bytes(path, check_certificate.MOST_BYTES))
-        verdict = check_certificate.check(arrays)
+        arrays = check_certificate.unpack_arrays(read_bytes(path, check_certificate.MOST_BYTES))
+        proven = check_certificate.check_arrays(arrays)
         with naming(path):
-            field = _field(arrays)
+            field = _field_of(arrays)
         if on is not None and field.instance.sha256 != on.sha256:
             raise InputError(
                 f"is a certificate of another instance ({field.instance.summary}), not of {on.summary}",
                 file=path,
             )
-    except check_certificate.RefusedError as error:
+    except check_certificate.NotProvenError as error:
         raise InputError(f"is refused as a certificate: {error}", file=path) from error
     except check_certificate.UnreadableError as error:
         raise InputError(f"is not a certificate: {error}", file=path) from error
     except MemoryError as error:
         raise InputError("takes more memory to check than there is", file=path) from error
     bound = check_certificate.head_of(arrays)["bound"]
-    return Certificate(field, field.energy(verdict.norm).total, bound, verdict)
+    return Certificate(field, field.energy(proven.norm).total, bound, proven)
 
 
-def _field(arrays: Arrays) -> CrossField:
+def _field_of(arrays: Arrays) -> CrossField:
     """The field of a certificate; its instance must not round the arrays, which alone are proven."""
     parts = {name.removeprefix(_PREFIX): array for name, array in arrays.items() if name.startswith(_PREFIX)}
     field = CrossField(instance_of_arrays(parts), arrays["alpha"], arrays["beta"], arrays["p"])

@@ -248,7 +248,7 @@ class Descent:
         """Record the level and, in time, prune it; return the cells that are left, None if there are none."""
         chain, energy = self.chain, self.energy(self.best)
         rough, left = _ROUGH * (1 + energy), None
-        level = LevelRecord.of(dual, energy, rough if self.gap > rough else 0.0)
+        level = LevelRecord.of_dual(dual, energy, rough if self.gap > rough else 0.0)
         if level.bound > chain.bound or not self.ends.over():
             chain.levels.append(level)
         if not self.ends.over():

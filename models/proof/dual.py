@@ -47,7 +47,7 @@ from .clusters import (
     zero_clusters,
 )
 from .combs import comb_excesses
-from .encoding import messages_of, tables_of
+from .encoding import share_arrays, table_arrays
 from .lattice import Lattice, nearest_labels
 from .passes import pair_minimum, reparametrised_costs, row_ends, shares_at, visit_pixel
 from .pruning import RemainingCells, bound_by_boxes, interpolate_shares, surviving_cells
@@ -271,7 +271,7 @@ class Dual:
             (3 + 4 * float(size.max())) ** 2 + costs + 4 * shares
         )  # angles and jumps, squared; tables; excesses
         unit = 2 * check_certificate.ROUNDING * check_certificate.PRECISION
-        sides = check_certificate.slack_of(weight, skew, _LEVELS)
+        sides = check_certificate.sliver_slack(weight, skew, _LEVELS)
         return unit * (2 * pixels + m * pair) + sides, 4 * unit * m * pair
 
     def remaining_cells(self, bound: float, energy: float) -> RemainingCells:
@@ -303,8 +303,8 @@ class Dual:
     def arrays(self, quanta: tuple[float, float]) -> tuple[Arrays, Arrays]:
         """Messages and tables as whole numbers of their scales, after `quantise`."""
         shares, (of_shares, of_tables) = (self.state.shares_first, self.state.shares_second), quanta
-        messages = messages_of(self.lattice, shares, of_shares)
-        return messages, tables_of(self.lattice, self.state.clusters, of_tables)
+        messages = share_arrays(self.lattice, shares, of_shares)
+        return messages, table_arrays(self.lattice, self.state.clusters, of_tables)
 
 
 def antidiagonals(grid: Grid) -> list[Indices]:

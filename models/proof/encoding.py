@@ -15,7 +15,7 @@ from .state import Clusters
 _MOST: Final = 2**31 - 1
 
 
-def messages_of(lattice: Lattice, shares: Sequence[Floats], quantum: float) -> Arrays:
+def share_arrays(lattice: Lattice, shares: Sequence[Floats], quantum: float) -> Arrays:
     """The shares of the earlier pixels of all pairs, at their allowed labels.
 
     shares: those at the first pixels of all pairs, and those at the second ones, in the grid's order,
@@ -32,17 +32,17 @@ def messages_of(lattice: Lattice, shares: Sequence[Floats], quantum: float) -> A
         numbers: Floats = shares[side[e]][begin[e] : begin[e + 1]][allowed]
         return numbers
 
-    return _blocks("share", map(share, range(len(side))), quantum)
+    return _encode_blocks("share", map(share, range(len(side))), quantum)
 
 
-def tables_of(lattice: Lattice, clusters: Clusters, quantum: float) -> Arrays:
+def table_arrays(lattice: Lattice, clusters: Clusters, quantum: float) -> Arrays:
     """The quads that have tables, and the tables."""
     tables = np.split(clusters.tables, clusters.start[1:-1]) if len(clusters.quads) else []
     quads = lattice.instance.grid.first[clusters.quads[:, 0]].astype(np.int32)
-    return {"quads": quads, **_blocks("table", tables, quantum)}
+    return {"quads": quads, **_encode_blocks("table", tables, quantum)}
 
 
-def _blocks(name: str, blocks: Iterable[Floats], quantum: float) -> Arrays:
+def _encode_blocks(name: str, blocks: Iterable[Floats], quantum: float) -> Arrays:
     """Blocks of numbers as whole multiples of a unit each, stored by their differences modulo 2^32.
 
     The unit is the quantum, unless the numbers then take more bits than the certificate has.

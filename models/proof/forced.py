@@ -166,7 +166,7 @@ class Piece:
         return above * u, below * u
 
 
-def pieces_of(first: Lattice, step: LastStep, energy: float) -> tuple[Ints, Floats]:
+def last_step_pieces(first: Lattice, step: LastStep, energy: float) -> tuple[Ints, Floats]:
     """The cuts and multipliers of a certificate for a last step of the checker; see docs/files.md.
 
     first: any lattice of the proof. energy: at which a bound is sufficient.

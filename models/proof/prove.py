@@ -17,7 +17,7 @@ from ..processes.limits import Limits
 from ..processes.process_groups import catch_interrupts
 from ..smooth.sparse_systems import one_thread
 from .absolute_descent import DescentIn1Norm, DescentInMixedNorm
-from .certificate import REFUSALS, checked_proof
+from .certificate import REFUSALS, check_proof
 from .compiling import compile_proofs
 from .descent import Descent, Termination
 from .record import Proof
@@ -123,6 +123,6 @@ def prove(
         return proof
     progress("checking the levels")
     try:
-        return checked_proof(proof)
+        return check_proof(proof)
     except (*REFUSALS, MemoryError):  # `write_certificate` names the reason
         return replace(proof, bound=0.0, forced=0)

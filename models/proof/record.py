@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, Literal, Self, cast
 
 from ..array_archive import Arrays
 from ..field.field import CrossField, Norm
-from .check_certificate import Verdict, gap_of, status_of
+from .check_certificate import ProvenClaim, gap_of, status_of
 from .lattice import Lattice
 
 if TYPE_CHECKING:
@@ -41,31 +41,33 @@ class Claim:
 class LevelRecord(Lattice):
     """One level of a proof: its lattice and a dual solution on it.
 
-    messages, tables: the arrays of shares and quads of a certificate (models/proof/encoding.py). bound: sum
+    shares, tables: the arrays of shares and quads of a certificate (models/proof/encoding.py). bound: sum
     over pixels of min (D + shares) + sum over pairs of min (c + tables - shares) + sum over clusters of min
     (- tables), over allowed labels, minus a bound of its rounding error. energy: U when the level was pruned;
     fields outside the next level have more (models/proof/pruning.py).
     """
 
-    messages: Arrays
+    shares: Arrays
     tables: Arrays
     bound: float
     energy: float
 
     @classmethod
-    def of(cls, dual: Dual, energy: float, least_gap: float = 0.0) -> Self:
+    def of_dual(cls, dual: Dual, energy: float, least_gap: float = 0.0) -> Self:
         """The record of a dual, whose shares and tables are first rounded, as for that gap at least.
 
         Where the bound exceeds the energy, rounding costs a small part of the excess.
         """
         quanta = dual.quantise(max(abs(energy - dual.bound()), least_gap))
-        return cls.on(dual.lattice, dual.arrays(quanta), bound=dual.bound(), energy=energy)
+        return cls.on_lattice(dual.lattice, dual.arrays(quanta), bound=dual.bound(), energy=energy)
 
     @classmethod
-    def on(cls, lattice: Lattice, arrays: tuple[Arrays, Arrays], *, bound: float, energy: float) -> Self:
-        """The record of messages and tables on a lattice, which is without cached arrays."""
+    def on_lattice(
+        cls, lattice: Lattice, arrays: tuple[Arrays, Arrays], *, bound: float, energy: float
+    ) -> Self:
+        """The record of shares and tables on a lattice, which is without cached arrays."""
         given = {each.name: getattr(lattice, each.name) for each in fields(Lattice)}
-        return cls(**given, messages=arrays[0], tables=arrays[1], bound=bound, energy=energy)
+        return cls(**given, shares=arrays[0], tables=arrays[1], bound=bound, energy=energy)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,7 @@ class Proof(Claim):
         would be too large.
     norm
         1, 2 or `mixed`.
-    verdict
+    proven
         Findings of the checker; None before the check.
     pieces
         The arrays of the certificate that prove the last step; None before the check.
@@ -104,5 +106,5 @@ class Proof(Claim):
     seconds: float
     ended: str
     norm: Norm = 2
-    verdict: Verdict | None = field(default=None, init=False, repr=False)  # `replace` leaves it out
+    proven: ProvenClaim | None = field(default=None, init=False, repr=False)  # `replace` leaves it out
     pieces: Arrays | None = field(default=None, init=False, repr=False)

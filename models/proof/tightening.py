@@ -21,12 +21,12 @@ def remaining_windows(certificate: Certificate) -> Windows:
     lies between plus and minus its greatest size. A jump that is forced between two boxes within their
     windows is fixed; other ranges follow from the windows, as in the gauge.
     """
-    field, verdict = certificate.field, certificate.verdict
+    field, proven = certificate.field, certificate.proven
     instance, grid = field.instance, field.instance.grid
-    steps = np.round((field.alpha - verdict.boxes[:, :2].mean(axis=1)) / HALF).astype(np.int32)
+    steps = np.round((field.alpha - proven.boxes[:, :2].mean(axis=1)) / HALF).astype(np.int32)
     alpha, beta = (
-        verdict.boxes[:, :2] + HALF * steps[:, None],
-        verdict.boxes[:, 2:] * parity_sign(steps)[:, None],
+        proven.boxes[:, :2] + HALF * steps[:, None],
+        proven.boxes[:, 2:] * parity_sign(steps)[:, None],
     )
     box = np.concatenate([alpha, np.sort(beta, axis=1)], axis=1)
     box += np.array([-_MARGIN, _MARGIN, -_MARGIN, _MARGIN])
@@ -37,7 +37,7 @@ def remaining_windows(certificate: Certificate) -> Windows:
     beta_lower = np.maximum(np.where(inside, box[:, 2], -reach), -QUARTER)
     beta_upper = np.minimum(np.where(inside, box[:, 3], reach), QUARTER)
     least, most = instance.pair_terms.jump_range(alpha_lower, alpha_upper)
-    fixed = verdict.forced_pairs & inside[grid.first] & inside[grid.second]
+    fixed = proven.forced_pairs & inside[grid.first] & inside[grid.second]
     return Windows(
         alpha_lower,
         alpha_upper,

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.proof.clusters import zero_clusters
-from crossfield.models.proof.encoding import messages_of, tables_of
+from crossfield.models.proof.encoding import share_arrays, table_arrays
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.record import LevelRecord, Proof
 
@@ -127,9 +127,9 @@ class Table:
         )
         shares = [np.concatenate([*each, []]) for each in (first, second)]
         clusters = zero_clusters(lattice, np.zeros(0, int))
-        messages = messages_of(lattice, shares, QUANTUM)
-        arrays = messages, tables_of(lattice, clusters, QUANTUM)
-        return LevelRecord.on(lattice, arrays, bound=bound, energy=energy)
+        messages = share_arrays(lattice, shares, QUANTUM)
+        arrays = messages, table_arrays(lattice, clusters, QUANTUM)
+        return LevelRecord.on_lattice(lattice, arrays, bound=bound, energy=energy)
 
 
 def whole(field, h, i, offset):

@@ -78,7 +78,7 @@ def test_certificates_are_checked(folder, capsys, tmp_path):
     command = [sys.executable, "-I", check_certificate.__file__, str(certificate)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "optimal: no field has less" in done.stdout
-    arrays = check_certificate.read(str(certificate))
+    arrays = check_certificate.read_arrays(str(certificate))
     arrays["beta"] = arrays["beta"] + np.eye(1, len(arrays["beta"]), 2)[0] * 1e-5
     wrong = tmp_path / "wrong.npz"
     wrong.write_bytes(pack_arrays(arrays))

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import places
 import pytest
 from allowed_labels import with_allowed
 from archives import forged, members_of, npy, of_numpy, packed
@@ -23,12 +24,14 @@ from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
-from crossfield.models.proof.forced import pieces_of
+from crossfield.models.proof.forced import last_step_pieces
+from crossfield.models.proof.prove import prove
+from crossfield.models.proof.tightening import windows_left
 from exhaustive import exact, optimum, random_instance, sketch
 from plain_prover import proof_of
 
 PROGRAM = Path(check_certificate.__file__)
-WRONG = (check_certificate.RefusedError, check_certificate.UnreadableError)
+WRONG = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 
 
 @cache
@@ -45,7 +48,7 @@ def written(tmp_path_factory):
     def one(seed):
         path = folder / f"{seed}.npz"
         write_certificate(proven(seed), path)
-        return path, check_certificate.read(str(path))
+        return path, check_certificate.read_arrays(str(path))
 
     return one
 
@@ -57,7 +60,7 @@ def with_head(arrays, **changes):
 
 def refusal(arrays):
     with pytest.raises(WRONG) as caught:
-        check_certificate.check(arrays)
+        check_certificate.check_arrays(arrays)
     return str(caught.value)
 
 
@@ -67,8 +70,8 @@ def test_what_was_written_is_read_back_and_holds(written):
     assert found.field.instance.sha256 == proof.field.instance.sha256
     for name in ("alpha", "beta", "p"):
         np.testing.assert_array_equal(getattr(found.field, name), getattr(proof.field, name))
-    assert found.status == found.verdict.status == "optimal"
-    assert found.bound <= found.verdict.bound <= found.energy
+    assert found.status == found.proven.status == "optimal"
+    assert found.bound <= found.proven.bound <= found.energy
     assert found.energy == pytest.approx(proof.energy, abs=1e-12)
 
 
@@ -87,8 +90,8 @@ def test_optima_of_small_instances_are_proven_and_no_bound_is_above_one(tmp_path
         proof = proof_of(field, levels=4)
         found = write_certificate(proof, tmp_path / "it.npz")
         levels = [record.bound for record in proof.levels]
-        np.testing.assert_array_less(np.array(levels) - 1e-8 * (1 + np.abs(levels)), found.verdict.levels)
-        assert max(found.verdict.levels) <= found.verdict.energy
+        np.testing.assert_array_less(np.array(levels) - 1e-8 * (1 + np.abs(levels)), found.proven.levels)
+        assert max(found.proven.levels) <= found.proven.energy
         assert found.bound <= found.energy
         if field.energy().total <= least + 1e-9:  # no window binds, so that this is the optimum
             assert found.bound <= least + 1e-12
@@ -116,12 +119,44 @@ def test_weights_gauges_holes_and_parts(change, tmp_path):
     instance = replace(instance, **{key: value for key, value in change.items() if key != "mask"})
     field = optimum(instance)
     found = write_certificate(proof_of(field, levels=3, passes=8), tmp_path / "it.npz")
-    assert found.verdict.bound <= field.energy().total
+    assert found.proven.bound <= field.energy().total
     for other in (instance.turned(), instance.mirrored()):
         turned = write_certificate(proof_of(optimum(other), levels=3, passes=8), tmp_path / "other.npz")
         if instance.gauge == "strokes":
             assert found.bound <= turned.energy + 1e-9
             assert turned.bound <= found.energy + 1e-9
+
+
+@pytest.mark.parametrize("norm", [2, 1, "mixed"])
+def test_a_part_without_strokes_has_no_cost_at_the_optimum(norm, tmp_path):
+    """A field that has one there is not optimal, and the windows of that part stay whole."""
+    theta = np.full((2, 5), np.nan)
+    theta[0, 3], theta[1, 4] = 0.3, 1.2
+    mask = np.ones((2, 5), bool)
+    mask[:, 2] = False
+    instance, path = sketch(mask, theta, 0.5), tmp_path / "it.npz"
+    proof = prove(instance, norm=norm, jobs=1)
+    written = write_certificate(proof, path)
+    assert written.status == "optimal"
+    windows, apart = windows_left(written), instance.grid.columns < 2
+    assert (windows.alpha_lower[apart] == instance.alpha_lower[apart]).all()
+    assert (windows.alpha_upper[apart] == instance.alpha_upper[apart]).all()
+    assert (np.abs([windows.beta_lower[apart], windows.beta_upper[apart]]) == np.pi / 4).all()
+    assert (windows.alpha_upper - windows.alpha_lower)[~apart].min() < 1.0
+    beta = proof.field.beta + np.where(instance.grid.rows + instance.grid.columns == 0, 0.1, 0.0)
+    worse = CrossField(instance, proof.field.alpha, beta, proof.field.p)
+    energy = worse.energy(norm).total
+    found = write_certificate(replace(proof, field=worse, energy=energy, levels=proof.levels[:1]), path)
+    assert (found.status, read_certificate(path).status) == ("gap", "gap")
+    assert found.bound <= written.energy
+
+
+@pytest.mark.slow
+def test_all_certificates_that_ship_hold():
+    paths = sorted(
+        (places.ROOT / "export" / "library" / "plan" / "known" / "points").glob("*.certificate.npz")
+    )
+    assert {read_certificate(path).status for path in paths} == {"optimal"}
 
 
 def test_a_field_that_is_not_optimal_is_never_certified(tmp_path):
@@ -134,8 +169,8 @@ def test_a_field_that_is_not_optimal_is_never_certified(tmp_path):
             assert worse.energy().total > good.energy().total + 1e-7
             found = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
             assert found.status == "gap"
-            assert found.verdict.bound <= good.energy().total
-            arrays = check_certificate.read(str(tmp_path / "it.npz"))
+            assert found.proven.bound <= good.energy().total
+            arrays = check_certificate.read_arrays(str(tmp_path / "it.npz"))
             assert "status is claimed as optimal" in refusal(with_head(arrays, status="optimal"))
 
 
@@ -147,16 +182,16 @@ def test_an_instance_with_two_strokes_at_one_pixel_is_refused(written):
 def test_a_changed_byte_of_the_file_is_told_or_changes_nothing(written, tmp_path):
     rng = np.random.default_rng(3)
     path, _ = written(3)
-    data, verdict = path.read_bytes(), check_certificate.check(check_certificate.read(str(path)))
+    data, claim = path.read_bytes(), check_certificate.check_arrays(check_certificate.read_arrays(str(path)))
     other, refused_forgeries = tmp_path / "other.npz", 0
     for at in rng.integers(0, len(data), 100):
         other.write_bytes(data[:at] + bytes([data[at] ^ (1 << rng.integers(8))]) + data[at + 1 :])
         try:
-            found = check_certificate.check(check_certificate.read(str(other)))
+            found = check_certificate.check_arrays(check_certificate.read_arrays(str(other)))
         except WRONG:
             refused_forgeries += 1
             continue
-        assert (found.status, found.energy, found.bound) == (verdict.status, verdict.energy, verdict.bound)
+        assert (found.status, found.energy, found.bound) == (claim.status, claim.energy, claim.bound)
     assert refused_forgeries > 70
 
 
@@ -208,8 +243,8 @@ def test_levels_that_do_not_follow_are_not_written(written, tmp_path):
     allowed = proof.levels[1].allowed.copy()
     allowed[label] = False
     fewer = with_allowed(arrays, 1, allowed)
-    messages = {name: fewer[f"level_1_{name}"] for name in proof.levels[1].messages}
-    less = replace(proof.levels[1], allowed=allowed, messages=messages)
+    shares = {name: fewer[f"level_1_{name}"] for name in proof.levels[1].shares}
+    less = replace(proof.levels[1], allowed=allowed, shares=shares)
     levels = (proof.levels[0], less, *proof.levels[2:])
     with pytest.raises(InputError, match=r"it\.npz: would hold a proof that is not valid: level 1, pixel 0"):
         write_certificate(replace(proof, levels=levels), path)
@@ -245,8 +280,8 @@ def test_a_forged_archive_is_refused_or_has_the_arrays_that_numpy_loads(written,
         with subtests.test(what):
             other.write_bytes(forge(path.read_bytes()))
             try:
-                unpacked = check_certificate.read(str(other))
-                check_certificate.check(unpacked)
+                unpacked = check_certificate.read_arrays(str(other))
+                check_certificate.check_arrays(unpacked)
             except WRONG:
                 assert check_certificate.main([str(other)]) == 2
                 assert capsys.readouterr().out.startswith("unreadable: ")
@@ -369,7 +404,7 @@ def test_products_are_the_least_sums(shape):
     left, right = rng.normal(size=(rows, terms)), rng.normal(size=(columns, terms)).T
     left[:, 1:][rng.random((rows, terms - 1)) < 0.3] = np.inf
     expected = (left[:, :, None] + right).min(axis=1)
-    np.testing.assert_array_equal(check_certificate.min_plus(left, right), expected)
+    np.testing.assert_array_equal(check_certificate.min_plus_product(left, right), expected)
 
 
 def free_energy(instance, alpha, beta, norm=2):
@@ -408,27 +443,27 @@ def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(writ
         (7, 0.0, 0.5),
     ):
         _, arrays = written(seed)
-        instance, (sketch_, _) = proven(seed).field.instance, check_certificate.sketch_of(arrays)
-        level = check_certificate.level_of(arrays, 0, sketch_)
+        instance, (terms, _) = proven(seed).field.instance, check_certificate.terms_of(arrays)
+        level = check_certificate.level_of(arrays, 0, terms)
         level.shares = [
             level.shares[e]
             + rng.normal(0, size, level.shares[e].shape)
             + steep * np.arange(len(level.shares[e]))
-            for e in range(len(sketch_.first))
+            for e in range(len(terms.first))
         ]
-        passed = check_certificate.ForwardPass(level, sketch_, np.inf)
-        places = [level.places(i) for i in range(instance.grid.size)]
+        passed = check_certificate.ForwardPass(level, terms, np.inf)
+        angles = [level.angles(i) for i in range(instance.grid.size)]
         for near in (1.0, 0.3, 0.05, 0.01) * 40:
-            at = [near * rng.uniform(-1, 1, 2) * np.pi / 4 for _ in places]
+            at = [near * rng.uniform(-1, 1, 2) * np.pi / 4 for _ in angles]
             x = [
                 np.clip(level.alpha[i] + a, alpha[0], alpha[-1]) for i, ((a, _), (alpha, _)) in enumerate(
-                    zip(at, places, strict=True))
+                    zip(at, angles, strict=True))
             ]  # fmt: skip
             y = [np.clip(level.beta[i] + b, -np.pi / 4, np.pi / 4) for i, (_, b) in enumerate(at)]
             energy = free_energy(instance, np.array(x), np.array(y))
             assert passed.bound <= energy
             for number, test in enumerate(passed.tests):
-                for i, (alpha, beta) in enumerate(places):
+                for i, (alpha, beta) in enumerate(angles):
                     mean = hat(x[i], alpha) @ test.bounds[i].reshape(len(alpha), -1) @ hat(y[i], beta)
                     closest[number] = min(closest[number], energy - mean)
                     assert mean <= energy + 1e-12
@@ -443,11 +478,11 @@ def hat(value, places):
 def test_boxes_hold_the_crosses_of_all_cells(written):
     rng = np.random.default_rng(6)
     _, arrays = written(1)
-    sketch_, _ = check_certificate.sketch_of(arrays)
-    level = check_certificate.level_of(arrays, 0, sketch_)
+    terms, _ = check_certificate.terms_of(arrays)
+    level = check_certificate.level_of(arrays, 0, terms)
     cells = [rng.random(np.array(allowed.shape) - 1) < 0.05 for allowed in level.allowed]
     for i, box in enumerate(check_certificate.boxes_of(level, cells, 1e-9)):
-        alpha, beta = level.places(i)
+        alpha, beta = level.angles(i)
         k, l = np.nonzero(cells[i])  # noqa: E741
         x = alpha[k] + rng.random(len(k)) * level.h
         y = np.clip(beta[l] + rng.random(len(l)) * level.h, -np.pi / 4, np.pi / 4)
@@ -461,26 +496,26 @@ def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(norm, written):
     rng, cut = np.random.default_rng(4), 0
     for seed in (1, 3, 4, 7):
         _, arrays = written(seed)
-        (sketch_, _), proof = check_certificate.sketch_of(arrays), proven(seed)
-        sketch_.norm, lattice = norm, replace(proof.levels[0], norm=norm)
+        (terms, _), proof = check_certificate.terms_of(arrays), proven(seed)
+        terms.norm, lattice = norm, replace(proof.levels[0], norm=norm)
         for away in (0.0, 0.0, 0.0, 0.0, 0.15, 0.3):
-            edge = sketch_.theta[0] + rng.choice([-1, 1]) * (np.pi / 4 + away)
+            edge = terms.theta[0] + rng.choice([-1, 1]) * (np.pi / 4 + away)
             alpha = edge + rng.normal(0, 0.02, 4)
             beta = rng.choice([-1, 1]) * rng.uniform(0.3, 0.75, 4)
             sides = rng.uniform(0.01, 0.1, (2, 4))
             high = np.minimum(beta + sides[1], np.pi / 4)
             boxes = np.stack([alpha - sides[0], alpha + sides[0], beta - sides[1], high], axis=1)
-            p = np.zeros(len(sketch_.first), int)
-            step = check_certificate.last_step(sketch_, boxes, alpha, p)
-            if not check_certificate.is_convex(sketch_, step):
+            p = np.zeros(len(terms.first), int)
+            step = check_certificate.last_step(terms, boxes, alpha, p)
+            if not check_certificate.is_convex(terms, step):
                 continue
-            cuts, multipliers = pieces_of(lattice, step, np.inf)
+            cuts, multipliers = last_step_pieces(lattice, step, np.inf)
             low, size = boxes[:, ::2], boxes[:, 1::2] - boxes[:, ::2]
             points = low + rng.random((400, 4, 2)) ** rng.choice([0.1, 1, 10], (400, 1, 1)) * size
             energies = [free_energy(proof.field.instance, *point.T, norm) for point in points]
             for noise in (0.0, 0.1):
                 parts = {"cuts": cuts, "multipliers": multipliers + rng.normal(0, noise, multipliers.shape)}
-                bound = check_certificate.pieces_bound(sketch_, step, parts)
+                bound = check_certificate.pieces_bound(terms, step, parts)
                 assert bound <= min(energies) + 1e-9
                 assert noise or bound > min(energies) - 0.5
             cut += len(cuts) > 1

@@ -22,7 +22,7 @@ from crossfield.models.proof.prove import prove
 from crossfield.models.search.absolute_fit import alternate_absolute
 from exhaustive import optimum, random_instance
 
-REFUSED = (check_certificate.RefusedError, check_certificate.UnreadableError)
+REFUSED = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 KINDS = ("optimal", "a window binds", "a worse field", "tables", "norm 1", "norm mixed")
 COARSE = 2.0**-12
 TRIES = 7
@@ -72,8 +72,8 @@ def modest(name, arrays):
     if name == "head":
         return []
     try:
-        sketch, _ = check_certificate.sketch_of(arrays)
-        energy, _ = check_certificate.energy_of(sketch, *check_certificate.field_of(arrays, sketch))
+        terms, _ = check_certificate.terms_of(arrays)
+        energy, _ = check_certificate.energy_of(terms, *check_certificate.field_of(arrays, terms))
     except REFUSED:
         return []
     return [with_head(arrays, status="gap", energy=energy, bound=0.0)]
@@ -124,7 +124,7 @@ def least_energy(arrays, known, norm):
 def confirmed_bound(arrays):
     """The bound that the checker confirms, None where it refuses."""
     try:
-        return check_certificate.check(arrays).bound
+        return check_certificate.check_arrays(arrays).bound
     except REFUSED:
         return None
 
@@ -136,7 +136,7 @@ def test_no_changed_number_makes_a_false_claim_pass(kind, honest):
 
     Where the status is `optimal`, the bound confirms the energy, too.
     """
-    arrays = check_certificate.read(str(honest(kind)))
+    arrays = check_certificate.read_arrays(str(honest(kind)))
     arrays = {name: arrays[name] for name in sorted(arrays)}  # the same changes for any order in the file
     rng, known, counts = np.random.default_rng(7), {}, Counter()
     for name, other in changes(arrays, rng):
@@ -190,7 +190,7 @@ def assert_refused(path):
 def test_every_array_in_another_form_is_refused(honest, tmp_path, subtests):
     """Arrays of the last level stand for those of all."""
     path, other = honest("tables"), tmp_path / "other.npz"
-    members, arrays = members_of(path.read_bytes()), check_certificate.read(str(path))
+    members, arrays = members_of(path.read_bytes()), check_certificate.read_arrays(str(path))
     for name, array in arrays.items():
         for what, form in other_forms(array).items() if not name.startswith(("level_0", "level_1")) else ():
             with subtests.test(name=name, what=what):

@@ -111,10 +111,10 @@ def test_the_levels_are_a_chain_round_one_centre_and_its_bound_is_theirs():
         size = level.alpha_count.astype(int) * level.beta_count
         assert len(level.allowed) == size.sum()
         grid = proof.field.instance.grid
-        steps = len(level.messages["share_steps"])
+        steps = len(level.shares["share_steps"])
         labels = np.add.reduceat(level.allowed, np.cumsum(size) - size, dtype=int)
         assert steps == labels[np.minimum(grid.first, grid.second)].sum()
-        assert len(set(level.messages["share_unit"])) == 1
+        assert len(set(level.shares["share_unit"])) == 1
         assert level.bound <= proof.energy <= level.energy
         np.testing.assert_array_equal(level.alpha, proof.levels[0].alpha)
         np.testing.assert_array_equal(level.p, proof.levels[0].p)

@@ -5,7 +5,7 @@ import numpy as np
 from crossfield.models.field.field import CrossField
 from crossfield.models.processes.compilation import crew
 from crossfield.models.proof import check_certificate
-from crossfield.models.proof.certificate import _arrays, _head
+from crossfield.models.proof.certificate import _head_arrays, _proof_arrays
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.record import LevelRecord, Proof
@@ -24,12 +24,12 @@ def test_every_label_costs_what_the_checker_computes():
     lines = rng.uniform(0, np.pi, (2, instance.grid.size))
     field = CrossField.from_lines(instance, *lines)
     with crew(1) as hands:
-        level = LevelRecord.of(Dual(Lattice.whole(field, 16), hands), field.energy().total)
+        level = LevelRecord.of_dual(Dual(Lattice.whole(field, 16), hands), field.energy().total)
     proof = Proof(field, field.energy().total, 0.0, 0, (level,), 0.0, "labels")
-    arrays = _arrays(proof) | _head(proof)
-    sketch, _ = check_certificate.sketch_of(arrays)
-    same = check_certificate.level_of(arrays, 0, sketch)
+    arrays = _head_arrays(proof) | _proof_arrays(proof)
+    terms, _ = check_certificate.terms_of(arrays)
+    same = check_certificate.level_of(arrays, 0, terms)
     mine = np.split(level.unary_costs(), level.start[1:-1])
     for i, cost in enumerate(mine):
-        checked, _ = check_certificate.pixel_costs(same, sketch, i)
+        checked, _ = check_certificate.pixel_costs(same, terms, i)
         assert np.allclose(cost, checked.ravel(), rtol=0, atol=1e-12)
