@@ -21,7 +21,7 @@ import numpy as np
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.bundle.starts import STARTS
 from crossfield.export.cli.tables import smallest_problems
-from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
+from crossfield.export.solvers_table import PROGRAMS, SOLVERS, suitability
 from crossfield.export.verify.checks import Check, Verdict, Verification
 from crossfield.export.verify.verify import verify
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -105,7 +105,7 @@ def route_tables(main: Run) -> list[str]:
     """A table for each formulation, of the solvers that take it."""
     parts = []
     for problem in smallest_problems():
-        found = [f for f in main.solves(problem.name) if takes(problem, f.program).answer == "yes"]
+        found = [f for f in main.solves(problem.name) if suitability(problem, f.program).answer == "yes"]
         proven = "No route proves the optimum in time."
         if proofs := len(main.proven(problem.name)):
             proven = (
@@ -195,7 +195,7 @@ def update_record(runs: list[Run]) -> dict[str, dict[str, Any]]:
                     for problem in smallest_problems()
                     for check in main.solves(problem.name)
                     if check.program in entry.solvers and check.verdict != Verdict.NOT_TRIED
-                    if takes(problem, check.program).answer == "yes"
+                    if suitability(problem, check.program).answer == "yes"
                 ],
             }
     RECORD.write_text(json.dumps(kept, indent=1) + "\n")
@@ -229,7 +229,10 @@ def licences(kept: dict[str, dict[str, Any]], present: dict[str, str]) -> list[s
 def capabilities() -> list[str]:
     """The solvers that take each formulation, and the reasons of the others."""
     marks = {"yes": "yes", "local": "local", "no": "-"}
-    rows = [[f"`{p.name}`", *(marks[takes(p, name).answer] for name in SOLVERS)] for p in smallest_problems()]
+    rows = [
+        [f"`{p.name}`", *(marks[suitability(p, name).answer] for name in SOLVERS)]
+        for p in smallest_problems()
+    ]
     reasons = [
         [entry.title, trait, refusal.reason]
         for entry in SOLVERS.values()

@@ -24,7 +24,7 @@ from ..models.formulations.declaration import Formulation
 from ..models.formulations.problem import Problem
 from ..models.instance.instance import Instance
 from .formats.registry import FORMATS, problem_in_format
-from .licence import licence_error
+from .licences import licence_error
 
 Stage = Literal["read", "solve", "local"]
 Proof = Literal["global", "convex", "local"]
@@ -297,7 +297,7 @@ BUNDLED: Final = {name: solver for name, solver in SOLVERS.items() if solver.bun
 """The solvers that are installed with crossfield."""
 
 
-class Taking(NamedTuple):
+class Suitability(NamedTuple):
     """Whether a solver takes a problem, in which format, and the reason for any answer but `yes`.
 
     answer: `yes`, `local` (it answers without proof) or `no`.
@@ -308,31 +308,31 @@ class Taking(NamedTuple):
     reason: str
 
 
-def takes(problem: Problem, solver: str) -> Taking:
+def suitability(problem: Problem, solver: str) -> Suitability:
     """Whether the solver takes the problem, and in which format: the first one with the best answer."""
-    found = [takes_in(problem, solver, name) for name in SOLVERS[solver].formats]
+    found = [suitability_in_format(problem, solver, name) for name in SOLVERS[solver].formats]
     return min(found, key=lambda each: ("yes", "local", "no").index(each.answer))
 
 
-def takes_in(problem: Problem, solver: str, name: str) -> Taking:
+def suitability_in_format(problem: Problem, solver: str, name: str) -> Suitability:
     """Whether the solver takes the problem in the format of that name."""
     try:
         held = problem_in_format(problem, FORMATS[name])
     except UnsupportedByFormatError as error:
-        return Taking("no", name, str(error))
+        return Suitability("no", name, str(error))
     entry = SOLVERS[solver]
     refusal = entry.refusal(held, "read", "solve") or entry.refusal(held)
     if refusal is None:
-        return Taking("yes", name, "")
-    return Taking("local" if refusal.stage == "local" else "no", name, refusal.reason)
+        return Suitability("yes", name, "")
+    return Suitability("local" if refusal.stage == "local" else "no", name, refusal.reason)
 
 
-def takers(problem: Problem) -> dict[str, Taking]:
+def suitabilities(problem: Problem) -> dict[str, Suitability]:
     """The answer of each solver to a problem."""
-    return {name: takes(problem, name) for name in SOLVERS}
+    return {name: suitability(problem, name) for name in SOLVERS}
 
 
-def smallest(formulation: Formulation) -> Problem:
+def smallest_problem(formulation: Formulation) -> Problem:
     """The formulation on two pixels: enough to determine what a format carries and a solver takes."""
     pixels, ones = np.zeros((1, 2), dtype=np.int32), np.ones(1)
     instance = Instance("smallest", np.ones((1, 2), dtype=bool), pixels, ones, ones)

@@ -29,7 +29,7 @@ class Status(StrEnum):
     UNKNOWN = "unknown"
 
     @property
-    def promises_point(self) -> bool:
+    def needs_point(self) -> bool:
         """Whether the status implies a feasible point."""
         return self in {
             Status.OPTIMAL_GLOBAL,
@@ -43,14 +43,14 @@ class Status(StrEnum):
         """The status of a file that states this one, but holds no point."""
         if self is Status.LIMIT_WITH_POINT:
             return Status.LIMIT_WITHOUT_POINT
-        return Status.ERROR if self.promises_point else self
+        return Status.ERROR if self.needs_point else self
 
 
 OPTIMAL_GAP: Final = 1.01e-4, 1e-6
 """Largest relative and absolute gap of an optimum: the defaults of solvers."""
 
 
-def closes(bound: float, objective: float) -> bool:
+def is_gap_closed(bound: float, objective: float) -> bool:
     """Whether a dual bound is so close to an objective that a claim of optimality holds."""
     relative, absolute = OPTIMAL_GAP
     return objective - bound <= max(absolute, relative * abs(objective))
@@ -137,7 +137,7 @@ SCIP_GAP: Final = "gaplimit"
 """PySCIPOpt's name for a search that ended at the gap it was given."""
 
 
-def of_scip(words: str) -> Status:
+def status_of_scip(words: str) -> Status:
     """The status in SCIP's words; every limit that it reaches has words of its own."""
     limit = words.endswith(("limit reached", "limit"))
     return Status.LIMIT_WITH_POINT if limit else SCIP.get(words, Status.ERROR)
@@ -156,11 +156,11 @@ CBC: Final = {
 """The start of CBC's words in lower case; the first that fits counts."""
 
 
-def of_cbc(words: str) -> Status:
+def status_of_cbc(words: str) -> Status:
     """The status in CBC's words, which may end with what values follow."""
     known = (status for start, status in CBC.items() if words.lower().startswith(start))
     status = next(known, Status.ERROR)
-    relaxed = "continuous used" in words and status.promises_point
+    relaxed = "continuous used" in words and status.needs_point
     return Status.LIMIT_WITHOUT_POINT if relaxed else status
 
 
@@ -223,7 +223,7 @@ GAMS_LIMITS: Final = {2, 3, 4, 8}
 """GAMS's solver states at which a limit or the user ended the search."""
 
 
-def of_gams(model: int, solver: int) -> tuple[Status, str]:
+def status_of_gams(model: int, solver: int) -> tuple[Status, str]:
     """The claim of GAMS's model state and solver state, and both in words."""
     status, words = GAMS_MODEL.get(model, (Status.ERROR, f"model status {model}"))
     if status is Status.FEASIBLE and solver in GAMS_LIMITS:
@@ -253,7 +253,7 @@ AMPL_GLOBAL: Final = re.compile(
 name; Ipopt writes them after its own."""
 
 
-def of_ampl(code: int | None, message: str, *, with_point: bool) -> Status:
+def status_of_ampl(code: int | None, message: str, *, with_point: bool) -> Status:
     """The status of an AMPL solve code, which states only `solved`: the message names who can prove more."""
     if code is None:
         return Status.FEASIBLE if with_point else Status.NO_POINT
@@ -294,7 +294,7 @@ BARON_STOPPED: Final = re.compile(r"max\. allowable|memory|interrupt", re.IGNORE
 """BARON's banners at a limit."""
 
 
-def of_baron(banner: str, *, has_table: bool, unbounded: bool) -> Status:
+def status_of_baron(banner: str, *, has_table: bool, unbounded: bool) -> Status:
     """The status of BARON's last banner, and of whether a table of the best point and a ray follow it."""
     if banner == BARON_NORMAL:
         proven = Status.OPTIMAL_GLOBAL if has_table else Status.INFEASIBLE
@@ -338,7 +338,7 @@ WORDS: Final = (
 point."""
 
 
-def of_words(words: str) -> Status:
+def status_of_words(words: str) -> Status:
     """The status in words of any program."""
     known = (status for start, status in WORDS if re.match(start, words, re.IGNORECASE))
     return next(known, Status.FEASIBLE)

@@ -18,7 +18,7 @@ from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
 from ..formats.registry import Written, program_version
-from ..solvers_table import smallest, takers
+from ..solvers_table import smallest_problem, suitabilities
 from ..writing.canonical import CanonicalForm
 
 FORMAT: Final = "crossfield-manifest"
@@ -223,7 +223,9 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
         "sha256": problem.sha256,
         "files": files,
         "refused": refused,
-        "solvers": {name: taking._asdict() for name, taking in takers(smallest(formulation)).items()},
+        "solvers": {
+            name: taking._asdict() for name, taking in suitabilities(smallest_problem(formulation)).items()
+        },
     }
 
 

@@ -27,7 +27,7 @@ from ...models.instance.instance import Instance
 from ...models.processes.deadline import Progress, silent
 from ...models.storage import make_folder
 from ..formats.registry import DEFAULTS, FORMATS, problem_in_format, write
-from ..solvers_table import smallest
+from ..solvers_table import smallest_problem
 from .manifest import LARGE, Manifest, file_stem, narrow_windows, write_manifest
 from .starts import write_starts
 
@@ -179,7 +179,7 @@ def _check_formats(
         if name not in FORMATS:
             raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
     reasons = []
-    for problem in map(smallest, formulations):
+    for problem in map(smallest_problem, formulations):
         for name in formats:
             try:
                 problem_in_format(problem, FORMATS[name])

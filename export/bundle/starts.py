@@ -28,7 +28,7 @@ from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ..formats.registry import FORMATS, problem_in_format
-from ..solvers_table import SOLVERS, takes
+from ..solvers_table import SOLVERS, suitability
 from ..writing.canonical import CanonicalForm
 from ..writing.records import Decimals, Pieces, number_text, render, words
 from ..writing.sink import save_file
@@ -183,7 +183,7 @@ def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: 
 
 def _reason_of_refusal(problem: Problem, start: Start, solver: str) -> str:
     """Reason why a solver does not start from a point of the problem, empty if it does."""
-    taking = takes(problem, solver)
+    taking = suitability(problem, solver)
     if taking.answer == "no":
         return f"{solver} does not take {problem.name}: {taking.reason}"
     if STARTS[solver].convex and not start.problem.convex:

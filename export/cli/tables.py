@@ -10,7 +10,7 @@ from ...models.formulations.problem import Problem
 from ...models.sketch.samples import samples
 from ..formats.registry import FORMATS, problem_in_format
 from ..solutions.readers.registry import READERS
-from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, smallest, takers
+from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, smallest_problem, suitabilities
 from ..solving.local import choose_format
 from ..solving.methods import METHODS
 
@@ -54,15 +54,15 @@ def tables() -> Tables:
 
 def smallest_problems() -> list[Problem]:
     """Every formulation on an instance of two pixels."""
-    return [smallest(declare(name)) for name in FORMULATIONS]
+    return [smallest_problem(declare(name)) for name in FORMULATIONS]
 
 
 def _list_relaxations() -> list[tuple[Problem, bool]]:
     rows: list[tuple[Problem, bool]] = []
     for name, recipe in FORMULATIONS.items():
-        rows.append((smallest(declare(name)), False))
+        rows.append((smallest_problem(declare(name)), False))
         if "relax" in recipe.option_names:
-            rows.append((smallest(declare(name, relax=True)), True))
+            rows.append((smallest_problem(declare(name, relax=True)), True))
     return rows
 
 
@@ -100,5 +100,5 @@ def _solver_row(problem: Problem, relaxed: bool) -> Row:
 
 
 def _external_row(problem: Problem) -> Row:
-    answers = {name: taking.reason or taking.answer for name, taking in takers(problem).items()}
+    answers = {name: taking.reason or taking.answer for name, taking in suitabilities(problem).items()}
     return {"formulation": problem.name} | answers

@@ -15,8 +15,8 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.instance.grid import Floats
+from .model_content import Behaviour, Points
 from .protocol import file_names, run_program
-from .reading import Evaluation, Points
 
 _ACCURACY: Final = 1e-5
 """Relative accuracy of its bounds, which it prints with six digits."""
@@ -28,14 +28,14 @@ def version() -> str:
     return f"{found[1]} (ASL {found[2]})" if found else "unknown"
 
 
-def at_start(path: Path) -> dict[str, Any]:
+def report_at_start(path: Path) -> dict[str, Any]:
     """The library's report about an .nl file, with values at its start; writes a .json next to the file."""
     run_program("gjh_asl_json", str(path.with_suffix("")), folder=path.parent)
     report: dict[str, Any] = json.loads(path.with_suffix(".json").read_text("utf-8"))
     return report
 
 
-def with_start(data: bytes, point: Floats) -> bytes:
+def add_start(data: bytes, point: Floats) -> bytes:
     """The bytes of an .nl file with that starting point, in the order of the file."""
     if data.startswith(b"b"):
         entries = b"".join(struct.pack("<id", place, value) for place, value in enumerate(point.tolist()))
@@ -44,18 +44,18 @@ def with_start(data: bytes, point: Floats) -> bytes:
     return data + f"x{len(point)}\n{lines}".encode()
 
 
-def evaluate(path: Path, points: Points) -> Evaluation:
+def evaluate(path: Path, points: Points) -> Behaviour:
     """The .nl file as the library reads it; it reports how many columns are integer, but not which."""
     columns, rows = file_names(path)
     data, copy = path.read_bytes(), Path("point.nl").resolve()
     reports: list[dict[str, Any]] = []
     for point in points.of(columns):
-        copy.write_bytes(with_start(data, point))
-        reports.append(at_start(copy))
+        copy.write_bytes(add_start(data, point))
+        reports.append(report_at_start(copy))
     lower, upper = _bounds(reports[0]["variable bounds"], len(columns))
     row_lower, row_upper = _bounds(reports[0].get("constraint bounds", {}), len(rows))
     values = [report["initial evaluations"] for report in reports]
-    return Evaluation(
+    return Behaviour(
         columns,
         lower,
         upper,

@@ -23,8 +23,8 @@ from ...models.instance.grid import Bools, Floats
 from ...models.processes.child_program import is_stopped, on_stop
 from ..solutions.readers.ampl import write_ampl_sol
 from ..statuses import CASADI
+from .model_content import Behaviour, Points
 from .protocol import Job, Outcome, RefusedError, file_names, interrupt_self
-from .reading import Evaluation, Points
 
 FEASIBLE: Final = 1e-6
 """Violation up to which a point counts as feasible: the solvers' own tolerance."""
@@ -85,7 +85,7 @@ _NO_POINT: Final = 1e49
 """Least objective that means no incumbent: Bonmin then reports 1e50."""
 
 
-class Watch(ca.Callback):
+class IterateWatch(ca.Callback):
     """Callback of Ipopt at every iterate: keeps the best feasible point and passes on a request to stop.
 
     best: the lowest feasible point so far, initially the start; None without one. value: its
@@ -143,7 +143,7 @@ class AmplAnswer(NamedTuple):
     point: Floats
 
 
-def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
+def solver_options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
     """Options of the solver for a time limit and a relative gap."""
     if solver == "ipopt":
         return {
@@ -171,12 +171,12 @@ def version() -> str:
     return str(ca.CasadiMeta.version())
 
 
-def evaluate(path: Path, points: Points) -> Evaluation:
+def evaluate(path: Path, points: Points) -> Behaviour:
     """The .nl file as CasADi reads it; names come from .col and .row."""
     model = read_nl(path)
     columns, rows = file_names(path)
     values = [model.evaluate(point) for point in points.of(columns)]
-    return Evaluation(
+    return Behaviour(
         columns,
         model.lower,
         model.upper,
@@ -204,8 +204,8 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
 
     Raises RefusedError for an error inside the solver.
     """
-    chosen = options(solver, seconds, gap) | {"print_time": False, "error_on_fail": False}
-    watch = Watch(model)
+    chosen = solver_options(solver, seconds, gap) | {"print_time": False, "error_on_fail": False}
+    watch = IterateWatch(model)
     if solver == "ipopt":
         chosen["iteration_callback"] = watch
     else:
@@ -230,7 +230,7 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
     words += " (at the limit, or by Ctrl-C)" if words in _STOPPED else ""
     point, value = np.array(answer["x"]).ravel(), float(answer["f"])
     if solver == "bonmin" and value >= _NO_POINT:
-        return _without_better(words, code, watch)
+        return _answer_of_start(words, code, watch)
     if solver == "ipopt" and code == _LIMIT and watch.best is not None:
         watch.see(point, np.array([value]), np.array(answer["g"]).ravel())
         words += "" if watch.best is point else ", the best feasible point before it"
@@ -238,7 +238,7 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
     return AmplAnswer(words, code, np.zeros(0) if code == 300 else point)
 
 
-def _without_better(words: str, code: int, watch: Watch) -> AmplAnswer:
+def _answer_of_start(words: str, code: int, watch: IterateWatch) -> AmplAnswer:
     """The answer of a search by Bonmin without a result: the start, if it is feasible."""
     if watch.best is None:
         return AmplAnswer(words, 470 if code == _LIMIT else code, np.zeros(0))

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..writing.stamps import is_one_column
 from . import highs as highs_program
-from .protocol import Job, NotReportedError, Outcome, RefusedError, complete, run_program
-from .reading import Meaning
+from .model_content import Algebra
+from .protocol import Job, NotReportedError, Outcome, RefusedError, run_program, write_in_full
 
 
 def version() -> str:
@@ -29,15 +29,15 @@ def _run(*arguments: str) -> str:
     return run_program("cbc", *arguments)
 
 
-def _fresh(name: str) -> Path:
+def _new_path(name: str) -> Path:
     path = Path(name)
     path.unlink(missing_ok=True)
     return path
 
 
-def read(path: Path) -> Meaning:
+def read(path: Path) -> Algebra:
     """The file as CBC reads it."""
-    copy, listed = _fresh("cbc.mps"), _fresh("cbc.txt")
+    copy, listed = _new_path("cbc.mps"), _new_path("cbc.txt")
     output = _run(str(path), "export", copy.name, "printi", "all", "solution", listed.name)
     if re.search(r"ERROR|too many errors|not valid", output) or not copy.exists():
         raise RefusedError(f"CBC cannot read it: {' '.join(re.findall(r'.*(?:ERROR|errors).*', output)[:1])}")
@@ -46,13 +46,13 @@ def read(path: Path) -> Meaning:
     names = [words[1] for words in lines]
     one = next((at for at, name in enumerate(names) if is_one_column(name)), None)
     if one is not None and len(names) == len(model.rows) + len(model.columns) + 1:
-        model = _with_column(model, one - len(model.rows), float(lines[one][2]))
+        model = _insert_fixed_column(model, one - len(model.rows), float(lines[one][2]))
     if len(names) != len(model.rows) + len(model.columns):
         raise NotReportedError("CBC does not export what its presolve removes, and its numbers have no names")
     return replace(model, rows=names[: len(model.rows)], columns=names[len(model.rows) :])
 
 
-def _with_column(model: Meaning, place: int, value: float) -> Meaning:
+def _insert_fixed_column(model: Algebra, place: int, value: float) -> Algebra:
     """The model with a column that is fixed to a value, and in no term.
 
     CBC does not export such a column, ONE of a problem without a constant; its table of values shows it.
@@ -70,7 +70,7 @@ def solve(job: Job) -> Outcome:
     """Solve the file; the solution is the file of CBC's command `solution`, which has eight digits."""
     gaps = ("ratio", f"{job.gap:g}", "allow", "1e-9", "primalT", "1e-9", "integerT", "1e-9")
     limits = (*gaps, "sec", f"{job.seconds:g}", "timem", "elapsed")
-    with complete(job.solution) as part:
+    with write_in_full(job.solution) as part:
         output = _run(str(job.model), *limits, "solve", "solution", str(part))
     if not job.solution.exists():
         raise RefusedError(f"CBC wrote no solution: {' '.join(output.split())[-200:]}")

@@ -16,8 +16,8 @@ from cplex.exceptions import CplexError, CplexSolverError
 from ...models.processes.child_program import on_stop
 from ..statuses import CPLEX, CPLEX_STOPPED, Status
 from ..writing.terms import Terms, terms_of_entries
-from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
-from .reading import Meaning, finite, infinite
+from .model_content import Algebra, finite_or_none, with_infinities
+from .protocol import Job, Outcome, RefusedError, TooLargeError, write_in_full
 
 _SIZE_LIMIT = 1016
 
@@ -38,7 +38,7 @@ def _load(path: Path, *, log: bool = False) -> Any:
     return model
 
 
-def read(path: Path) -> Meaning:
+def read(path: Path) -> Algebra:
     """The file as CPLEX reads it, quadratic rows last; its parser of decimals sometimes errs by an ulp."""
     model = _load(path)
     columns, goal = model.variables, model.objective
@@ -49,11 +49,11 @@ def read(path: Path) -> Meaning:
     limits = np.array([*plain.get_rhs(), *products.get_rhs()])
     matrix, cubes = _rows(plain, products)
     mixed = "MI" in model.problem_type[model.get_problem_type()]
-    return Meaning.of(
+    return Algebra.of(
         columns.get_names(),
         [*plain.get_names(), *products.get_names()],
-        lower=infinite(columns.get_lower_bounds()),
-        upper=infinite(columns.get_upper_bounds()),
+        lower=with_infinities(columns.get_lower_bounds()),
+        upper=with_infinities(columns.get_upper_bounds()),
         integer=[kind in "BI" for kind in (columns.get_types() if mixed else "C" * columns.get_num())],
         costs=goal.get_linear(),
         row_lower=np.where(senses == "L", -np.inf, limits),
@@ -115,11 +115,11 @@ def solve(job: Job) -> Outcome:
     words = answer.get_status_string()
     mixed = "MI" in model.problem_type[model.get_problem_type()]
     nodes = answer.progress.get_num_nodes_processed() if mixed else None
-    bound = finite(answer.MIP.get_best_objective()) if mixed else None
+    bound = finite_or_none(answer.MIP.get_best_objective()) if mixed else None
     if not answer.is_primal_feasible():
         code = answer.get_status()
         status = Status.LIMIT_WITHOUT_POINT if code in CPLEX_STOPPED else CPLEX.get(code, Status.ERROR)
         return Outcome(status.without_point, words, bound, nodes)
-    with complete(job.solution) as part:
+    with write_in_full(job.solution) as part:
         answer.write(str(part))
     return Outcome(bound=bound, nodes=nodes)

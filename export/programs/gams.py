@@ -14,11 +14,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from ..licence import package_folder
-from ..statuses import GAMS_INTEGER, GAMS_NORMAL, Status, closes, of_gams
+from ..licences import package_folder
+from ..statuses import GAMS_INTEGER, GAMS_NORMAL, Status, is_gap_closed, status_of_gams
 from . import casadi as casadi_program
-from .protocol import Job, Outcome, RefusedError, TooLargeError, complete, run_command
-from .reading import Evaluation, Points
+from .model_content import Behaviour, Points
+from .protocol import Job, Outcome, RefusedError, TooLargeError, run_command, write_in_full
 
 _LINEAR_AND_QUADRATIC: Final = ("lp", "mip", "qcp", "miqcp")
 _NONLINEAR: Final = ("nlp", "minlp")
@@ -40,7 +40,7 @@ def version() -> str:
     return f"{installed('gamspy_base')} (demo; CONVERT, read by CasADi {casadi_program.version()})"
 
 
-def _system(solver: str) -> Path:
+def _gams_folder(solver: str) -> Path:
     """The folder of GAMS; for BARON a copy, by links where possible, with BARON's files and its entry."""
     base, baron = package_folder("gamspy_base"), package_folder("gamspy_baron")
     assert base is not None
@@ -49,17 +49,19 @@ def _system(solver: str) -> Path:
     folder = Path("gams_with_baron").resolve()
     if folder.exists():
         return folder
-    shutil.copytree(base, folder, copy_function=_link, ignore=shutil.ignore_patterns(_TABLE, "__pycache__"))
+    shutil.copytree(
+        base, folder, copy_function=_link_or_copy, ignore=shutil.ignore_patterns(_TABLE, "__pycache__")
+    )
     from gamspy_baron import files, verbatim
 
     for name in files:
-        _link(baron / name, folder / name)
+        _link_or_copy(baron / name, folder / name)
     head, mark, tail = (base / _TABLE).read_text("utf-8").partition("DEFAULTS")
     (folder / _TABLE).write_text(f"{head}{verbatim}\n\n{mark}{tail}", "utf-8", newline="\n")
     return folder
 
 
-def _link(source: str | Path, target: str | Path) -> None:
+def _link_or_copy(source: str | Path, target: str | Path) -> None:
     try:
         Path(target).hardlink_to(source)
     except OSError:  # another file system
@@ -78,7 +80,7 @@ def _run(path: Path, solver: str, *options: str, gap: float | None = None) -> st
     chosen = [f"{kind}={solver}" for kind in kinds]
     Path(f"{solver}.opt").write_text(option_file(solver, gap), "ascii", newline="\n")
     command = [
-        str(_system(solver) / "gams"),
+        str(_gams_folder(solver) / "gams"),
         str(path),
         "optfile=1",
         "lo=4",
@@ -88,7 +90,7 @@ def _run(path: Path, solver: str, *options: str, gap: float | None = None) -> st
         *options,
     ]
     done = run_command(command)
-    log, listing = (_text(Path(name)) for name in ("run.log", "run.lst"))
+    log, listing = (_read_text(Path(name)) for name in ("run.log", "run.lst"))
     if re.search(r"exceeds the demo license|demo license limits|Licensing Problem", log + listing):
         raise TooLargeError("beyond the limits of the demo licence")
     if done.returncode:
@@ -97,11 +99,11 @@ def _run(path: Path, solver: str, *options: str, gap: float | None = None) -> st
     return log + listing
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     return path.read_text("utf-8", "replace") if path.exists() else ""
 
 
-def evaluate(path: Path, points: Points) -> Evaluation:
+def evaluate(path: Path, points: Points) -> Behaviour:
     """The GAMS model as CONVERT translates it and CasADi reads it, without columns in no term."""
     Path("out.nl").unlink(missing_ok=True)
     _run(path, "convert")
@@ -115,7 +117,7 @@ def solve(job: Job) -> Outcome:
     """Solve the file with one of GAMS's solvers; the solution is the CSV that our models write."""
     solver = job.solver.removeprefix("gams-")
     threads = (f"threads={job.threads}",) if job.threads else ()
-    with complete(job.solution) as part:
+    with write_in_full(job.solution) as part:
         log = _run(job.model, solver, f"reslim={job.seconds:g}", *threads, f"--RESULTS={part}", gap=job.gap)
     used = re.search(r"^ +SOLVER +(\w+) +FROM LINE", log, re.MULTILINE)
     if used and used[1].lower() != solver:
@@ -124,7 +126,7 @@ def solve(job: Job) -> Outcome:
     if refusal:
         raise RefusedError(refusal[1])
     outcome = outcome_of(log)
-    if outcome.status is None or not outcome.status.promises_point:
+    if outcome.status is None or not outcome.status.needs_point:
         job.solution.unlink(missing_ok=True)  # its values are not an answer
     elif not job.solution.exists():
         raise RefusedError(f"GAMS wrote no solution: {outcome.message}")
@@ -133,22 +135,22 @@ def solve(job: Job) -> Outcome:
 
 def outcome_of(log: str) -> Outcome:
     """Return what log and listing of a run state: status, words and dual bound."""
-    model, state = (_whole(rf"\*\*\*\* {kind} STATUS +(\d+)", log) for kind in ("MODEL", "SOLVER"))
-    status, words = of_gams(model, state)
-    bound = _number(r"^Best possible *[=:] *(\S+)$", log)
-    objective = _number(r"\*\*\*\* OBJECTIVE VALUE +(\S+)$", log)
+    model, state = (_find_integer(rf"\*\*\*\* {kind} STATUS +(\d+)", log) for kind in ("MODEL", "SOLVER"))
+    status, words = status_of_gams(model, state)
+    bound = _find_number(r"^Best possible *[=:] *(\S+)$", log)
+    objective = _find_number(r"\*\*\*\* OBJECTIVE VALUE +(\S+)$", log)
     at_gap = (model, state) == (GAMS_INTEGER, GAMS_NORMAL)
-    if at_gap and bound is not None and objective is not None and closes(bound, objective):
+    if at_gap and bound is not None and objective is not None and is_gap_closed(bound, objective):
         status = Status.OPTIMAL_GLOBAL
     return Outcome(status, words, bound)
 
 
-def _whole(pattern: str, log: str) -> int:
+def _find_integer(pattern: str, log: str) -> int:
     found = re.search(pattern, log)
     return int(found[1]) if found else 0
 
 
-def _number(pattern: str, log: str) -> float | None:
+def _find_number(pattern: str, log: str) -> float | None:
     found = re.search(pattern, log, re.MULTILINE)
     try:
         return float(found[1]) if found else None

@@ -14,10 +14,10 @@ from typing import Any, Final
 import numpy as np
 
 from ..writing.terms import terms_of_entries
-from .protocol import Job, Outcome, RefusedError, complete, run_command, run_program
-from .reading import Evaluation, Meaning, Points
+from .model_content import Algebra, Behaviour, Points
+from .protocol import Job, Outcome, RefusedError, run_command, run_program, write_in_full
 
-_KINDS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
+_FLAGS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
 _OBJECTIVE: Final = "energy"
 _ROUNDING: Final = 1e-14
 
@@ -30,7 +30,7 @@ def version() -> str:
 
 def _run(path: Path, *arguments: str) -> str:
     kind = path.suffix.removeprefix(".")
-    given = [_KINDS[kind], str(path)]
+    given = [_FLAGS[kind], str(path)]
     if kind == "mod":
         given += ["--data", str(path.with_suffix(".dat"))]
     done = run_command(["glpsol", *given, *arguments])
@@ -40,7 +40,7 @@ def _run(path: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def read(path: Path) -> Meaning:
+def read(path: Path) -> Algebra:
     """The file as GLPK reads it."""
     _run(path, "--check", "--wglp", "model.glp")
     lines = [line.split() for line in Path("model.glp").read_text("utf-8").splitlines()]
@@ -62,7 +62,7 @@ def read(path: Path) -> Meaning:
     row_lower, row_upper = _limits(lines, "i", len(names["i"]), 2)
     continuous = {int(line[1]) - 1 for line in lines if line[0] == "j" and line[2] == "c"}
     integer = [mixed and place not in continuous for place in range(len(costs))]  # binary by default
-    model = Meaning.of(
+    model = Algebra.of(
         names["j"],
         names["i"],
         lower=lower,
@@ -76,11 +76,11 @@ def read(path: Path) -> Meaning:
     return _without_objective(model, path) if path.suffix == ".mod" else model
 
 
-def evaluate(path: Path, points: Points) -> Evaluation:
+def evaluate(path: Path, points: Points) -> Behaviour:
     """The AMPL model as GLPK reads it, without columns in no term, as in AMPL."""
     model = read(path)
     given = points.of(model.columns)
-    return Evaluation(
+    return Behaviour(
         model.columns,
         model.lower,
         model.upper,
@@ -95,14 +95,14 @@ def evaluate(path: Path, points: Points) -> Evaluation:
     )
 
 
-def _without_objective(model: Meaning, path: Path) -> Meaning:
+def _without_objective(model: Algebra, path: Path) -> Algebra:
     """The model with our names, without the objective among the rows."""
     goal = model.rows.index(_OBJECTIVE)
     kept = model.matrix_at[model.matrix_at[:, 0] != goal]
     return replace(
         model,
-        columns=_ours(model.columns, path),
-        rows=_ours([name for name in model.rows if name != _OBJECTIVE], path),
+        columns=_our_names(model.columns, path),
+        rows=_our_names([name for name in model.rows if name != _OBJECTIVE], path),
         row_lower=np.delete(model.row_lower, goal),
         row_upper=np.delete(model.row_upper, goal),
         matrix_at=np.stack([kept[:, 0] - (kept[:, 0] > goal), kept[:, 1]], axis=1),
@@ -110,7 +110,7 @@ def _without_objective(model: Meaning, path: Path) -> Meaning:
     )
 
 
-def _ours(names: list[str], path: Path) -> list[str]:
+def _our_names(names: list[str], path: Path) -> list[str]:
     """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with the printed number of digits."""
     printed = re.search(r"_%0(\d+)d", path.read_text("utf-8"))
     assert printed
@@ -140,6 +140,6 @@ def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any
 def solve(job: Job) -> Outcome:
     """Solve the file; the solution is the file of `-w`, whose columns have no names."""
     limits = ("--tmlim", str(max(1, int(job.seconds))), "--mipgap", f"{job.gap:g}")
-    with complete(job.solution) as part:
+    with write_in_full(job.solution) as part:
         _run(job.model, *limits, "-w", str(part))
     return Outcome()

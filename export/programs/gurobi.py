@@ -12,8 +12,8 @@ import numpy as np
 
 from ...models.processes.child_program import on_stop
 from ..writing.terms import Terms, terms_of_entries
-from .protocol import Job, Outcome, RefusedError, TooLargeError, complete
-from .reading import Meaning, finite
+from .model_content import Algebra, finite_or_none
+from .protocol import Job, Outcome, RefusedError, TooLargeError, write_in_full
 
 _SIZE_LIMIT = 10010
 
@@ -24,7 +24,7 @@ def version() -> str:
 
 
 @contextmanager
-def _loaded(path: Path, *, log: bool = False) -> Iterator[Any]:
+def _open_model(path: Path, *, log: bool = False) -> Iterator[Any]:
     with (
         gurobipy.Env(params={"OutputFlag": int(log)}) as environment,
         gurobipy.read(str(path), environment) as model,
@@ -32,9 +32,9 @@ def _loaded(path: Path, *, log: bool = False) -> Iterator[Any]:
         yield model
 
 
-def read(path: Path) -> Meaning:
+def read(path: Path) -> Algebra:
     """The file as Gurobi reads it; quadratic rows come after the others."""
-    with _loaded(path) as model:
+    with _open_model(path) as model:
         if model.ModelSense != gurobipy.GRB.MINIMIZE or model.ObjCon != 0:
             raise RefusedError("it is not minimised, or has a constant besides ONE")
         variables, plain, products = model.getVars(), model.getConstrs(), model.getQConstrs()
@@ -43,7 +43,7 @@ def read(path: Path) -> Meaning:
         goal = model.getObjective()
         square = _products(goal) if isinstance(goal, gurobipy.QuadExpr) else []
         matrix, cubes = _rows(model, plain, products)
-        return Meaning.of(
+        return Algebra.of(
             [v.VarName for v in variables],
             [r.ConstrName for r in plain] + [r.QCName for r in products],
             lower=model.getAttr("LB", variables),
@@ -79,7 +79,7 @@ def _products(expression: Any) -> list[tuple[int, int, float]]:
 
 def solve(job: Job) -> Outcome:
     """Solve the file; the solution is a .json, which holds the status and the bound."""
-    with _loaded(job.model, log=True) as model, on_stop(model.terminate):
+    with _open_model(job.model, log=True) as model, on_stop(model.terminate):
         if job.start is not None:
             model.read(str(job.start))
         for option, value in (
@@ -94,8 +94,8 @@ def solve(job: Job) -> Outcome:
                 raise TooLargeError(str(error)) from error
             raise RefusedError(f"Gurobi error {error.errno}: {error}") from error
         model.setParam("JSONSolDetail", 1)  # columns at 0 too
-        with complete(job.solution) as part:
+        with write_in_full(job.solution) as part:
             model.write(str(part))
         if not (model.IsMIP or model.IsQCP):
             return Outcome()
-        return Outcome(bound=finite(model.ObjBound), nodes=int(model.NodeCount))
+        return Outcome(bound=finite_or_none(model.ObjBound), nodes=int(model.NodeCount))

@@ -11,8 +11,8 @@ import numpy as np
 from ...models.errors import OutputError
 from ...models.processes.child_program import is_stopped
 from ..writing.terms import merged_terms, terms_of_triangle
-from .protocol import Job, Outcome, RefusedError, complete
-from .reading import Meaning, finite
+from .model_content import Algebra, finite_or_none
+from .protocol import Job, Outcome, RefusedError, write_in_full
 
 _RAW: Final = 0
 """The style of solution files that HiGHS reads and writes with all digits."""
@@ -29,7 +29,7 @@ def _model() -> Any:
     return highspy.Highs()  # type: ignore[no-untyped-call]
 
 
-def loaded(path: Path, *, silent: bool = True, **options: str | float) -> Any:
+def load_model(path: Path, *, silent: bool = True, **options: str | float) -> Any:
     """Model of an LP or MPS file, with these options. Raises RefusedError if HiGHS cannot read it.
 
     The options are set afterwards: HiGHS applies a time limit to reading too and then reports an error.
@@ -50,7 +50,7 @@ def set_options(highs: Any, **options: str | float) -> None:
         highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - otherwise the old number is kept
 
 
-def solved(highs: Any, path: Path) -> Any:
+def solve_loaded(highs: Any, path: Path) -> Any:
     """Solve the model of a file and return it. Raises RefusedError if HiGHS reports an error."""
     if highs.run() == highspy.HighsStatus.kError:
         raise RefusedError("HiGHS answers with an error (model status Not Set)", file=path)
@@ -59,16 +59,16 @@ def solved(highs: Any, path: Path) -> Any:
 
 def write_solution(highs: Any, solution: Path) -> None:
     """Write the solution file. Raises OutputError."""
-    with complete(solution) as part:
+    with write_in_full(solution) as part:
         if highs.writeSolution(str(part), _RAW) == highspy.HighsStatus.kError:
             raise OutputError(
                 "HiGHS cannot write it; free some space or choose another folder", file=solution
             )
 
 
-def read(path: Path) -> Meaning:
+def read(path: Path) -> Algebra:
     """The file as HiGHS reads it."""
-    highs = loaded(path)
+    highs = load_model(path)
     lp, hessian = highs.getLp(), highs.getModel().hessian_
     if lp.sense_ != highspy.ObjSense.kMinimize or lp.offset_ != 0:
         raise RefusedError("it is not minimised, or has a constant besides ONE")
@@ -81,7 +81,7 @@ def read(path: Path) -> Meaning:
     if hessian.dim_:
         column, row, value = _columnwise(hessian, hessian.dim_)  # the lower triangle of x'Qx/2
         given["quadratic"] = terms_of_triangle(row, column, value)
-    return Meaning.of(list(lp.col_names_), list(lp.row_names_), **given)
+    return Algebra.of(list(lp.col_names_), list(lp.row_names_), **given)
 
 
 def _columnwise(matrix: Any, columns: int) -> tuple[Any, Any, Any]:
@@ -91,7 +91,9 @@ def _columnwise(matrix: Any, columns: int) -> tuple[Any, Any, Any]:
 
 def solve(job: Job) -> Outcome:
     """Solve the file; the solution is HiGHS' raw style, which has no bound."""
-    highs = loaded(job.model, silent=False, mip_rel_gap=job.gap, time_limit=job.seconds, threads=job.threads)
+    highs = load_model(
+        job.model, silent=False, mip_rel_gap=job.gap, time_limit=job.seconds, threads=job.threads
+    )
     if job.precise and not highs.getModel().hessian_.dim_:  # the QP method fails with such tolerances
         set_options(
             highs, mip_abs_gap=1e-9, mip_feasibility_tolerance=1e-9, primal_feasibility_tolerance=1e-9
@@ -105,7 +107,7 @@ def solve(job: Job) -> Outcome:
     if not len(highs.getLp().integrality_):
         return Outcome()
     info = highs.getInfo()
-    return Outcome(bound=finite(info.mip_dual_bound), nodes=info.mip_node_count)
+    return Outcome(bound=finite_or_none(info.mip_dual_bound), nodes=info.mip_node_count)
 
 
 def _run(highs: Any) -> None:

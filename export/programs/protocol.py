@@ -87,7 +87,7 @@ class Outcome(NamedTuple):
     nodes: int | None = None
 
 
-def call(program: str, step: str, *arguments: Any) -> Any:
+def call_program(program: str, step: str, *arguments: Any) -> Any:
     """Call a function of a program's module: `version`, `read`, `evaluate` or `solve` (see protocol.py).
 
     A program that ends with an error after a request to stop has no answer: an interrupt ends GLPK and CBC at
@@ -105,18 +105,18 @@ def call(program: str, step: str, *arguments: Any) -> Any:
         raise FailedError(f"{type(error).__name__}: {error}") from error
 
 
-def part_of(solution: Path) -> Path:
+def part_path(solution: Path) -> Path:
     """Return the path of a solution while it is written; programs choose the layout by its suffix."""
     return solution.with_name(f".part-{solution.name}")
 
 
 @contextmanager
-def complete(solution: Path) -> Iterator[Path]:
+def write_in_full(solution: Path) -> Iterator[Path]:
     """Yield the path for a program to write a solution to; the file gets its name once it is complete.
 
     So a file that exists after the program was killed is a whole answer.
     """
-    part = part_of(solution)
+    part = part_path(solution)
     part.unlink(missing_ok=True)
     try:
         yield part

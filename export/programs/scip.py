@@ -15,11 +15,11 @@ import numpy as np
 import pyscipopt
 
 from ...models.processes.child_program import on_stop
-from ..statuses import SCIP_GAP, Status, closes, of_scip
+from ..statuses import SCIP_GAP, Status, is_gap_closed, status_of_scip
 from ..writing.stamps import is_one_column
 from ..writing.terms import Terms, terms_of_entries
-from .protocol import Job, Outcome, RefusedError, complete, file_names
-from .reading import Evaluation, Meaning, Points, finite
+from .model_content import Algebra, Behaviour, Points, finite_or_none
+from .protocol import Job, Outcome, RefusedError, file_names, write_in_full
 
 _INFINITY: Final = 1e19  # SCIP's is 1e20
 _OBJECTIVE_COLUMNS: Final = frozenset({"quadobjvar", "qmatrixvar", "nlobjvar"})
@@ -44,7 +44,7 @@ def _load(path: Path) -> Any:
     return scip
 
 
-def read(path: Path) -> Meaning:
+def read(path: Path) -> Algebra:
     """The LP or MPS file as SCIP reads it."""
     scip = _load(path)
     if scip.getObjoffset() != 0:
@@ -59,7 +59,7 @@ def read(path: Path) -> Meaning:
         raise RefusedError("its quadratic objective has linear terms besides the costs")
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in variables])
     row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in rows])
-    return Meaning.of(
+    return Algebra.of(
         list(number),
         [row.name for row in rows],
         lower=lower,
@@ -97,7 +97,7 @@ def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, T
     return terms_of_entries(linear, indices=2), terms_of_entries(square, indices=3, products=2)
 
 
-def evaluate(path: Path, points: Points) -> Evaluation:
+def evaluate(path: Path, points: Points) -> Behaviour:
     """The .nl or OSiL file as SCIP reads it: columns, linear rows, its judgement of the objective."""
     scip = _load(path)
     variables = {v.name: v for v in scip.getVars()}
@@ -107,7 +107,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
     row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in map(rows.get, row_names)])
     given = points.of(columns)
-    return Evaluation(
+    return Behaviour(
         [v.name for v in ours],
         lower,
         upper,
@@ -126,7 +126,9 @@ def _objective(scip: Any, variables: dict[str, Any], columns: list[str], points:
     values = np.full(len(points.values), np.nan)
     given = points.of(columns)
     for place in range(points.random, len(given)):
-        values[place] = _agreed(scip, variables, columns, given[place], float(points.objective[place]))
+        values[place] = _judge_objective(
+            scip, variables, columns, given[place], float(points.objective[place])
+        )
     return values
 
 
@@ -137,7 +139,9 @@ def _activity(scip: Any, row: Any, columns: list[str], given: Any) -> Any:
     return given @ np.array([value.get(name, 0.0) for name in columns])
 
 
-def _agreed(scip: Any, variables: dict[str, Any], columns: list[str], point: Any, claim: float) -> float:
+def _judge_objective(
+    scip: Any, variables: dict[str, Any], columns: list[str], point: Any, claim: float
+) -> float:
     """The claimed objective at a feasible point if SCIP agrees within a small amount, else infinity."""
     extra = [v for name, v in variables.items() if name in _OBJECTIVE_COLUMNS]
     rest = sum(variables[name].getObj() * value for name, value in zip(columns, point, strict=True))
@@ -177,12 +181,12 @@ def solve(job: Job) -> Outcome:
         scip.addSol(scip.readSolFile(str(job.start)))
     with on_stop(scip.interruptSolve):
         scip.optimizeNogil()
-    words, bound = scip.getStatus(), finite(scip.getDualbound())
-    status = of_scip(words)
+    words, bound = scip.getStatus(), finite_or_none(scip.getDualbound())
+    status = status_of_scip(words)
     if not scip.getNSols():
         return Outcome(status.without_point, words, bound, scip.getNTotalNodes())
-    with complete(job.solution) as part:
+    with write_in_full(job.solution) as part:
         scip.writeBestSol(str(part))
-    if words == SCIP_GAP and bound is not None and closes(bound, scip.getPrimalbound()):
+    if words == SCIP_GAP and bound is not None and is_gap_closed(bound, scip.getPrimalbound()):
         status = Status.OPTIMAL_GLOBAL
     return Outcome(status, words, bound, scip.getNTotalNodes())

@@ -15,8 +15,8 @@ from ...models.processes.child_program import on_stop
 from ...models.storage import replacing
 from ..statuses import XPRESS, Status
 from ..writing.terms import Terms, merged_terms, terms_of_entries, terms_of_triangle
+from .model_content import Algebra, finite_or_none, with_infinities
 from .protocol import Job, Outcome, RefusedError, TooLargeError
-from .reading import Meaning, finite, infinite
 
 _ROWS, _COLUMNS = 1, 2
 
@@ -33,17 +33,17 @@ def _load(path: Path, *, log: bool = False) -> Any:
     try:
         model.readProb(str(path))
     except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
-        _complain(error)
+        _raise_refusal(error)
     return model
 
 
-def _complain(error: Exception) -> None:
+def _raise_refusal(error: Exception) -> None:
     if "too many rows and columns" in str(error):
         raise TooLargeError(str(error)) from error
     raise RefusedError(str(error)) from error
 
 
-def read(path: Path) -> Meaning:
+def read(path: Path) -> Algebra:
     """The file as Xpress reads it."""
     model = _load(path)
     if model.attributes.objsense != 1 or model.attributes.objrhs != 0:
@@ -52,11 +52,11 @@ def read(path: Path) -> Meaning:
     kinds, limits = np.array(model.getRowType(0, m - 1)), np.array(model.getRHS(0, m - 1))
     start, column, value = (np.array(part) for part in model.getRows(0, m - 1))
     row = np.repeat(np.arange(m), np.diff(start))
-    return Meaning.of(
+    return Algebra.of(
         list(model.getNameList(_COLUMNS, 0, n - 1)),
         list(model.getNameList(_ROWS, 0, m - 1)),
-        lower=infinite(model.getLB(0, n - 1)),
-        upper=infinite(model.getUB(0, n - 1)),
+        lower=with_infinities(model.getLB(0, n - 1)),
+        upper=with_infinities(model.getUB(0, n - 1)),
         integer=[kind in "BI" for kind in model.getColType(0, n - 1)],
         costs=model.getObj(0, n - 1),
         row_lower=np.where(kinds == "L", -np.inf, limits),
@@ -101,12 +101,14 @@ def solve(job: Job) -> Outcome:
         with on_stop(model.interrupt):
             _, found = model.optimize()
     except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
-        _complain(error)
+        _raise_refusal(error)
     words = str(found).removeprefix("SolStatus.")
     status = XPRESS.get(found.name, Status.ERROR)
     mixed = model.attributes.mipents or model.attributes.qconstraints
-    bound, nodes = (finite(model.attributes.bestbound), model.attributes.nodes) if mixed else (None, None)
-    if status.promises_point:
+    bound, nodes = (
+        (finite_or_none(model.attributes.bestbound), model.attributes.nodes) if mixed else (None, None)
+    )
+    if status.needs_point:
         _write_slx(job, names, model.getSolution())
     return Outcome(status, words, bound, nodes)
 

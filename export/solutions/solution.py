@@ -22,12 +22,12 @@ from ...models.formulations.problem import Problem, Violation, with_products_lif
 from ...models.instance.grid import Floats
 from ...models.previews import table_of
 from ..formats.registry import FORMATS, problem_in_format
-from ..statuses import Status, closes
+from ..statuses import Status, is_gap_closed
 from ..writing.canonical import CanonicalForm
 from ..writing.stamps import is_identified
 from .misfit import check_names, check_range
 from .readers.registry import read_raw
-from .readers.text import RawSolution, values_for, values_in_order
+from .readers.text import RawSolution, values_by_name, values_in_order
 
 ROUND: Final = 1e-5
 """Largest distance from an integer at which an integer column is rounded; other values are kept."""
@@ -153,7 +153,7 @@ class Solution:
         """
         if self.objective is None or self.violation is None:
             return ()
-        if self.claimed.promises_point:
+        if self.claimed.needs_point:
             return (*self._infeasibilities, *self._wrong_values(self.objective))
         if self._infeasibilities or self.claimed is Status.UNBOUNDED:
             return ()
@@ -198,7 +198,7 @@ class Solution:
         """
         if not self.identified or self.contradictions:
             return False
-        return not self.claimed.promises_point or all(
+        return not self.claimed.needs_point or all(
             value <= allowed for _, value, allowed in self._violations(TRUSTED)
         )
 
@@ -215,7 +215,7 @@ class Solution:
             return Status.LIMIT_WITH_POINT if self._leaves_gap else self.claimed
         if self.claimed is Status.LIMIT_WITHOUT_POINT:
             return Status.NO_POINT
-        return Status.FEASIBLE if self.claimed.promises_point and not self.contradictions else Status.UNKNOWN
+        return Status.FEASIBLE if self.claimed.needs_point and not self.contradictions else Status.UNKNOWN
 
     @property
     def _has_unclaimed_point(self) -> bool:
@@ -229,7 +229,7 @@ class Solution:
         """Whether the file calls a point optimal that is far above its own dual bound."""
         if self.claimed is not Status.OPTIMAL_GLOBAL or self.objective is None or self.bound is None:
             return False
-        return not closes(self.bound, self.objective)
+        return not is_gap_closed(self.bound, self.objective)
 
     @property
     def bound(self) -> float | None:
@@ -241,7 +241,7 @@ class Solution:
         """Reason why the point cannot be used; empty if it can."""
         if self.contradictions:
             return f"claims {self.claimed}, but {'; '.join(self.contradictions)}"
-        if self.point is not None and not self.claimed.promises_point and not self._has_unclaimed_point:
+        if self.point is not None and not self.claimed.needs_point and not self._has_unclaimed_point:
             return f"claims {self.claimed} ({self.message or 'no message'}): its values are not a solution"
         return ""
 
@@ -388,13 +388,15 @@ def read_solution(
         known = is_identified(raw.stamps, problem.stamp) or identified
         if not raw.has_point:
             return _solution(raw, problem, None, identified=known, tolerance=tolerance)
-        return _mapped(raw, _form(raw, problem, held or {}), identified=known, tolerance=tolerance)
+        return _map_values(
+            raw, _canonical_form(raw, problem, held or {}), identified=known, tolerance=tolerance
+        )
 
 
-def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> CanonicalForm:
+def _canonical_form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> CanonicalForm:
     """The problem that the solver was given: by the manifest, or else by the names of lifted products."""
     if raw.names is None:
-        return CanonicalForm(held[raw.order] if raw.order in held else _carried(problem, raw.order))
+        return CanonicalForm(held[raw.order] if raw.order in held else _problem_in_file(problem, raw.order))
     forms = {each.sha256: each for each in held.values()}
     if len(forms) == 1:
         return CanonicalForm(*forms.values())
@@ -403,7 +405,7 @@ def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Ca
     return CanonicalForm(with_products_lifted(problem) if named else problem)
 
 
-def _carried(problem: Problem, name: str) -> Problem:
+def _problem_in_file(problem: Problem, name: str) -> Problem:
     try:
         return problem_in_format(problem, FORMATS[name])
     except UnsupportedByFormatError as error:
@@ -425,15 +427,15 @@ def _solution(raw: RawSolution, problem: Problem, point: Floats | None, **facts:
     )
 
 
-def _mapped(raw: RawSolution, form: CanonicalForm, **facts: Any) -> Solution:
+def _map_values(raw: RawSolution, form: CanonicalForm, **facts: Any) -> Solution:
     problem = form.problem
-    point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
+    point, unknown = (_point_by_position(raw, form), 0) if raw.names is None else _point_by_name(raw, form)
     check_range(point, form, LARGEST)
-    point, moved = _rounded(point, problem)
+    point, moved = _round_integers(point, problem)
     return _solution(raw, problem, point, rounded=moved, unknown=unknown, **facts)
 
 
-def _by_position(raw: RawSolution, form: CanonicalForm) -> Floats:
+def _point_by_position(raw: RawSolution, form: CanonicalForm) -> Floats:
     """The point of a file without names; columns in no term, missing in the solver's model, are arbitrary."""
     problem, order = form.problem, form.order(raw.order)
     point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and the column fixed to 1
@@ -441,13 +443,13 @@ def _by_position(raw: RawSolution, form: CanonicalForm) -> Floats:
     return point[: problem.n_columns]
 
 
-def _by_name(raw: RawSolution, form: CanonicalForm) -> tuple[Floats, int]:
-    mapped = values_for(form.column_names, raw)
+def _point_by_name(raw: RawSolution, form: CanonicalForm) -> tuple[Floats, int]:
+    mapped = values_by_name(form.column_names, raw)
     check_names(raw, form, mapped)
     return mapped.values, mapped.unknown
 
 
-def _rounded(point: Floats, problem: Problem) -> tuple[Floats, float]:
+def _round_integers(point: Floats, problem: Problem) -> tuple[Floats, float]:
     nearest = np.round(point)
     gap = np.abs(point - nearest)
     chosen = problem.integer & (gap <= ROUND)

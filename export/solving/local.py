@@ -38,9 +38,17 @@ from ..bundle.manifest import add_to_manifest
 from ..bundle.problem_files import is_recordable
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, problem_in_format, write
-from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError, call, part_of
+from ..programs.protocol import (
+    FailedError,
+    Job,
+    Outcome,
+    RefusedError,
+    TooLargeError,
+    call_program,
+    part_path,
+)
 from ..solutions.solution import Solution, read_solution
-from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in
+from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Suitability, suitability_in_format
 from ..statuses import Status
 from ..writing.sink import save_file
 
@@ -138,14 +146,14 @@ def choose_solver(problem: Problem, name: str | None = None) -> Solver:
     )
 
 
-def choose_format(problem: Problem, solver: str) -> Taking:
+def choose_format(problem: Problem, solver: str) -> Suitability:
     """Return the format in which a solver gets a problem, or the reason why it does not take the problem.
 
     An answer without proof is accepted only from a solver that never proves anything.
     """
     entry = SOLVERS[solver]
     readable = [name for name in entry.formats if name in PROGRAMS[entry.program].formats]
-    answers = [takes_in(problem, solver, name) for name in readable]
+    answers = [suitability_in_format(problem, solver, name) for name in readable]
     local = entry.proves == "local"
     for taking in answers:
         if taking.answer == "yes" or (local and taking.answer == "local"):
@@ -216,7 +224,11 @@ class Solvers:
     def ask(self, program: str, step: str, *arguments: Any, seconds: float) -> Any:
         """Run a step (see protocol.py) of a program and return its result. Raises its errors."""
         log, deadline = self._folder / f"{program}.log", Deadline.after(seconds)
-        return self.child(program).call(call, program, step, *arguments, deadline=deadline, log=log).value
+        return (
+            self.child(program)
+            .call(call_program, program, step, *arguments, deadline=deadline, log=log)
+            .value
+        )
 
     def program_version(self, program: str) -> str:
         """Return the version that a program reports. Raises SolverError."""
@@ -287,7 +299,13 @@ class Solvers:
         begin = time.perf_counter()
         try:
             outcome, interrupted = self.child(entry.program).call(
-                call, entry.program, "solve", job, deadline=deadline, log=files.log, stop=stop_function(stop)
+                call_program,
+                entry.program,
+                "solve",
+                job,
+                deadline=deadline,
+                log=files.log,
+                stop=stop_function(stop),
             )
         except TooLargeError as error:
             raise UnsupportedBySolverError(
@@ -342,7 +360,7 @@ def _write_start_file(held: Problem, solver: str, start: CrossField | None, path
 
 def _outcome_of_killed(files: SolveFiles, held: Problem) -> Outcome:
     """Outcome of a solver that was killed: its solution file counts if the solver completed it."""
-    part_of(files.solution).unlink(missing_ok=True)
+    part_path(files.solution).unlink(missing_ok=True)
     try:
         status = read_solution(files.solution, held).claimed
     except (InputError, SolutionError):  # there is none, or one that cannot be read

@@ -11,7 +11,7 @@ from ...models.storage import read_bytes, write_bytes
 from ...templates import ENVIRONMENT
 from ..bundle.manifest import Manifest
 from ..formats.registry import FORMATS
-from ..solvers_table import BUNDLED, smallest, takes
+from ..solvers_table import BUNDLED, smallest_problem, suitability
 from .methods import table_cells
 
 PAGE: Final = "index.html"
@@ -87,8 +87,8 @@ def _describe_set(manifest: Manifest) -> dict[str, Any]:
     """
     document = manifest.document
     counts = document["counts"]
-    problem = smallest(declare(manifest.formulation))
-    solver = next((name for name in BUNDLED if takes(problem, name).answer == "yes"), "")
+    problem = smallest_problem(declare(manifest.formulation))
+    solver = next((name for name in BUNDLED if suitability(problem, name).answer == "yes"), "")
     name, instance = manifest.formulation, f"models/{document['instance']['file']}"
     facet = " --facet printed" if document["options"].get("facet") == "printed" else ""
     return {

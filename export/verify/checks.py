@@ -31,8 +31,8 @@ class Check:
     problem: instance and formulation. program: its name, or the solver's. objective: recomputed at the
     solver's point; bound: its dual bound; energy: the objective again, with every other column at the value
     that follows from angles and jumps; leeway: greatest reduction of the objective by the rows that the point
-    breaks (`saved`). group: equal for problems with the same optimum; relaxes: the group that the file
-    relaxes, whose optimum is at least as high.
+    breaks. group: equal for problems with the same optimum; relaxes: the group that the file relaxes, whose
+    optimum is at least as high.
     """
 
     problem: str

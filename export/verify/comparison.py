@@ -11,7 +11,7 @@ from ...models.formulations.arrays import row_terms
 from ...models.formulations.names import column_names, row_names
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats
-from ..programs.reading import Evaluation, Meaning, Points, places
+from ..programs.model_content import Algebra, Behaviour, Points, positions_of
 from ..writing.canonical import CanonicalForm
 from ..writing.terms import merged_terms
 
@@ -19,24 +19,24 @@ VALUES: Final = 1e-9
 """Relative difference up to which values at a point agree: sums may have another order."""
 
 
-def names_of(matrix: np.ndarray[Any, Any]) -> list[str]:
+def name_list(matrix: np.ndarray[Any, Any]) -> list[str]:
     """Names as text, from rows of bytes padded with NUL."""
     return [bytes(row).rstrip(b"\0").decode() for row in matrix]
 
 
 def names_of_rows(problem: Problem) -> list[str]:
     """Names of all rows of a problem."""
-    return names_of(row_names(problem)) if problem.rows else []
+    return name_list(row_names(problem)) if problem.rows else []
 
 
-def of_problem(problem: Problem) -> Meaning:
+def problem_algebra(problem: Problem) -> Algebra:
     """The intended content of an LP or MPS file, from the problem's arrays; the last column is fixed to 1."""
     form = CanonicalForm(problem)
     n, ones = problem.n_columns, np.ones(1)
     at, value = row_terms(problem.rows, 1)
     products, product = row_terms(problem.rows, 2)
-    return Meaning.of(
-        [*names_of(column_names(problem)), form.one.decode()],
+    return Algebra.of(
+        [*name_list(column_names(problem)), form.one.decode()],
         names_of_rows(problem) or ["c_ONE"],
         lower=np.concatenate([problem.lower, ones]),
         upper=np.concatenate([problem.upper, ones]),
@@ -60,15 +60,15 @@ def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:
     return objective, np.array(rows).reshape(len(points), problem.n_rows)
 
 
-def difference(found: Meaning, problem: Problem, tolerance: float, points: Floats) -> str:
+def algebra_difference(found: Algebra, problem: Problem, tolerance: float, points: Floats) -> str:
     """First difference between the algebra of a file and the problem; empty without one.
 
     tolerance: relative difference of numbers, 0 for equal to the bit. points: (k, columns), where values are
     compared as well.
     """
-    expected = of_problem(problem)
+    expected = problem_algebra(problem)
     for kind in ("columns", "rows"):
-        wrong = _names_differ(getattr(found, kind), getattr(expected, kind), kind)
+        wrong = _name_difference(getattr(found, kind), getattr(expected, kind), kind)
         if wrong:
             return wrong
     found = found.ordered(expected.columns, expected.rows)
@@ -89,7 +89,7 @@ _NUMBERS: Final = (
 )  # fmt: skip
 
 
-def _names_differ(found: Sequence[str], expected: Sequence[str], kind: str) -> str:
+def _name_difference(found: Sequence[str], expected: Sequence[str], kind: str) -> str:
     if sorted(found) == sorted(expected):
         return ""
     extra, missing = sorted(set(found) - set(expected)), sorted(set(expected) - set(found))
@@ -99,12 +99,12 @@ def _names_differ(found: Sequence[str], expected: Sequence[str], kind: str) -> s
     return f"{len(found)} {kind} instead of {len(expected)}: {'; '.join(parts) or 'some twice'}"
 
 
-def _number_difference(found: Meaning, expected: Meaning, name: str, tolerance: float) -> str:
+def _number_difference(found: Algebra, expected: Algebra, name: str, tolerance: float) -> str:
     mine, theirs = getattr(expected, name), getattr(found, name)
     index = f"{name}_at"
     if hasattr(expected, index) and not np.array_equal(getattr(expected, index), getattr(found, index)):
         return f"{name}: {len(theirs)} coefficients instead of {len(mine)}, or at other places"
-    wrong = np.nonzero(~_close(theirs, mine, tolerance))[0]
+    wrong = np.nonzero(~_are_close(theirs, mine, tolerance))[0]
     if not len(wrong):
         return ""
     labels = expected.rows if name.startswith("row_") else expected.columns
@@ -112,7 +112,7 @@ def _number_difference(found: Meaning, expected: Meaning, name: str, tolerance: 
     return f"{name} at {at} is {theirs[wrong[0]]!s} instead of {mine[wrong[0]]!s} ({len(wrong)} such)"
 
 
-def _close(found: Any, expected: Any, tolerance: float) -> Bools:
+def _are_close(found: Any, expected: Any, tolerance: float) -> Bools:
     if not tolerance or expected.dtype == bool:
         return np.asarray(found == expected)
     return np.asarray(np.isclose(found, expected, rtol=tolerance, atol=tolerance * 1e-3))
@@ -127,15 +127,21 @@ def _value_difference(what: str, found: Floats, expected: Floats, accuracy: floa
     return f"{what} at point {place[0]} is {found[place]:.12g} instead of {expected[place]:.12g}"
 
 
-def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -> str:
+def behaviour_difference(found: Behaviour, problem: Problem, points: Points) -> str:
     """First difference between the behaviour of a file and the problem; empty without one."""
-    columns, rows = names_of(column_names(problem)), names_of_rows(problem)
+    columns, rows = name_list(column_names(problem)), names_of_rows(problem)
     lacking = set(columns) - set(found.columns) if found.may_lack else set()
     wanted = [name for name in columns if name not in lacking & _unused(problem, columns)]
-    strangers = _names_differ(found.columns, wanted, "columns") or _names_differ(found.rows, rows, "rows")
+    strangers = _name_difference(found.columns, wanted, "columns") or _name_difference(
+        found.rows, rows, "rows"
+    )
     if strangers:
         return strangers
-    at, c, r = places(columns, wanted), places(found.columns, wanted), places(found.rows, rows)
+    at, c, r = (
+        positions_of(columns, wanted),
+        positions_of(found.columns, wanted),
+        positions_of(found.rows, rows),
+    )
     if found.integer is not None and (found.integer[c] != problem.integer[at]).any():
         return "other columns are integer"
     if found.discrete is not None and found.discrete != problem.integer.sum():
@@ -148,7 +154,7 @@ def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -
         ("row_upper", found.row_upper[r], form.row_upper),
     ]
     for name, theirs, mine in bounds:
-        wrong = np.nonzero(~_close(theirs, mine, found.rounding))[0]
+        wrong = np.nonzero(~_are_close(theirs, mine, found.rounding))[0]
         if len(wrong):
             return f"{name} is {theirs[wrong[0]]!s} instead of {mine[wrong[0]]!s} ({len(wrong)} such)"
     objective, activities = values_at(problem, points.of(columns))

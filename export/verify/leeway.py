@@ -20,7 +20,7 @@ _CHOSEN: Final = frozenset({"alpha", "beta", "p", "p1", "p2"})
 """Blocks of columns that determine the field of a point."""
 
 
-def saved(problem: Problem, point: Floats) -> float:
+def objective_leeway(problem: Problem, point: Floats) -> float:
     """Greatest reduction of the objective by the rows and bounds that a point (columns,) breaks.
 
     The error of a column that follows from angles and jumps is at most the greatest violation of its bounds

@@ -30,15 +30,15 @@ from ...models.processes.limits import Limits
 from ...models.storage import read_bytes, sha256_of, write_bytes
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, problem_in_format
+from ..programs.model_content import Points
 from ..programs.protocol import NotReportedError, RefusedError, TooLargeError
-from ..programs.reading import Points
 from ..solutions.solution import Solution
 from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
 from ..solving.local import SolveFiles, Solvers
 from ..statuses import Status
 from .checks import Check, Verdict, Verification
-from .comparison import difference, evaluation_difference, names_of
-from .leeway import saved
+from .comparison import algebra_difference, behaviour_difference, name_list
+from .leeway import objective_leeway
 
 RESULT: Final = "verify.json"
 SEED: Final = 1
@@ -57,7 +57,7 @@ GAP: Final = 0.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Subject:
+class _ModelFile:
     """A file to verify: its intended content, its unpacked copy, the points for comparison."""
 
     problem: Problem
@@ -103,19 +103,19 @@ def verify(
         for program in (each for each in wanted if not each.missing):
             chosen = [subject for subject in subjects if subject.format in program.formats]
             with Solvers() as solvers:
-                bench = _Bench(program, solvers, seconds)
+                bench = _ProgramChecks(program, solvers, seconds)
                 found.versions[program.name] = solvers.program_version(program.name)
                 for subject in chosen:
                     progress(f"{subject.name}: {program.title}")
                     found.checks.extend(bench.checks(subject))
-    found.checks[:] = compared(found.checks)
+    found.checks[:] = judge_solves(found.checks)
     write_bytes(folder / RESULT, (json.dumps(found.document(), indent=1) + "\n").encode())
     return found
 
 
-def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject], list[Check]]:
+def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_ModelFile], list[Check]]:
     """The files that match their manifests, and failed checks of those that do not."""
-    subjects: list[_Subject] = []
+    subjects: list[_ModelFile] = []
     broken: list[Check] = []
     for number, manifest in enumerate(manifests):
         problem = manifest.problem()
@@ -137,9 +137,9 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
                 words = f"the manifest states {stated!r} for it, but it holds {holds!r}; export again"
                 broken.append(Check(*about, Verdict.DIFFERS, words))
             if len(held.blocks) not in points:
-                points[len(held.blocks)] = _points(held)
+                points[len(held.blocks)] = _test_points(held)
             subjects.append(
-                _Subject(problem, held, entry["name"], entry["format"], path, points[len(held.blocks)])
+                _ModelFile(problem, held, entry["name"], entry["format"], path, points[len(held.blocks)])
             )
     return subjects, broken
 
@@ -154,14 +154,14 @@ def _unpacked(source: Path, folder: Path) -> Path:
     return path
 
 
-def _points(problem: Problem) -> Points:
+def _test_points(problem: Problem) -> Points:
     """Arbitrary points, then complete points of random fields, which respect bounds, rows and integrality."""
     rng = np.random.default_rng(SEED)
     anywhere = rng.normal(size=(RANDOM, problem.n_columns))
     feasible = [problem.point(random_field(problem, seed)) for seed in range(FEASIBLE)]
     values = np.concatenate([anywhere, np.array(feasible)])
     objective = np.array([problem.objective_value(point) for point in values])
-    return Points(names_of(column_names(problem)), values, objective, RANDOM)
+    return Points(name_list(column_names(problem)), values, objective, RANDOM)
 
 
 def random_field(problem: Problem, seed: int) -> CrossField:
@@ -174,7 +174,7 @@ def random_field(problem: Problem, seed: int) -> CrossField:
 
 
 @dataclass(frozen=True, eq=False)
-class _Bench:
+class _ProgramChecks:
     """A running program: its child process, and the seconds for a solve."""
 
     program: Program
@@ -182,7 +182,7 @@ class _Bench:
     seconds: float | None
     solved: set[tuple[str, str]] = field(default_factory=set)
 
-    def checks(self, subject: _Subject) -> Iterator[Check]:
+    def checks(self, subject: _ModelFile) -> Iterator[Check]:
         """Check how the program reads a file and solves it; files of the same problem are solved once."""
         read = self._read(subject)
         yield read
@@ -194,7 +194,7 @@ class _Bench:
                 self.solved.add(key)
                 yield self._solve(subject, solver, self.seconds)
 
-    def _read(self, subject: _Subject) -> Check:
+    def _read(self, subject: _ModelFile) -> Check:
         refusal = _refusal(self.program.name, subject, "read")
         try:
             wrong = self._difference(subject)
@@ -211,20 +211,20 @@ class _Bench:
             verdict, words = (Verdict.DIFFERS if wrong else Verdict.AGREES), wrong
         return subject.check(self.program.name, "read", verdict, words)
 
-    def _difference(self, subject: _Subject) -> str:
+    def _difference(self, subject: _ModelFile) -> str:
         """Return how the model that the program reads differs from the problem; empty if it does not."""
         program, points = self.program, subject.points
         if subject.format in program.algebra:
             model = self.solvers.ask(program.name, "read", subject.path, seconds=READING_SECONDS)
-            return difference(model, subject.held, program.tolerance, points.values)
+            return algebra_difference(model, subject.held, program.tolerance, points.values)
         found = self.solvers.ask(program.name, "evaluate", subject.path, points, seconds=READING_SECONDS)
-        return evaluation_difference(found, subject.held, points)
+        return behaviour_difference(found, subject.held, points)
 
-    def _too_large(self, subject: _Subject) -> str:
+    def _too_large(self, subject: _ModelFile) -> str:
         held = subject.held
         return f"{held.n_columns} columns and {held.n_rows} rows; the free edition takes {self.program.free}"
 
-    def _solve(self, subject: _Subject, solver: str, seconds: float) -> Check:
+    def _solve(self, subject: _ModelFile, solver: str, seconds: float) -> Check:
         def ended(verdict: Verdict, words: str) -> Check:
             return subject.check(solver, "solve", verdict, words)
 
@@ -244,16 +244,16 @@ class _Bench:
             return ended(Verdict.NOT_TRIED, self._too_large(subject))
         except CrossfieldError as error:
             return ended(Verdict.FAILED, str(error))
-        return _judged(subject, solver, found)
+        return _judge_answer(subject, solver, found)
 
 
-def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
+def _refusal(solver: str, subject: _ModelFile, stage: Stage) -> str:
     """Reason why the solver refuses at that stage, by the table of solvers; empty without a refusal."""
     refusal = SOLVERS[solver].refusal(subject.held, stage) if solver in SOLVERS else None
     return "" if refusal is None else refusal.reason
 
 
-def _judged(subject: _Subject, solver: str, found: Solution) -> Check:
+def _judge_answer(subject: _ModelFile, solver: str, found: Solution) -> Check:
     """Judge a solver's answer: check its point, and compute objective and energy again."""
     held, numbers = subject.held, {"seconds": round(found.seconds or 0.0, 2), "bound": found.claimed_bound}
     point, objective, worst = found.point, found.objective, found.violation
@@ -262,14 +262,19 @@ def _judged(subject: _Subject, solver: str, found: Solution) -> Check:
         verdict = Verdict.LIMIT if limit else Verdict.FAILED
         return subject.check(solver, "solve", verdict, f"no point: {found.message}", **numbers)
     energy = subject.problem.objective_value(subject.problem.point(found.field))
-    leeway = saved(held, point)
+    leeway = objective_leeway(held, point)
     numbers |= {"objective": objective, "energy": energy, "leeway": leeway}
     wrong = ""
     if worst.worst > SOLVERS[solver].feasible_within:
         wrong = f"its point violates {worst.worst_family or 'bounds'} by {worst.worst:.2g}"
     proven = found.claimed in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
     claim = found.reported
-    if not wrong and claim is not None and not same(claim, objective) and (proven or claim < objective):
+    if (
+        not wrong
+        and claim is not None
+        and not is_same_optimum(claim, objective)
+        and (proven or claim < objective)
+    ):
         # Before the end, a solver's own variable for the objective may differ.
         wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"
     wrong = wrong or _energy_difference(subject.problem, objective, energy, leeway, proven=proven)
@@ -285,29 +290,31 @@ def _energy_difference(
     """Fault of an objective compared with its field's energy; only an optimum has tight slacks."""
     if not problem.formulation.has_only_fields:
         return ""  # z may differ from p1 beta, and then the field is another point
-    if same(energy, objective) or (objective < energy and not _above(energy, objective + leeway)):
+    if is_same_optimum(energy, objective) or (
+        objective < energy and not _is_above(energy, objective + leeway)
+    ):
         return ""
     if not proven and energy < objective:
         return ""
     return f"its objective is {objective:.9g}, but its field has {energy:.9g}"
 
 
-def same(first: float, second: float) -> bool:
+def is_same_optimum(first: float, second: float) -> bool:
     """Whether two optima agree."""
     return abs(first - second) <= TOLERANCE * max(1.0, abs(second))
 
 
-def _above(value: float, best: float) -> bool:
+def _is_above(value: float, best: float) -> bool:
     """Whether an optimum or a bound lies above a point's objective by more than rounding."""
-    return value > best and not same(value, best)
+    return value > best and not is_same_optimum(value, best)
 
 
-def compared(checks: list[Check]) -> list[Check]:
+def judge_solves(checks: list[Check]) -> list[Check]:
     """The checks, in which a solve that contradicts the best point of its problem now differs."""
-    return [_against(check, checks) for check in checks]
+    return [_judge_solve(check, checks) for check in checks]
 
 
-def _against(check: Check, checks: list[Check]) -> Check:
+def _judge_solve(check: Check, checks: list[Check]) -> Check:
     if check.step != "solve" or check.verdict not in {Verdict.AGREES, Verdict.LIMIT}:
         return check
     wrong = _contradiction(check, _best(checks, check.group), _best(checks, check.relaxes))
@@ -319,12 +326,12 @@ def _against(check: Check, checks: list[Check]) -> Check:
 def _contradiction(check: Check, same_problem: float | None, relaxed: float | None) -> str:
     """How an optimum or a bound contradicts the best point of its problem, or of the problem it relaxes."""
     optimum = check.objective if check.proven else None
-    if same_problem is not None and optimum is not None and _above(optimum, same_problem):
+    if same_problem is not None and optimum is not None and _is_above(optimum, same_problem):
         return f"its optimum is {optimum:.9g}, another has {same_problem:.9g}"
-    if same_problem is not None and check.bound is not None and _above(check.bound, same_problem):
+    if same_problem is not None and check.bound is not None and _is_above(check.bound, same_problem):
         return f"its bound {check.bound:.9g} is above a point of {same_problem:.9g}"
     lower = optimum if check.proven else check.bound
-    if relaxed is not None and lower is not None and _above(lower, relaxed):
+    if relaxed is not None and lower is not None and _is_above(lower, relaxed):
         return (
             f"it holds a relaxation, and its optimum is at least {lower:.9g}, above a point of {relaxed:.9g}"
         )

@@ -14,7 +14,7 @@ from cases import make_instance
 from crossfield.export.bundle.manifest import read_manifest
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.tables import tables
-from crossfield.export.licence import licence_error
+from crossfield.export.licences import licence_error
 from crossfield.export.solvers_table import BUNDLED, PROGRAMS, SOLVERS, Refusal, Solver, StartFile
 from crossfield.models.errors import MissingSolverError
 from crossfield.models.formulations.catalogue import FORMULATIONS

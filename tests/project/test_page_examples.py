@@ -16,7 +16,7 @@ import places
 import pytest
 import typer
 from crossfield.export.cli.app import app
-from crossfield.export.licence import package_folder
+from crossfield.export.licences import package_folder
 from crossfield.export.solvers_table import PROGRAMS
 
 DOCS = places.ROOT / "docs"

@@ -16,10 +16,10 @@ from crossfield.export.programs import asl as asl_program
 from crossfield.export.programs import highs as highs_program
 from crossfield.export.programs import scip as scip_program
 from crossfield.export.programs.casadi import read_nl
-from crossfield.export.programs.reading import Meaning as Model
-from crossfield.export.programs.reading import Points
+from crossfield.export.programs.model_content import Algebra as Model
+from crossfield.export.programs.model_content import Points
 from crossfield.export.solvers_table import PROGRAMS
-from crossfield.export.verify.comparison import of_problem, values_at
+from crossfield.export.verify.comparison import problem_algebra, values_at
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.grid import Floats
@@ -33,7 +33,7 @@ __all__ = [
     "by_gurobi",
     "by_highs",
     "by_scip",
-    "of_problem",
+    "problem_algebra",
     "random_points",
 ]
 
@@ -93,7 +93,7 @@ def by_asl(path: Path) -> tuple[dict[str, Any], float, Floats, Floats, Floats]:
 
     Statistics, objective, gradient, rows, Jacobian (rows, columns).
     """
-    answer = asl_program.at_start(path)
+    answer = asl_program.report_at_start(path)
     statistics, values = answer["problem statistics"], answer["initial evaluations"]
     columns, rows = statistics["total no. of variables"], statistics["total no. of constraints"]
     goal = values["objective function"]["0"]

@@ -114,17 +114,17 @@ def improve_in_1norm(start: CrossField, rung: str) -> list[KnownField]:
 
 def _solve_by_highs(problem: Problem, start: CrossField | None = None, **options: int) -> CrossField | None:
     """The field that HiGHS finds under options, or None."""
-    from ...programs.highs import loaded, set_options, solved, write_solution
+    from ...programs.highs import load_model, set_options, solve_loaded, write_solution
 
     with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
         model, first, answer = (Path(folder) / name for name in ("model.mps", "start.sol", "answer.sol"))
         write(problem, model)
-        highs = loaded(model, threads=1, parallel="off", mip_rel_gap=1e-6, mip_abs_gap=1e-9)
+        highs = load_model(model, threads=1, parallel="off", mip_rel_gap=1e-6, mip_abs_gap=1e-9)
         set_options(highs, **options)
         if start is not None:
             write_start(problem, start, first, "highs")
             highs.readSolution(str(first), 0)
-        write_solution(solved(highs, model), answer)
+        write_solution(solve_loaded(highs, model), answer)
         try:
             solution = read_solution(answer, problem)
         except SolutionError:

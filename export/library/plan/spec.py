@@ -27,7 +27,7 @@ from ....models.sketch.random_strokes import RAGGED_SHARE
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS, problem_in_format
-from ...solvers_table import smallest
+from ...solvers_table import smallest_problem
 from .splits import check_splits, seeds_document, seeds_of, split_document, splits_of
 
 FORMAT: Final = "crossfield-library-spec"
@@ -360,7 +360,7 @@ def _check_entries(formulations: tuple[str, ...], rungs: Sequence[Rung]) -> None
 
 def _can_hold(file_format: str, formulation: str) -> bool:
     try:
-        problem_in_format(smallest(declare(formulation)), FORMATS[file_format])
+        problem_in_format(smallest_problem(declare(formulation)), FORMATS[file_format])
     except UnsupportedByFormatError:
         return False
     return True

@@ -43,15 +43,15 @@ import numpy as np
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ....models.storage import replacing
-from ...statuses import of_ampl
+from ...statuses import status_of_ampl
 from ...writing.stamps import digits_of_option, stamp_option
-from .grammar import HEAD, Form, place_of_entry, shown
-from .text import Cursor, RawSolution, Reader, begins, entries, fault, one_line
+from .grammar import HEAD, EntryForm, place_of_entry, quoted
+from .text import Cursor, RawSolution, Reader, line_error, one_line, read_entries, starts_with
 
 _OPTIONS = re.compile(rb"^Options[ \t]*\n", re.MULTILINE)
 _OBJNO = re.compile(rb"^objno\b.*", re.MULTILINE)
 _CODE = re.compile(rb"objno[ \t]+\d{1,9}(?:[ \t]+(-?\d{1,9}))?[ \t]*")
-_NUMBERS: Final = Form("value")
+_NUMBERS: Final = EntryForm("value")
 _MOST_OPTIONS: Final = 16
 _CODE_DIGITS: Final = 3
 _OUR_OPTIONS: Final = (1, 1, 0)  # and the stamp, as in the first line of our .nl files
@@ -116,15 +116,15 @@ def _stamps(options: Sequence[int]) -> frozenset[str]:
 def _read_values(cursor: Cursor, counts: _Counts) -> Floats:
     """The primal values; the cursor moves behind them."""
     needed = counts.duals + counts.values
-    numbers = entries(cursor.data, cursor.position, _NUMBERS)
+    numbers = read_entries(cursor.data, cursor.position, _NUMBERS)
     held = len(numbers.values)
     if held > needed:
         place = place_of_entry(cursor.data, cursor.position, needed)
-        raise fault(cursor.data, place, "there are more numbers than announced")
+        raise line_error(cursor.data, place, "there are more numbers than announced")
     if held < needed:
         rest = cursor.data[numbers.end :].lstrip().split(b"\n", 1)
         if len(rest) > 1 and not _OBJNO.match(rest[0]):
-            raise fault(cursor.data, numbers.end, _NUMBERS.fault(rest[0]))
+            raise line_error(cursor.data, numbers.end, _NUMBERS.fault(rest[0]))
         raise cursor.fault(f"{needed} numbers are announced, {held} whole lines follow; the file is cut off")
     cursor.position = numbers.end
     return numbers.values[counts.duals :].copy()
@@ -139,7 +139,7 @@ def _read_code(cursor: Cursor) -> int | None:
     line = cursor.line("the solve code")
     code = _CODE.fullmatch(line)
     if code is None:
-        raise cursor.fault(f"{shown(line)} is not the number of the objective and a solve code")
+        raise cursor.fault(f"{quoted(line)} is not the number of the objective and a solve code")
     digits = code[1] or b""
     whole = cursor.data.endswith(b"\n") or not cursor.at_end or digits == b"0" or len(digits) == _CODE_DIGITS
     return int(digits) if digits and whole else None
@@ -149,7 +149,7 @@ def _solution(message: bytes, code: int | None, values: Floats, counts: _Counts)
     words = one_line(message)
     if code is not None and 0 <= code <= 99 and not values.size:
         raise SolutionError("the file states solved but holds no values; let the solver write the file again")
-    status = of_ampl(code, words, with_point=values.size > 0)
+    status = status_of_ampl(code, words, with_point=values.size > 0)
     return RawSolution(status, words, None, None, values, rows=counts.rows, stamps=counts.stamps)
 
 
@@ -269,5 +269,5 @@ def _text_parts(message: str, primal: Floats, numbers: tuple[int, ...], code: in
     yield f"objno 0 {code}\n".encode()
 
 
-BINARY: Final = Reader("ampl-binary", "AMPL .sol, binary", begins(_MAGIC), parse_binary, text=False)
+BINARY: Final = Reader("ampl-binary", "AMPL .sol, binary", starts_with(_MAGIC), parse_binary, text=False)
 TEXT: Final = Reader("ampl-text", "AMPL .sol, text", _recognises_text, parse_text)

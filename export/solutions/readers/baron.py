@@ -22,15 +22,24 @@ from typing import Final
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
-from ...statuses import Status, of_baron
-from .grammar import Form
-from .text import Bytes, Cursor, RawSolution, Reader, begins, entries, one_line, without_point
+from ...statuses import Status, status_of_baron
+from .grammar import EntryForm
+from .text import (
+    Bytes,
+    Cursor,
+    RawSolution,
+    Reader,
+    one_line,
+    read_entries,
+    solution_without_point,
+    starts_with,
+)
 
 _SUMMARY: Final = b"\n Best solution found at node:"
 _BANNER = re.compile(rb"^ *\*\*\* ([^*\n]{3,100}?) \*\*\* *$", re.MULTILINE)
 _TABLE: Final = b"\nThe best solution found is"
 _HEADER: Final = b"variable"
-_ROW: Final = Form("name number value number")
+_ROW: Final = EntryForm("name number value number")
 _OBJECTIVE: Final = b"The above solution has an objective value of:"
 _FIRST = re.compile(rb"^ +first(?:feas|loc) += +1$", re.MULTILINE)
 _POINT: Final = b">>> Objective value is:"
@@ -47,7 +56,7 @@ def parse_results(data: bytes) -> RawSolution:
         raise SolutionError("the file is cut off: the end of the search is missing; let BARON write it again")
     words = one_line(banners[-1])
     at = data.rfind(_TABLE)
-    status = of_baron(words, has_table=at >= 0, unbounded=_RAY in data[max(at, 0) :])
+    status = status_of_baron(words, has_table=at >= 0, unbounded=_RAY in data[max(at, 0) :])
     if status is Status.OPTIMAL_GLOBAL and _FIRST.search(data):
         status = Status.FEASIBLE
     if at < 0 or status is Status.UNBOUNDED:
@@ -55,10 +64,10 @@ def parse_results(data: bytes) -> RawSolution:
             raise SolutionError(
                 "the file is cut off: points were found, and the table of the best is not there"
             )
-        return without_point(status, words)
+        return solution_without_point(status, words)
     names, values, objective = _table(data, at + 1)
     if abs(objective) >= _INFINITE:
-        return without_point(Status.UNBOUNDED, words)
+        return solution_without_point(Status.UNBOUNDED, words)
     return RawSolution(status, words, objective, names, values)
 
 
@@ -67,7 +76,7 @@ def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:
     cursor = Cursor(data, position)
     cursor.line("the table of the best solution")
     cursor.after(_HEADER, "the head of the table")
-    table = entries(data, cursor.position, _ROW)
+    table = read_entries(data, cursor.position, _ROW)
     cursor.position = table.end
     line = cursor.line("the objective")
     if not line.startswith(_OBJECTIVE):
@@ -77,5 +86,5 @@ def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:
 
 
 READER: Final = Reader(
-    "baron-res", "BARON results (res.lst)", begins(rb"\s*=+\n\s*BARON version "), parse_results
+    "baron-res", "BARON results (res.lst)", starts_with(rb"\s*=+\n\s*BARON version "), parse_results
 )

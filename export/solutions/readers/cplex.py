@@ -28,7 +28,15 @@ from defusedxml.ElementTree import DefusedXMLParser
 from ....models.errors import SolutionError
 from ...statuses import CPLEX, CPLEX_STOPPED, Status
 from .grammar import float_of, is_number
-from .text import RawSolution, Reader, begins, named_pairs, one_line, pooled, without_point
+from .text import (
+    RawSolution,
+    Reader,
+    named_values,
+    one_line,
+    solution_pool,
+    solution_without_point,
+    starts_with,
+)
 
 _OMITS_ZEROS: Final = "3"
 _INTEGERS_ONLY: Final = {"2", "4"}
@@ -42,10 +50,10 @@ def parse(data: bytes) -> RawSolution:
     Raises SolutionError, with the line, for XML that is damaged or has entities, and for values that are not
     numbers.
     """
-    return pooled([_solution(entry) for entry in _parsed(data)])
+    return solution_pool([_solution(entry) for entry in _parse_xml(data)])
 
 
-def _solution(entry: _Entry) -> RawSolution:
+def _solution(entry: _SolutionEntry) -> RawSolution:
     if entry.header is None:
         raise SolutionError("the file has no header with a status; let CPLEX write it again")
     status = _status(entry.header)
@@ -53,11 +61,11 @@ def _solution(entry: _Entry) -> RawSolution:
     if name := entry.header.get("solutionName"):
         words += f"; {name}"
     if status in _POINTLESS:
-        return without_point(status, words)
+        return solution_without_point(status, words)
     return _with_point(entry, status, words)
 
 
-def _with_point(entry: _Entry, status: Status, words: str) -> RawSolution:
+def _with_point(entry: _SolutionEntry, status: Status, words: str) -> RawSolution:
     header = entry.header or {}
     level = header.get("writeLevel", "1")
     if level in _INTEGERS_ONLY:
@@ -65,11 +73,11 @@ def _with_point(entry: _Entry, status: Status, words: str) -> RawSolution:
             f"the file was written with writeLevel {level} and holds the integer columns only; "
             "use level 1 (AllVars)"
         )
-    names, values = named_pairs(entry.names, entry.values)
+    names, values = named_values(entry.names, entry.values)
     omits = level == _OMITS_ZEROS
     if not (omits or len(values)):
-        if not status.promises_point:
-            return without_point(status, words)
+        if not status.needs_point:
+            return solution_without_point(status, words)
         raise SolutionError("the file holds no variables; let CPLEX write it again")
     stated = header.get("objectiveValue", "").encode(errors="replace")
     objective = float_of(stated) if is_number(stated) else None
@@ -86,7 +94,7 @@ def _status(header: dict[str, str]) -> Status:
 
 
 @dataclass
-class _Entry:
+class _SolutionEntry:
     """One solution of a file."""
 
     header: dict[str, str] | None = None
@@ -94,16 +102,16 @@ class _Entry:
     values: array[float] = field(default_factory=lambda: array("d"))
 
 
-class _Entries:
+class _XmlTarget:
     """Receives elements as they are parsed and keeps headers and variables, so that no tree is built."""
 
     def __init__(self) -> None:
-        self.solutions: list[_Entry] = []
+        self.solutions: list[_SolutionEntry] = []
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         """Process the start of an element."""
         if tag == "CPLEXSolution":
-            self.solutions.append(_Entry())
+            self.solutions.append(_SolutionEntry())
         elif tag == "variable" and self.solutions:
             self._variable(attributes.get("name"), attributes.get("value", ""))
         elif tag == "header" and self.solutions:
@@ -116,17 +124,17 @@ class _Entries:
         self.solutions[-1].names.append(sys.intern(name))
         self.solutions[-1].values.append(float_of(word))
 
-    def close(self) -> list[_Entry]:
+    def close(self) -> list[_SolutionEntry]:
         """Return all solutions, at the end of the document."""
         return self.solutions
 
 
-def _parsed(data: bytes) -> list[_Entry]:
-    parser: Any = DefusedXMLParser(target=_Entries(), forbid_dtd=True)
+def _parse_xml(data: bytes) -> list[_SolutionEntry]:
+    parser: Any = DefusedXMLParser(target=_XmlTarget(), forbid_dtd=True)
     try:
         for start in range(0, len(data), _CHUNK):
             parser.feed(data[start : start + _CHUNK])
-        solutions: list[_Entry] = parser.close()
+        solutions: list[_SolutionEntry] = parser.close()
     except ParseError as error:
         raise SolutionError(
             f"line {error.position[0]}: the XML is damaged or cut off; let CPLEX write the file again"
@@ -140,7 +148,7 @@ def _parsed(data: bytes) -> list[_Entry]:
     except SolutionError as error:
         line = parser.parser.CurrentLineNumber
         raise SolutionError(f"line {line}: {error}; let CPLEX write the file again") from error
-    return solutions or [_Entry()]
+    return solutions or [_SolutionEntry()]
 
 
-READER: Final = Reader("cplex", "CPLEX .sol (XML)", begins(rb"(?s)\s*(?=<[?!C]).*<CPLEXSolution"), parse)
+READER: Final = Reader("cplex", "CPLEX .sol (XML)", starts_with(rb"(?s)\s*(?=<[?!C]).*<CPLEXSolution"), parse)

@@ -20,33 +20,41 @@ from typing import Any, Final
 
 from ....models.errors import SolutionError
 from ...statuses import GUROBI, PULP, PYOMO, Status
-from .grammar import shown
-from .text import RawSolution, Reader, begins, named_pairs, one_line, pooled, without_point
+from .grammar import quoted
+from .text import (
+    RawSolution,
+    Reader,
+    named_values,
+    one_line,
+    solution_pool,
+    solution_without_point,
+    starts_with,
+)
 
 _INFINITE: Final = 1e100
 _AGAIN: Final = "let the program write the file again"
 
 _POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED, Status.NO_POINT}
 
-Path = tuple[str | int | None, ...]
+DocumentPath = tuple[str | int | None, ...]
 """Keys and places that lead into a document; None is the only member of an object."""
 
 
 @dataclass(frozen=True)
-class _Layout:
+class _DocumentLayout:
     """Paths to the columns and claims of a document; states: what a status means, and its words."""
 
     title: str
-    columns: Path
-    status: Path
+    columns: DocumentPath
+    status: DocumentPath
     states: Mapping[Any, tuple[Status, str]]
-    objective: Path = ()
-    bound: Path = ()
+    objective: DocumentPath = ()
+    bound: DocumentPath = ()
     omits_zeros: bool = False
 
 
 _PLAIN: Final = {word.casefold(): (status, word) for word, status in PYOMO.items()}
-_GUROBI: Final = _Layout(
+_GUROBI: Final = _DocumentLayout(
     "Gurobi .json",
     ("Vars",),
     ("SolutionInfo", "Status"),
@@ -57,8 +65,8 @@ _GUROBI: Final = _Layout(
 )
 _CLAIMS: Final = {"status", "objective", "bound"}
 _OTHERS: Final = (
-    _Layout("PuLP", ("variables",), ("parameters", "sol_status"), PULP),
-    _Layout(
+    _DocumentLayout("PuLP", ("variables",), ("parameters", "sol_status"), PULP),
+    _DocumentLayout(
         "Pyomo",
         ("Solution", 1, "Variable"),
         ("Solver", 0, "Termination condition"),
@@ -78,7 +86,7 @@ def parse_gurobi(data: bytes) -> RawSolution:
     return _pool(content, _solution(content, _GUROBI))
 
 
-def parse_other(data: bytes) -> RawSolution:
+def parse_document(data: bytes) -> RawSolution:
     """Read a document of PuLP or Pyomo, or a plain one. Raises SolutionError for invalid values."""
     content = _document(data)
     layout = next((each for each in _OTHERS if _at(content, each.status) is not None), None)
@@ -87,10 +95,12 @@ def parse_other(data: bytes) -> RawSolution:
     inner = next((key for key in ("variables", "values", "solution") if key in content), "columns")
     if inner == "columns":
         content |= {inner: {key: value for key, value in content.items() if key not in _CLAIMS}}
-    return _solution(content, _Layout("plain", (inner,), ("status",), _PLAIN, ("objective",), ("bound",)))
+    return _solution(
+        content, _DocumentLayout("plain", (inner,), ("status",), _PLAIN, ("objective",), ("bound",))
+    )
 
 
-def _solution(content: dict[str, Any], layout: _Layout) -> RawSolution:
+def _solution(content: dict[str, Any], layout: _DocumentLayout) -> RawSolution:
     """The solution of a document; a status that is no point leaves its values out."""
     code, columns = _at(content, layout.status), _at(content, layout.columns)
     if isinstance(code, str):
@@ -102,15 +112,15 @@ def _solution(content: dict[str, Any], layout: _Layout) -> RawSolution:
     if columns is None or status in _POINTLESS:
         if status is Status.OPTIMAL_GLOBAL:
             raise SolutionError(f"the file states optimal but holds no values; {_AGAIN}")
-        return without_point(status.without_point, words)
-    names, values = named_pairs(*_columns(columns))
-    objective, bound = (_finite(_at(content, path)) for path in (layout.objective, layout.bound))
+        return solution_without_point(status.without_point, words)
+    names, values = named_values(*_columns(columns))
+    objective, bound = (_finite_number(_at(content, path)) for path in (layout.objective, layout.bound))
     return RawSolution(
         status, one_line(words.encode()), objective, names, values, layout.omits_zeros, bound=bound
     )
 
 
-def _at(content: Any, path: Path) -> Any:
+def _at(content: Any, path: DocumentPath) -> Any:
     """The member of a document at a path, or None."""
     for key in path:
         if key is None:
@@ -129,7 +139,7 @@ def _columns(entries: Any) -> tuple[list[str], list[float]]:
     columns = [_column(entry) for entry in pairs]
     wrong = next((entry for entry, column in zip(pairs, columns, strict=True) if column is None), None)
     if None in columns or not columns:
-        raise SolutionError(f"{shown(repr(wrong).encode())} is not a name with a value; {_AGAIN}")
+        raise SolutionError(f"{quoted(repr(wrong).encode())} is not a name with a value; {_AGAIN}")
     names, values = zip(*columns, strict=True)
     return list(names), list(values)
 
@@ -154,21 +164,21 @@ def _pool(content: dict[str, Any], best: RawSolution) -> RawSolution:
     names = [entry[0] for entry in content["Vars"]]
     others = []
     for at, objective in enumerate(objectives[1:], 1):
-        values = named_pairs(names, [values[at] for values in further])[1]
+        values = named_values(names, [values[at] for values in further])[1]
         others.append(
             replace(
                 best,
                 status=Status.FEASIBLE,
                 message="",
-                objective=_finite(objective),
+                objective=_finite_number(objective),
                 bound=None,
                 values=values,
             )
         )
-    return pooled([best, *others])
+    return solution_pool([best, *others])
 
 
-def _finite(value: Any) -> float | None:
+def _finite_number(value: Any) -> float | None:
     """A number that is below Gurobi's infinity, else None."""
     return float(value) if type(value) in {int, float} and abs(value) < _INFINITE else None
 
@@ -208,11 +218,11 @@ def _object(pairs: list[tuple[str, Any]]) -> Any:
 
 
 READERS: Final = (
-    Reader("gurobi-json", "Gurobi .json", begins(rb'\s*\{\s*"SolutionInfo"'), parse_gurobi),
+    Reader("gurobi-json", "Gurobi .json", starts_with(rb'\s*\{\s*"SolutionInfo"'), parse_gurobi),
     Reader(
         "json",
         "JSON of PuLP or Pyomo, or of names and values",
-        begins(rb'\s*\{(?!\s*"SolutionInfo")'),
-        parse_other,
+        starts_with(rb'\s*\{(?!\s*"SolutionInfo")'),
+        parse_document,
     ),
 )

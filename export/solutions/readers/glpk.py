@@ -26,8 +26,8 @@ from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ...statuses import GLPK, Status
 from ...writing.canonical import ColumnOrder
-from .grammar import Form, place_of_entry, shown
-from .text import Cursor, RawSolution, Reader, entries, fault, without_point
+from .grammar import EntryForm, place_of_entry, quoted
+from .text import Cursor, RawSolution, Reader, line_error, read_entries, solution_without_point
 
 _SUMMARY = re.compile(rb"s (mip|bas|ipt) (\d{1,12}) (\d{1,12}) (.+) (\S+)")
 _END: Final = b"e o f"
@@ -35,9 +35,9 @@ _BEGIN = re.compile(rb"^[ \t]*(?:c Problem:|s (?:mip|bas|ipt) )", re.MULTILINE)
 _LAST = re.compile(rb"^[ \t]*e o f[ \t]*$", re.MULTILINE)
 _GOAL_OF_MOD: Final = b"energy ="
 _FORMS: Final = {
-    b"mip": Form("j index value"),
-    b"ipt": Form("j index value number"),
-    b"bas": Form("j index word value number"),
+    b"mip": EntryForm("j index value"),
+    b"ipt": EntryForm("j index value number"),
+    b"bas": EntryForm("j index word value number"),
 }
 _COLUMNS = re.compile(rb"^[ \t\f\v]*j[ \t\f\v]", re.MULTILINE)
 
@@ -45,7 +45,7 @@ _COLUMNS = re.compile(rb"^[ \t\f\v]*j[ \t\f\v]", re.MULTILINE)
 class _Summary(NamedTuple):
     """The line that begins with s: kind, rows, columns, status and objective."""
 
-    form: Form
+    form: EntryForm
     rows: int
     columns: int
     status: Status
@@ -63,7 +63,7 @@ def parse(data: bytes) -> RawSolution:
     if not data.rstrip().endswith(b"\n" + _END):
         raise SolutionError("the file is cut off: it has no line `e o f`; let the solver write it again")
     if summary.status in {Status.INFEASIBLE, Status.UNBOUNDED}:
-        return without_point(summary.status, message, rows=summary.rows)
+        return solution_without_point(summary.status, message, rows=summary.rows)
     values = _columns(data, cursor.position, summary)
     return RawSolution(
         summary.status, message, summary.objective, None, values, rows=summary.rows, order=order
@@ -99,7 +99,7 @@ def _summary(cursor: Cursor) -> _Summary:
     line = cursor.line("the line of counts and status")
     found = _SUMMARY.fullmatch(line)
     if found is None:
-        raise cursor.fault(f"{shown(line)} is not kind, rows, columns, status and objective")
+        raise cursor.fault(f"{quoted(line)} is not kind, rows, columns, status and objective")
     status = GLPK.get(found[4].decode(errors="replace"), Status.LIMIT_WITHOUT_POINT)
     return _Summary(_FORMS[found[1]], int(found[2]), int(found[3]), status, cursor.number(found[5]))
 
@@ -107,19 +107,19 @@ def _summary(cursor: Cursor) -> _Summary:
 def _columns(data: bytes, start: int, summary: _Summary) -> Floats:
     first = _COLUMNS.search(data, start)
     start = first.start() if first else data.rfind(_END)
-    columns = entries(data, start, summary.form)
+    columns = read_entries(data, start, summary.form)
     rest = data[columns.end :].lstrip()
     if not rest.startswith(_END):
         line = rest.split(b"\n", 1)[0]
-        raise fault(data, columns.end, summary.form.fault(line))
+        raise line_error(data, columns.end, summary.form.fault(line))
     if len(columns.values) != summary.columns:
-        raise fault(
+        raise line_error(
             data, start, f"{summary.columns} columns are announced, {len(columns.values)} lines follow"
         )
     wrong = columns.numbers != np.arange(1, summary.columns + 1)
     if wrong.any():
         at = int(np.argmax(wrong))
-        raise fault(data, place_of_entry(data, start, at), f"this is not the line of column {at + 1}")
+        raise line_error(data, place_of_entry(data, start, at), f"this is not the line of column {at + 1}")
     return columns.values
 
 

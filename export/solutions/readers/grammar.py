@@ -1,6 +1,6 @@
 r"""The line grammar of solution files: one engine for every text layout of names and values.
 
-A layout (`Layout`) declares what its lines look like. Blank lines, comments and claims may stand anywhere
+A layout (`TextLayout`) declares what its lines look like. Blank lines, comments and claims may stand anywhere
 between the entries. Lines may end as on Windows or old Macs, words may be separated by tabs or form feeds,
 and the last line may lack its end. A regular expression checks a megabyte of entries at a time; only lines
 that are no entries are processed one by one.
@@ -62,7 +62,7 @@ class LineError(Exception):
     """A fault of a text, with its line if it has one."""
 
 
-def fault_at(data: bytes, position: int, text: str) -> LineError:
+def error_at(data: bytes, position: int, text: str) -> LineError:
     """An error with the line of a byte position in a text."""
     return LineError(f"line {data.count(10, 0, position) + 1}: {text}")
 
@@ -100,12 +100,12 @@ def spellings(name: bytes) -> tuple[bytes, bytes]:
     return plain, plain[2:] if plain.startswith(b"t_") else plain
 
 
-def shown(text: bytes) -> str:
+def quoted(text: bytes) -> str:
     """A short quotation for a message."""
     return repr(text[:40].decode(errors="replace"))
 
 
-class Form:
+class EntryForm:
     """The words of an entry, as in `name value`.
 
     `name`, `value` and `index` (a number without a point) are kept; `number` and `word` are not. A word in
@@ -169,17 +169,17 @@ class Form:
             return f"{len(words)} words stand where {len(self.words)} should"
         for kind, word in pairs:
             if kind in self.numeric and not is_number(word):
-                return f"{shown(word)} is not a number"
-        return f"{shown(line.strip())} is not an entry of `{' '.join(self.words)}`"
+                return f"{quoted(word)} is not a number"
+        return f"{quoted(line.strip())} is not an entry of `{' '.join(self.words)}`"
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """The look of a kind of text. Patterns are regular expressions of bytes that ignore case.
 
     signature: pattern of the start of the first line of an answer, or of a line in it if `heads` is false. A
-    group `answer` begins with the only answer. forms: words of an entry (`Form`); the first that fits the
-    first entry is that of the whole text. claims: patterns of whole lines, with groups objective, bound,
+    group `answer` begins with the only answer. forms: words of an entry (`EntryForm`); the first that fits
+    the first entry is that of the whole text. claims: patterns of whole lines, with groups objective, bound,
     status and others that the reader knows; `none` states that there is no point. begin: pattern of the line
     before the entries, with groups `count` (negative: without zeros) and `sparse`; empty if they start at
     once. end: pattern of the line after them. needs: groups, `begin` or `end`, without which a text is cut
@@ -235,7 +235,7 @@ class Layout:
 
 
 @cache
-def _compiled(layout: Layout) -> dict[str, re.Pattern[bytes]]:
+def _compiled(layout: TextLayout) -> dict[str, re.Pattern[bytes]]:
     """The patterns of a layout, compiled: signature, begin, end, and claims and refusals by number."""
     lines = {"begin": layout.begin, "end": layout.end}
     lines.update({f"refusal {at}": pattern for at, (pattern, _) in enumerate(layout.refusals)})
@@ -252,8 +252,8 @@ def _compiled(layout: Layout) -> dict[str, re.Pattern[bytes]]:
 
 
 @cache
-def _forms(layout: Layout) -> tuple[Form, ...]:
-    return tuple(Form(words, layout.separator, layout.reserved) for words in layout.forms)
+def _forms(layout: TextLayout) -> tuple[EntryForm, ...]:
+    return tuple(EntryForm(words, layout.separator, layout.reserved) for words in layout.forms)
 
 
 class Scan:
@@ -264,7 +264,7 @@ class Scan:
     the last entry, if its value ends the text without the end of a line, and so may be cut off.
     """
 
-    def __init__(self, data: bytes, layout: Layout) -> None:
+    def __init__(self, data: bytes, layout: TextLayout) -> None:
         self.layout = layout
         self.patterns = _compiled(layout)
         self.form = _forms(layout)[0]
@@ -317,7 +317,7 @@ class Scan:
             self.restarts += len(again)
             if self.restarts > 1:
                 place = place_of_entry(self.data, start, again[-1])
-                raise fault_at(self.data, place, "the numbers start again for the second time")
+                raise error_at(self.data, place, "the numbers start again for the second time")
             self.first = self.entries + again[0] if again else self.first
             self.last_index = index[-1]
         self.entries += len(names)
@@ -340,7 +340,7 @@ class Scan:
             if match is None or key == ("begin" if self.begun else "end"):
                 continue
             if key.startswith("refusal"):
-                raise fault_at(data, at, self.layout.refusals[int(key[8:])][1])
+                raise error_at(data, at, self.layout.refusals[int(key[8:])][1])
             self._keep(match)
             if key == "end":
                 self.ended = True
@@ -352,8 +352,8 @@ class Scan:
         if self._is_other_text(at):
             return len(data), False
         if self.unended and end + 1 == len(data):
-            raise fault_at(data, at, "the file is cut off in the middle of this line")
-        raise fault_at(data, at, self.form.fault(data[at:end]))
+            raise error_at(data, at, "the file is cut off in the middle of this line")
+        raise error_at(data, at, self.form.fault(data[at:end]))
 
     def _is_other_text(self, at: int) -> bool:
         """Whether the text from a line on is no part of the answer: after an empty line, without entries."""
@@ -369,13 +369,13 @@ class Scan:
             if group in NUMBERS and not is_number(text):
                 if text.upper() in NO_NUMBERS:
                     continue
-                raise fault_at(self.data, match.start(group), f"{shown(text)} is not a number")
+                raise error_at(self.data, match.start(group), f"{quoted(text)} is not a number")
             before = self.claims.setdefault(group, text)
             if group == "objective" and not isclose(
                 float_of(before), float_of(text), rel_tol=AGREEMENT, abs_tol=AGREEMENT
             ):
                 line = self.data.count(10, 0, place) + 1
-                raise fault_at(self.data, match.start(group), f"this is not the objective of line {line}")
+                raise error_at(self.data, match.start(group), f"this is not the objective of line {line}")
 
     def _check(self) -> None:
         """Refuse a text whose counts or marks show that it is not whole."""
@@ -383,12 +383,12 @@ class Scan:
             text, place = self.claims["count"], self.places["count"]
             if not re.fullmatch(rb"-?\d{1,12}", text):
                 line = self.data[self.data.rfind(b"\n", 0, place) + 1 : self.data.index(b"\n", place)]
-                raise fault_at(self.data, place, f"{shown(line)} is not the number of columns")
+                raise error_at(self.data, place, f"{quoted(line)} is not the number of columns")
             announced, held = abs(int(text)), self.entries - bool(self.cut)
             self.sparse = text.startswith(b"-") or "sparse" in self.claims or not announced
             if held != announced:
                 words = f"{announced} columns are announced, {held} whole lines follow"
-                raise fault_at(self.data, place, words)
+                raise error_at(self.data, place, words)
         none = {"none", "infeasible"} & set(self.claims)
         for group, missing in () if none else self.layout.needs:
             marks = {"end": self.ended or not self.begun, "begin": self.begun}

@@ -5,12 +5,12 @@ The standalone checker of a library contains this text: it needs Python 3.9 and 
 
 from __future__ import annotations
 
-from .grammar import NUMBER, RESERVED, Layout
+from .grammar import NUMBER, RESERVED, TextLayout
 
 OUR_NAME = rb"[a-z]\w*_\d{2,4}_\d{2,4}(?:_[ru])?\b"
 FEW_LINES = rb"(?:[^\n]*\n){0,9}?"
 
-HIGHS = Layout(
+HIGHS = TextLayout(
     "highs",
     "HiGHS, solution style 0 (raw) or 4 (sparse)",
     signature=rb"Model status[ \t]*\n",
@@ -45,7 +45,7 @@ Values below 1e-13 in size are written as 0. Before 1.16, a sparse file of the p
 HiGHS reports `Optimal` for local points of non-convex quadratic problems, which are outside its documented
 classes. The caller checks the class of the problem."""
 
-SCIP = Layout(
+SCIP = TextLayout(
     "scip",
     "SCIP .sol",
     signature=(
@@ -68,7 +68,7 @@ The columns are in no particular order and those at 0 are omitted, unless write/
 be +infinity or -infinity; a partial solution has the value `unknown`. SCIP adds columns of its own (nlobjvar,
 quadobjvar, qmatrixvar, objconstvar). Without a status a point counts as feasible."""
 
-XPRESS = Layout(
+XPRESS = TextLayout(
     "xpress-slx",
     "Xpress .slx",
     signature=rb"NAME\b[^\n]*\n\s*(?:[A-Z] |ENDATA)|\A\s*ENDATA[ \t]*(?:\n|\Z)",
@@ -87,7 +87,7 @@ XPRESS = Layout(
 There is no status: the point counts as feasible. Without an integer solution Xpress writes the relaxation,
 which the recomputed violation reveals. .prt has six decimals, .hdr no columns: they are not read."""
 
-CBC = Layout(
+CBC = TextLayout(
     "cbc",
     "CBC, the file of its command solution",
     signature=rb"[A-Z][^\n]{2,100}? - objective value",
@@ -110,7 +110,7 @@ before that must not be columns. Some versions and options omit columns at 0; a 
 not. A file of an infeasible problem looks the same, and a file of a search without result holds the
 relaxation, (no integer solution - continuous used): both hold no point."""
 
-GAMS = Layout(
+GAMS = TextLayout(
     "gams-csv",
     "GAMS, the CSV that our models write with --RESULTS",
     signature=rb"model_status[ \t]*,",
@@ -138,7 +138,7 @@ EPS is a zero, +INF and -INF occur, NA and UNDF are not values. GAMS's numbers o
 manual under modelStat and solveStat. If the model status promises no point, GAMS keeps the start in the
 levels: values are then not read. A listing (.lst) has four decimals, too few for a point, and is not read."""
 
-MIPLIB = Layout(
+MIPLIB = TextLayout(
     "miplib",
     "MIPLIB .sol",
     signature=rb"=(?:obj|infeas)=",
@@ -150,7 +150,7 @@ MIPLIB = Layout(
 denotes an infeasible instance (MIPLIB's solution checker). There is no other status: a point counts as
 feasible."""
 
-LIST = Layout(
+LIST = TextLayout(
     "gurobi",
     "Gurobi .sol, or any list of names and values",
     signature=(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from .grammar import BLANK, NUMBER, Layout
+from .grammar import BLANK, NUMBER, TextLayout
 from .layouts import LAYOUTS, OUR_NAME
 
 _SOLVED = rb"(?:CPLEX> )?(?:MIP|Barrier|Primal simplex|Dual simplex) - "
@@ -25,10 +25,10 @@ def _quotient(match: re.Match[bytes]) -> bytes:
     return repr(int(above) / int(below)).encode()
 
 
-def _list_of(name: str, title: str, separator: bytes, value: bytes) -> Layout:
+def _list_of(name: str, title: str, separator: bytes, value: bytes) -> TextLayout:
     """Pairs with a sign between, after a heading or none; in other text, five or more of them."""
     pair = _PAIR % (separator, value)
-    return Layout(
+    return TextLayout(
         name,
         f"names and values with {title} between",
         signature=rb"(?!model_status)(?P<answer>\A%b(?:%b)?%b*(?:%b|%b)|(?:%b)?%b(?:[ \t]*%b){4})"
@@ -44,8 +44,8 @@ def _list_of(name: str, title: str, separator: bytes, value: bytes) -> Layout:
 
 
 LISTINGS = (
-    Layout("cuopt", "cuOpt .sol", signature=rb"# Status:", pointless=rb"infeasible|unbounded"),
-    Layout(
+    TextLayout("cuopt", "cuOpt .sol", signature=rb"# Status:", pointless=rb"infeasible|unbounded"),
+    TextLayout(
         "python-mip",
         "python-mip .sol",
         signature=rb"Feasible solution - objective\b",
@@ -53,14 +53,14 @@ LISTINGS = (
         claims=(rb"Feasible solution - objective .*",),  # 0.0 for every model
         omits_zeros=True,
     ),
-    Layout(
+    TextLayout(
         "gurobi-attr",
         "Gurobi .attr",
         signature=rb"# Attribute file for model\b",
         begin=rb"SECTION SOLUTION",
         end=rb"SECTION .*",
     ),
-    Layout(
+    TextLayout(
         "xpress-asc",
         "Xpress .asc",
         signature=rb'\d+,"[^"\n]*","[A-Z]",',
@@ -68,7 +68,7 @@ LISTINGS = (
         separator=b",",
         rewrites=((b'"', rb'(?m)^ *\d+,"[^"\n]*","[^C].*$', b""), _QUOTES),
     ),
-    Layout(
+    TextLayout(
         "lp_solve",
         "lp_solve, its output",
         signature=rb"Value of objective function:|This problem is (?:infeasible|unbounded)",
@@ -81,7 +81,7 @@ LISTINGS = (
         needs=(("begin", "list of variables"),),
         digits="lp_solve prints six and has no option for more",
     ),
-    Layout(
+    TextLayout(
         "symphony",
         "SYMPHONY, its output",
         signature=rb"\* [A-Z][\w ]+\*[ \t]*\n\*(?! +Copyright)",
@@ -95,7 +95,7 @@ LISTINGS = (
         needs=(("status", "status"),),
         omits_zeros=True,
     ),
-    Layout(
+    TextLayout(
         "qsopt_ex",
         "QSopt_ex, esolver -O",
         signature=rb"status = [A-Z]+\n",
@@ -111,7 +111,7 @@ LISTINGS = (
         omits_zeros=True,
         rewrites=((b"/", rb"(?<!\S)-?\d+/[1-9]\d*(?!\S)", _quotient),),
     ),
-    Layout(
+    TextLayout(
         "mosek",
         "MOSEK .int, .bas or .sol",
         signature=rb"(?:NAME +:[^\n]*\n)?PROBLEM STATUS +:",
@@ -124,7 +124,7 @@ LISTINGS = (
         end=rb"SYMMETRIC MATRIX VARIABLES",
         pointless=rb"infeasible|dual_infeasible",
     ),
-    Layout(
+    TextLayout(
         "cplex-display",
         "CPLEX, display solution variables -",
         signature=_SOLVED + rb"[^\n]*(?:Objective =|infeasible|no integer solution)",
@@ -138,7 +138,7 @@ LISTINGS = (
         omits_zeros=True,
         digits="`write FILE.sol` in CPLEX writes all",
     ),
-    Layout(
+    TextLayout(
         "gams-listing",
         "GAMS listing (.lst)",
         signature=rb"\*\*\*\* SOLVER STATUS (?=(?:[^\n]*\n){0,2000}?---- VAR )",
@@ -157,7 +157,7 @@ LISTINGS = (
         ),
         digits="`gams MODEL --RESULTS=FILE.csv` writes all",
     ),
-    Layout(
+    TextLayout(
         "gams-display",
         "GAMS, display of levels",
         signature=rb"---- +\d+ VARIABLE [^\s.]+\.L +=",
@@ -165,7 +165,7 @@ LISTINGS = (
         rewrites=((b"VARIABLE", rb"(?m)^[-\d \t]*VARIABLE ([^\s.]+)\.L( *= *\S+).*$", rb"\1\2"),),
         digits="`option decimals = 8` in GAMS writes more, and --RESULTS=FILE.csv all",
     ),
-    Layout(
+    TextLayout(
         "ampl-display",
         "AMPL, display _varname, _var",
         signature=rb":\s+_varname\s+_var\s+:=",
@@ -176,7 +176,7 @@ LISTINGS = (
         rewrites=((b"'", b"'", b" "),),
         digits="`option display_precision 0` in AMPL prints all",
     ),
-    Layout(
+    TextLayout(
         "pyomo",
         "Pyomo results, YAML",
         signature=rb"# = Solver Results",
@@ -192,7 +192,7 @@ LISTINGS = (
         omits_zeros=True,
         rewrites=((b"Variable:", rb"(?m)^ {4}(\S+):\n {6}Value: (\S+)\n", rb"\1 \2\n\n"),),
     ),
-    Layout(
+    TextLayout(
         "list-in-text",
         "names and values in other text",
         signature=rb"\A\s*%b(?:%b[^\n]*\n)+?(?P<answer>(?:[ \t]*(?:ONE|%b)\w*[ \t]+%b[ \t]*\n){5})"

@@ -19,13 +19,13 @@ import numpy as np
 from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
-from ...statuses import HIGHS, PYOMO, Status, of_cbc, of_gams, of_scip, of_words
+from ...statuses import HIGHS, PYOMO, Status, status_of_cbc, status_of_gams, status_of_scip, status_of_words
 from ...writing.stamps import digits_in_columns, digits_in_text
 from . import ampl, baron, cplex, documents, glpk
-from .grammar import HEAD, Scan, fault_at, plain_text
+from .grammar import HEAD, Scan, error_at, plain_text
 from .listings import TEXT_LAYOUTS
 from .siblings import log_of, sibling_of
-from .text import Claim, RawSolution, Reader, choose, reader_of, refusing
+from .text import Claim, RawSolution, Reader, choose_solution, reader_of, refuse_faults
 
 _NEAR_ONE: Final = 1e-5
 _SMALLER: Final = "let the solver write it without columns at 0"
@@ -40,16 +40,16 @@ _PACKED: Final[dict[bytes, Callable[[io.BytesIO], Any]]] = {
 def _claim_of_highs(scan: Scan) -> tuple[Status, str]:
     status = HIGHS.get(scan.status, Status.ERROR)
     if status is Status.OPTIMAL_GLOBAL and "none" in scan.claims:
-        raise fault_at(scan.data, scan.places["none"], "the file is Optimal but holds no point")
+        raise error_at(scan.data, scan.places["none"], "the file is Optimal but holds no point")
     denied = scan.claims.get("primal", b"").lower() not in {b"feasible", b""}
     return status.without_point if denied else status, scan.status
 
 
 def _claim_of_gams(scan: Scan) -> tuple[Status, str]:
-    return of_gams(int(scan.status), int(scan.claims["solver"]))
+    return status_of_gams(int(scan.status), int(scan.claims["solver"]))
 
 
-def _stated(table: Callable[[str], Status]) -> Claim:
+def _claim_by(table: Callable[[str], Status]) -> Claim:
     """The claim of a text that states a status in words, or none."""
     return lambda scan: (table(scan.status) if scan.status else Status.FEASIBLE, scan.status)
 
@@ -58,14 +58,14 @@ _CLAIMS: Final[dict[str, Claim]] = {
     "highs": _claim_of_highs,
     "gams-csv": _claim_of_gams,
     "gams-listing": _claim_of_gams,
-    "scip": _stated(of_scip),
-    "cbc": _stated(of_cbc),
-    "pyomo": _stated(lambda words: PYOMO.get(words, Status.FEASIBLE)),
+    "scip": _claim_by(status_of_scip),
+    "cbc": _claim_by(status_of_cbc),
+    "pyomo": _claim_by(lambda words: PYOMO.get(words, Status.FEASIBLE)),
 }
 """Functions that return the claim of a text, by layout; the others state a status in words at most."""
 
 _LISTS: Final = tuple(
-    reader_of(layout, _CLAIMS.get(layout.name, _stated(of_words))) for layout in TEXT_LAYOUTS
+    reader_of(layout, _CLAIMS.get(layout.name, _claim_by(status_of_words))) for layout in TEXT_LAYOUTS
 )
 PLAIN: Final = _LISTS[-4:]
 """Readers of lists without a mark of their program, for files that no other reader recognises."""
@@ -92,7 +92,7 @@ def read_raw(path: str | Path, solution: int | None = None) -> RawSolution:
     """
     data = read_bytes(path, MAX_SOLUTION, _SMALLER)
     with naming(path):
-        return parse_raw(_unpacked(data), solution)
+        return parse_raw(_unpack(data), solution)
 
 
 def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
@@ -100,9 +100,9 @@ def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
     if not data or data.isspace():
         raise SolutionError("the file is empty; the solver's log should give the reason")
     binary = ampl.BINARY.recognises(data[:HEAD])
-    with refusing():
+    with refuse_faults():
         text = data if binary else plain_text(data)
-    head, readers = text[:HEAD], recognised(text)
+    head, readers = text[:HEAD], recognising_readers(text)
     if not readers:
         known = "; ".join(reader.description for reader in READERS)
         unknown = f"this is not a solution file of a known kind; give one of these: {known}"
@@ -110,11 +110,11 @@ def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
     if len(readers) > 1:
         kinds = " and ".join(reader.description for reader in readers)
         raise SolutionError(f"the text holds answers of several kinds: {kinds}; leave one of them in it")
-    raw = choose(readers[0].parse(text), solution)
-    return replace(raw, reader=readers[0].name, stamps=raw.stamps | _stamps(head, raw))
+    raw = choose_solution(readers[0].parse(text), solution)
+    return replace(raw, reader=readers[0].name, stamps=raw.stamps | _stated_stamps(head, raw))
 
 
-def recognised(text: bytes) -> list[Reader]:
+def recognising_readers(text: bytes) -> list[Reader]:
     """The readers that recognise a text, as `plain_text` returns it; an answer may stand in other text."""
     head = text[:HEAD]
     if sibling_of(head):
@@ -128,7 +128,7 @@ def recognised(text: bytes) -> list[Reader]:
     return [reader for reader in _LISTS if reader not in PLAIN and reader.recognises(text)]
 
 
-def _stamps(head: bytes, raw: RawSolution) -> frozenset[str]:
+def _stated_stamps(head: bytes, raw: RawSolution) -> frozenset[str]:
     """Digits of the stamps (`Problem.stamp`) that a solver repeats in a message, a name or a column.
 
     Raises SolutionError for a column that is fixed to 1 and has another value.
@@ -144,9 +144,9 @@ def _stamps(head: bytes, raw: RawSolution) -> frozenset[str]:
     return digits_in_text(head) | digits_in_columns(names[chosen].tolist())
 
 
-def _unpacked(data: bytes) -> bytes:
+def _unpack(data: bytes) -> bytes:
     """The content of a packed file, or the data themselves. Raises SolutionError."""
-    content = _start_of(data, MAX_SOLUTION + 1)
+    content = _unpack_start(data, MAX_SOLUTION + 1)
     if len(content) > MAX_SOLUTION:
         raise SolutionError(f"unpacks to more than {MAX_SOLUTION} bytes; {_SMALLER}")
     return content
@@ -154,12 +154,12 @@ def _unpacked(data: bytes) -> bytes:
 
 def head_of(data: bytes) -> bytes:
     """The first bytes of a file, unpacked, as `plain_text` returns them; as they are if they are damaged."""
-    with suppress(SolutionError), refusing():
-        return plain_text(_start_of(data, HEAD))
+    with suppress(SolutionError), refuse_faults():
+        return plain_text(_unpack_start(data, HEAD))
     return data[:HEAD]
 
 
-def _start_of(data: bytes, limit: int) -> bytes:
+def _unpack_start(data: bytes, limit: int) -> bytes:
     """At most `limit` bytes of a packed file, or of the data themselves. Raises SolutionError."""
     opened = next((opened for start, opened in _PACKED.items() if data.startswith(start)), None)
     if opened is None:

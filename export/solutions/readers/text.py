@@ -19,15 +19,15 @@ from ...statuses import Status
 from .grammar import (
     HEAD,
     TOKEN_LIMIT,
-    Form,
-    Layout,
+    EntryForm,
     LineError,
     Scan,
-    fault_at,
+    TextLayout,
+    error_at,
     float_of,
     is_number,
     plain_numbers,
-    shown,
+    quoted,
     spellings,
 )
 
@@ -91,13 +91,13 @@ class RawSolution:
         return self.values.size > 0 or self.omits_zeros
 
 
-def pooled(solutions: Sequence[RawSolution]) -> RawSolution:
+def solution_pool(solutions: Sequence[RawSolution]) -> RawSolution:
     """The content of a file with one or more solutions; by default the first of them."""
     first, *others = solutions
     return replace(first, pool=(first, *others)) if others else first
 
 
-def choose(raw: RawSolution, number: int | None = None) -> RawSolution:
+def choose_solution(raw: RawSolution, number: int | None = None) -> RawSolution:
     """The solution of a pool with a number from 1, by default the best; its message states which it is.
 
     The best is that of least objective if each states one, else the first. Raises SolutionError for a
@@ -116,7 +116,7 @@ def choose(raw: RawSolution, number: int | None = None) -> RawSolution:
     return replace(chosen, message=f"{chosen.message}; {place}" if chosen.message else place)
 
 
-def without_point(status: Status, message: bytes | str, *, rows: int | None = None) -> RawSolution:
+def solution_without_point(status: Status, message: bytes | str, *, rows: int | None = None) -> RawSolution:
     """The content of a file without a point; the message is put on one line."""
     words = one_line(message if isinstance(message, bytes) else message.encode())
     return RawSolution(status, words, None, np.empty(0, dtype="S1"), np.empty(0), rows=rows)
@@ -141,27 +141,27 @@ class Reader:
     text: bool = True
 
 
-def begins(pattern: bytes) -> Callable[[bytes], bool]:
+def starts_with(pattern: bytes) -> Callable[[bytes], bool]:
     """Return a test for a Reader: whether a file's first bytes match a regular expression."""
     compiled = re.compile(pattern)
     return lambda head: compiled.match(head) is not None
 
 
-def reader_of(layout: Layout, claim: Claim) -> Reader:
+def reader_of(layout: TextLayout, claim: Claim) -> Reader:
     """The reader of a text layout; claim: what its text claims."""
     return Reader(
         layout.name, layout.description, layout.recognises, lambda data: _parse_layout(data, layout, claim)
     )
 
 
-def _parse_layout(data: bytes, layout: Layout, claim: Claim) -> RawSolution:
-    with refusing():
-        return pooled([_parse_answer(answer, layout, claim) for answer in layout.answers(data)])
+def _parse_layout(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
+    with refuse_faults():
+        return solution_pool([_parse_answer(answer, layout, claim) for answer in layout.answers(data)])
 
 
-def _parse_answer(data: bytes, layout: Layout, claim: Claim) -> RawSolution:
+def _parse_answer(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
     scan = Scan(data, layout)
-    pieces = [(np.array(names), floats(values)) for names, values in scan.read()]
+    pieces = [(np.array(names), float_values(values)) for names, values in scan.read()]
     status, words = claim(scan)
     if not scan.has_point:
         return _without_point(scan, status, words)
@@ -193,10 +193,10 @@ def _without_point(scan: Scan, status: Status, words: str) -> RawSolution:
     """The content of a text without a point. Raises LineError when it must have one."""
     silent = "status" not in scan.claims
     if "infeasible" in scan.claims:
-        return without_point(Status.INFEASIBLE, words or scan.claims["infeasible"])
-    if not {"none", "status"} & set(scan.claims) or (status.promises_point and "none" not in scan.claims):
+        return solution_without_point(Status.INFEASIBLE, words or scan.claims["infeasible"])
+    if not {"none", "status"} & set(scan.claims) or (status.needs_point and "none" not in scan.claims):
         raise LineError("the file holds no values")
-    return without_point(
+    return solution_without_point(
         Status.NO_POINT if silent or status is Status.FEASIBLE else status.without_point,
         words or scan.claims.get("none", b""),
     )
@@ -207,7 +207,7 @@ def _number(scan: Scan, group: str) -> float | None:
 
 
 @contextmanager
-def refusing() -> Iterator[None]:
+def refuse_faults() -> Iterator[None]:
     """Raise SolutionError with a remedy for a fault of the text."""
     try:
         yield
@@ -225,18 +225,18 @@ class Entries(NamedTuple):
     end: int
 
 
-def entries(data: bytes, start: int, form: Form) -> Entries:
+def read_entries(data: bytes, start: int, form: EntryForm) -> Entries:
     """The lines of a text that are entries, from a byte position on; a line without an end is none."""
     names, values, index, end = [np.empty(0, "S1")], [np.empty(0)], [np.empty(0, np.int64)], start
     for stop, words in form.read(data, start):
         end = stop
         names.append(np.array(form.column(words, "name") or np.empty(0, "S1")))
-        values.append(floats(form.column(words, "value")))
-        index.append(floats(form.column(words, "index")).astype(np.int64))
+        values.append(float_values(form.column(words, "value")))
+        index.append(float_values(form.column(words, "index")).astype(np.int64))
     return Entries(np.concatenate(names), np.concatenate(values), np.concatenate(index), end)
 
 
-def floats(words: list[bytes]) -> Floats:
+def float_values(words: list[bytes]) -> Floats:
     """The numbers in words that are numbers. Python's own rounding: exact."""
     return np.fromstring(plain_numbers(b" ".join(words)), sep=" ")
 
@@ -249,7 +249,7 @@ class NamedValues(NamedTuple):
     unknown: int
 
 
-def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
+def values_by_name(names: Bytes, raw: RawSolution) -> NamedValues:
     """The values of `names` (n,), unique byte strings, in their order.
 
     A name that is not in the file is 0 if its format omits zeros, else NaN and counted as missing. Names in
@@ -259,7 +259,7 @@ def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of
     `names` as the name of a row.
     """
-    listed = _listed(raw)
+    listed = _listed_names(raw)
     _check_rows(names, raw)
     if np.array_equal(listed, names):
         return NamedValues(raw.values.copy(), 0, 0)
@@ -268,13 +268,13 @@ def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     values = np.full(len(names), 0.0 if raw.omits_zeros else np.nan)
     values[index[known]] = raw.values[known]
     _check_repeats(listed[known], raw.values[known], values[index[known]])
-    return NamedValues(values, int(np.isnan(values).sum()), len(_strangers(listed[~known])))
+    return NamedValues(values, int(np.isnan(values).sum()), len(_foreign_names(listed[~known])))
 
 
 def unknown_names(names: Bytes, raw: RawSolution) -> list[bytes]:
     """The names in a file that are neither among `names` nor added by programs."""
-    listed = _listed(raw)
-    return _strangers(listed[_places(names, listed) < 0])
+    listed = _listed_names(raw)
+    return _foreign_names(listed[_places(names, listed) < 0])
 
 
 def _places(names: Bytes, listed: Bytes) -> NDArray[np.int64]:
@@ -289,13 +289,13 @@ def _places(names: Bytes, listed: Bytes) -> NDArray[np.int64]:
     return index
 
 
-def _strangers(names: Bytes) -> list[bytes]:
+def _foreign_names(names: Bytes) -> list[bytes]:
     """The names that are not of columns that programs add."""
     added = re.compile("|".join(added_columns().values()).encode(), re.DOTALL | re.IGNORECASE)
     return [name for name in names.tolist() if not any(map(added.fullmatch, spellings(name)))]
 
 
-def _listed(raw: RawSolution) -> Bytes:
+def _listed_names(raw: RawSolution) -> Bytes:
     _check_point(raw)
     if raw.names is None:
         raise SolutionError(
@@ -360,9 +360,9 @@ def one_line(text: bytes) -> str:
     return " ".join(_CONTROLS.sub(" ", text[:HEAD].decode(errors="replace")).split())[:300]
 
 
-def fault(data: bytes, position: int, text: str) -> SolutionError:
+def line_error(data: bytes, position: int, text: str) -> SolutionError:
     """An error with the line of a byte position in a text, and the remedy."""
-    return SolutionError(f"{fault_at(data, position, text)}; let the solver write the file again")
+    return SolutionError(f"{error_at(data, position, text)}; let the solver write the file again")
 
 
 @dataclass
@@ -383,7 +383,7 @@ class Cursor:
         line = b""
         while not line:
             if self.at_end:
-                raise fault(self.data, self.position, f"the file is cut off where {expected} should be")
+                raise line_error(self.data, self.position, f"the file is cut off where {expected} should be")
             end = self.data.find(b"\n", self.position)
             self.before, self.position = self.position, len(self.data) if end < 0 else end + 1
             line = self.data[self.before : self.position].strip()
@@ -393,7 +393,7 @@ class Cursor:
         """The text after a label on the next line, stripped. Raises SolutionError for another label."""
         line = self.line(expected)
         if not line.startswith(label):
-            raise self.fault(f"{shown(line)} stands where {expected} should")
+            raise self.fault(f"{quoted(line)} stands where {expected} should")
         return line.removeprefix(label).strip()
 
     def count(self, expected: str) -> int:
@@ -407,26 +407,26 @@ class Cursor:
         """The next line as an integer. Raises SolutionError."""
         line = self.line(expected)
         if not re.fullmatch(rb"-?\d{1,12}", line):
-            raise self.fault(f"{shown(line)} is not {expected}")
+            raise self.fault(f"{quoted(line)} is not {expected}")
         return int(line)
 
     def number(self, text: bytes) -> float:
         """A number on the line last read. Raises SolutionError."""
         if not is_number(text):
-            raise self.fault(f"{shown(text)} is not a number")
+            raise self.fault(f"{quoted(text)} is not a number")
         return float_of(text)
 
     def fault(self, text: str) -> SolutionError:
         """An error about the line last read."""
-        return fault(self.data, self.before, text)
+        return line_error(self.data, self.before, text)
 
 
-def named_pairs(names: list[str], values: Sequence[float] | Floats) -> tuple[Bytes, Floats]:
+def named_values(names: list[str], values: Sequence[float] | Floats) -> tuple[Bytes, Floats]:
     """Names and values of a document as arrays. Raises SolutionError for a long name or NaN."""
     long = next((name for name in names if len(name) > TOKEN_LIMIT), None)
     if long is not None:
         raise SolutionError(
-            f"the name {shown(long.encode(errors='replace'))}... has more than {TOKEN_LIMIT} characters; "
+            f"the name {quoted(long.encode(errors='replace'))}... has more than {TOKEN_LIMIT} characters; "
             "give the solution of the file that was written"
         )
     numbers_ = np.array(values, dtype=np.float64)

@@ -24,9 +24,9 @@ from crossfield.export.bundle.problem_files import write_all, write_problem
 from crossfield.export.formats.registry import DEFAULTS, FORMATS, problem_in_format, write
 from crossfield.export.programs import glpk as glpk_program
 from crossfield.export.programs import scip as scip_program
-from crossfield.export.programs.reading import Points
+from crossfield.export.programs.model_content import Points
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
+from crossfield.export.verify.comparison import behaviour_difference, problem_algebra, values_at
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.export.writing.curvature import probtype
 from crossfield.models.errors import UnsupportedByFormatError
@@ -59,7 +59,7 @@ def names(problem: Problem) -> tuple[list[str], list[str]]:
 
 def limits(problem: Problem) -> tuple[Any, Any]:
     """Left and right sides of all rows, the row `c_ONE` of LP and MPS left out."""
-    model = of_problem(problem)
+    model = problem_algebra(problem)
     return model.row_lower[: problem.n_rows], model.row_upper[: problem.n_rows]
 
 
@@ -219,7 +219,7 @@ def test_glpk_reads_the_linear_ampl_model_as_the_problem(
     write(problem, tmp_path / "model.mod")
     points = feasible_points(problem)
     found = glpk_program.evaluate(tmp_path / "model.mod", points)
-    assert evaluation_difference(found, problem, points) == ""
+    assert behaviour_difference(found, problem, points) == ""
     assert found.integer.sum() == problem.integer.sum()
 
 
@@ -259,7 +259,7 @@ def test_scip_reads_osil_as_the_problem(label: str, tmp_path: Path):
     write(problem, tmp_path / "model.osil")
     points = feasible_points(problem)
     found = scip_program.evaluate(tmp_path / "model.osil", points)
-    assert evaluation_difference(found, problem, points) == ""
+    assert behaviour_difference(found, problem, points) == ""
     assert np.isfinite(found.objective[2:]).all()
 
 

@@ -15,7 +15,7 @@ from crossfield.export.formats import gams
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import gams as gams_program
 from crossfield.export.solving.local import solve
-from crossfield.export.verify.comparison import evaluation_difference
+from crossfield.export.verify.comparison import behaviour_difference
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
@@ -63,7 +63,7 @@ def test_gams_reads_the_problem(label: str, tmp_path: Path, monkeypatch: pytest.
     write(problem, tmp_path / "model.gms")
     points = random_points(problem)
     found = gams_program.evaluate(tmp_path / "model.gms", points)
-    assert evaluation_difference(found, problem, points) == ""
+    assert behaviour_difference(found, problem, points) == ""
 
 
 @needs_gams

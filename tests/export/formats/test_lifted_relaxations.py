@@ -9,7 +9,7 @@ from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.export.solving.local import choose_solver
 from crossfield.export.verify.checks import Verdict
-from crossfield.export.verify.verify import compared, verify
+from crossfield.export.verify.verify import judge_solves, verify
 
 LIFTED = ("minlp-quartic", "minlp-cubic")
 
@@ -100,6 +100,6 @@ def test_verify_compares_optima_across_formats(written, two, tmp_path):
     assert weak.objective < whole.objective - 0.04
     assert weak.reason.startswith("a relaxation")
     called_exact = [replace(weak, group=whole.group, relaxes=""), replace(whole, proven=True)]
-    assert Verdict.DIFFERS in {each.verdict for each in compared(called_exact)}
+    assert Verdict.DIFFERS in {each.verdict for each in judge_solves(called_exact)}
     too_high = [replace(weak, objective=0.3, bound=None), whole]
-    assert [each.verdict for each in compared(too_high)] == [Verdict.DIFFERS, whole.verdict]
+    assert [each.verdict for each in judge_solves(too_high)] == [Verdict.DIFFERS, whole.verdict]

@@ -11,7 +11,7 @@ import pytest
 from cases import CASES, LOW_DEGREE, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.formats import lp, mps
 from crossfield.export.formats.registry import FORMATS, header_lines, problem_in_format, write
-from crossfield.export.verify.comparison import difference
+from crossfield.export.verify.comparison import algebra_difference
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -19,7 +19,7 @@ from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
 from loops import for_each
-from oracles import Model, by_gurobi, by_highs, by_scip, of_problem
+from oracles import Model, by_gurobi, by_highs, by_scip, problem_algebra
 
 GOLDEN = places.GOLDEN
 READERS = {"highs": by_highs, "scip": by_scip, "gurobi": by_gurobi}
@@ -57,8 +57,8 @@ def test_readers_see_the_problem(label: str, reader: str, suffix: str, tmp_path:
             column_names(problem)
         )
     if reader == "highs":  # Gurobi lists quadratic rows after the others
-        assert model.rows == of_problem(problem).rows
-    assert difference(model, problem, 0.0, points_of(problem)) == ""
+        assert model.rows == problem_algebra(problem).rows
+    assert algebra_difference(model, problem, 0.0, points_of(problem)) == ""
 
 
 @both
@@ -77,8 +77,8 @@ def test_parity_without_pairs_is_quadratic(suffix: str, tmp_path: Path):
     assert problem.problem_class == "QP"
     write(problem, tmp_path / f"model.{suffix}")
     assert_same(
-        by_scip(tmp_path / f"model.{suffix}").ordered(of_problem(problem).columns, ["c_ONE"]),
-        of_problem(problem),
+        by_scip(tmp_path / f"model.{suffix}").ordered(problem_algebra(problem).columns, ["c_ONE"]),
+        problem_algebra(problem),
     )
 
 
@@ -86,7 +86,7 @@ def test_parity_without_pairs_is_quadratic(suffix: str, tmp_path: Path):
 def test_no_weight_at_all_is_written(suffix: str, tmp_path: Path):
     problem = make_problem("milp-mccormick", make_instance(skew_coefficient=0))
     write(problem, tmp_path / f"model.{suffix}")
-    expected = of_problem(problem)
+    expected = problem_algebra(problem)
     model = by_highs(tmp_path / f"model.{suffix}").ordered(expected.columns, expected.rows)
     assert_same(model, expected)
     assert not model.costs[[name.startswith("psi") for name in model.columns]].any()
@@ -98,7 +98,7 @@ def test_an_angle_next_to_nothing_is_written(angle: float, suffix: str, tmp_path
     instance = Instance("flat", np.ones((1, 2), bool), np.array([[0, 0]]), np.array([angle]), np.ones(1))
     problem = make_problem("qp-fixed", instance)
     write(problem, tmp_path / f"model.{suffix}")
-    expected = of_problem(problem)
+    expected = problem_algebra(problem)
     assert_same(by_highs(tmp_path / f"model.{suffix}").ordered(expected.columns, expected.rows), expected)
 
 
@@ -249,5 +249,5 @@ def test_golden_files(file: str, pixels: int, tmp_path: Path):
     problem = make_problem(name, instance)
     text = b"".join(GENERATE[suffix](CanonicalForm(problem), ["for people to read"]))
     assert text == (GOLDEN / file).read_bytes()
-    expected = of_problem(problem)
+    expected = problem_algebra(problem)
     assert_same(by_scip(GOLDEN / file).ordered(expected.columns, expected.rows), expected)

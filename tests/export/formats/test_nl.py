@@ -15,7 +15,7 @@ from crossfield.export.formats.pyomo_model import to_pyomo
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import casadi as casadi_program
 from crossfield.export.programs import scip as scip_program
-from crossfield.export.verify.comparison import evaluation_difference
+from crossfield.export.verify.comparison import behaviour_difference
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.formulations.problem import Problem
@@ -46,7 +46,7 @@ def test_casadi_sees_the_problem(label: str, tmp_path: Path):
     write(problem, tmp_path / "model.nl", start=field)
     points = random_points(problem, 20)
     found = casadi_program.evaluate(tmp_path / "model.nl", points)
-    assert evaluation_difference(found, problem, points) == ""
+    assert behaviour_difference(found, problem, points) == ""
     start = by_casadi(tmp_path / "model.nl").start
     np.testing.assert_array_equal(start, problem.point(field)[NlOrder(problem).order])
 
@@ -89,7 +89,7 @@ def test_scip_sees_the_problem(label: str, binary: bool, tmp_path: Path):
     write(problem, tmp_path / "model.nl", dialect="binary" if binary else "text")
     points = random_points(problem, 2)
     found = scip_program.evaluate(tmp_path / "model.nl", points)
-    assert evaluation_difference(found, problem, points) == ""
+    assert behaviour_difference(found, problem, points) == ""
 
 
 # the header

@@ -23,7 +23,7 @@ from crossfield.export.library.ledger.known_points import read_points
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.library.ledger.points import complete_point
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.verify.comparison import names_of
+from crossfield.export.verify.comparison import name_list
 from crossfield.models.errors import CrossfieldError, InputError, InstanceError, SolutionError
 from crossfield.models.field.file import write_field
 from crossfield.models.formulations.names import column_names
@@ -301,7 +301,7 @@ def point_of(lib):
 
 def written(problem, point, folder):
     """The point as a list of names and values."""
-    pairs = zip(names_of(column_names(problem)), point.tolist(), strict=True)
+    pairs = zip(name_list(column_names(problem)), point.tolist(), strict=True)
     path = folder / "mine.sol"
     path.write_text("=obj= 0\n" + "".join(f"{name} {value!r}\n" for name, value in pairs))
     return path

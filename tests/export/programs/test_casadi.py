@@ -6,7 +6,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.programs.casadi import FEASIBLE, Watch, ca, read_nl
+from crossfield.export.programs.casadi import FEASIBLE, IterateWatch, ca, read_nl
 from crossfield.export.programs.casadi import solve_model as solve
 from crossfield.export.programs.protocol import RefusedError
 from crossfield.export.writing.nl_order import NlOrder
@@ -31,7 +31,7 @@ def own_interrupt():
 
 def test_only_feasible_points_that_are_lower_are_kept(relaxed):
     problem, model, order = relaxed
-    watch = Watch(model)
+    watch = IterateWatch(model)
     assert watch.value == pytest.approx(
         problem.objective_value(problem.point(cf.greedy_field(problem.instance)))
     )

@@ -2,7 +2,7 @@
 
 import pytest
 from crossfield.export.programs import gams
-from crossfield.export.statuses import Status, of_gams
+from crossfield.export.statuses import Status, status_of_gams
 
 
 @pytest.mark.parametrize(
@@ -42,4 +42,4 @@ def test_the_states_of_gams_have_one_meaning(model, solver, bound, status):
     found = gams.outcome_of(OUTPUT.format(model=model, solver=solver, bound=bound))
     assert (found.status, found.bound) == (status, bound)
     if status is not Status.OPTIMAL_GLOBAL:
-        assert of_gams(model, solver)[0] is status
+        assert status_of_gams(model, solver)[0] is status

@@ -13,7 +13,7 @@ import pytest
 from answers import BAD, GOOD, problem, problem_of
 from crossfield.export.solutions.readers import registry
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
-from crossfield.export.solutions.readers.text import values_for, values_in_order
+from crossfield.export.solutions.readers.text import values_by_name, values_in_order
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.statuses import Status
 from crossfield.models.errors import InputError, SolutionError
@@ -206,7 +206,7 @@ def test_a_file_cut_anywhere_never_gives_other_values_or_a_stronger_claim(path):
         if path in OTHERS:
             assert raw.values.tolist() == whole.values.tolist()
         if CUT not in raw.message and whole.has_point and not raw.omits_zeros and raw.names is not None:
-            assert (values_for(whole.names, raw).missing == 0) == (len(kept) == len(whole.values))
+            assert (values_by_name(whole.names, raw).missing == 0) == (len(kept) == len(whole.values))
 
 
 def sized(raw):

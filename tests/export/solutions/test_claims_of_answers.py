@@ -177,7 +177,7 @@ def test_claims_fall_to_objective_bound_and_violation(milp):
     for silent in (Status.ERROR, Status.LIMIT_WITHOUT_POINT, Status.NO_POINT):
         assert of(silent).status == of(silent, reported=objective).status == "feasible"
         assert of(silent, reported=objective + 0.01).status != "feasible"
-        assert not of(silent, at=off).status.promises_point
+        assert not of(silent, at=off).status.needs_point
 
 
 def test_a_point_that_breaks_rows_a_little_has_the_objective_of_its_field_beside(milp):
@@ -287,7 +287,7 @@ def binary_sol(message, of, point):
 
 def bears_out(solution):
     """Whether a point agrees with its status, by independent numbers."""
-    if not solution.status.promises_point or solution.point is None:
+    if not solution.status.needs_point or solution.point is None:
         return True
     off = solution.violation
     return (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from answers import GOOD, TINY, problem, problem_of
 from crossfield.export.solutions.readers.grammar import plain_text
-from crossfield.export.solutions.readers.registry import parse_raw, read_raw, recognised
+from crossfield.export.solutions.readers.registry import parse_raw, read_raw, recognising_readers
 from crossfield.export.solutions.solution import read_solution
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.problem import formulate
@@ -40,7 +40,7 @@ def test_lists_of_names_and_values(data):
     raw = parse_raw(data)
     assert listed(raw) == {b"a": 1, b"b_2": -0.0025}
     assert (raw.status, raw.omits_zeros) == ("feasible", False)
-    assert len(recognised(plain_text(data))) == 1
+    assert len(recognising_readers(plain_text(data))) == 1
 
 
 @for_each("data, fault", [

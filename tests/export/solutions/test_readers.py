@@ -7,11 +7,11 @@ import numpy as np
 import places
 import pytest
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
-from crossfield.export.solutions.readers.grammar import Form
+from crossfield.export.solutions.readers.grammar import EntryForm
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.text import (
-    entries,
-    values_for,
+    read_entries,
+    values_by_name,
     values_in_order,
 )
 from crossfield.models.errors import OutputError, SolutionError
@@ -282,18 +282,20 @@ def test_columns_of_text_larger_than_a_piece(monkeypatch):
     data = "".join(f"{name} {value}\n" for name, value in rows).encode()
     for size in (1, 30, 64, 1000, 4096, len(data) - 1, len(data), len(data) + 1):
         monkeypatch.setattr("crossfield.export.solutions.readers.grammar.PIECE", size)
-        names, values = entries(data, 0, Form("name value"))[:2]
+        names, values = read_entries(data, 0, EntryForm("name value"))[:2]
         assert names.tolist() == [name.encode() for name, _ in rows]
         assert values.tolist() == [float(value) for _, value in rows]
         column = "".join(f"{value}\n" for _, value in rows).encode()
-        assert entries(b"7\n" + column, 2, Form("value")).values.tolist() == values.tolist()
+        assert read_entries(b"7\n" + column, 2, EntryForm("value")).values.tolist() == values.tolist()
 
 
 @settings(deadline=None)
 @given(st.lists(st.floats(allow_nan=False)))
 def test_numbers_come_back_bit_by_bit(values):
     text = "".join(f"{value!r}\n" for value in values).encode()
-    assert entries(text, 0, Form("value")).values.tobytes() == np.array(values, dtype=float).tobytes()
+    assert (
+        read_entries(text, 0, EntryForm("value")).values.tobytes() == np.array(values, dtype=float).tobytes()
+    )
 
 
 # by name
@@ -301,10 +303,10 @@ def test_numbers_come_back_bit_by_bit(values):
 
 def test_missing_names_are_zero_only_where_zeros_are_omitted():
     dense, sparse = (parse_raw(data) for data in (highs(["x 1", "y 2"]), highs(["x 1 0", "y 2 1"], count=-2)))
-    values, missing, _ = values_for(NAMES, dense)
+    values, missing, _ = values_by_name(NAMES, dense)
     assert np.isnan(values).tolist() == [False, False, True, True, True]
     assert missing == 3
-    values, missing, _ = values_for(NAMES, sparse)
+    values, missing, _ = values_by_name(NAMES, sparse)
     assert values.tolist() == [1, 2, 0, 0, 0]
     assert missing == 0
 
@@ -312,7 +314,7 @@ def test_missing_names_are_zero_only_where_zeros_are_omitted():
 def test_a_sparse_file_without_values_is_the_point_zero():
     raw = parse_raw(highs([]))
     assert raw.has_point
-    assert values_for(NAMES, raw) == (pytest.approx(np.zeros(5)), 0, 0)
+    assert values_by_name(NAMES, raw) == (pytest.approx(np.zeros(5)), 0, 0)
 
 
 def test_columns_that_readers_of_models_add_are_no_strangers():
@@ -328,20 +330,20 @@ def test_columns_that_readers_of_models_add_are_no_strangers():
         "GAMS_OBJECTIVE",
     ]
     raw = parse_raw(highs([f"{name} 1" for name in [*added, "x", "One", "objvars", "aRg"]]))
-    values, missing, unknown = values_for(np.array([b"x"]), raw)
+    values, missing, unknown = values_by_name(np.array([b"x"]), raw)
     assert (values.tolist(), missing, unknown) == ([1], 0, 2)
 
 
 def test_a_column_of_the_problem_may_bear_the_name_of_an_added_one():
     raw = parse_raw(highs(["x 2", "ONE 1"]))
-    assert values_for(np.array([b"ONE", b"x"]), raw).values.tolist() == [1, 2]
+    assert values_by_name(np.array([b"ONE", b"x"]), raw).values.tolist() == [1, 2]
 
 
 def test_a_name_with_two_values_is_refused():
     same, other = (parse_raw(highs(["x 1", "y 2", f"x {again}"])) for again in ("1.0", "3"))
-    assert values_for(np.array([b"y", b"x"]), same).values.tolist() == [2, 1]
+    assert values_by_name(np.array([b"y", b"x"]), same).values.tolist() == [2, 1]
     with pytest.raises(SolutionError, match=r"x has two values, 1\.0 and 3\.0"):
-        values_for(np.array([b"y", b"x"]), other)
+        values_by_name(np.array([b"y", b"x"]), other)
 
 
 # writing

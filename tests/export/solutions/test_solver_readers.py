@@ -34,9 +34,9 @@ from answers import (
     problem_of,
 )
 from crossfield.export.solutions.readers.grammar import HEAD
-from crossfield.export.solutions.readers.registry import parse_raw, read_raw, recognised
+from crossfield.export.solutions.readers.registry import parse_raw, read_raw, recognising_readers
 from crossfield.export.solutions.readers.siblings import sibling_of
-from crossfield.export.solutions.readers.text import values_for, values_in_order
+from crossfield.export.solutions.readers.text import values_by_name, values_in_order
 from crossfield.export.solutions.solution import read_solution
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.names import column_names
@@ -76,7 +76,9 @@ def test_reader_status_and_point(path):
 @for_each("path", [*GOOD, *BAD, *(path for path in HERE.rglob("*.sol") if TINY not in path.parents)])
 def test_no_file_is_claimed_by_two_readers(path):
     text = path.read_bytes()
-    assert len(recognised(text)) == (0 if path.stem in {"empty", "junk"} or sibling_of(text[:HEAD]) else 1)
+    assert len(recognising_readers(text)) == (
+        0 if path.stem in {"empty", "junk"} or sibling_of(text[:HEAD]) else 1
+    )
 
 
 @for_each("path", [path for path in GOOD if FILES[path.name][1] in WITH_POINT and problem_of(path)])
@@ -146,7 +148,7 @@ def test_codes_of_gurobi(code):
 
 def test_the_incumbent_of_a_pool_is_read():
     raw = read_raw(TINY / f"{G}_milp_pool.json")
-    values = values_for(names_of("milp"), raw)
+    values = values_by_name(names_of("milp"), raw)
     listed = json.loads(text(f"{G}_milp_pool.json"))["Vars"]
     first = {entry["VarName"]: entry["PoolNX"][0] for entry in listed}
     assert values.values.tolist() == [first.get(name.decode(), 0) for name in names_of("milp")]
@@ -232,7 +234,7 @@ def test_glpk_has_no_names_and_tells_lp_from_mps():
     for order, raw in raws.items():
         assert (raw.order, raw.rows, len(raw.values)) == (order, 48, 36)
         with pytest.raises(SolutionError, match=f"without names.*in the order of the .{order} file"):
-            values_for(names_of("milp"), raw)
+            values_by_name(names_of("milp"), raw)
         for rows, columns in ((48, 35), (49, 36), (46, 36)):
             with pytest.raises(SolutionError, match="of 36 columns and 48 rows, the problem has"):
                 values_in_order(columns, rows, raw)

@@ -4,10 +4,10 @@ from collections import Counter
 
 import crossfield as cf
 import pytest
-from crossfield.export.solvers_table import takes_in
+from crossfield.export.solvers_table import suitability_in_format
 from crossfield.export.solving.local import SolveFiles, Solvers
 from crossfield.export.statuses import Status
-from crossfield.export.verify.leeway import saved
+from crossfield.export.verify.leeway import objective_leeway
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS, norm_of
 from crossfield.models.processes.deadline import Deadline
@@ -32,7 +32,7 @@ def answers(problem, solvers, folder, only=tuple(BUNDLED)):
     """The answers of the solvers that take a problem, by solver and format; None where they fail honestly."""
     found = {}
     for solver, form in [(name, form) for name in only for form in BUNDLED[name]]:
-        taking = takes_in(problem, solver, form).answer
+        taking = suitability_in_format(problem, solver, form).answer
         if taking != "yes" and (taking, solver) != ("local", "ipopt"):
             continue
         try:
@@ -77,13 +77,16 @@ def assert_consistent(held, solution):
     assert solution.objective == objective
     size = max(1.0, abs(objective))
     assert solution.reported is None or abs(solution.reported - objective) <= 1e-5 * size
-    assert solution.bound is None or solution.bound <= objective + saved(held, solution.point) + CLOSE * size
+    assert (
+        solution.bound is None
+        or solution.bound <= objective + objective_leeway(held, solution.point) + CLOSE * size
+    )
 
 
 def optima(found):
     """Objectives of optimal answers, each with the greatest amount that its broken rows saved."""
     points = [each for each in found.values() if each is not None and each.status in OPTIMAL]
-    return [(each.objective, saved(each.problem, each.point)) for each in points]
+    return [(each.objective, objective_leeway(each.problem, each.point)) for each in points]
 
 
 def assert_equal_optima(instance, values, least=None):

@@ -4,7 +4,7 @@ import threading
 
 import crossfield as cf
 import pytest
-from crossfield.export.programs.protocol import part_of
+from crossfield.export.programs.protocol import part_path
 from crossfield.export.solving.local import Solvers
 from crossfield.export.statuses import Status
 from crossfield.models.processes.child import Child, KilledError
@@ -72,7 +72,7 @@ def test_a_cut_answer_of_a_killed_solver_is_not_read(tmp_path, skew):
     problem, start = skew
 
     def cut(job):
-        job.solution.replace(part_of(job.solution))
+        job.solution.replace(part_path(job.solution))
 
     with KilledSolvers() as solvers:
         solvers.child("highs").spoil = cut
@@ -86,11 +86,11 @@ def test_a_cut_answer_of_a_killed_solver_is_not_read(tmp_path, skew):
 
 def test_a_time_limit_does_not_keep_highs_from_reading_a_file(tmp_path):
     """HiGHS ends the reading of an MPS file at its time limit, with the error of an unreadable file."""
-    from crossfield.export.programs.highs import loaded
+    from crossfield.export.programs.highs import load_model
 
     problem = cf.formulate(cf.sample("mouse", 24), "milp-mccormick")
     cf.write(problem, tmp_path / "model.mps")
-    assert loaded(tmp_path / "model.mps", time_limit=1e-4).getNumCol() == problem.n_columns + 1
+    assert load_model(tmp_path / "model.mps", time_limit=1e-4).getNumCol() == problem.n_columns + 1
 
 
 def test_the_second_stage_keeps_a_part_of_the_time():

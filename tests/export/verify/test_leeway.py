@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from crossfield.export.formats.registry import FORMATS, problem_in_format
-from crossfield.export.verify.leeway import saved
+from crossfield.export.verify.leeway import objective_leeway
 from crossfield.export.verify.verify import random_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import Problem, formulate
@@ -29,11 +29,11 @@ def test_no_less_than_what_was_saved(name: str):
         follows, rng = following(held), np.random.default_rng(2)
         point = held.point(random_field(held, 1))
         energy = held.objective_value(point)
-        assert saved(held, point) == pytest.approx(0.0, abs=1e-12 * max(1.0, energy))
+        assert objective_leeway(held, point) == pytest.approx(0.0, abs=1e-12 * max(1.0, energy))
         for size in (1e-6, 1e-3, 0.1):
             for direction in (-1.0, rng.choice([-1.0, 1.0], len(point)), rng.uniform(-1, 1, len(point))):
                 moved = point + size * direction * follows
-                assert energy - held.objective_value(moved) <= saved(held, moved) + 1e-9
+                assert energy - held.objective_value(moved) <= objective_leeway(held, moved) + 1e-9
 
 
 def test_one_broken_row_is_worth_its_slacks_cost():
@@ -44,7 +44,7 @@ def test_one_broken_row_is_worth_its_slacks_cost():
         moved = point.copy()
         moved[column] -= 1e-3
         lost = problem.objective_value(point) - problem.objective_value(moved)
-        assert saved(problem, moved) == pytest.approx(lost, rel=1e-6)
+        assert objective_leeway(problem, moved) == pytest.approx(lost, rel=1e-6)
         assert lost == pytest.approx(1e-3 * price, rel=1e-6)
 
 
@@ -58,4 +58,4 @@ def test_a_product_that_is_off_counts_in_its_pair():
     z = problem.blocks["z"]
     moved = point.copy()
     moved[z.offset] += 1e-3
-    assert round(saved(problem, moved) / 4e-3, 9) in {1.0, 2.0}
+    assert round(objective_leeway(problem, moved) / 4e-3, 9) in {1.0, 2.0}

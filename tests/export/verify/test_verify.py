@@ -17,11 +17,18 @@ from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.export.solutions.solution import Solution
-from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
+from crossfield.export.solvers_table import PROGRAMS, SOLVERS, suitability
 from crossfield.export.solving.local import SolveFiles, Solvers
 from crossfield.export.statuses import Status
 from crossfield.export.verify.checks import Verdict, Verification
-from crossfield.export.verify.verify import _energy_difference, _judged, _subjects, random_field, same, verify
+from crossfield.export.verify.verify import (
+    _energy_difference,
+    _judge_answer,
+    _subjects,
+    is_same_optimum,
+    random_field,
+    verify,
+)
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import Problem, formulate
@@ -112,7 +119,7 @@ def test_optima_agree(verified: Callable[[str], Verification], solver: str, inst
     assert all(f.reason for f in found if f.verdict != Verdict.AGREES)
     for check in (f for f in found if f.verdict == Verdict.AGREES):
         others = [f for f in verified(instance).checks if f.group == check.group and f.proven]
-        assert all(same(check.objective, other.objective) for other in others)
+        assert all(is_same_optimum(check.objective, other.objective) for other in others)
 
 
 @pytest.mark.slow
@@ -135,7 +142,7 @@ def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path: Path)
         point = problem.point(random_field(problem, 1))
         point[index[cost > 0, 0]] -= less
         answer = Solution(problem, point, Status.OPTIMAL_GLOBAL, "", "test", identified=True)
-        check = _judged(subjects[0], "highs", answer)
+        check = _judge_answer(subjects[0], "highs", answer)
         assert check.verdict == verdict, (less, check.reason)
         assert check.objective <= check.energy <= check.objective + check.leeway + 1e-9
     assert _energy_difference(problem, 1.0, 1.2, 0.1, proven=False)
@@ -331,7 +338,7 @@ def test_claims_are_true(
     """A solver that takes a problem is not contradicted; others refuse the file or prove no optimum."""
     verification = verified("1 x 3" if kind == "whole" else RELAXED)
     problem = read_manifest(verification.folder / f"small.{name}.manifest.json").problem()
-    taking = takes(problem, solver)
+    taking = suitability(problem, solver)
     found = [f for f in verification.checks if f.problem == f"small {name}" and f.step == "solve"]
     mine = [f for f in found if f.program == solver]
     if taking.answer == "yes":
@@ -352,5 +359,7 @@ def proves(solvers: Solvers, held: Problem, path: Path, solver: str, optimum: fl
     except CrossfieldError:
         return False
     return (
-        found.claimed.startswith("optimal") and found.reported is not None and same(found.reported, optimum)
+        found.claimed.startswith("optimal")
+        and found.reported is not None
+        and is_same_optimum(found.reported, optimum)
     )

@@ -1,7 +1,7 @@
 """The content of a model file as its program reads it, as plain arrays.
 
-export/verify/comparison.py states how it differs from the problem. There are two forms. A `Meaning` is the
-algebra: costs, quadratic terms and rows by coefficient, as readers of LP and MPS report it. An `Evaluation`
+export/verify/comparison.py states how it differs from the problem. There are two forms. A `Algebra` is the
+algebra: costs, quadratic terms and rows by coefficient, as readers of LP and MPS report it. An `Behaviour`
 is the behaviour: values of objective and rows at points, as readers of .nl and GAMS report it.
 """
 
@@ -21,7 +21,7 @@ _INFINITE_BOUND: Final = 1e19
 
 
 @dataclass(frozen=True, eq=False)
-class Meaning:
+class Algebra:
     """A quadratic model: costs, limits and coefficients in the order of `columns` and `rows`.
 
     quadratic: coefficient of x_i x_j for i <= j, at quadratic_at (k, 2); matrix at (row, column);
@@ -67,15 +67,15 @@ class Meaning:
         np.add.at(values.T, row, (points[:, first] * points[:, second] * self.row_quadratic).T)
         return values
 
-    def ordered(self, columns: list[str], rows: list[str]) -> Meaning:
+    def ordered(self, columns: list[str], rows: list[str]) -> Algebra:
         """The same model with its columns and rows in another order."""
-        c, r = places(self.columns, columns), places(self.rows, rows)
+        c, r = positions_of(self.columns, columns), positions_of(self.rows, rows)
         back_c, back_r = np.argsort(c), np.argsort(r)
         per_column = {name: getattr(self, name)[c] for name in ("lower", "upper", "integer", "costs")}
         per_row = {name: getattr(self, name)[r] for name in ("row_lower", "row_upper")}
         matrix = np.stack([back_r[self.matrix_at[:, 0]], back_c[self.matrix_at[:, 1]]], axis=1)
         cubes = np.column_stack([back_r[self.row_quadratic_at[:, 0]], back_c[self.row_quadratic_at[:, 1:]]])
-        return Meaning.of(
+        return Algebra.of(
             columns,
             rows,
             **per_column,
@@ -86,14 +86,14 @@ class Meaning:
         )
 
 
-def places(have: list[str], wanted: list[str]) -> Ints:
+def positions_of(have: list[str], wanted: list[str]) -> Ints:
     """Position of each wanted name among the existing ones."""
     number = {name: place for place, name in enumerate(have)}
     return np.array([number[name] for name in wanted], dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
+class Behaviour:
     """Columns and rows of a model, and the values of objective (k,) and rows (k, rows) at k points.
 
     integer is None if the program does not report it; then discrete counts these columns. Values that are not
@@ -129,15 +129,15 @@ class Points:
 
     def of(self, columns: list[str]) -> Floats:
         """The points with their columns in that order."""
-        return self.values[:, places(self.names, columns)]
+        return self.values[:, positions_of(self.names, columns)]
 
 
-def infinite(values: Sequence[float]) -> Floats:
+def with_infinities(values: Sequence[float]) -> Floats:
     """Bounds with infinity from 1e20 on, as in CPLEX and Xpress."""
     given = np.array(values, dtype=float)
     return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
 
 
-def finite(value: float | None) -> float | None:
+def finite_or_none(value: float | None) -> float | None:
     """Return the number, or None for a number that represents infinity."""
     return None if value is None or abs(value) >= _INFINITE_BOUND else float(value)
