@@ -56,30 +56,6 @@ def test_clusters_close_a_gap_that_finer_lattices_leave(tmp_path):
     assert cf.write_certificate(proof, tmp_path / "it.npz").status == "optimal"
 
 
-def weighted(seed, **weights):
-    """A random instance with a hole and a part without strokes."""
-    rng = np.random.default_rng(seed)
-    mask = np.ones((3, 5), bool)
-    mask[1, 1] = mask[:, 3] = False
-    at = np.argwhere(mask[:, :3])[np.sort(rng.permutation(8)[:4])]
-    return Instance("holes", mask, at, rng.uniform(0, np.pi, 4), 1 - rng.random(4), **weights)
-
-
-@pytest.mark.parametrize(
-    "weights",
-    [{"skew_coefficient": w} for w in (0.0, 1e-6, 1.0)] + [{"stroke_coefficient": w} for w in (0.1, 1000.0)],
-    ids=str,
-)
-@pytest.mark.slow
-def test_weights_holes_and_parts_without_strokes(weights):
-    instance = weighted(3, **weights)
-    proof = cf.prove(instance, jobs=1, limits=cf.Limits(math.inf, 1e-4))
-    found = cf.search(instance, rounds=1, jobs=1).field.energy().total
-    assert proof.bound <= min(found, proof.energy)
-    assert proof.energy <= found + 1e-9
-    assert proof.energy - proof.bound <= 1e-4 * proof.energy
-
-
 def test_one_pixel_and_one_row():
     for mask, theta in (([[True]], [[2.0]]), ([[True] * 5], [[0.3, np.nan, 1.2, np.nan, 2.9]])):
         proof = cf.prove(sketch(np.array(mask), np.array(theta)), jobs=1)
@@ -168,6 +144,15 @@ def test_ctrl_c_ends_a_proof_with_what_it_has():
         "print(proof.ended, proof.status, proof.bound <= proof.energy)"
     )
     assert interrupted(program) == ["interrupted", "gap", "True"]
+
+
+def weighted(seed, **weights):
+    """A random instance with a hole and a part without strokes."""
+    rng = np.random.default_rng(seed)
+    mask = np.ones((3, 5), bool)
+    mask[1, 1] = mask[:, 3] = False
+    at = np.argwhere(mask[:, :3])[np.sort(rng.permutation(8)[:4])]
+    return Instance("holes", mask, at, rng.uniform(0, np.pi, 4), 1 - rng.random(4), **weights)
 
 
 @pytest.mark.slow
