@@ -28,8 +28,8 @@ _SECONDS: Final = 60.0
 
 def package_folder(name: str) -> Path | None:
     """The folder of an installed package, which is not imported; None if it is not installed."""
-    found = find_spec(name)
-    return None if found is None or found.origin is None else Path(found.origin).parent
+    spec = find_spec(name)
+    return None if spec is None or spec.origin is None else Path(spec.origin).parent
 
 
 @cache

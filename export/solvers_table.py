@@ -310,8 +310,8 @@ class Suitability(NamedTuple):
 
 def suitability(problem: Problem, solver: str) -> Suitability:
     """Whether the solver takes the problem, and in which format: the first one with the best answer."""
-    found = [suitability_in_format(problem, solver, name) for name in SOLVERS[solver].formats]
-    return min(found, key=lambda each: ("yes", "local", "no").index(each.answer))
+    answers = [suitability_in_format(problem, solver, name) for name in SOLVERS[solver].formats]
+    return min(answers, key=lambda answer: ("yes", "local", "no").index(answer.answer))
 
 
 def suitability_in_format(problem: Problem, solver: str, name: str) -> Suitability:

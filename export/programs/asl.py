@@ -24,8 +24,8 @@ _ACCURACY: Final = 1e-5
 
 def version() -> str:
     """Its version, and the library's."""
-    found = re.search(r"Version (\S+).*ASL\((\d+)\)", run_program("gjh_asl_json", "-v"))
-    return f"{found[1]} (ASL {found[2]})" if found else "unknown"
+    stated = re.search(r"Version (\S+).*ASL\((\d+)\)", run_program("gjh_asl_json", "-v"))
+    return f"{stated[1]} (ASL {stated[2]})" if stated else "unknown"
 
 
 def report_at_start(path: Path) -> dict[str, Any]:

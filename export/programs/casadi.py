@@ -57,8 +57,8 @@ class NlModel:
     def feasible_value(self, point: Floats) -> float | None:
         """The objective at a point (n,), or None when the point is not feasible."""
         objective, rows = self.evaluate(point)
-        whole = np.abs(point - np.round(point))[self.discrete].max(initial=0.0) <= FEASIBLE
-        return objective if whole and self.holds(point, rows) else None
+        are_whole = np.abs(point - np.round(point))[self.discrete].max(initial=0.0) <= FEASIBLE
+        return objective if are_whole and self.holds(point, rows) else None
 
     def holds(self, point: Floats, rows: Floats) -> bool:
         """Whether a point (n,) and the values of its rows (m,) respect their limits."""

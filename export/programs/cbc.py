@@ -21,8 +21,8 @@ from .protocol import Job, NotReportedError, Outcome, RefusedError, run_program,
 
 def version() -> str:
     """Its version."""
-    found = re.search(r"Version: (\S+)", _run("-quit"))
-    return found[1] if found else "unknown"
+    stated = re.search(r"Version: (\S+)", _run("-quit"))
+    return stated[1] if stated else "unknown"
 
 
 def _run(*arguments: str) -> str:

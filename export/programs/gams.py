@@ -109,8 +109,8 @@ def evaluate(path: Path, points: Points) -> Behaviour:
     _run(path, "convert")
     if not Path("out.nl").exists():
         raise RefusedError("CONVERT wrote no .nl")
-    found = casadi_program.evaluate(Path("out.nl").resolve(), points)
-    return replace(found, may_lack=True, rounding=1e-14)
+    behaviour = casadi_program.evaluate(Path("out.nl").resolve(), points)
+    return replace(behaviour, may_lack=True, rounding=1e-14)
 
 
 def solve(job: Job) -> Outcome:
@@ -146,13 +146,13 @@ def outcome_of(log: str) -> Outcome:
 
 
 def _find_integer(pattern: str, log: str) -> int:
-    found = re.search(pattern, log)
-    return int(found[1]) if found else 0
+    match = re.search(pattern, log)
+    return int(match[1]) if match else 0
 
 
 def _find_number(pattern: str, log: str) -> float | None:
-    found = re.search(pattern, log, re.MULTILINE)
+    match = re.search(pattern, log, re.MULTILINE)
     try:
-        return float(found[1]) if found else None
+        return float(match[1]) if match else None
     except ValueError:  # NA, or asterisks
         return None

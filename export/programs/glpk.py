@@ -24,16 +24,16 @@ _ROUNDING: Final = 1e-14
 
 def version() -> str:
     """Its version."""
-    found = re.search(r"(\d+\.\d+)", run_program("glpsol", "--version"))
-    return found[1] if found else "unknown"
+    stated = re.search(r"(\d+\.\d+)", run_program("glpsol", "--version"))
+    return stated[1] if stated else "unknown"
 
 
 def _run(path: Path, *arguments: str) -> str:
     kind = path.suffix.removeprefix(".")
-    given = [_FLAGS[kind], str(path)]
+    inputs = [_FLAGS[kind], str(path)]
     if kind == "mod":
-        given += ["--data", str(path.with_suffix(".dat"))]
-    done = run_command(["glpsol", *given, *arguments])
+        inputs += ["--data", str(path.with_suffix(".dat"))]
+    done = run_command(["glpsol", *inputs, *arguments])
     if done.returncode:
         lines = [line for line in done.stdout.splitlines() if line.startswith(str(path))]
         raise RefusedError(f"GLPK cannot read it: {' '.join(lines[-1:]).removeprefix(f'{path}:')}")
@@ -56,7 +56,7 @@ def read(path: Path) -> Algebra:
     costs = np.zeros(len(names["j"]))
     for _, j, value in (entry for entry in entries if not entry[0]):
         costs[j - 1] = value
-    rest = [(i - 1, j - 1, value) for i, j, value in entries if i]
+    coefficients = [(i - 1, j - 1, value) for i, j, value in entries if i]
     mixed = head[1] == "mip"
     lower, upper = _limits(lines, "j", len(costs), 3 if mixed else 2)
     row_lower, row_upper = _limits(lines, "i", len(names["i"]), 2)
@@ -71,7 +71,7 @@ def read(path: Path) -> Algebra:
         costs=costs,
         row_lower=row_lower,
         row_upper=row_upper,
-        matrix=terms_of_entries(rest, indices=2),
+        matrix=terms_of_entries(coefficients, indices=2),
     )
     return _without_objective(model, path) if path.suffix == ".mod" else model
 
@@ -79,7 +79,7 @@ def read(path: Path) -> Algebra:
 def evaluate(path: Path, points: Points) -> Behaviour:
     """The AMPL model as GLPK reads it, without columns in no term, as in AMPL."""
     model = read(path)
-    given = points.of(model.columns)
+    values = points.of(model.columns)
     return Behaviour(
         model.columns,
         model.lower,
@@ -88,8 +88,8 @@ def evaluate(path: Path, points: Points) -> Behaviour:
         model.rows,
         model.row_lower,
         model.row_upper,
-        model.objective(given),
-        model.activities(given),
+        model.objective(values),
+        model.activities(values),
         rounding=_ROUNDING,
         may_lack=True,
     )
@@ -98,14 +98,14 @@ def evaluate(path: Path, points: Points) -> Behaviour:
 def _without_objective(model: Algebra, path: Path) -> Algebra:
     """The model with our names, without the objective among the rows."""
     goal = model.rows.index(_OBJECTIVE)
-    kept = model.matrix_at[model.matrix_at[:, 0] != goal]
+    places = model.matrix_at[model.matrix_at[:, 0] != goal]
     return replace(
         model,
         columns=_our_names(model.columns, path),
         rows=_our_names([name for name in model.rows if name != _OBJECTIVE], path),
         row_lower=np.delete(model.row_lower, goal),
         row_upper=np.delete(model.row_upper, goal),
-        matrix_at=np.stack([kept[:, 0] - (kept[:, 0] > goal), kept[:, 1]], axis=1),
+        matrix_at=np.stack([places[:, 0] - (places[:, 0] > goal), places[:, 1]], axis=1),
         matrix=model.matrix[model.matrix_at[:, 0] != goal],
     )
 

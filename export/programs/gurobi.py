@@ -65,8 +65,11 @@ def _rows(model: Any, plain: list[Any], products: list[Any]) -> tuple[Terms, Ter
     for place, row in enumerate(products, start=len(plain)):
         expression = model.getQCRow(row)
         cubes += [(place, *product) for product in _products(expression)]
-        rest = expression.getLinExpr()
-        linear += [(place, rest.getVar(term).index, rest.getCoeff(term)) for term in range(rest.size())]
+        linear_part = expression.getLinExpr()
+        linear += [
+            (place, linear_part.getVar(term).index, linear_part.getCoeff(term))
+            for term in range(linear_part.size())
+        ]
     return terms_of_entries(linear, indices=2), terms_of_entries(cubes, indices=3, products=2)
 
 

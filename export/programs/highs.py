@@ -72,16 +72,16 @@ def read(path: Path) -> Algebra:
     lp, hessian = highs.getLp(), highs.getModel().hessian_
     if lp.sense_ != highspy.ObjSense.kMinimize or lp.offset_ != 0:
         raise RefusedError("it is not minimised, or has a constant besides ONE")
-    given: dict[str, Any] = {"lower": lp.col_lower_, "upper": lp.col_upper_, "costs": lp.col_cost_}
-    given |= {"row_lower": lp.row_lower_, "row_upper": lp.row_upper_}
+    content: dict[str, Any] = {"lower": lp.col_lower_, "upper": lp.col_upper_, "costs": lp.col_cost_}
+    content |= {"row_lower": lp.row_lower_, "row_upper": lp.row_upper_}
     if len(lp.integrality_):
-        given["integer"] = [kind == highspy.HighsVarType.kInteger for kind in lp.integrality_]
+        content["integer"] = [kind == highspy.HighsVarType.kInteger for kind in lp.integrality_]
     column, row, value = _columnwise(lp.a_matrix_, lp.num_col_)
-    given["matrix"] = merged_terms(np.stack([row, column], axis=1), value, indices=2)
+    content["matrix"] = merged_terms(np.stack([row, column], axis=1), value, indices=2)
     if hessian.dim_:
         column, row, value = _columnwise(hessian, hessian.dim_)  # the lower triangle of x'Qx/2
-        given["quadratic"] = terms_of_triangle(row, column, value)
-    return Algebra.of(list(lp.col_names_), list(lp.row_names_), **given)
+        content["quadratic"] = terms_of_triangle(row, column, value)
+    return Algebra.of(list(lp.col_names_), list(lp.row_names_), **content)
 
 
 def _columnwise(matrix: Any, columns: int) -> tuple[Any, Any, Any]:

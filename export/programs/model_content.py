@@ -134,8 +134,8 @@ class Points:
 
 def with_infinities(values: Sequence[float]) -> Floats:
     """Bounds with infinity from 1e20 on, as in CPLEX and Xpress."""
-    given = np.array(values, dtype=float)
-    return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
+    bounds = np.array(values, dtype=float)
+    return np.where(np.abs(bounds) >= _INFINITY, np.copysign(np.inf, bounds), bounds)
 
 
 def finite_or_none(value: float | None) -> float | None:

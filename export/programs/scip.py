@@ -89,11 +89,11 @@ def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, T
             continue
         if not scip.checkQuadraticNonlinear(row):
             raise RefusedError(f"row {row.name} is not quadratic there")
-        products, squares, rest = scip.getTermsQuadratic(row)
+        products, squares, linear_part = scip.getTermsQuadratic(row)
         square += [(place, number[a.name], number[b.name], value) for a, b, value in products]
         square += [(place, number[v.name], number[v.name], value) for v, value, _ in squares]
         linear += [(place, number[v.name], cost) for v, _, cost in squares]
-        linear += [(place, number[v.name], value) for v, value in rest if v.name in number]
+        linear += [(place, number[v.name], value) for v, value in linear_part if v.name in number]
     return terms_of_entries(linear, indices=2), terms_of_entries(square, indices=3, products=2)
 
 
@@ -106,7 +106,7 @@ def evaluate(path: Path, points: Points) -> Behaviour:
     ours = [v for name, v in variables.items() if name not in _OBJECTIVE_COLUMNS and not is_one_column(name)]
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
     row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in map(rows.get, row_names)])
-    given = points.of(columns)
+    values = points.of(columns)
     return Behaviour(
         [v.name for v in ours],
         lower,
@@ -117,26 +117,29 @@ def evaluate(path: Path, points: Points) -> Behaviour:
         row_upper,
         _objective(scip, variables, columns, points),
         np.column_stack(
-            [np.zeros((len(given), 0)), *(_activity(scip, rows[name], columns, given) for name in row_names)]
+            [
+                np.zeros((len(values), 0)),
+                *(_activity(scip, rows[name], columns, values) for name in row_names),
+            ]
         ),
     )
 
 
 def _objective(scip: Any, variables: dict[str, Any], columns: list[str], points: Points) -> Any:
     values = np.full(len(points.values), np.nan)
-    given = points.of(columns)
-    for place in range(points.random, len(given)):
+    columnwise = points.of(columns)
+    for place in range(points.random, len(columnwise)):
         values[place] = _judge_objective(
-            scip, variables, columns, given[place], float(points.objective[place])
+            scip, variables, columns, columnwise[place], float(points.objective[place])
         )
     return values
 
 
-def _activity(scip: Any, row: Any, columns: list[str], given: Any) -> Any:
+def _activity(scip: Any, row: Any, columns: list[str], points: Any) -> Any:
     if row.getConshdlrName() != "linear":
-        return np.full(len(given), np.nan)
+        return np.full(len(points), np.nan)
     value = scip.getValsLinear(row)
-    return given @ np.array([value.get(name, 0.0) for name in columns])
+    return points @ np.array([value.get(name, 0.0) for name in columns])
 
 
 def _judge_objective(
@@ -144,17 +147,17 @@ def _judge_objective(
 ) -> float:
     """The claimed objective at a feasible point if SCIP agrees within a small amount, else infinity."""
     extra = [v for name, v in variables.items() if name in _OBJECTIVE_COLUMNS]
-    rest = sum(variables[name].getObj() * value for name, value in zip(columns, point, strict=True))
+    linear_part = sum(variables[name].getObj() * value for name, value in zip(columns, point, strict=True))
     solution = scip.createSol()
     for one in filter(is_one_column, variables):
         scip.setSolVal(solution, variables[one], 1.0)
-        rest += variables[one].getObj()
+        linear_part += variables[one].getObj()
     for name, value in zip(columns, point, strict=True):
         scip.setSolVal(solution, variables[name], value)
 
     def feasible(step: float) -> bool:
         for variable in extra:
-            scip.setSolVal(solution, variable, claim - rest - scip.getObjoffset() + step)
+            scip.setSolVal(solution, variable, claim - linear_part - scip.getObjoffset() + step)
         return bool(scip.checkSol(solution, original=True))
 
     hair = _HAIR * max(1.0, abs(claim))

@@ -99,11 +99,11 @@ def solve(job: Job) -> Outcome:
     names = list(model.getNameList(_COLUMNS, 0, model.attributes.cols - 1))
     try:
         with on_stop(model.interrupt):
-            _, found = model.optimize()
+            _, solution_status = model.optimize()
     except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
         _raise_refusal(error)
-    words = str(found).removeprefix("SolStatus.")
-    status = XPRESS.get(found.name, Status.ERROR)
+    words = str(solution_status).removeprefix("SolStatus.")
+    status = XPRESS.get(solution_status.name, Status.ERROR)
     mixed = model.attributes.mipents or model.attributes.qconstraints
     bound, nodes = (
         (finite_or_none(model.attributes.bestbound), model.attributes.nodes) if mixed else (None, None)

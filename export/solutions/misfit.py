@@ -76,8 +76,8 @@ class _Misfit:
         tail = not unknown and self._missing == list(range(self._missing[0], len(names)))
         cut = "the file may be cut off; let the solver write it again"
         yield tail and _tags(names[self._missing[0] :][:1]) <= tags, cut
-        others = self._formulations(tags, ours)
-        yield bool(others), f"it is probably of {others}; give the manifest of that formulation"
+        formulations = self._formulations(tags, ours)
+        yield bool(formulations), f"it is probably of {formulations}; give the manifest of that formulation"
         foreign = bool(_tags(unknown) - ours) or (bool(unknown) and not _tags(unknown))
         yield foreign, "it is of another formulation or model; give the manifest of its model"
         yield bool(unknown), "it is of another instance, at other pixels; give the manifest of its model"

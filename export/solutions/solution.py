@@ -397,7 +397,7 @@ def _canonical_form(raw: RawSolution, problem: Problem, held: Mapping[str, Probl
     """The problem that the solver was given: by the manifest, or else by the names of lifted products."""
     if raw.names is None:
         return CanonicalForm(held[raw.order] if raw.order in held else _problem_in_file(problem, raw.order))
-    forms = {each.sha256: each for each in held.values()}
+    forms = {problem_held.sha256: problem_held for problem_held in held.values()}
     if len(forms) == 1:
         return CanonicalForm(*forms.values())
     liftable = "p1" in problem.blocks and "z" not in problem.blocks

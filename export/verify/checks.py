@@ -80,7 +80,7 @@ class Verification:
             "versions": self.versions,
             "absent": self.absent,
             "checks": [
-                {key: value for key, value in asdict(each).items() if value not in (None, "")}
-                for each in self.checks
+                {key: value for key, value in asdict(check).items() if value not in (None, "")}
+                for check in self.checks
             ],
         }

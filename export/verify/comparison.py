@@ -60,7 +60,7 @@ def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:
     return objective, np.array(rows).reshape(len(points), problem.n_rows)
 
 
-def algebra_difference(found: Algebra, problem: Problem, tolerance: float, points: Floats) -> str:
+def algebra_difference(reported: Algebra, problem: Problem, tolerance: float, points: Floats) -> str:
     """First difference between the algebra of a file and the problem; empty without one.
 
     tolerance: relative difference of numbers, 0 for equal to the bit. points: (k, columns), where values are
@@ -68,19 +68,19 @@ def algebra_difference(found: Algebra, problem: Problem, tolerance: float, point
     """
     expected = problem_algebra(problem)
     for kind in ("columns", "rows"):
-        wrong = _name_difference(getattr(found, kind), getattr(expected, kind), kind)
+        wrong = _name_difference(getattr(reported, kind), getattr(expected, kind), kind)
         if wrong:
             return wrong
-    found = found.ordered(expected.columns, expected.rows)
-    checks = (_number_difference(found, expected, name, tolerance) for name in _NUMBERS)
+    reported = reported.ordered(expected.columns, expected.rows)
+    checks = (_number_difference(reported, expected, name, tolerance) for name in _NUMBERS)
     wrong = next(filter(None, checks), "")
     if wrong:
         return wrong
-    given = np.hstack([points, np.ones((len(points), len(expected.columns) - problem.n_columns))])
+    extended = np.hstack([points, np.ones((len(points), len(expected.columns) - problem.n_columns))])
     objective, rows = values_at(problem, points)
     accuracy = max(VALUES, 100 * tolerance)
-    return _value_difference("the objective", found.objective(given), objective, accuracy) or (
-        _value_difference("a row", found.activities(given), rows, accuracy) if problem.rows else ""
+    return _value_difference("the objective", reported.objective(extended), objective, accuracy) or (
+        _value_difference("a row", reported.activities(extended), rows, accuracy) if problem.rows else ""
     )
 
 
@@ -89,20 +89,20 @@ _NUMBERS: Final = (
 )  # fmt: skip
 
 
-def _name_difference(found: Sequence[str], expected: Sequence[str], kind: str) -> str:
-    if sorted(found) == sorted(expected):
+def _name_difference(reported: Sequence[str], expected: Sequence[str], kind: str) -> str:
+    if sorted(reported) == sorted(expected):
         return ""
-    extra, missing = sorted(set(found) - set(expected)), sorted(set(expected) - set(found))
+    extra, missing = sorted(set(reported) - set(expected)), sorted(set(expected) - set(reported))
     parts = [
         f"{word} {', '.join(names[:3])}" for word, names in (("adds", extra), ("lacks", missing)) if names
     ]
-    return f"{len(found)} {kind} instead of {len(expected)}: {'; '.join(parts) or 'some twice'}"
+    return f"{len(reported)} {kind} instead of {len(expected)}: {'; '.join(parts) or 'some twice'}"
 
 
-def _number_difference(found: Algebra, expected: Algebra, name: str, tolerance: float) -> str:
-    mine, theirs = getattr(expected, name), getattr(found, name)
+def _number_difference(reported: Algebra, expected: Algebra, name: str, tolerance: float) -> str:
+    mine, theirs = getattr(expected, name), getattr(reported, name)
     index = f"{name}_at"
-    if hasattr(expected, index) and not np.array_equal(getattr(expected, index), getattr(found, index)):
+    if hasattr(expected, index) and not np.array_equal(getattr(expected, index), getattr(reported, index)):
         return f"{name}: {len(theirs)} coefficients instead of {len(mine)}, or at other places"
     wrong = np.nonzero(~_are_close(theirs, mine, tolerance))[0]
     if not len(wrong):
@@ -112,54 +112,54 @@ def _number_difference(found: Algebra, expected: Algebra, name: str, tolerance: 
     return f"{name} at {at} is {theirs[wrong[0]]!s} instead of {mine[wrong[0]]!s} ({len(wrong)} such)"
 
 
-def _are_close(found: Any, expected: Any, tolerance: float) -> Bools:
+def _are_close(reported: Any, expected: Any, tolerance: float) -> Bools:
     if not tolerance or expected.dtype == bool:
-        return np.asarray(found == expected)
-    return np.asarray(np.isclose(found, expected, rtol=tolerance, atol=tolerance * 1e-3))
+        return np.asarray(reported == expected)
+    return np.asarray(np.isclose(reported, expected, rtol=tolerance, atol=tolerance * 1e-3))
 
 
-def _value_difference(what: str, found: Floats, expected: Floats, accuracy: float) -> str:
-    reported = ~np.isnan(found)
-    wrong = reported & ~np.isclose(found, expected, rtol=accuracy, atol=accuracy)
+def _value_difference(what: str, values: Floats, expected: Floats, accuracy: float) -> str:
+    known = ~np.isnan(values)
+    wrong = known & ~np.isclose(values, expected, rtol=accuracy, atol=accuracy)
     if not wrong.any():
         return ""
     place = tuple(np.argwhere(wrong)[0])
-    return f"{what} at point {place[0]} is {found[place]:.12g} instead of {expected[place]:.12g}"
+    return f"{what} at point {place[0]} is {values[place]:.12g} instead of {expected[place]:.12g}"
 
 
-def behaviour_difference(found: Behaviour, problem: Problem, points: Points) -> str:
+def behaviour_difference(reported: Behaviour, problem: Problem, points: Points) -> str:
     """First difference between the behaviour of a file and the problem; empty without one."""
     columns, rows = name_list(column_names(problem)), names_of_rows(problem)
-    lacking = set(columns) - set(found.columns) if found.may_lack else set()
+    lacking = set(columns) - set(reported.columns) if reported.may_lack else set()
     wanted = [name for name in columns if name not in lacking & _unused(problem, columns)]
-    strangers = _name_difference(found.columns, wanted, "columns") or _name_difference(
-        found.rows, rows, "rows"
+    strangers = _name_difference(reported.columns, wanted, "columns") or _name_difference(
+        reported.rows, rows, "rows"
     )
     if strangers:
         return strangers
     at, c, r = (
         positions_of(columns, wanted),
-        positions_of(found.columns, wanted),
-        positions_of(found.rows, rows),
+        positions_of(reported.columns, wanted),
+        positions_of(reported.rows, rows),
     )
-    if found.integer is not None and (found.integer[c] != problem.integer[at]).any():
+    if reported.integer is not None and (reported.integer[c] != problem.integer[at]).any():
         return "other columns are integer"
-    if found.discrete is not None and found.discrete != problem.integer.sum():
-        return f"{found.discrete} discrete columns instead of {problem.integer.sum()}"
+    if reported.discrete is not None and reported.discrete != problem.integer.sum():
+        return f"{reported.discrete} discrete columns instead of {problem.integer.sum()}"
     form = CanonicalForm(problem)
     bounds = [
-        ("lower", found.lower[c], problem.lower[at]),
-        ("upper", found.upper[c], problem.upper[at]),
-        ("row_lower", found.row_lower[r], form.row_lower),
-        ("row_upper", found.row_upper[r], form.row_upper),
+        ("lower", reported.lower[c], problem.lower[at]),
+        ("upper", reported.upper[c], problem.upper[at]),
+        ("row_lower", reported.row_lower[r], form.row_lower),
+        ("row_upper", reported.row_upper[r], form.row_upper),
     ]
     for name, theirs, mine in bounds:
-        wrong = np.nonzero(~_are_close(theirs, mine, found.rounding))[0]
+        wrong = np.nonzero(~_are_close(theirs, mine, reported.rounding))[0]
         if len(wrong):
             return f"{name} is {theirs[wrong[0]]!s} instead of {mine[wrong[0]]!s} ({len(wrong)} such)"
     objective, activities = values_at(problem, points.of(columns))
-    return _value_difference("the objective", found.objective, objective, VALUES) or _value_difference(
-        "a row", found.activities[:, r], activities, VALUES
+    return _value_difference("the objective", reported.objective, objective, VALUES) or _value_difference(
+        "a row", reported.activities[:, r], activities, VALUES
     )
 
 

@@ -49,14 +49,14 @@ def _spread(
     Rows with blocks that come later give no limit for these.
     """
     slacks = [(_block(term), term) for term in family.of_degree(1) if _block(term) not in _CHOSEN]
-    own = [term for name, term in slacks if name in wanted]
-    if not own or any(name in later for name, _ in slacks):
+    terms = [term for name, term in slacks if name in wanted]
+    if not terms or any(name in later for name, _ in slacks):
         return
     reach = np.maximum(family.excess(point), 0.0)
     for _, term in slacks:
-        if term is not own[0]:
+        if term is not terms[0]:
             reach = reach + np.abs(term.coefficient) * off[term.factors[0]]
-    np.maximum.at(off, own[0].factors[0], reach / np.abs(own[0].coefficient))
+    np.maximum.at(off, terms[0].factors[0], reach / np.abs(terms[0].coefficient))
 
 
 def _block(term: Monomial) -> str:

@@ -68,8 +68,10 @@ class _ModelFile:
     points: Points
 
     def check(self, program: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any) -> Check:
-        own, of = self.held.sha256[:16], self.problem.sha256[:16]
-        group, relaxes = (own, of) if self.held.formulation.is_weakened else (of, "")
+        held_hash, problem_hash = self.held.sha256[:16], self.problem.sha256[:16]
+        group, relaxes = (
+            (held_hash, problem_hash) if self.held.formulation.is_weakened else (problem_hash, "")
+        )
         facts = (_title(self.problem), self.name, program, step, verdict, reason)
         return Check(*facts, **numbers, group=group, relaxes=relaxes)
 
@@ -96,21 +98,26 @@ def verify(
     manifests = [read_manifest(path) for path in sorted(folder.glob("*.manifest.json"))]
     if not manifests:
         raise InputError("holds no manifest; give the folder that `crossfield export` wrote", file=folder)
-    found = Verification(folder, absent={each.name: each.missing for each in wanted if each.missing})
+    verification = Verification(
+        folder,
+        absent={
+            program_wanted.name: program_wanted.missing for program_wanted in wanted if program_wanted.missing
+        },
+    )
     with tempfile.TemporaryDirectory(prefix="crossfield-verify-") as temporary:
         subjects, broken = _subjects(manifests, Path(temporary))
-        found.checks.extend(broken)
-        for program in (each for each in wanted if not each.missing):
+        verification.checks.extend(broken)
+        for program in (program_wanted for program_wanted in wanted if not program_wanted.missing):
             chosen = [subject for subject in subjects if subject.format in program.formats]
             with Solvers() as solvers:
                 bench = _ProgramChecks(program, solvers, seconds)
-                found.versions[program.name] = solvers.program_version(program.name)
+                verification.versions[program.name] = solvers.program_version(program.name)
                 for subject in chosen:
                     progress(f"{subject.name}: {program.title}")
-                    found.checks.extend(bench.checks(subject))
-    found.checks[:] = judge_solves(found.checks)
-    write_bytes(folder / RESULT, (json.dumps(found.document(), indent=1) + "\n").encode())
-    return found
+                    verification.checks.extend(bench.checks(subject))
+    verification.checks[:] = judge_solves(verification.checks)
+    write_bytes(folder / RESULT, (json.dumps(verification.document(), indent=1) + "\n").encode())
+    return verification
 
 
 def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_ModelFile], list[Check]]:
@@ -217,8 +224,8 @@ class _ProgramChecks:
         if subject.format in program.algebra:
             model = self.solvers.ask(program.name, "read", subject.path, seconds=READING_SECONDS)
             return algebra_difference(model, subject.held, program.tolerance, points.values)
-        found = self.solvers.ask(program.name, "evaluate", subject.path, points, seconds=READING_SECONDS)
-        return behaviour_difference(found, subject.held, points)
+        behaviour = self.solvers.ask(program.name, "evaluate", subject.path, points, seconds=READING_SECONDS)
+        return behaviour_difference(behaviour, subject.held, points)
 
     def _too_large(self, subject: _ModelFile) -> str:
         held = subject.held
@@ -237,14 +244,14 @@ class _ProgramChecks:
         files = SolveFiles.for_model(subject.path, solver)
         limits = Limits(seconds, GAP, threads=1)
         try:
-            found = self.solvers.solve_file(
+            solution = self.solvers.solve_file(
                 subject.held, solver, files, limits, Deadline.after(seconds + LATE), precise=True
             )
         except UnsupportedBySolverError:
             return ended(Verdict.NOT_TRIED, self._too_large(subject))
         except CrossfieldError as error:
             return ended(Verdict.FAILED, str(error))
-        return _judge_answer(subject, solver, found)
+        return _judge_answer(subject, solver, solution)
 
 
 def _refusal(solver: str, subject: _ModelFile, stage: Stage) -> str:
@@ -253,22 +260,25 @@ def _refusal(solver: str, subject: _ModelFile, stage: Stage) -> str:
     return "" if refusal is None else refusal.reason
 
 
-def _judge_answer(subject: _ModelFile, solver: str, found: Solution) -> Check:
+def _judge_answer(subject: _ModelFile, solver: str, solution: Solution) -> Check:
     """Judge a solver's answer: check its point, and compute objective and energy again."""
-    held, numbers = subject.held, {"seconds": round(found.seconds or 0.0, 2), "bound": found.claimed_bound}
-    point, objective, worst = found.point, found.objective, found.violation
+    held, numbers = (
+        subject.held,
+        {"seconds": round(solution.seconds or 0.0, 2), "bound": solution.claimed_bound},
+    )
+    point, objective, worst = solution.point, solution.objective, solution.violation
     if point is None or objective is None or worst is None:
-        limit = found.claimed == Status.LIMIT_WITHOUT_POINT
+        limit = solution.claimed == Status.LIMIT_WITHOUT_POINT
         verdict = Verdict.LIMIT if limit else Verdict.FAILED
-        return subject.check(solver, "solve", verdict, f"no point: {found.message}", **numbers)
-    energy = subject.problem.objective_value(subject.problem.point(found.field))
+        return subject.check(solver, "solve", verdict, f"no point: {solution.message}", **numbers)
+    energy = subject.problem.objective_value(subject.problem.point(solution.field))
     leeway = objective_leeway(held, point)
     numbers |= {"objective": objective, "energy": energy, "leeway": leeway}
     wrong = ""
     if worst.worst > SOLVERS[solver].feasible_within:
         wrong = f"its point violates {worst.worst_family or 'bounds'} by {worst.worst:.2g}"
-    proven = found.claimed in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
-    claim = found.reported
+    proven = solution.claimed in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
+    claim = solution.reported
     if (
         not wrong
         and claim is not None
@@ -280,7 +290,7 @@ def _judge_answer(subject: _ModelFile, solver: str, found: Solution) -> Check:
     wrong = wrong or _energy_difference(subject.problem, objective, energy, leeway, proven=proven)
     if wrong:
         return subject.check(solver, "solve", Verdict.DIFFERS, wrong, **numbers)
-    verdict, words = (Verdict.AGREES, "") if proven else (Verdict.LIMIT, found.message)
+    verdict, words = (Verdict.AGREES, "") if proven else (Verdict.LIMIT, solution.message)
     return subject.check(solver, "solve", verdict, words, proven=proven, **numbers)
 
 
@@ -348,6 +358,6 @@ def _as_relaxation(check: Check, checks: list[Check]) -> str:
 
 def _best(checks: list[Check], group: str) -> float | None:
     """The least objective found in each group, with the greatest reduction by its broken rows."""
-    found = [each for each in checks if each.group == group]
-    values = [each.objective + (each.leeway or 0.0) for each in found if each.objective is not None]
+    same_group = [check for check in checks if check.group == group]
+    values = [check.objective + (check.leeway or 0.0) for check in same_group if check.objective is not None]
     return min(values, default=None)

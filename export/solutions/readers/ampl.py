@@ -66,13 +66,13 @@ def _recognises_text(head: bytes) -> bool:
 
 def parse_text(data: bytes) -> RawSolution:
     """Read a text file. Raises SolutionError if it is cut off or numbers do not fit."""
-    found = _OPTIONS.search(data, 0, HEAD)
-    assert found
-    cursor = Cursor(data, found.end())
+    heading = _OPTIONS.search(data, 0, HEAD)
+    assert heading
+    cursor = Cursor(data, heading.end())
     counts = _read_counts(cursor)
     values = _read_values(cursor, counts)
     code = _read_code(cursor)
-    return _solution(data[: found.start()], code, values, counts)
+    return _solution(data[: heading.start()], code, values, counts)
 
 
 class _Counts(NamedTuple):
@@ -122,9 +122,9 @@ def _read_values(cursor: Cursor, counts: _Counts) -> Floats:
         place = place_of_entry(cursor.data, cursor.position, needed)
         raise line_error(cursor.data, place, "there are more numbers than announced")
     if held < needed:
-        rest = cursor.data[numbers.end :].lstrip().split(b"\n", 1)
-        if len(rest) > 1 and not _OBJNO.match(rest[0]):
-            raise line_error(cursor.data, numbers.end, _NUMBERS.fault(rest[0]))
+        next_lines = cursor.data[numbers.end :].lstrip().split(b"\n", 1)
+        if len(next_lines) > 1 and not _OBJNO.match(next_lines[0]):
+            raise line_error(cursor.data, numbers.end, _NUMBERS.fault(next_lines[0]))
         raise cursor.fault(f"{needed} numbers are announced, {held} whole lines follow; the file is cut off")
     cursor.position = numbers.end
     return numbers.values[counts.duals :].copy()
@@ -141,8 +141,10 @@ def _read_code(cursor: Cursor) -> int | None:
     if code is None:
         raise cursor.fault(f"{quoted(line)} is not the number of the objective and a solve code")
     digits = code[1] or b""
-    whole = cursor.data.endswith(b"\n") or not cursor.at_end or digits == b"0" or len(digits) == _CODE_DIGITS
-    return int(digits) if digits and whole else None
+    is_complete = (
+        cursor.data.endswith(b"\n") or not cursor.at_end or digits == b"0" or len(digits) == _CODE_DIGITS
+    )
+    return int(digits) if digits and is_complete else None
 
 
 def _solution(message: bytes, code: int | None, values: Floats, counts: _Counts) -> RawSolution:
@@ -260,8 +262,8 @@ def _text_parts(message: str, primal: Floats, numbers: tuple[int, ...], code: in
     lines = message[:_LONGEST_MESSAGE].strip().splitlines()
     words = (one_line(line.encode(errors="replace")) for line in lines)
     # An empty line or this word would end the message.
-    kept = ({"": " ", "Options": "Options."}.get(line, line) for line in words)
-    head = ["\n".join(kept), "", "Options", *numbers]
+    harmless = ({"": " ", "Options": "Options."}.get(line, line) for line in words)
+    head = ["\n".join(harmless), "", "Options", *numbers]
     yield "\n".join(map(str, head)).encode() + b"\n"
     for start in range(0, len(primal), HEAD):
         text = "\n".join(map(repr, primal[start : start + HEAD].tolist())) + "\n"

@@ -51,7 +51,7 @@ def parse_results(data: bytes) -> RawSolution:
     """Read a res.lst. Raises SolutionError for a sum.lst, a cut, and words that are not numbers."""
     if _SUMMARY in data:
         raise SolutionError("this is the summary of BARON, which holds no values; give its results, res.lst")
-    banners = [found[1] for found in _BANNER.finditer(data)]
+    banners = [match[1] for match in _BANNER.finditer(data)]
     if not banners:
         raise SolutionError("the file is cut off: the end of the search is missing; let BARON write it again")
     words = one_line(banners[-1])

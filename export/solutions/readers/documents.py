@@ -89,7 +89,7 @@ def parse_gurobi(data: bytes) -> RawSolution:
 def parse_document(data: bytes) -> RawSolution:
     """Read a document of PuLP or Pyomo, or a plain one. Raises SolutionError for invalid values."""
     content = _document(data)
-    layout = next((each for each in _OTHERS if _at(content, each.status) is not None), None)
+    layout = next((known for known in _OTHERS if _at(content, known.status) is not None), None)
     if layout is not None:
         return _solution(content, layout)
     inner = next((key for key in ("variables", "values", "solution") if key in content), "columns")
@@ -162,10 +162,10 @@ def _pool(content: dict[str, Any], best: RawSolution) -> RawSolution:
     if any(len(values) != len(objectives) for values in further):
         raise SolutionError(f"not every column has {len(objectives)} values; {_AGAIN}")
     names = [entry[0] for entry in content["Vars"]]
-    others = []
+    further_solutions = []
     for at, objective in enumerate(objectives[1:], 1):
         values = named_values(names, [values[at] for values in further])[1]
-        others.append(
+        further_solutions.append(
             replace(
                 best,
                 status=Status.FEASIBLE,
@@ -175,7 +175,7 @@ def _pool(content: dict[str, Any], best: RawSolution) -> RawSolution:
                 values=values,
             )
         )
-    return solution_pool([best, *others])
+    return solution_pool([best, *further_solutions])
 
 
 def _finite_number(value: Any) -> float | None:

@@ -97,20 +97,20 @@ def _order(comments: dict[bytes, bytes]) -> ColumnOrder:
 
 def _summary(cursor: Cursor) -> _Summary:
     line = cursor.line("the line of counts and status")
-    found = _SUMMARY.fullmatch(line)
-    if found is None:
+    match = _SUMMARY.fullmatch(line)
+    if match is None:
         raise cursor.fault(f"{quoted(line)} is not kind, rows, columns, status and objective")
-    status = GLPK.get(found[4].decode(errors="replace"), Status.LIMIT_WITHOUT_POINT)
-    return _Summary(_FORMS[found[1]], int(found[2]), int(found[3]), status, cursor.number(found[5]))
+    status = GLPK.get(match[4].decode(errors="replace"), Status.LIMIT_WITHOUT_POINT)
+    return _Summary(_FORMS[match[1]], int(match[2]), int(match[3]), status, cursor.number(match[5]))
 
 
 def _columns(data: bytes, start: int, summary: _Summary) -> Floats:
     first = _COLUMNS.search(data, start)
     start = first.start() if first else data.rfind(_END)
     columns = read_entries(data, start, summary.form)
-    rest = data[columns.end :].lstrip()
-    if not rest.startswith(_END):
-        line = rest.split(b"\n", 1)[0]
+    following = data[columns.end :].lstrip()
+    if not following.startswith(_END):
+        line = following.split(b"\n", 1)[0]
         raise line_error(data, columns.end, summary.form.fault(line))
     if len(columns.values) != summary.columns:
         raise line_error(

@@ -240,7 +240,7 @@ def _compiled(layout: TextLayout) -> dict[str, re.Pattern[bytes]]:
     lines = {"begin": layout.begin, "end": layout.end}
     lines.update({f"refusal {at}": pattern for at, (pattern, _) in enumerate(layout.refusals)})
     lines.update({f"claim {at}": claim for at, claim in enumerate((*layout.claims, *CLAIMS))})
-    whole = {
+    whole_lines = {
         key: re.compile(rb"%b*(?:%b)%b*(?=\n)" % (BLANK, line, BLANK), re.IGNORECASE)
         for key, line in lines.items()
         if line
@@ -248,7 +248,7 @@ def _compiled(layout: TextLayout) -> dict[str, re.Pattern[bytes]]:
     head = rb"%b*(?:%b)" % (BLANK, layout.signature)
     heads = {"first head": head, "later head": rb"\n" + head}
     flags = re.IGNORECASE | re.MULTILINE
-    return {**whole, **{key: re.compile(pattern, flags) for key, pattern in heads.items()}}
+    return {**whole_lines, **{key: re.compile(pattern, flags) for key, pattern in heads.items()}}
 
 
 @cache

@@ -93,8 +93,8 @@ class RawSolution:
 
 def solution_pool(solutions: Sequence[RawSolution]) -> RawSolution:
     """The content of a file with one or more solutions; by default the first of them."""
-    first, *others = solutions
-    return replace(first, pool=(first, *others)) if others else first
+    first, *further = solutions
+    return replace(first, pool=(first, *further)) if further else first
 
 
 def choose_solution(raw: RawSolution, number: int | None = None) -> RawSolution:
@@ -105,7 +105,7 @@ def choose_solution(raw: RawSolution, number: int | None = None) -> RawSolution:
     """
     pool = raw.pool or (raw,)
     if number is None:
-        objectives = [np.inf if each.objective is None else each.objective for each in pool]
+        objectives = [np.inf if solution.objective is None else solution.objective for solution in pool]
         number = 1 + (int(np.argmin(objectives)) if np.isfinite(objectives).all() else 0)
     if not 1 <= number <= len(pool):
         raise SolutionError(f"there is no solution {number} in it; choose one of 1 to {len(pool)}")
@@ -281,10 +281,10 @@ def _places(names: Bytes, listed: Bytes) -> NDArray[np.int64]:
     """The place of each listed name among `names`, -1 for an unknown one."""
     place = dict(zip(names.tolist(), range(len(names)), strict=True))
     index = np.fromiter(map(place.get, listed.tolist(), repeat(-1)), np.int64, len(listed))
-    others = np.flatnonzero(index < 0)
-    if len(others):
+    unknown = np.flatnonzero(index < 0)
+    if len(unknown):
         folded = {name.lower(): at for name, at in place.items()}
-        for at, name in zip(others.tolist(), listed[others].tolist(), strict=True):
+        for at, name in zip(unknown.tolist(), listed[unknown].tolist(), strict=True):
             index[at] = next((folded[word] for word in spellings(name) if word in folded), -1)
     return index
 
@@ -325,13 +325,13 @@ def _check_rows(names: Bytes, raw: RawSolution) -> None:
         )
 
 
-def _check_repeats(names: Bytes, given: Floats, kept: Floats) -> None:
-    clash = given != kept
+def _check_repeats(names: Bytes, first: Floats, last: Floats) -> None:
+    clash = first != last
     if clash.any():
         at = int(np.argmax(clash))
         name = names[at].decode(errors="replace")
         raise SolutionError(
-            f"{name} has two values, {given[at]} and {kept[at]}; leave one solution in the file"
+            f"{name} has two values, {first[at]} and {last[at]}; leave one solution in the file"
         )
 
 
@@ -341,15 +341,15 @@ def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
     Raises SolutionError when the file has no point or is of a problem of another size.
     """
     _check_point(raw)
-    found = raw.values.size
-    if (raw.rows, found) != (rows, columns):
-        if raw.order != "nl" and (raw.rows, found) == (rows + 1, columns):
+    count = raw.values.size
+    if (raw.rows, count) != (rows, columns):
+        if raw.order != "nl" and (raw.rows, count) == (rows + 1, columns):
             raise SolutionError(
                 "the file counts one row too many: this is HiGHS style 2 (GLPK raw); "
                 "write it with write_solution_style = 0 (raw) or 4 (sparse)"
             )
         raise SolutionError(
-            f"the file is of {found} columns and {raw.rows} rows, the problem has {columns} columns and "
+            f"the file is of {count} columns and {raw.rows} rows, the problem has {columns} columns and "
             f"{rows} rows; give the solution of this problem"
         )
     return raw.values.copy()
