@@ -26,7 +26,7 @@ from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.forced import last_step_pieces
 from crossfield.models.proof.prove import prove
-from crossfield.models.proof.tightening import windows_left
+from crossfield.models.proof.tightening import remaining_windows
 from exhaustive import optimum, random_instance, sketch
 from plain_prover import proof_of
 
@@ -92,7 +92,7 @@ def test_a_part_without_strokes_has_no_cost_at_the_optimum(norm, tmp_path):
     proof = prove(instance, norm=norm, jobs=1)
     written = write_certificate(proof, path)
     assert written.status == "optimal"
-    windows, apart = windows_left(written), instance.grid.columns < 2
+    windows, apart = remaining_windows(written), instance.grid.columns < 2
     assert (windows.alpha_lower[apart] == instance.alpha_lower[apart]).all()
     assert (windows.alpha_upper[apart] == instance.alpha_upper[apart]).all()
     assert (np.abs([windows.beta_lower[apart], windows.beta_upper[apart]]) == np.pi / 4).all()
