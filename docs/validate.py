@@ -291,7 +291,7 @@ def main() -> None:
         ),
     ]
     (DOCS / "validation.md").write_text("\n\n".join(parts) + "\n")
-    bad = [check for each in runs for check in each.result.bad]
+    bad = [check for each in runs for check in each.result.failed_checks]
     print(
         f"{time.perf_counter() - begin:.0f} s, {len(bad)} checks with something wrong",
         *bad,

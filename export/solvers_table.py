@@ -144,13 +144,13 @@ Each has a module in export/programs.
 class StartFile(NamedTuple):
     """The file from which a solver starts: its layout (see export/bundle/starts.py), suffix, and use.
 
-    convex: whether the solver uses it only for convex problems.
+    needs_convex: whether the solver uses it only for convex problems.
     """
 
     layout: str
     suffix: str
     use: str
-    convex: bool = False
+    needs_convex: bool = False
 
 
 @dataclass(frozen=True)
@@ -160,9 +160,10 @@ class Solver:
     program: the name of the program that contains it. package: an additional Python package. proves:
     `global`: all optima of the problems that it takes are proven; `convex`: those of convex problems;
     `local`: none. start: the file with a starting point for a model, if it takes one. answers: suffix of its
-    solution files. bundled: whether it is installed with crossfield. not_for: classes of problems for which
-    other bundled solvers come first. vendor: its maker, if the table has others of the same maker: together
-    they count as one opinion. feasible_within: largest violation of a row by the points that it reports.
+    solution files. is_bundled: whether it is installed with crossfield. not_for: classes of problems for
+    which other bundled solvers come first. vendor: its maker, if the table has others of the same maker:
+    together they count as one opinion. feasible_within: largest violation of a row by the points that it
+    reports.
     """
 
     name: str
@@ -174,7 +175,7 @@ class Solver:
     proves: Proof = "global"
     start: StartFile | None = None
     answers: str = ".sol"
-    bundled: bool = False
+    is_bundled: bool = False
     not_for: tuple[str, ...] = ()
     vendor: str = ""
     feasible_within: float = 5e-6  # solvers keep to 1e-6 in rows that they scale
@@ -227,7 +228,9 @@ SOLVERS: Final = {
         ),
         Solver(
             "xpress", "Xpress", ("mps", "lp"), "xpress",
-            start=StartFile("slx", ".slx", "READPROB MODEL.mps, then READSLXSOL START.slx", convex=True),
+            start=StartFile(
+                "slx", ".slx", "READPROB MODEL.mps, then READSLXSOL START.slx", needs_convex=True
+            ),
             answers=".slx",
         ),
         Solver(
@@ -243,7 +246,7 @@ SOLVERS: Final = {
                 ),
             },
             start=StartFile("highs", ".sol", "highs --read_solution_file START.sol MODEL.mps"),
-            bundled=True, not_for=("QP",),
+            is_bundled=True, not_for=("QP",),
         ),
         Solver(
             "scip", "SCIP", ("nl", "mps", "lp", "osil"), "scip",
@@ -266,7 +269,7 @@ SOLVERS: Final = {
                 "integers": Refusal("solve", "Ipopt drops integrality; relax it, or fix the jumps"),
                 "non-convexity": Refusal("local", "Ipopt finds local optima"),
             },
-            proves="local", bundled=True, vendor="COIN-OR",
+            proves="local", is_bundled=True, vendor="COIN-OR",
         ),
         Solver(
             "bonmin", "Bonmin", ("nl", "gms"), "casadi",
@@ -275,7 +278,7 @@ SOLVERS: Final = {
                     "local", "Bonmin is exact for convex problems, elsewhere a heuristic"
                 )
             },
-            proves="convex", bundled=True, vendor="COIN-OR",
+            proves="convex", is_bundled=True, vendor="COIN-OR",
         ),
         Solver(
             "gams-cplex", "CPLEX in GAMS", ("gms",), "gams",
@@ -293,7 +296,7 @@ SOLVERS: Final = {
 }  # fmt: skip
 """The table of solvers. Bundled ones are in the order of preference."""
 
-BUNDLED: Final = {name: solver for name, solver in SOLVERS.items() if solver.bundled}
+BUNDLED: Final = {name: solver for name, solver in SOLVERS.items() if solver.is_bundled}
 """The solvers that are installed with crossfield."""
 
 

@@ -206,7 +206,7 @@ def _write_problem_files(
         entry = FORMATS[name]
         path = folder / f"{stem}{entry.suffix}{'.gz' if compress else ''}"
         try:
-            file = write(problem, path, dialect=dialects.get(name), start=start if entry.starts else None)
+            file = write(problem, path, dialect=dialects.get(name), start=start if entry.has_start else None)
         except UnsupportedByFormatError as error:
             refused[name] = str(error)
         else:

@@ -86,7 +86,7 @@ def _format_row(name: str) -> Row:
     readers = [program.title for program in PROGRAMS.values() if name in program.formats]
     return {
         "name": name,
-        "written": "by default" if entry.default else "when asked for",
+        "written": "by default" if entry.is_default else "when asked for",
         "dialects": ", ".join(filter(None, entry.dialects)),
         "verified by": ", ".join(readers) or "none",
         "summary": entry.summary,

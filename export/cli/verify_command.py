@@ -33,9 +33,9 @@ def verify_command(
     with show_progress(quiet=printing.quiet) as show:
         verification = verify(folder, seconds=solve, programs=programs, progress=show)
     printing.show(verification.document(), lambda: _show_verification(verification))
-    for check in verification.bad:
+    for check in verification.failed_checks:
         print_notice(f"{check.file}: {check.program}: {check.verdict}: {check.reason}")
-    if not verification.ok:
+    if not verification.is_ok:
         raise typer.Exit(1)
 
 

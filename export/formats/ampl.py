@@ -219,7 +219,7 @@ class _AmplExpressions(InfixLanguage):
 
     def bound(self, expression: sp.Expr) -> str:
         """A bound of a variable for all elements of its set."""
-        return _literal_text(self.alone(expression))
+        return _literal_text(self.outermost(expression))
 
 
 def _literal_text(pieces: list[Piece]) -> str:

@@ -200,7 +200,7 @@ class _NlExpressions(PrefixLanguage):
             self.node("product", [self.number(coefficient(term)), *map(self.column, term.symbols)])
             for term in nonlinear_terms(self.family)
         ]
-        return self.joined("sum", terms) if terms else self.number(0.0)
+        return self.join("sum", terms) if terms else self.number(0.0)
 
 
 def _limits(nl: NlOrder, code: TextForm) -> Iterator[bytes]:

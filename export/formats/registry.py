@@ -30,9 +30,9 @@ class Format:
     """A file format: its capabilities and its writer.
 
     degree: greatest degree of a polynomial it holds (99: any function); module: of its writer in this folder;
-    dialects: named variants, the default first; starts: whether it has a place for a starting point; default:
-    whether it is written when no format is requested; command: a line that solves {model} and writes
-    {answer}; answers: suffix of that answer, so that those of several formats differ.
+    dialects: named variants, the default first; has_start: whether it has a place for a starting point;
+    is_default: whether it is written when no format is requested; command: a line that solves {model} and
+    writes {answer}; answers: suffix of that answer, so that those of several formats differ.
     """
 
     name: str
@@ -40,8 +40,8 @@ class Format:
     degree: int
     module: str
     dialects: tuple[str, ...] = ("",)
-    starts: bool = False
-    default: bool = True
+    has_start: bool = False
+    is_default: bool = True
     command: str = ""
     answers: str = ".sol"
 
@@ -58,7 +58,7 @@ class Format:
         self, form: CanonicalForm, header: list[str], start: Floats | None = None, dialect: str = ""
     ) -> Iterator[bytes]:
         """The bytes of a file, as its writer makes them; the module of the writer is loaded only here."""
-        options: dict[str, Any] = {"start": start} if self.starts else {}
+        options: dict[str, Any] = {"start": start} if self.has_start else {}
         if dialect == "binary":
             options["binary"] = True
         writer = import_module(f"{__package__}.{self.module}")
@@ -71,11 +71,11 @@ FORMATS: Final = {
     for entry in (
         Format(
             "nl", "AMPL .nl with .row and .col, for Ipopt, Bonmin, Couenne, SCIP, Baron, Knitro",
-            ANY_DEGREE, "nl", ("text", "binary"), starts=True, command="bonmin {model} -AMPL",
+            ANY_DEGREE, "nl", ("text", "binary"), has_start=True, command="bonmin {model} -AMPL",
         ),
         Format(
             "gms", "GAMS model, self-contained, one equation per row",
-            ANY_DEGREE, "gams", ("scalar",), starts=True,
+            ANY_DEGREE, "gams", ("scalar",), has_start=True,
             command="gams {model} --RESULTS={answer}", answers=".csv",
         ),
         Format(
@@ -89,16 +89,19 @@ FORMATS: Final = {
         ),
         Format(
             "mod", "AMPL model in the paper's notation with its data in a .dat; the linear ones for GLPK too",
-            ANY_DEGREE, "ampl", default=False,
+            ANY_DEGREE, "ampl", is_default=False,
         ),
-        Format("osil", "OSiL, XML, for SCIP and Optimization Services", ANY_DEGREE, "osil", default=False),
-        Format("qplib", "QPLIB's own format, at most quadratic", 2, "qplib", starts=True, default=False),
-        Format("bar", "BARON's own format, polynomials", 4, "baron", starts=True, default=False),
+        Format("osil", "OSiL, XML, for SCIP and Optimization Services", ANY_DEGREE, "osil", is_default=False),
+        Format(
+            "qplib", "QPLIB's own format, at most quadratic",
+            2, "qplib", has_start=True, is_default=False,
+        ),
+        Format("bar", "BARON's own format, polynomials", 4, "baron", has_start=True, is_default=False),
     )
 }  # fmt: skip
 """The table of formats; command line, docs and tests are generated from it."""
 
-DEFAULTS: Final = tuple(name for name, entry in FORMATS.items() if entry.default)
+DEFAULTS: Final = tuple(name for name, entry in FORMATS.items() if entry.is_default)
 """Names of the formats that are written when none is requested."""
 
 
@@ -223,8 +226,8 @@ def write(
         known = ", ".join(filter(None, entry.dialects))
         remedy = f"choose one of {known}" if known else "it has one form, so leave the dialect out"
         raise InputError(f"there is no dialect {chosen!r} of {entry.name}; {remedy}", file=path)
-    if start is not None and not entry.starts:
-        holders = ", ".join(name for name, holder in FORMATS.items() if holder.starts)
+    if start is not None and not entry.has_start:
+        holders = ", ".join(name for name, holder in FORMATS.items() if holder.has_start)
         raise UnsupportedByFormatError(
             f"{entry.name} has no place for a start; choose a format that has one ({holders}), or call "
             "write_problem, which writes a start file for each solver",

@@ -58,9 +58,9 @@ class NlModel:
         """The objective at a point (n,), or None when the point is not feasible."""
         objective, rows = self.evaluate(point)
         are_whole = np.abs(point - np.round(point))[self.discrete].max(initial=0.0) <= FEASIBLE
-        return objective if are_whole and self.holds(point, rows) else None
+        return objective if are_whole and self.is_within_limits(point, rows) else None
 
-    def holds(self, point: Floats, rows: Floats) -> bool:
+    def is_within_limits(self, point: Floats, rows: Floats) -> bool:
         """Whether a point (n,) and the values of its rows (m,) respect their limits."""
         excess = (self.lower - point, point - self.upper, self.row_lower - rows, rows - self.row_upper)
         return all(float(part.max(initial=0.0)) <= FEASIBLE for part in excess)
@@ -126,12 +126,12 @@ class IterateWatch(ca.Callback):
     def eval(self, arguments: Sequence[Any]) -> list[int]:
         """Return 1 to stop, 0 to continue."""
         by_name = dict(zip(self.sizes, arguments, strict=True))
-        self.see(*(np.array(by_name[name]).ravel() for name in ("x", "f", "g")))
+        self.keep_if_better(*(np.array(by_name[name]).ravel() for name in ("x", "f", "g")))
         return [int(is_stopped())]
 
-    def see(self, point: Floats, value: Floats, rows: Floats) -> None:
+    def keep_if_better(self, point: Floats, value: Floats, rows: Floats) -> None:
         """Keep a point (n,) with its objective (1,) and rows (m,) if it is feasible and lower."""
-        if value[0] < self.value and self.model.holds(point, rows):
+        if value[0] < self.value and self.model.is_within_limits(point, rows):
             self.value, self.best = float(value[0]), point
 
 
@@ -232,7 +232,7 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
     if solver == "bonmin" and value >= _NO_POINT:
         return _answer_of_start(words, code, watch)
     if solver == "ipopt" and code == _LIMIT and watch.best is not None:
-        watch.see(point, np.array([value]), np.array(answer["g"]).ravel())
+        watch.keep_if_better(point, np.array([value]), np.array(answer["g"]).ravel())
         words += "" if watch.best is point else ", the best feasible point before it"
         return AmplAnswer(words, code, watch.best)
     return AmplAnswer(words, code, np.zeros(0) if code == 300 else point)

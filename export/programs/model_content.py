@@ -67,7 +67,7 @@ class Algebra:
         np.add.at(values.T, row, (points[:, first] * points[:, second] * self.row_quadratic).T)
         return values
 
-    def ordered(self, columns: list[str], rows: list[str]) -> Algebra:
+    def reordered(self, columns: list[str], rows: list[str]) -> Algebra:
         """The same model with its columns and rows in another order."""
         c, r = positions_of(self.columns, columns), positions_of(self.rows, rows)
         back_c, back_r = np.argsort(c), np.argsort(r)

@@ -254,7 +254,7 @@ class Solvers:
             taking = choose_format(problem, solver)
             stem = f"{problem.instance.name}.{problem.name}"
             files = SolveFiles.for_model(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
-            written = write(problem, files.model, start=start if FORMATS[taking.format].starts else None)
+            written = write(problem, files.model, start=start if FORMATS[taking.format].has_start else None)
             if folder is not None and is_recordable(problem):
                 add_to_manifest(problem, written, place)
             # Reading the answer takes about as long as writing the problem did.

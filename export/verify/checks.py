@@ -61,14 +61,14 @@ class Verification:
     absent: dict[str, str] = field(default_factory=dict)
 
     @property
-    def bad(self) -> list[Check]:
+    def failed_checks(self) -> list[Check]:
         """The checks that found a fault."""
         return [check for check in self.checks if check.verdict in _BAD]
 
     @property
-    def ok(self) -> bool:
+    def is_ok(self) -> bool:
         """Whether no program differs or failed."""
-        return not self.bad
+        return not self.failed_checks
 
     def document(self) -> dict[str, Any]:
         """The content of verify.json."""
@@ -76,7 +76,7 @@ class Verification:
             "format": "crossfield-verification",
             "version": 2,
             "generator": program_version(),
-            "ok": self.ok,
+            "ok": self.is_ok,
             "versions": self.versions,
             "absent": self.absent,
             "checks": [

@@ -71,7 +71,7 @@ def algebra_difference(reported: Algebra, problem: Problem, tolerance: float, po
         wrong = _name_difference(getattr(reported, kind), getattr(expected, kind), kind)
         if wrong:
             return wrong
-    reported = reported.ordered(expected.columns, expected.rows)
+    reported = reported.reordered(expected.columns, expected.rows)
     checks = (_number_difference(reported, expected, name, tolerance) for name in _NUMBERS)
     wrong = next(filter(None, checks), "")
     if wrong:

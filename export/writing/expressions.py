@@ -49,7 +49,7 @@ class InfixLanguage(ABC):
         terms = self._terms(expression)
         return [piece for place, term in enumerate(terms) for piece in self._term(term, signed=place > 0)]
 
-    def alone(self, expression: sp.Expr) -> list[Piece]:
+    def outermost(self, expression: sp.Expr) -> list[Piece]:
         """An expression that is not part of another: a negative number needs no brackets."""
         negative = not expression.free_symbols and expression.is_negative
         return [b"-", *self.expression(-expression)] if negative else self.expression(expression)
@@ -149,11 +149,11 @@ class PrefixLanguage(ABC):
         data = [part for part in expression.args if is_free_of_columns(self.family, part)]
         parts = [self.expression(part) for part in expression.args if part not in data]
         if expression.is_Mul and data == [-1]:
-            return self.node("negative", [self.joined("product", parts)])
+            return self.node("negative", [self.join("product", parts)])
         constant = [self.expression(expression.func(*data))] if data else []
-        return self.joined("sum" if expression.is_Add else "product", constant + parts)
+        return self.join("sum" if expression.is_Add else "product", constant + parts)
 
-    def joined(self, operator: Operator, parts: list[Pieces]) -> Pieces:
+    def join(self, operator: Operator, parts: list[Pieces]) -> Pieces:
         """The sum or the product of one part or more."""
         return self.node(operator, parts) if len(parts) > 1 else parts[0]
 

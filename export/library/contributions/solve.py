@@ -205,7 +205,7 @@ class _SolveSession:
     def _solve(self, document: dict[str, Any], problem: Problem, solver: str) -> Solution:
         """The solution of a solver. Raises SolverError if no time was left to start it."""
         limits, start = Limits(self.limit, GAP, 1), None
-        if SOLVERS[solver].bundled:
+        if SOLVERS[solver].is_bundled:
             known = read_solution(self.library.folder / document["best"]["point"], problem)
             start = None if known.point is None else clipped_field(known.problem, known.point)
         with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:

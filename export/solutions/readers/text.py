@@ -62,7 +62,7 @@ class RawSolution:
     names: byte strings (k,), or None when the format is positional. values: float (k,), in the order of the
     file; infinities may occur, NaN may not. omits_zeros: whether a column that is not listed is 0. rows:
     number of constraints in the file, or None if it does not state them. order: the order of the values
-    without names. bound: the solver's dual bound, or None. of_rows: names (k,) that the file lists as names
+    without names. bound: the solver's dual bound, or None. row_names: names (k,) that the file lists as names
     of rows, whose values are left out.
     stamps: digits of the problem's stamp, or the first of them, wherever the solver repeated it. reader: name
     of the reader of the file.
@@ -79,7 +79,7 @@ class RawSolution:
     rows: int | None = None
     order: ColumnOrder = "nl"
     bound: float | None = None
-    of_rows: Bytes | None = None
+    row_names: Bytes | None = None
     stamps: frozenset[str] = frozenset()
     reader: str = ""
     rounded: str = ""
@@ -178,7 +178,7 @@ def _parse_answer(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
         omits_zeros=scan.sparse or (not (values[first:] == 0).any() if zeros is None else zeros),
         rows=int(rows) if re.fullmatch(rb"\d{1,12}", rows) else None,
         bound=bound if bound is not None and np.isfinite(bound) else None,
-        of_rows=names[:first] if first else None,
+        row_names=names[:first] if first else None,
         rounded=layout.digits,
     )
 
@@ -314,9 +314,9 @@ def _check_point(raw: RawSolution) -> None:
 
 
 def _check_rows(names: Bytes, raw: RawSolution) -> None:
-    if raw.of_rows is None:
+    if raw.row_names is None:
         return
-    misplaced = raw.of_rows[np.isin(raw.of_rows, names)]
+    misplaced = raw.row_names[np.isin(raw.row_names, names)]
     if len(misplaced):
         name = misplaced[0].decode(errors="replace")
         raise SolutionError(

@@ -259,7 +259,7 @@ def test_a_start_is_in_the_file_or_refused(tmp_path, name):
     """It is never dropped; the message names the formats that hold one."""
     problem, path = make_problem("milp-mccormick", make_instance()), tmp_path / f"model.{name}"
     field = make_field(problem.instance)
-    if FORMATS[name].starts:
+    if FORMATS[name].has_start:
         write(problem, tmp_path / f"without.{name}")
         write(problem, path, start=field)
         assert path.stat().st_size > (tmp_path / f"without.{name}").stat().st_size

@@ -27,6 +27,6 @@ def test_glpk_reads_the_same_limits_as_highs(integers, tmp_path, monkeypatch):
     path = tmp_path / "model.lp"
     path.write_text(f"{LP}{INTEGERS[integers]}end\n")
     ours, theirs = glpk.read(path), highs.read(path)
-    theirs = theirs.ordered(ours.columns, ours.rows)
+    theirs = theirs.reordered(ours.columns, ours.rows)
     for name in ("lower", "upper", "integer", "costs", "row_lower", "row_upper"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)

@@ -160,7 +160,7 @@ def test_options_and_packed_files(tmp_path: Path):
         instance, tmp_path / "options", formulations=names, options=chosen, dialects=dialects, compress=True
     )
     found = verify(tmp_path / "options")
-    assert found.bad == []
+    assert found.failed_checks == []
     assert {f.program for f in found.checks if f.verdict == Verdict.AGREES} >= {"highs", "casadi"}
 
 
@@ -244,9 +244,9 @@ def test_a_file_that_is_not_the_manifests_is_not_tried(tmp_path: Path):
     path.write_bytes(path.read_bytes() + b"\n")
     (tmp_path / "small.qp-fixed.mps").unlink()
     found = verify(tmp_path, programs=["highs"])
-    assert [f.file for f in found.bad] == ["small.qp-fixed.lp", "small.qp-fixed.mps"]
+    assert [f.file for f in found.failed_checks] == ["small.qp-fixed.lp", "small.qp-fixed.mps"]
     assert all("export again" in f.reason for f in found.checks)
-    assert not found.ok
+    assert not found.is_ok
 
 
 @needing("scip")
@@ -271,7 +271,7 @@ def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     found = verify(tmp_path, programs=["highs", "xpress"])
     assert found.absent == {"xpress": "Xpress is not installed; pip install xpress"}
     assert {f.program for f in found.checks} == {"highs"}
-    assert found.ok
+    assert found.is_ok
 
 
 @pytest.mark.slow

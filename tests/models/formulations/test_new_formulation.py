@@ -76,7 +76,7 @@ def test_it_is_written_solved_and_read(toy, instance, solver, tmp_path):
 def test_it_is_verified(toy, instance, tmp_path):
     write_all(instance, tmp_path, formulations=["toy"], formats=tuple(FORMATS))
     checked = verify(tmp_path, seconds=10, programs=["highs", "casadi"])
-    assert checked.ok
+    assert checked.is_ok
     agreed = {check.program for check in checked.checks if check.verdict is Verdict.AGREES}
     assert agreed == {"highs", "twin", "casadi", "bonmin"}
 
