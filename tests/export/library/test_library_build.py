@@ -120,25 +120,14 @@ SKETCH = '[[sketches]]\nname = "a"\nsample = "mouse"\n'
 BAD = {
     "no TOML": ("[[[", "not valid TOML"),
     "another kind": ('format = "x"\n', "format: must be 'crossfield-library-spec'"),
-    "version as truth": (HEAD.replace("version = 1", "version = true"), "version: must be 1"),
     "unknown key": (
         HEAD + 'colour = "red"\n' + RUNG + SKETCH,
         "colour: is unknown; the keys here are format",
     ),
     "unknown key of a rung": (HEAD + RUNG + "speed = 1\n" + SKETCH, "rungs.tiny.speed: is unknown"),
-    "unknown rung": (
-        HEAD + "[rungs.huge]\nsizes = [4]\n" + SKETCH,
-        "rungs.huge: is unknown; the keys here are tiny",
-    ),
     "no rung": (HEAD + SKETCH, "rungs: there is none"),
     "no sketch": (HEAD + RUNG, "sketches: there is none"),
-    "size zero": (
-        HEAD + "[rungs.tiny]\nsizes = [0]\n" + SKETCH,
-        "rungs.tiny.sizes: 0 is out of range; choose 1 to 999",
-    ),
     "size too large": (HEAD + "[rungs.tiny]\nsizes = [1000]\n" + SKETCH, "1000 is out of range"),
-    "size as text": (HEAD + '[rungs.tiny]\nsizes = ["4"]\n' + SKETCH, "must be a list of whole numbers"),
-    "size as truth": (HEAD + "[rungs.tiny]\nsizes = [true]\n" + SKETCH, "must be a list of whole numbers"),
     "size twice": (HEAD + RUNG + "[rungs.small]\nsizes = [4]\n" + SKETCH, "a has size 4 on two rungs"),
     "no facet of a formulation": (
         HEAD + 'formulations = ["parity", "milp"]\nfacets = ["printed"]\n' + RUNG + SKETCH,
@@ -156,21 +145,11 @@ BAD = {
         HEAD + 'formulations = ["milp", "parity"]\n' + RUNG + 'formats = ["lp", "mps"]\n' + SKETCH,
         "rungs.tiny.formats: none of lp, mps holds minlp-parity; add nl or gms, or omit the formulation",
     ),
-    "unknown format": (HEAD + RUNG + 'formats = ["docx"]\n' + SKETCH, "there is no 'docx'; choose from nl"),
-    "unknown formulation": (
-        HEAD + 'formulations = ["lp"]\n' + RUNG + SKETCH,
-        "formulations: there is no 'lp'",
-    ),
-    "formulation twice": (
-        HEAD + 'formulations = ["qp-fixed", "qp-fixed"]\n' + RUNG + SKETCH,
-        "'qp-fixed' is listed twice",
-    ),
     "duplicate name": (HEAD + RUNG + SKETCH + SKETCH, "sketches[1].name: 'a' is the name of two sketches"),
     "name with a path": (
         HEAD + RUNG + SKETCH.replace('"a"', '"../a"'),
         "sketches[0].name: '../a' is not allowed",
     ),
-    "name in capitals": (HEAD + RUNG + SKETCH.replace('"a"', '"A"'), "'A' is not allowed"),
     "name too long": (
         HEAD
         + 'formulations = ["milp-mccormick"]\n'
@@ -179,46 +158,20 @@ BAD = {
         + SKETCH.replace('"a"', '"abcdefghijklmn"'),
         "has 39 characters; shorten",
     ),
-    "unknown sample": (HEAD + RUNG + SKETCH.replace("mouse", "cat"), "there is no sample 'cat'"),
     "missing file": (
         HEAD + RUNG + '[[sketches]]\nname = "a"\nfile = "gone.svg"\n',
         "sketches[0].file: there is no file",
     ),
-    "missing mask": (
-        HEAD + RUNG + '[[sketches]]\nname = "a"\nfile = "drawn by hand.svg"\nmask = "gone.png"\n',
-        "sketches[0].mask: there is no file",
-    ),
     "no source": (HEAD + RUNG + '[[sketches]]\nname = "a"\n', "needs exactly one of sample, file, random"),
-    "two sources": (HEAD + RUNG + SKETCH + 'file = "drawn by hand.svg"\n', "needs exactly one of"),
-    "random without seeds": (
-        HEAD + RUNG + '[[sketches]]\nname = "a"\nrandom = "full"\n',
-        "sketches[0].random: goes with seeds",
-    ),
     "sizes on a rung that is not": (
         HEAD + RUNG + SKETCH + "sizes = { large = [9] }\n",
         "sketches[0].sizes.large: is unknown",
     ),
-    "seeds of a sample": (HEAD + RUNG + SKETCH + "seeds = [1]\n", "sketches[0].seeds: goes with random"),
-    "mask of a sample": (HEAD + RUNG + SKETCH + 'mask = "m.png"\n', "sketches[0].mask: goes with file"),
-    "two lines in a title": (
-        HEAD + RUNG + SKETCH + 'title = "a\\nb"\n',
-        "sketches[0].title: must be one line",
-    ),
     "two lines in a name": (HEAD + RUNG + SKETCH.replace('"a"', '"a\\n"'), "sketches[0].name: must be a"),
-    "compressed as text": (
-        HEAD + RUNG + 'compress = "no"\n' + SKETCH,
-        "rungs.tiny.compress: must be true or",
-    ),
     "a rung without sizes": (
         HEAD + "[rungs.tiny]\n" + SKETCH,
         "rungs.tiny.sizes: there is none; write a list",
     ),
-    "a sketch that is a number": (HEAD + "sketches = [3]\n" + RUNG, "sketches: must be a table [[sketches]]"),
-    "another shape": (
-        HEAD + RUNG + '[[sketches]]\nname = "a"\nrandom = "round"\nseeds = [1]\n',
-        "sketches[0].random: there is no 'round'; choose from full, ragged",
-    ),
-    "missing ledger": (HEAD + 'ledger = "gone.json"\n' + RUNG + SKETCH, "ledger: there is no file gone.json"),
     "a drawing without strokes": (
         HEAD + RUNG + '[[sketches]]\nname = "a"\nfile = "spec.toml"\n',
         "cf_a_n004",

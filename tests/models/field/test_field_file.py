@@ -90,29 +90,21 @@ def pixel(number, column, value):
         (change("format", "crossfield-instance"), '"format" must be "crossfield-field"'),
         (change("version", 2), "has version 2"),
         (change("extra", 1), "$: Additional properties"),
-        (without("instance"), "'instance' is a required property"),
         (without("pixels"), "'pixels' is a required property"),
-        (change("pixels", []), "$.pixels"),
         (change("pixels", [[0, 0, 0, 0, None, None]]), "has 1 pixels, but its mask has 7"),
         (
             lambda d: d | {"instance": d["instance"] | {"gauge": "x"}},
             "its instance: $.gauge: 'x' is not one of",
         ),
-        (lambda d: d | {"instance": d["instance"] | {"version": 0}}, "its instance: has version 0"),
-        (change("instance", 3), "$.instance: 3 is not of type 'object'"),
         (pixel(3, 1, 2), "$.pixels[3]: is [1, 2], but the mask has [1, 0] there"),
         (pixel(0, 2, None), "$.pixels[0][2]"),
         (pixel(0, 2, float("nan")), "alpha holds a value that is not finite"),
-        (pixel(0, 3, float("-inf")), "beta holds a value that is not finite"),
         (pixel(0, 3, 10**400), "beyond the range of doubles"),
         (
             pixel(0, 4, 1),
             "$.pixels[0]: a jump belongs where the mask has the upper neighbour, null elsewhere",
         ),
         (pixel(0, 5, None), "$.pixels[0]: a jump belongs where the mask has the right neighbour"),
-        (pixel(0, 5, 0.5), "$.pixels[0][5]"),
-        (pixel(0, 5, 10**400), "$.pixels[0][5]"),
-        (lambda _: 1, '"format" must be'),
     ],
 )
 def test_field_json_that_breaks_the_rules_is_named_with_its_place(field, tmp_path, edit, message):
@@ -126,16 +118,10 @@ def test_field_json_that_breaks_the_rules_is_named_with_its_place(field, tmp_pat
     [
         ("alpha", np.zeros(3), "alpha has shape (3,), but the grid of sample needs (7,)"),
         ("beta", np.full(7, np.nan), "beta holds a value that is not finite"),
-        ("p", np.full(7, 0.5), "p holds something other than whole numbers"),
         ("p", None, "holds no array 'p'"),
         ("instance_w", None, "its instance: holds no array 'w'"),
         ("instance_theta", np.full(3, np.inf), "its instance: stroke pixel [0, 0]: theta"),
         ("head", np.frombuffer(b'{"format": "crossfield-field", "version": 2}', np.uint8), "has version 2"),
-        (
-            "head",
-            np.frombuffer(b'{"format": "other", "version": 1}', np.uint8),
-            '"format" must be "crossfield-field"',
-        ),
     ],
 )
 def test_field_npz_that_breaks_the_rules_is_named(field, tmp_path, name, array, message):
