@@ -237,17 +237,36 @@ def test_wrong_usage_has_exit_code_2(arguments, tmp_path, monkeypatch, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_help_loads_nothing_heavy():
+HEAVY = {
+    "scipy", "numba", "matplotlib", "PIL", "casadi", "highspy", "pyomo", "jinja2", "distributed", "rich",
+    "crossfield.models.proof", "crossfield.models.search", "crossfield.export.library",
+    "crossfield.export.solving",
+}  # fmt: skip
+
+
+def modules_of(*arguments):
+    """Names of the modules that a command has loaded at its end."""
     code = (
-        "import sys; from crossfield.export.cli.app import invoke; invoke(['--help']); "
-        "print(*sorted(sys.modules), file=sys.stderr)"
+        "import sys; from crossfield.export.cli.app import invoke; code = invoke(sys.argv[1:])\n"
+        "print(*sorted(sys.modules), file=sys.stderr); sys.exit(code)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = {name.split(".")[0] for name in done.stderr.split()}
-    assert not loaded & {
-        "numpy", "scipy", "sympy", "matplotlib", "PIL", "casadi", "highspy", "pyomo", "jinja2", "jsonschema",
-        "distributed",
-    }  # fmt: skip
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return set(done.stderr.split())
+
+
+def test_help_loads_nothing_heavy():
+    assert not modules_of("--help") & (HEAVY - {"rich"} | {"numpy", "sympy", "jsonschema"})
+
+
+def test_files_are_written_and_read_without_solvers_proofs_and_libraries(crossfield, instance, instance_file):
+    assert not modules_of("export", instance_file, "-f", "milp", "-F", "mps", "-o", "set") & HEAVY
+    problem = cf.read_manifest("set/tiny.milp-mccormick.manifest.json").problem()
+    columns = problem.to_arrays().column_names
+    point = zip(columns, problem.point(cf.greedy_field(instance)), strict=True)
+    Path("a.sol").write_text("".join(f"{name} {float(value)}\n" for name, value in point))
+    manifest = "set/tiny.milp-mccormick.manifest.json"
+    assert not modules_of("read", "a.sol", "--manifest", manifest, "-o", "field.npz") & HEAVY
 
 
 def test_the_version_is_that_of_the_package(crossfield):
