@@ -50,11 +50,13 @@ class Sketch:
     def instance(self, size: int) -> Instance:
         """The instance of that size, with the coefficients of the paper."""
         if self.what in SAMPLES:
-            found = cf.sample(self.what, size)
+            instance = cf.sample(self.what, size)
         else:
-            found = cf.read_sketch(self.what, size=size, mask=self.mask)
+            instance = cf.read_sketch(self.what, size=size, mask=self.mask)
         return replace(
-            found, stroke_coefficient=Instance.stroke_coefficient, skew_coefficient=Instance.skew_coefficient
+            instance,
+            stroke_coefficient=Instance.stroke_coefficient,
+            skew_coefficient=Instance.skew_coefficient,
         )
 
 
@@ -77,9 +79,9 @@ def run_command(command: list[str], folder: Path, name: str) -> dict[str, Any]:
     With `memory`, the most bytes that its processes held, and `whole`, its wall time in seconds. The folder
     keeps it with the command's files; the next call reads it from there.
     """
-    kept = folder / "facts.json"
-    if kept.exists():
-        return dict(json.loads(kept.read_text()))
+    record = folder / "facts.json"
+    if record.exists():
+        return dict(json.loads(record.read_text()))
     begin = time.perf_counter()
     command = [sys.executable, "-m", "crossfield", *command]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
@@ -92,7 +94,7 @@ def run_command(command: list[str], folder: Path, name: str) -> dict[str, Any]:
     if process.returncode:
         raise SystemExit(f"{name}: exit code {process.returncode}")
     facts = dict(json.loads(answer)) | {"memory": most, "whole": whole}
-    kept.write_text(json.dumps(facts, indent=1) + "\n")
+    record.write_text(json.dumps(facts, indent=1) + "\n")
     return facts
 
 

@@ -72,8 +72,8 @@ class Task:
     def rows(self) -> list[list[str]]:
         """The rows of the task."""
         facts = (self.measure, self.name, self.size, f"{self.noise:g}")
-        found = MEASURES[self.measure](self)
-        return [[*map(str, facts), f"{w:g}", name, curve, f"{v:.6g}"] for w, name, curve, v in found]
+        values = MEASURES[self.measure](self)
+        return [[*map(str, facts), f"{w:g}", name, curve, f"{v:.6g}"] for w, name, curve, v in values]
 
 
 def hidden(task: Task) -> Found:
@@ -120,7 +120,7 @@ def surface(task: Task) -> Found:
         for weight, name, field in fields(task, noisy_instance(truth.instance, task.noise, seed)):
             error = np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean()
             errors.setdefault((weight, name), []).append(float(error))
-    yield from ((weight, name, "", float(np.mean(found))) for (weight, name), found in errors.items())
+    yield from ((weight, name, "", float(np.mean(draws))) for (weight, name), draws in errors.items())
 
 
 MEASURES: Final[dict[str, Callable[[Task], Found]]] = {
@@ -147,15 +147,15 @@ def main() -> None:
     parser.add_argument("--sketches", type=Path, help="folder of line drawings by others")
     parser.add_argument("--seconds", type=float, default=5.0, help="limit of methods that search")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
-    given = parser.parse_args()
+    options = parser.parse_args()
     with KEPT.open(newline="") as file:
         _, *lines = csv.reader(file)
     rows = {tuple(line[:-1]): line for line in lines}
-    for measure in given.measures:
-        with ProcessPoolExecutor(given.jobs) as processes:
-            chosen = tasks(measure, given.sketches, given.seconds, tuple(given.methods))
-            for found in processes.map(Task.rows, chosen):
-                rows |= {tuple(line[:-1]): line for line in found}
+    for measure in options.measures:
+        with ProcessPoolExecutor(options.jobs) as processes:
+            chosen = tasks(measure, options.sketches, options.seconds, tuple(options.methods))
+            for lines_of_task in processes.map(Task.rows, chosen):
+                rows |= {tuple(line[:-1]): line for line in lines_of_task}
         with KEPT.open("w", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows.values()])
 

@@ -147,14 +147,14 @@ def write_errata() -> None:
     facets = []
     for seed in range(3):
         for facet in ("hull", "printed"):
-            found = optimum(random_instance(4, 4, seed), "milp-mccormick", facet=facet)
+            solution = optimum(random_instance(4, 4, seed), "milp-mccormick", facet=facet)
             facets.append(
                 [
                     str(seed),
                     facet,
-                    f"{found.objective:.6f}",
-                    f"{found.field.energy(1).total:.6f}",
-                    str(found.status),
+                    f"{solution.objective:.6f}",
+                    f"{solution.field.energy(1).total:.6f}",
+                    str(solution.status),
                 ]
             )
     gauges = []
@@ -166,8 +166,8 @@ def write_errata() -> None:
                 [
                     str(seed),
                     gauge,
-                    *(f"{found.objective:.6f}" for found in both),
-                    " / ".join(found.message.split(": ")[1].split()[0] for found in both),
+                    *(f"{solution.objective:.6f}" for solution in both),
+                    " / ".join(solution.message.split(": ")[1].split()[0] for solution in both),
                 ]
             )
     single = Instance(
@@ -266,10 +266,10 @@ def draw_mouse_surface() -> None:
     """Draw docs/pictures/mouse_surface.png, in the README: the surface over the bend field of the mouse."""
     import surface_pictures
 
-    found = cf.surface(cf.bend_field(cf.polyvector_field(cf.sample("mouse", 48), hold=max(HOLDS))))
-    if found.doubts:
-        raise SystemExit(f"the mouse is not to be shown: {'; '.join(found.doubts)}")
-    surface_pictures.strip(found, "mouse", DOCS / "pictures" / "mouse_surface.png")
+    surface = cf.surface(cf.bend_field(cf.polyvector_field(cf.sample("mouse", 48), hold=max(HOLDS))))
+    if surface.doubts:
+        raise SystemExit(f"the mouse is not to be shown: {'; '.join(surface.doubts)}")
+    surface_pictures.strip(surface, "mouse", DOCS / "pictures" / "mouse_surface.png")
 
 
 def samples_in_short() -> str:

@@ -29,8 +29,8 @@ def allowed_cells(level: LevelRecord, pixel: int) -> Bools:
     """The cells of a pixel with four allowed vertices, (alpha, beta)."""
     begin = block_starts(level.alpha_count.astype(np.int64) * level.beta_count)
     shape = (level.alpha_count[pixel], level.beta_count[pixel])
-    found: Bools = level.allowed[begin[pixel] : begin[pixel + 1]].reshape(shape)
-    return found[:-1, :-1] & found[1:, :-1] & found[:-1, 1:] & found[1:, 1:]
+    vertices: Bools = level.allowed[begin[pixel] : begin[pixel + 1]].reshape(shape)
+    return vertices[:-1, :-1] & vertices[1:, :-1] & vertices[:-1, 1:] & vertices[1:, 1:]
 
 
 def remaining_shares(level: LevelRecord) -> Floats:
@@ -143,8 +143,8 @@ def _strip(place: Any, level: LevelRecord, pixel: int, proof: Proof) -> None:
     )
     centre = np.degrees(level.alpha[pixel])
     place.set_facecolor(BACKGROUND)
-    found = np.where(allowed_cells(level, pixel), 1.0, np.nan).T
-    place.pcolormesh(alpha, beta, found, cmap=mpl.colors.ListedColormap([CELL]))
+    picture = np.where(allowed_cells(level, pixel), 1.0, np.nan).T
+    place.pcolormesh(alpha, beta, picture, cmap=mpl.colors.ListedColormap([CELL]))
     place.axvline(centre, color=U, linewidth=0.6)
     place.axhline(np.degrees(level.beta[pixel]), color=U, linewidth=0.6)
     left = centre - 45 + np.degrees(proof.levels[0].h) * offset

@@ -48,8 +48,10 @@ class Answer:
 def solve_file(problem: Problem, solver: str, seconds: float) -> Answer:
     """Solve the MPS file of a problem."""
     with tempfile.TemporaryDirectory() as folder:
-        found = cf.solve(problem, solver, folder=folder, limits=cf.Limits(seconds, gap=1e-7, threads=THREADS))
-    return Answer(found.objective, found.bound, found.seconds or seconds)
+        solution = cf.solve(
+            problem, solver, folder=folder, limits=cf.Limits(seconds, gap=1e-7, threads=THREADS)
+        )
+    return Answer(solution.objective, solution.bound, solution.seconds or seconds)
 
 
 def can_take(problem: Problem, solver: str) -> bool:
@@ -121,5 +123,5 @@ def solver_rows(name: str, size: int, seconds: float, proof_seconds: float) -> I
             "tightened": solve_file(narrow, solver, seconds),
             "here": prove_here(instance, 1 if formulation == "milp-mccormick" else 2, seconds),
         }
-        row |= {what: asdict(found) | {"proven": found.proven} for what, found in answers.items()}
+        row |= {what: asdict(answer) | {"proven": answer.proven} for what, answer in answers.items()}
         yield row

@@ -64,9 +64,9 @@ SECONDS: Final = {
 OF_COLLECTIONS: Final = (
     "energy", "bound", "gap", "status", "pixels", "pairs", "labels", "levels", "seconds", "check", "limit"
 )  # fmt: skip
-"""Facts of a proof that are kept for drawings of collections."""
+"""Facts of a proof that are results for drawings of collections."""
 Facts = dict[str, Any]
-Kept = dict[str, dict[str, Facts]]
+Results = dict[str, dict[str, Facts]]
 Measurement = Callable[["Request"], Iterator[tuple[str, Facts]]]
 
 
@@ -195,13 +195,13 @@ def measure(part: str, request: Request) -> None:
     """Write the rows of a part to docs/proofs.json as they come."""
     request.work.mkdir(parents=True, exist_ok=True)
     for name, facts in PARTS[part](request):
-        kept = read()
-        kept.setdefault(part, {})[name] = facts | {"machine": machine_facts()}
+        results = read()
+        results.setdefault(part, {})[name] = facts | {"machine": machine_facts()}
         print(part, name, facts, file=sys.stderr, flush=True)
-        KEPT.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n")
+        KEPT.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
 
 
-def read() -> Kept:
+def read() -> Results:
     """Read all measured rows."""
     return dict(json.loads(KEPT.read_text())) if KEPT.exists() else {}
 
@@ -351,9 +351,9 @@ def solver_cells(row: Facts, what: str) -> list[str]:
     return [best, f"**{bound}**" if answer["proven"] else bound, f"{answer['seconds']:.1f}"]
 
 
-def short_summary(kept: Kept) -> str:
+def short_summary(results: Results) -> str:
     """Summary: the reach of proofs, agreement with other solvers, and the reach of those."""
-    rows, small, mip = kept["samples"], kept["optima"], kept["solvers"]
+    rows, small, mip = results["samples"], results["optima"], results["solvers"]
     closed = [row for row in rows.values() if row["status"] == "optimal"]
     open_gaps = ", ".join(
         f"{name}, gap {percent(row['gap'])}" for name, row in rows.items() if row["status"] != "optimal"
@@ -398,27 +398,27 @@ def count_cores(cores: int) -> str:
     return "one core" if cores == 1 else f"{cores} cores"
 
 
-def page(kept: Kept) -> str:
+def page(results: Results) -> str:
     """The text of docs/proofs.md."""
     tables = ("samples", "paper", "middle", "sketches", "fine", "large")
-    parts = {part: kept[part] for part in (*tables, "collections", "solvers")}
+    parts = {part: results[part] for part in (*tables, "collections", "solvers")}
     texts = {
         "generated": generated_line("python docs/proofs.py"),
-        "short": short_summary(kept),
+        "short": short_summary(results),
         "most": f"{MOST_LABELS:,}",
-        "optima": optima_table(kept["optima"]),
-        "solvers": solvers_table(kept["solvers"]),
+        "optima": optima_table(results["optima"]),
+        "solvers": solvers_table(results["solvers"]),
         **{
-            f"{part}_limit": f"{max(row['limit'] for row in kept[part].values()):g}"
+            f"{part}_limit": f"{max(row['limit'] for row in results[part].values()):g}"
             for part in (*tables, "collections")
         },
         "solvers_limit": f"{SECONDS['solvers']:g}",
     }
     texts |= {
-        "collections": collections_table(kept["collections"]),
-        "collections_open": open_drawings(kept["collections"]),
+        "collections": collections_table(results["collections"]),
+        "collections_open": open_drawings(results["collections"]),
     }
-    texts |= {part: proof_table(kept[part]) for part in tables}
+    texts |= {part: proof_table(results[part]) for part in tables}
     texts |= {f"{part}_machine": describe_machines(rows) for part, rows in parts.items()}
     return re.sub(r"@(\w+)@", lambda match: texts[match[1]], TEMPLATE.read_text(encoding="utf-8"))
 
@@ -431,11 +431,13 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, help="Time limit of each proof or solve.")
     parser.add_argument("--sketches", type=Path, help="Folder with drawings: .svg, .png, .scap.")
     parser.add_argument("--work", type=Path, help="Folder that keeps finished results.")
-    given = parser.parse_args()
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        for part in given.measure:
-            seconds = given.seconds or SECONDS[part]
-            measure(part, Request(tuple(given.names), seconds, given.sketches, given.work or Path(name)))
+        for part in options.measure:
+            seconds = options.seconds or SECONDS[part]
+            measure(
+                part, Request(tuple(options.names), seconds, options.sketches, options.work or Path(name))
+            )
     (DOCS / "proofs.md").write_text(page(read()))
 
 

@@ -33,8 +33,8 @@ ORDER: Final = (
 
 def folders(root: Path) -> list[str]:
     """Every folder of the package below its parts, as `export/formats`."""
-    found = (path.parent for part in PARTS for path in (root / part).rglob("__init__.py"))
-    return sorted(path.relative_to(root).as_posix() for path in found)
+    packages = (path.parent for part in PARTS for path in (root / part).rglob("__init__.py"))
+    return sorted(path.relative_to(root).as_posix() for path in packages)
 
 
 def first_line(root: Path, folder: str) -> str:
@@ -47,8 +47,8 @@ def used_folders(root: Path, folder: str) -> list[str]:
     """The other folders from which the modules of a folder import, except the ground."""
     trees = [ast.parse(path.read_text(encoding="utf-8")) for path in (root / folder).glob("*.py")]
     nodes = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-    found = {other for node in nodes if node.level for other in target_folders(root, folder, node)}
-    return sorted(found - {folder, GROUND})
+    used = {other for node in nodes if node.level for other in target_folders(root, folder, node)}
+    return sorted(used - {folder, GROUND})
 
 
 def target_folders(root: Path, folder: str, node: ast.ImportFrom) -> set[str]:

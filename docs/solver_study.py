@@ -49,12 +49,12 @@ class Study:
         """Start without rows. end: time of the monotonic clock."""
         self.plan, self.data, self.end = plan, data, end
         self.discards, self._lock = Counter[Run](), threading.Lock()
-        self.kept = table(data)
+        self.results = table(data)
         self._taken: set[Run] = set()
 
     def left(self) -> list[Run]:
         """The runs without a row whose solver is installed, those discarded least often first."""
-        done, best = self.kept.done, best_pairs(self.kept.rows, self.plan.limit)
+        done, best = self.results.done, best_pairs(self.results.rows, self.plan.limit)
         runs = [run for run in self.plan.first() if run.key not in done and _is_installed(run)]
         runs = runs or [run for run in self.plan.last(best) if run.key not in done]
         return sorted(runs, key=lambda run: self.discards[run])
@@ -62,15 +62,15 @@ class Study:
     def work(self, core: int) -> None:
         """Do runs on a core until the end."""
         while self._is_quiet(core) and (run := self._next()) is not None:
-            found = self._measured(run, core)
+            row = self._measured(run, core)
             with self._lock:
                 self._taken.remove(run)
-                if found["status"] == DISCARDED:
+                if row["status"] == DISCARDED:
                     self.discards[run] += 1
                 else:
-                    self.kept.append(run, found)
-            times = f"{found.get('cpu') or 0:.1f} s, beside {found.get('beside') or 0:.1f} s"
-            print(f"{run}: {found['status']}, {times}", file=sys.stderr, flush=True)
+                    self.results.append(run, row)
+            times = f"{row.get('cpu') or 0:.1f} s, beside {row.get('beside') or 0:.1f} s"
+            print(f"{run}: {row['status']}, {times}", file=sys.stderr, flush=True)
 
     def _is_quiet(self, core: int) -> bool:
         """Wait until a core is idle for most of a second; False at the end of the study."""
@@ -109,9 +109,9 @@ def certificates(data: Path) -> Path:
     return data.parent / "certificates"
 
 
-def row_of_run(data: Path, given: list[str], *, quick: bool) -> Row:
+def row_of_run(data: Path, words: list[str], *, quick: bool) -> Row:
     """The row of a run, in the process for it."""
-    run, core, left = given
+    run, core, left = words
     slack = float("inf") if quick else SLACK
     return measure_run(Run(**json.loads(run)), int(core), float(left), certificates(data), slack)
 
@@ -125,21 +125,21 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, choices=(1, 2), default=2, help="runs side by side")
     parser.add_argument("--data", type=Path, default=DATA.parent, help="folder of the rows")
     parser.add_argument("--one", nargs=3, help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    data = given.data / DATA.name if given.data.suffix != ".csv" else given.data
-    if given.one:
-        print(json.dumps(row_of_run(data, given.one, quick=given.quick)))
+    options = parser.parse_args()
+    data = options.data / DATA.name if options.data.suffix != ".csv" else options.data
+    if options.one:
+        print(json.dumps(row_of_run(data, options.one, quick=options.quick)))
         return
-    if given.quick and data == DATA:
+    if options.quick and data == DATA:
         parser.error("--quick is another plan; give --data FOLDER for its rows")
-    study = Study(QUICK if given.quick else FULL, data, time.monotonic() + 60 * given.minutes)
-    if given.plan:
-        print(f"{study.plan.size} runs, {len(study.kept.rows)} done")
+    study = Study(QUICK if options.quick else FULL, data, time.monotonic() + 60 * options.minutes)
+    if options.plan:
+        print(f"{study.plan.size} runs, {len(study.results.rows)} done")
         return
     certificates(data).mkdir(parents=True, exist_ok=True)
     with library_lock(data.parent, "a study", lambda line: print(line, file=sys.stderr)):
-        study.kept = table(data)
-        cores = sorted(os.sched_getaffinity(0))[-given.jobs :]
+        study.results = table(data)
+        cores = sorted(os.sched_getaffinity(0))[-options.jobs :]
         threads = [threading.Thread(target=study.work, args=(core,)) for core in cores]
         for thread in threads:
             thread.start()

@@ -51,8 +51,8 @@ def main() -> None:
             for size in SIZES:
                 page.execute_script(RESIZE, size)
                 wait_until_ready(page)
-                found = [draw_stroke(page, number) for number in range(REPEATED)]
-                cells = [[each[part] for each in found if part in each] for part in PARTS]
+                strokes = [draw_stroke(page, number) for number in range(REPEATED)]
+                cells = [[each[part] for each in strokes if part in each] for part in PARTS]
                 texts = [f"{statistics.median(each):.2f}" if each else "" for each in cells]
                 print(f"| `{sample}` | {size} | {' | '.join(texts)} |", flush=True)
 

@@ -58,23 +58,23 @@ def main() -> None:
     parser.add_argument("--sketches", type=Path, help="folder of line drawings by others, beside the samples")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--scheduler", help="address of a dask scheduler whose workers do the runs")
-    given = parser.parse_args()
-    plan = QUICK if given.quick else FULL
-    if given.quick and given.data == DATA:
+    options = parser.parse_args()
+    plan = QUICK if options.quick else FULL
+    if options.quick and options.data == DATA:
         parser.error("--quick is another plan; give --data FOLDER for its rows")
-    if given.plan:
-        print(overview(plan, given.sketches))
+    if options.plan:
+        print(overview(plan, options.sketches))
         return
-    if not given.page:
+    if not options.page:
         carry_out(
-            plan, given.data, jobs=given.jobs, scheduler=given.scheduler, folder=given.sketches,
-            parts=given.parts, progress=lambda line: print(line, file=sys.stderr, flush=True),
+            plan, options.data, jobs=options.jobs, scheduler=options.scheduler, folder=options.sketches,
+            parts=options.parts, progress=lambda line: print(line, file=sys.stderr, flush=True),
         )  # fmt: skip
     from make import replace_between
     from studying.page import read, short_summary, write_page
 
-    write_page(given.data, DOCS if given.data == DATA else given.data, plan)
-    if given.data == DATA:
+    write_page(options.data, DOCS if options.data == DATA else options.data, plan)
+    if options.data == DATA:
         replace_between(DOCS / "index.md", "answers", short_summary(read(DATA), plan))
 
 

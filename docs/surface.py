@@ -81,15 +81,15 @@ def known(name: str, size: int) -> Rows:
     flat = angles(true.normals, np.array([0.0, 0.0, 1.0]))
     rows = []
     for way, field in fields.items():
-        found, hinted = cf.surface(field), cf.surface(field, [middle_hint(true)])
-        error, hinted_error = normal_error(found, true.normals), angles(hinted.normals, true.normals)
+        estimate, hinted = cf.surface(field), cf.surface(field, [middle_hint(true)])
+        error, hinted_error = normal_error(estimate, true.normals), angles(hinted.normals, true.normals)
         numbers = {
             "flat": flat.mean(), "cross": np.degrees(field.cross_error(true.u_angle, true.v_angle)).mean(),
             "mean": error.mean(), "most": np.percentile(error, 95), "hinted": hinted_error.mean(),
-            "side": float(angles(found.normals, true.normals).mean() <= error.mean() + 1e-9),
-            "firm": found.firmness, "alike": rank_correlation(1 - found.confidence, error),
+            "side": float(angles(estimate.normals, true.normals).mean() <= error.mean() + 1e-9),
+            "firm": estimate.firmness, "alike": rank_correlation(1 - estimate.confidence, error),
         }  # fmt: skip
-        facts = {"surface": name, "size": size, "way": way, "doubts": len(found.doubts)}
+        facts = {"surface": name, "size": size, "way": way, "doubts": len(estimate.doubts)}
         rows.append(facts | {key: round(float(value), 4) for key, value in numbers.items()})
     return rows
 
@@ -150,9 +150,9 @@ def sides(name: str, size: int) -> Rows:
             s_range, t_range, seen, share=0.2,
         )  # fmt: skip
         true = analytic_instance(patch, "patch", size)
-        found = cf.surface(cf.CrossField.from_lines(true.instance, true.u_angle, true.v_angle))
-        error = normal_error(found, true.normals).mean()
-        right = angles(found.normals, true.normals).mean() <= error + 1e-9
+        estimate = cf.surface(cf.CrossField.from_lines(true.instance, true.u_angle, true.v_angle))
+        error = normal_error(estimate, true.normals).mean()
+        right = angles(estimate.normals, true.normals).mean() <= error + 1e-9
         facts = {"surface": name, "size": size, "tilt": tilt, "seen": side, "side": float(right)}
         rows.append(facts | {"mean": round(float(error), 4)})
     return rows
@@ -162,13 +162,18 @@ def trust(name: str, what: str, size: int) -> Rows:
     """Doubts about the surface over the bend field of a sample or drawing."""
     instance = cf.sample(what, size) if what in SAMPLES else cf.read_sketch(what, size=size)
     field = field_by("bend", instance)
-    found = cf.surface(field)
-    off = right_angle_deviation(field, found.heights)
+    estimate = cf.surface(field)
+    off = right_angle_deviation(field, estimate.heights)
     numbers = {
-        "unfit": np.mean(off > OFF), "slant": np.degrees(np.arccos(found.normals[:, 2])).mean(),
-        "confidence": found.confidence.mean(), "firm": found.firmness,
+        "unfit": np.mean(off > OFF), "slant": np.degrees(np.arccos(estimate.normals[:, 2])).mean(),
+        "confidence": estimate.confidence.mean(), "firm": estimate.firmness,
     }  # fmt: skip
-    facts = {"drawing": name, "size": size, "spots": len(field.singularities.index), "doubts": found.doubts}
+    facts = {
+        "drawing": name,
+        "size": size,
+        "spots": len(field.singularities.index),
+        "doubts": estimate.doubts,
+    }
     return [facts | {key: round(float(value), 4) for key, value in numbers.items()}]
 
 
@@ -205,8 +210,8 @@ def tasks(part: str, folder: Path | None) -> Iterator[tuple[Any, ...]]:
 def measure_part(part: str, folder: Path | None, jobs: int) -> Rows:
     """The rows of a part."""
     with ProcessPoolExecutor(1 if part == "times" else jobs) as processes:
-        found = [processes.submit(MEASURES[part], *given) for given in tasks(part, folder)]
-        return [row for each in found for row in each.result()]
+        running = [processes.submit(MEASURES[part], *task) for task in tasks(part, folder)]
+        return [row for future in running for row in future.result()]
 
 
 # The page
@@ -322,10 +327,10 @@ def main() -> None:
     )
     parser.add_argument("--sketches", type=Path, help="folder of line drawings by others")
     parser.add_argument("--jobs", type=int, default=1, help="processes at once")
-    given = parser.parse_args()
+    options = parser.parse_args()
     rows = json.loads(KEPT.read_text()) if KEPT.exists() else {}
-    for part in given.measure:
-        rows[part] = measure_part(part, given.sketches, given.jobs)
+    for part in options.measure:
+        rows[part] = measure_part(part, options.sketches, options.jobs)
         KEPT.write_text(json.dumps(rows, indent=0, sort_keys=True) + "\n")
     write_page(rows)
 

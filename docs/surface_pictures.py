@@ -86,8 +86,8 @@ def strip(surface: Surface, drawing: str | Path, path: Path) -> Path:
     """Draw a PNG of a surface four times, strokes, normals, lamp, matcap, and return its path."""
     row = Row("", surface, drawing)
     scale = max(1, WIDTH // (4 * surface.instance.grid.width))
-    found = raster(surface.instance, surface.normals, scale)
-    joined = np.concatenate([*_cells(row, scale), matcap(found)], axis=1)
+    shaded = raster(surface.instance, surface.normals, scale)
+    joined = np.concatenate([*_cells(row, scale), matcap(shaded)], axis=1)
     picture = Image.fromarray(to_eight_bit(lay_over(joined, np.ones(joined.shape))[..., :3]))
     picture.save(path, optimize=True)
     return path
@@ -97,13 +97,13 @@ def _cells(row: Row, scale: int) -> list[Floats]:
     """The pictures of a row, (h, w, 4) each, `scale` pixels per pixel of the grid."""
     instance = row.surface.instance
     drawing = None if row.drawing is None else read_underlay(row.drawing, on=instance)
-    found = raster(instance, row.surface.normals, scale)
-    faint = np.ones((*found.opacity.shape, 4)) * (0.94, 0.94, 0.94, 1.0)
-    faint[..., 3] = found.opacity
+    shaded = raster(instance, row.surface.normals, scale)
+    faint = np.ones((*shaded.opacity.shape, 4)) * (0.94, 0.94, 0.94, 1.0)
+    faint[..., 3] = shaded.opacity
     cells = [
         lay_over(draw_strokes(instance, drawing, scale), faint),
-        colour_normals(found),
-        shade_by_light(found),
+        colour_normals(shaded),
+        shade_by_light(shaded),
     ]
     return cells if row.truth is None else [*cells, shade_by_light(raster(instance, row.truth, scale))]
 
@@ -113,11 +113,11 @@ def known_rows() -> list[Row]:
     rows = []
     for name in SURFACES:
         true = cf.analytic(name, SIZE)
-        found = cf.surface(field_by("bend", true.instance))
-        off = normal_error(found, true.normals)
-        if off.mean() < angles(found.normals, true.normals).mean():
-            found = found.flipped()
-        rows.append(Row(f"{name}, {off.mean():.1f} degrees off", found, None, true.normals))
+        estimate = cf.surface(field_by("bend", true.instance))
+        off = normal_error(estimate, true.normals)
+        if off.mean() < angles(estimate.normals, true.normals).mean():
+            estimate = estimate.flipped()
+        rows.append(Row(f"{name}, {off.mean():.1f} degrees off", estimate, None, true.normals))
     return rows
 
 

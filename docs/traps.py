@@ -154,8 +154,10 @@ def cplex(path: Path) -> Answer:
     except cplex.exceptions.CplexError:
         return REFUSED
     model.solve()
-    found = model.solution
-    return float(found.get_objective_value()) if "optimal" in found.get_status_string() else "infeasible"
+    solution = model.solution
+    return (
+        float(solution.get_objective_value()) if "optimal" in solution.get_status_string() else "infeasible"
+    )
 
 
 def xpress(path: Path) -> Answer:
@@ -169,8 +171,8 @@ def xpress(path: Path) -> Answer:
     except xpress.SolverError:
         return REFUSED
     model.optimize()
-    found = model.attributes
-    return float(found.objval) if found.solstatus == xpress.SolStatus.OPTIMAL else "infeasible"
+    attributes = model.attributes
+    return float(attributes.objval) if attributes.solstatus == xpress.SolStatus.OPTIMAL else "infeasible"
 
 
 def scip(path: Path) -> Answer:
@@ -193,8 +195,8 @@ def glpk(path: Path) -> Answer:
     kind = "--lp" if path.suffix == ".lp" else "--freemps"
     run_program("glpsol", kind, str(path), "-o", str(report))
     text = report.read_text() if report.exists() else ""
-    found = re.search(r"Objective:.*= *(\S+)", text)
-    return REFUSED if found is None else float(found[1]) if "OPTIMAL" in text else "infeasible"
+    match = re.search(r"Objective:.*= *(\S+)", text)
+    return REFUSED if match is None else float(match[1]) if "OPTIMAL" in text else "infeasible"
 
 
 def cbc(path: Path) -> Answer:
@@ -202,8 +204,8 @@ def cbc(path: Path) -> Answer:
     report = path.with_suffix(".txt")
     run_program("cbc", str(path), "solve", "solution", str(report))
     text = report.read_text() if report.exists() else ""
-    found = re.match(r"Optimal - objective value (\S+)", text)
-    return REFUSED if not text else float(found[1]) if found else "infeasible"
+    match = re.match(r"Optimal - objective value (\S+)", text)
+    return REFUSED if not text else float(match[1]) if match else "infeasible"
 
 
 def run_program(*words: str) -> None:

@@ -65,13 +65,15 @@ class Run:
 
     def solves(self, formulation: str) -> list[Check]:
         """Its solves of a formulation."""
-        found = (f for f in self.result.checks if f.problem.endswith(f" {formulation}") and f.step == "solve")
-        return sorted(found, key=lambda f: (f.program, f.file))
+        checks = (
+            f for f in self.result.checks if f.problem.endswith(f" {formulation}") and f.step == "solve"
+        )
+        return sorted(checks, key=lambda f: (f.program, f.file))
 
     def proven(self, formulation: str) -> list[tuple[float, float]]:
         """Objective and energy of each proven optimum, in ascending order."""
-        found = self.solves(formulation)
-        return sorted((f.objective, f.energy or 0.0) for f in found if f.proven and f.objective is not None)
+        solves = self.solves(formulation)
+        return sorted((f.objective, f.energy or 0.0) for f in solves if f.proven and f.objective is not None)
 
     def apart(self, formulation: str) -> float:
         """Largest difference between its proven optima."""
@@ -85,8 +87,8 @@ def verify_instance(gauge: Gauge, facet: str, formulations: tuple[str, ...]) -> 
     best = cf.solve(cf.formulate(instance, "milp-mccormick"), start=cf.greedy_field(instance)).field
     with tempfile.TemporaryDirectory() as folder:
         write_all(instance, folder, formulations=formulations, start=best, options={"facet": facet})
-        found = verify(folder, seconds=SECONDS, progress=lambda words: print(words, file=sys.stderr))
-    return Run(gauge, facet, found)
+        result = verify(folder, seconds=SECONDS, progress=lambda words: print(words, file=sys.stderr))
+    return Run(gauge, facet, result)
 
 
 def route_row(check: Check) -> list[str]:
@@ -105,7 +107,7 @@ def route_tables(main: Run) -> list[str]:
     """A table for each formulation, of the solvers that take it."""
     parts = []
     for problem in smallest_problems():
-        found = [f for f in main.solves(problem.name) if suitability(problem, f.program).answer == "yes"]
+        checks = [f for f in main.solves(problem.name) if suitability(problem, f.program).answer == "yes"]
         proven = "No route proves the optimum in time."
         if proofs := len(main.proven(problem.name)):
             proven = (
@@ -114,7 +116,7 @@ def route_tables(main: Run) -> list[str]:
         parts += [
             f"## `{problem.name}`",
             proven,
-            markdown(ROUTES[1:], [route_row(f) for f in found]),
+            markdown(ROUTES[1:], [route_row(f) for f in checks]),
         ]
     return parts
 
@@ -136,12 +138,12 @@ def same_problem(main: Run) -> str:
 
 def short_summary(main: Run, runs: list[Run]) -> str:
     """Numbers of files that were read as intended or not, and of formulations with a proven optimum."""
-    found = [f.verdict for each in runs for f in each.result.checks if f.step == "read"]
+    verdicts = [f.verdict for each in runs for f in each.result.checks if f.step == "read"]
     proven = [name for name in FORMULATIONS if main.proven(name)]
     counts = [len(main.proven(name)) for name in proven]
     return (
-        f"{len(main.result.versions)} programs read {found.count(Verdict.AGREES)} files correctly and "
-        f"{found.count(Verdict.DIFFERS) + found.count(Verdict.FAILED)} wrongly. "
+        f"{len(main.result.versions)} programs read {verdicts.count(Verdict.AGREES)} files correctly and "
+        f"{verdicts.count(Verdict.DIFFERS) + verdicts.count(Verdict.FAILED)} wrongly. "
         f"{len(proven)} of the {len(FORMULATIONS)} formulations are proven optimal, "
         f"each by {min(counts)} to {max(counts)} routes. "
         f"The proven optima of a formulation differ by at most {max(map(main.apart, proven)):.1e}."
@@ -166,9 +168,9 @@ def readings(runs: list[Run]) -> str:
     rows = []
     for name, entry in PROGRAMS.items():
         checks = [f for each in runs for f in each.result.checks if f.program == name and f.step == "read"]
-        found = [f.verdict for f in checks]
-        counts = [found.count(verdict) for verdict in (Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED)]
-        counts.append(found.count(Verdict.DIFFERS) + found.count(Verdict.FAILED))
+        verdicts = [f.verdict for f in checks]
+        counts = [verdicts.count(verdict) for verdict in (Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED)]
+        counts.append(verdicts.count(Verdict.DIFFERS) + verdicts.count(Verdict.FAILED))
         version = runs[0].result.versions.get(name, "absent")
         by = ["coefficients"] * bool(entry.algebra) + ["values"] * bool(entry.behaviour)
         rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(by), *map(str, counts)])
@@ -180,13 +182,13 @@ def readings(runs: list[Run]) -> str:
 
 def update_record(runs: list[Run]) -> dict[str, dict[str, Any]]:
     """Store the results of programs that need a licence, and return the last ones of each."""
-    kept: dict[str, dict[str, Any]] = json.loads(RECORD.read_text())
+    record: dict[str, dict[str, Any]] = json.loads(RECORD.read_text())
     main = runs[0]
     for name, entry in PROGRAMS.items():
         if entry.free and name in main.result.versions:
             checks = [check for each in runs for check in each.result.checks if check.program == name]
             read = [check.verdict for check in checks if check.step == "read"]
-            kept[name] = {
+            record[name] = {
                 "version": main.result.versions[name],
                 "date": datetime.now(UTC).date().isoformat(),
                 "files": [read.count(Verdict.AGREES), *map(read.count, (Verdict.DIFFERS, Verdict.FAILED))],
@@ -198,19 +200,19 @@ def update_record(runs: list[Run]) -> dict[str, dict[str, Any]]:
                     if suitability(problem, check.program).answer == "yes"
                 ],
             }
-    RECORD.write_text(json.dumps(kept, indent=1) + "\n")
-    return kept
+    RECORD.write_text(json.dumps(record, indent=1) + "\n")
+    return record
 
 
-def licences(kept: dict[str, dict[str, Any]], present: dict[str, str]) -> list[str]:
+def licences(record: dict[str, dict[str, Any]], present: dict[str, str]) -> list[str]:
     """The table of the last runs with a licence, and the results of programs that are absent now."""
     rows = []
-    for name, last in kept.items():
+    for name, last in record.items():
         titles = [PROGRAMS[name].title, *(SOLVERS[solver].title for solver in PROGRAMS[name].solvers)]
         rows.append(
             [", ".join(dict.fromkeys(titles)), last["version"], last["date"], *map(str, last["files"])]
         )
-    absent = [line for name, last in kept.items() if name not in present for line in last["routes"]]
+    absent = [line for name, last in record.items() if name not in present for line in last["routes"]]
     title = "Results of that run, for programs that are left out above:"
     return [
         (

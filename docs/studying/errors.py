@@ -81,16 +81,16 @@ def change(rows: Iterable[Row], before: Kind, after: Kind) -> Change | None:
     """The error after minus the error before, for the same cases; None for fewer than three drawings."""
     old, new = defaultdict[Any, list[float]](list), defaultdict[Any, list[float]](list)
     for row in rows:
-        for kind, kept in ((before, old), (after, new)):
+        for kind, errors in ((before, old), (after, new)):
             if kind(row):
-                kept[case_of(row)].append(row["error"])
+                errors[case_of(row)].append(row["error"])
     of: dict[str, list[float]] = defaultdict(list)
     for case in old.keys() & new.keys():
         of[case[0]].append(float(np.mean(new[case]) - np.mean(old[case])))
-    found = summary(np.array([np.mean(of[name]) for name in sorted(of)]))
-    if found is None or found.error is None or found.count < 3:
+    effect = summary(np.array([np.mean(of[name]) for name in sorted(of)]))
+    if effect is None or effect.error is None or effect.count < 3:
         return None
-    return Change(found.mean, found.error, found.count, sum(map(len, of.values())))
+    return Change(effect.mean, effect.error, effect.count, sum(map(len, of.values())))
 
 
 def best_energies(rows: Iterable[Row]) -> dict[tuple[Any, ...], tuple[float, bool]]:
@@ -109,23 +109,23 @@ def best_energies(rows: Iterable[Row]) -> dict[tuple[Any, ...], tuple[float, boo
 
 def gaps(rows: Iterable[Row]) -> list[tuple[Row, float]]:
     """Each field with default weights, for cases with a proven optimum, with its relative gap to it."""
-    kept = [row for row in rows_with_error(rows) if is_default(row)]
-    best = best_energies(kept)
+    usual = [row for row in rows_with_error(rows) if is_default(row)]
+    best = best_energies(usual)
     return [
         (row, (row["energy_2"] - best[case_of(row)][0]) / max(best[case_of(row)][0], 1e-9))
-        for row in kept
+        for row in usual
         if best[case_of(row)][1]
     ]
 
 
-def differences(found: list[tuple[Row, float]]) -> list[tuple[Row, float, float]]:
+def differences(gaps: list[tuple[Row, float]]) -> list[tuple[Row, float, float]]:
     """Each field with its gap, and its error minus that of its instance's field with the lowest energy."""
     least: dict[Any, Row] = {}
-    for row, _ in found:
+    for row, _ in gaps:
         case = case_of(row)
         if case not in least or row["energy_2"] < least[case]["energy_2"]:
             least[case] = row
-    return [(row, gap, row["error"] - least[case_of(row)]["error"]) for row, gap in found]
+    return [(row, gap, row["error"] - least[case_of(row)]["error"]) for row, gap in gaps]
 
 
 def medians(x: Any, y: Any, bins: int = 12) -> tuple[list[float], list[float]]:
@@ -140,18 +140,18 @@ def medians(x: Any, y: Any, bins: int = 12) -> tuple[list[float], list[float]]:
         [[0.0, _NO_GAP], np.geomspace(5 * _NO_GAP, max(1.01 * x.max(), 10 * _NO_GAP), bins)]
     )
     parts = [(x >= a) & (x < b) for a, b in pairwise(ends)]
-    found = [(x[inside], y[inside]) for inside in parts if inside.sum() >= FEW]
-    return [float(np.median(a)) for a, _ in found], [float(np.median(b)) for _, b in found]
+    bins_of_points = [(x[inside], y[inside]) for inside in parts if inside.sum() >= FEW]
+    return [float(np.median(a)) for a, _ in bins_of_points], [float(np.median(b)) for _, b in bins_of_points]
 
 
 FEW: Final = 5
 _NO_GAP: Final = 1e-4
 
 
-def correlation(found: list[tuple[Row, float]]) -> Summary | None:
+def correlation(gaps: list[tuple[Row, float]]) -> Summary | None:
     """Rank correlation of gap and error within a case: its mean over drawings, with standard error."""
     cases: dict[Any, list[tuple[float, float]]] = defaultdict(list)
-    for row, gap in found:
+    for row, gap in gaps:
         cases[case_of(row)].append((round(gap, 6), row["error"]))
     of: dict[str, list[float]] = defaultdict(list)
     for case, points in sorted(cases.items(), key=lambda item: str(item[0])):

@@ -46,10 +46,10 @@ def surface(name: str, size: int) -> Any:
 def instance_of(run: Run, folder: Path | None) -> Instance:
     """The instance of a run."""
     if run.instance in SAMPLES and SAMPLES[run.instance].kind == "analytic":
-        found = noisy_instance(surface(run.instance, run.size).instance, run.noise, run.seed)
+        instance = noisy_instance(surface(run.instance, run.size).instance, run.noise, run.seed)
     else:
-        found = drawing(run.instance, run.size, folder) if run.hidden < 0 else hidden(run, folder).rest
-    return found.with_weights(stroke_weight=run.w_strokes, skew_weight=run.w_beta)
+        instance = drawing(run.instance, run.size, folder) if run.hidden < 0 else hidden(run, folder).rest
+    return instance.with_weights(stroke_weight=run.w_strokes, skew_weight=run.w_beta)
 
 
 def error(run: Run, field: CrossField, folder: Path | None) -> float | None:
@@ -107,10 +107,10 @@ def _by_method(run: Run, instance: Instance) -> Found:
     """The last field of a method of the table."""
     with tempfile.TemporaryDirectory(prefix="crossfield-study-") as folder:
         request = Request(instance, Path(folder), cf.Limits(run.limit, threads=1))
-        *_, found = METHODS[run.way].find(request)
-    if found.proof is not None:
-        return found.field, {"status": found.proof.status, "bound": found.proof.bound}
-    return found.field, {}
+        *_, answer = METHODS[run.way].find(request)
+    if answer.proof is not None:
+        return answer.field, {"status": answer.proof.status, "bound": answer.proof.bound}
+    return answer.field, {}
 
 
 def perturbed_field(instance: Instance, share: float, seed: int) -> CrossField:

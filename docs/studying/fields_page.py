@@ -31,11 +31,11 @@ COMPARED: Final = (
 def read() -> list[Row]:
     """The rows, each with the origin of its drawing."""
     with (DATA / "fields.csv").open(newline="") as file:
-        found: list[Row] = list(csv.DictReader(file))
-    for row in found:
+        rows: list[Row] = list(csv.DictReader(file))
+    for row in rows:
         row |= {name: float(row[name]) for name in ("noise", "weight", "value")}
         row |= {"size": int(row["size"]), "origin": OWN if row["name"] in SAMPLES else OTHERS}
-    return found
+    return rows
 
 
 def rows_with(**facts: Any) -> list[Row]:
@@ -53,10 +53,12 @@ def over_drawings(rows: list[Row]) -> str:
     of: dict[str, list[float]] = {}
     for row in rows:
         of.setdefault(row["name"], []).append(row["value"])
-    found = summary(np.array([np.mean(each) for each in of.values()]))
-    if found is None:
+    mean_of_drawings = summary(np.array([np.mean(each) for each in of.values()]))
+    if mean_of_drawings is None:
         return "-"
-    return f"{found.mean:.1f}" + ("" if found.error is None else f" ± {found.error:.1f}")
+    return f"{mean_of_drawings.mean:.1f}" + (
+        "" if mean_of_drawings.error is None else f" ± {mean_of_drawings.error:.1f}"
+    )
 
 
 def by_origin(cell: Callable[..., str]) -> tuple[tuple[str, ...], list[str]]:
@@ -101,24 +103,25 @@ def compared_table() -> Table:
 
 def by_drawing_table() -> Table:
     """Error at hidden curves of every drawing: a row for each drawing, size and method."""
-    found: dict[tuple[str, ...], list[float]] = {}
+    values_by_case: dict[tuple[str, ...], list[float]] = {}
     for row in rows_with(measure="hidden", weight=STROKE_WEIGHT):
         key = (row["origin"], row["name"], str(row["size"]), row["method"])
-        found.setdefault(key, []).append(row["value"])
+        values_by_case.setdefault(key, []).append(row["value"])
     heads = ("origin", "drawing", "pixels", "method", "curves", "mean", "median")
     return heads, [
-        [*key, str(len(of)), f"{np.mean(of):.2f}", f"{np.median(of):.2f}"] for key, of in found.items()
+        [*key, str(len(of)), f"{np.mean(of):.2f}", f"{np.median(of):.2f}"]
+        for key, of in values_by_case.items()
     ]
 
 
 def counts() -> dict[str, int]:
     """Numbers of drawings by others and of crossfield's, and of their curves at the middle size."""
     middle = sorted(values("size", measure="hidden"))[1]
-    found = {}
+    numbers = {}
     for origin, name in ((OTHERS, "others"), (OWN, "own")):
         rows = rows_with(measure="hidden", weight=STROKE_WEIGHT, origin=origin, method="greedy", size=middle)
-        found |= {f"{name}_drawings": len({row["name"] for row in rows}), f"{name}_curves": len(rows)}
-    return found
+        numbers |= {f"{name}_drawings": len({row["name"] for row in rows}), f"{name}_curves": len(rows)}
+    return numbers
 
 
 def surface_table() -> Table:

@@ -30,9 +30,9 @@ class HiddenCurve:
     @cached_property
     def rest(self) -> Instance:
         """The instance without the curve's strokes; its mask and its other strokes stay."""
-        kept = np.ones(len(self.instance.theta), dtype=bool)
-        kept[self.stroke] = False
-        return self.instance.with_strokes(kept)
+        shown = np.ones(len(self.instance.theta), dtype=bool)
+        shown[self.stroke] = False
+        return self.instance.with_strokes(shown)
 
     def deviation(self, field: CrossField) -> float:
         """The mean angle, in [0, pi/2] radians, from the curve to the nearer line of a field on its grid."""
@@ -53,13 +53,13 @@ def hidden_curves(instance: Instance, curve: Ints, most: int) -> list[HiddenCurv
     numbers, count = np.unique(curve[curve >= 0], return_counts=True)
     wanted = (count >= SHORTEST) & (count <= MOST * len(curve))
     order = np.argsort(-count[wanted], kind="stable")
-    found: list[HiddenCurve] = []
+    curves: list[HiddenCurve] = []
     part = ndimage.label(instance.mask)[0][tuple(instance.stroke_pixels.T)]
     for number in numbers[wanted][order]:
         hidden = curve == number
-        if len(found) < most and np.isin(part[hidden], part[~hidden]).all():
-            found.append(HiddenCurve(int(number), instance, np.nonzero(hidden)[0].astype(np.int32)))
-    return found
+        if len(curves) < most and np.isin(part[hidden], part[~hidden]).all():
+            curves.append(HiddenCurve(int(number), instance, np.nonzero(hidden)[0].astype(np.int32)))
+    return curves
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from .solvers.plan import FULL
 from .solvers.plan import table as solvers_table
 from .wording import percent, series
 
-Kept = dict[str, list[Row]]
+RowsByPart = dict[str, list[Row]]
 SOLVERS: Final = SOLVER_ROWS.stem
 TEMPLATE: Final = Path(__file__).with_name("evidence.template")
 COMMAND: Final = "python docs/study.py --page"
@@ -32,55 +32,58 @@ MADE_BY: Final = {
 }
 
 
-def read(data: Path) -> Kept:
+def read(data: Path) -> RowsByPart:
     """The rows of all parts."""
     files = {part: data / f"{part}.csv" for part in PARTS}
-    kept = {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
-    return kept | {SOLVERS: solvers_table(data / SOLVER_ROWS.name).rows}
+    rows_of = {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
+    return rows_of | {SOLVERS: solvers_table(data / SOLVER_ROWS.name).rows}
 
 
-def rows_in_order(kept: Kept, plan: Plan) -> Kept:
+def rows_in_order(rows_of: RowsByPart, plan: Plan) -> RowsByPart:
     """The rows in the order of the plan, which colours and lines of tables follow; others come last."""
     place = {run.key: number for number, run in enumerate(r for s in stages(plan, None) for r in s.runs)}
     return {
         part: sorted(rows, key=lambda row: place.get(key_of(row), len(place))) if part in PARTS else rows
-        for part, rows in kept.items()
+        for part, rows in rows_of.items()
     }
 
 
-def completeness(kept: Kept, plan: Plan) -> str:
+def completeness(rows_of: RowsByPart, plan: Plan) -> str:
     """Sentence on the completed share of the plan."""
     planned = [run for stage in stages(plan, None) for run in stage.runs]
-    done = {key_of(row) for part in PARTS for row in kept[part]}
+    done = {key_of(row) for part in PARTS for row in rows_of[part]}
     have = sum(run.key in done for run in planned)
     rest = len(planned) - have
     text = f"{have:,} of the {len(planned):,} planned runs on fields are done"
     return f"{text}." if not rest else f"{text}; **{rest:,} are still missing**."
 
 
-def findings(kept: Kept) -> dict[str, list[str]]:
+def findings(rows_of: RowsByPart) -> dict[str, list[str]]:
     """Sentences by question, the most important one first."""
     return {
-        "Which method has the smallest error?": [difference_by_others(), *practice_page.recommendation(kept)],
-        "Do lower energies give better fields?": effect_of_energy(kept),
-        "Can solvers prove optima?": solvers_page.answer(kept[SOLVERS], FULL),
+        "Which method has the smallest error?": [
+            difference_by_others(),
+            *practice_page.recommendation(rows_of),
+        ],
+        "Do lower energies give better fields?": effect_of_energy(rows_of),
+        "Can solvers prove optima?": solvers_page.answer(rows_of[SOLVERS], FULL),
     }
 
 
-def paragraphs(found: dict[str, list[str]], most: int | None = None) -> str:
+def paragraphs(sentences: dict[str, list[str]], most: int | None = None) -> str:
     """Questions and answers as paragraphs, each of that many sentences at most."""
-    return "\n\n".join(f"**{question}** {' '.join(lines[:most])}" for question, lines in found.items())
+    return "\n\n".join(f"**{question}** {' '.join(lines[:most])}" for question, lines in sentences.items())
 
 
 def difference_by_others() -> str:
     """The difference between the two best methods on drawings by others."""
     sizes = sorted(fields_page.values("size", measure="hidden"))
-    found = {
+    changes = {
         size: fields_page.compared("polyvector", "bend", origin=fields_page.OTHERS, size=size)
         for size in sizes
     }
-    parts = [f"{each} degrees at {size} pixels" for size, each in found.items() if each is not None]
-    sure = [str(size) for size, each in found.items() if each is not None and each.sure]
+    parts = [f"{change} degrees at {size} pixels" for size, change in changes.items() if change is not None]
+    sure = [str(size) for size, change in changes.items() if change is not None and change.sure]
     beyond = f"only the difference at {series(sure)} pixels" if sure else "no difference"
     return (
         f"On {fields_page.counts()['others_drawings']} drawings by others, `bend` changes the mean error at "
@@ -89,16 +92,16 @@ def difference_by_others() -> str:
     )
 
 
-def effect_of_energy(kept: Kept) -> list[str]:
+def effect_of_energy(rows_of: RowsByPart) -> list[str]:
     """Answer on the effect of the optimum on the error."""
-    own = quality_page.changes(kept["quality"], surfaces=False)["optimum"]
+    own = quality_page.changes(rows_of["quality"], surfaces=False)["optimum"]
     sizes = fields_page.values("size", measure="hidden", method="prove")
     there = fields_page.compared("greedy", "prove", size=sizes[0])
     search = fields_page.compared("greedy", "search", size=sizes[0])
     if own is None or there is None or search is None:
         return ["Not measured yet."]
     others = fields_page.counts()["others_drawings"]
-    before = [gap for row, gap in errors.gaps(kept["quality"]) if row["way"] == "greedy"]
+    before = [gap for row, gap in errors.gaps(rows_of["quality"]) if row["way"] == "greedy"]
     return [
         (
             "From the greedy field to the best field of `prove`, the mean error at hidden curves changes by "
@@ -107,17 +110,17 @@ def effect_of_energy(kept: Kept) -> list[str]:
         ),
         f"A search of 5 s changes it by {search} degrees on the {search.drawings} drawings.",
         f"The energy of greedy fields is {percent(float(np.mean(before or [0.0])))} above the optimum.",
-        quality_page.harmless_gaps(kept["quality"]),
+        quality_page.harmless_gaps(rows_of["quality"]),
     ]
 
 
-def threats(kept: Kept) -> dict[str, Any]:
+def threats(rows_of: RowsByPart) -> dict[str, Any]:
     """Numbers of drawings and surfaces, editions, and machine."""
     free = [f"{p.title}: {p.free}" for p in PROGRAMS.values() if p.free]
-    rows = [row for part in PARTS for row in kept[part] if row["machine"]]
+    rows = [row for part in PARTS for row in rows_of[part] if row["machine"]]
     machines = ", ".join(sorted({row["machine"] for row in rows}))
     loads = [row["load"] for row in rows] or [0.0]
-    fields = [row for part in ("quality", "practice") for row in kept[part]]
+    fields = [row for part in ("quality", "practice") for row in rows_of[part]]
     known = {row["instance"] for row in fields if row["instance"] in surfaces()}
     return {
         "drawings": len({row["instance"] for row in fields} - known),
@@ -131,47 +134,47 @@ def threats(kept: Kept) -> dict[str, Any]:
     }
 
 
-def tables(kept: Kept) -> dict[str, Table]:
+def tables(rows_of: RowsByPart) -> dict[str, Table]:
     """All tables by name; kept: in the order of the plan."""
-    found = fields_page.tables()
+    tables_of_pages = fields_page.tables()
     for part in (quality_page, practice_page):
-        found |= part.tables(kept)
-    return found | solvers_page.tables(kept[SOLVERS], FULL)
+        tables_of_pages |= part.tables(rows_of)
+    return tables_of_pages | solvers_page.tables(rows_of[SOLVERS], FULL)
 
 
-def page(kept: Kept, plan: Plan) -> str:
+def page(rows_of: RowsByPart, plan: Plan) -> str:
     """The text of the page; kept: in the order of the plan."""
-    found = tables(kept)
-    counts = {part: len(rows) for part, rows in kept.items()} | {"fields": len(fields_page.read())}
+    all_tables = tables(rows_of)
+    counts = {part: len(rows) for part, rows in rows_of.items()} | {"fields": len(fields_page.read())}
     files = [f"| `{name}.csv` | {count:,} | `{MADE_BY[name]}` |" for name, count in counts.items()]
     return TEMPLATE.read_text(encoding="utf-8").format(
         generated=generated_line(COMMAND),
-        findings=paragraphs(findings(kept)),
-        completeness=completeness(kept, plan),
+        findings=paragraphs(findings(rows_of)),
+        completeness=completeness(rows_of, plan),
         missed=fields_page.missed_sentence(),
         files="\n".join(files),
         **fields_page.counts(),
-        **solvers_page.sentences(kept[SOLVERS], FULL),
-        **quality_page.sentences(kept),
-        **practice_page.sentences(kept),
-        **threats(kept),
-        **{name: markdown(*table) if table[1] else "Not measured yet." for name, table in found.items()},
+        **solvers_page.sentences(rows_of[SOLVERS], FULL),
+        **quality_page.sentences(rows_of),
+        **practice_page.sentences(rows_of),
+        **threats(rows_of),
+        **{name: markdown(*table) if table[1] else "Not measured yet." for name, table in all_tables.items()},
     )
 
 
 def write_page(data: Path, target: Path, plan: Plan) -> None:
     """Make evidence.md in a folder, its tables in `evidence` and its plots in `pictures` there."""
-    kept = rows_in_order(read(data), plan)
+    rows_of = rows_in_order(read(data), plan)
     for part in (quality_page, practice_page):
-        part.draw(kept, target / "pictures")
+        part.draw(rows_of, target / "pictures")
     (target / "evidence").mkdir(exist_ok=True)
-    for name, (heads, lines) in tables(kept).items():
+    for name, (heads, lines) in tables(rows_of).items():
         with (target / "evidence" / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
             plain = [[cell.replace("`", "").replace("**", "") for cell in line] for line in (heads, *lines)]
             csv.writer(file, lineterminator="\n").writerows(plain)
-    (target / "evidence.md").write_text(page(kept, plan))
+    (target / "evidence.md").write_text(page(rows_of, plan))
 
 
-def short_summary(kept: Kept, plan: Plan) -> str:
+def short_summary(rows_of: RowsByPart, plan: Plan) -> str:
     """The first sentence of each answer, for the index of all pages."""
-    return paragraphs(findings(rows_in_order(kept, plan)), most=1)
+    return paragraphs(findings(rows_in_order(rows_of, plan)), most=1)

@@ -80,28 +80,28 @@ def practice_runs(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
 
 def quality_runs(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
     """Fields of all qualities, of drawings without a curve and of surfaces."""
-    for name, given in _instances(plan, size, folder):
+    for name, case in _instances(plan, size, folder):
         for way in PLAIN:
-            yield _default("quality", name, size, way, **given)
-        for share in SHARES if "hidden" in given else ():
+            yield _default("quality", name, size, way, **case)
+        for share in SHARES if "hidden" in case else ():
             for seed in SEEDS:
-                yield _default("quality", name, size, f"{PERTURBED} {share}", **given, seed=seed)
+                yield _default("quality", name, size, f"{PERTURBED} {share}", **case, seed=seed)
         for limit in dict.fromkeys(min(each, plan.quality_limit) for each in SEARCHES):
-            yield _default("quality", name, size, "search", **given, limit=limit)
+            yield _default("quality", name, size, "search", **case, limit=limit)
         for norm in (2, 1):
-            yield _default("quality", name, size, PROOF, **given, norm=norm, limit=plan.quality_limit)
+            yield _default("quality", name, size, PROOF, **case, norm=norm, limit=plan.quality_limit)
 
 
 def weight_runs(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
     """Greedy and best fields under other weights."""
-    for name, given in _instances(plan, size, folder):
+    for name, case in _instances(plan, size, folder):
         for strokes, skew in (
             *((each, SKEW_WEIGHT) for each in WEIGHTS),
             *((STROKE_WEIGHT, each) for each in SKEWS),
         ):
             for way, limit in (("greedy", 0.0), (PROOF, plan.quality_limit)):
                 changed = {"w_strokes": strokes, "w_beta": skew, "limit": limit}
-                yield _default("quality", name, size, way, **given | changed)
+                yield _default("quality", name, size, way, **case | changed)
 
 
 def _instances(plan: Plan, size: int, folder: Path | None) -> Iterator[tuple[str, dict[str, float]]]:
@@ -116,9 +116,9 @@ def _instances(plan: Plan, size: int, folder: Path | None) -> Iterator[tuple[str
                 yield name, {"noise": degrees, "seed": seed}
 
 
-def _default(part: str, name: str, size: int, way: str, **given: float) -> Run:
+def _default(part: str, name: str, size: int, way: str, **facts: float) -> Run:
     """A run with the default weights, unless others are given."""
-    return Run(part, name, size, way, **{"w_strokes": STROKE_WEIGHT, "w_beta": SKEW_WEIGHT} | given)  # type: ignore[arg-type]
+    return Run(part, name, size, way, **{"w_strokes": STROKE_WEIGHT, "w_beta": SKEW_WEIGHT} | facts)  # type: ignore[arg-type]
 
 
 def expected_seconds(run: Run) -> float:

@@ -134,8 +134,8 @@ def error_by_seconds(path: Path, panels: dict[str, dict[str, tuple[float, float,
 
 def _all_of(axes: Any) -> tuple[list[Any], list[str]]:
     """The legend of all panels, each name once."""
-    found: dict[str, Any] = {}
+    handles: dict[str, Any] = {}
     for axis in axes:
         for handle, name in zip(*axis.get_legend_handles_labels(), strict=True):
-            found.setdefault(name, handle)
-    return list(found.values()), list(found)
+            handles.setdefault(name, handle)
+    return list(handles.values()), list(handles)

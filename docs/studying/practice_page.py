@@ -14,7 +14,7 @@ from .hidden import Summary
 from .rows import FAILED, Row, Table
 from .wording import percent, series
 
-Kept = dict[str, list[Row]]
+RowsByPart = dict[str, list[Row]]
 QUICK: Final = 1.0
 """Seconds for which somebody who draws is willing to wait."""
 MILP_WAY: Final = "two-stage"
@@ -82,20 +82,20 @@ def fares(rows: list[Row]) -> Fares:
         if row["energy_2"] is not None:
             least[case] = min(least.get(case, np.inf), row["energy_2"])
     whole = [row for row in rows if have[errors.case_of(row)] == ways]
-    found: Fares = {}
+    by_size: Fares = {}
     for size in sorted({int(row["size"]) for row in whole}):
         here = [row for row in whole if row["size"] == size]
-        found[size] = {
+        by_size[size] = {
             way: Fare.of([row for row in here if name_of(row) == way], least)
             for way in dict.fromkeys(map(name_of, whole))
         }
-    return found
+    return by_size
 
 
-def full_table(found: Fares) -> Table:
+def full_table(by_size: Fares) -> Table:
     """All methods at all sizes."""
     cells = [
-        [str(size), f"`{way}`", *fare.cells()] for size, ways in found.items() for way, fare in ways.items()
+        [str(size), f"`{way}`", *fare.cells()] for size, ways in by_size.items() for way, fare in ways.items()
     ]
     return (
         "pixels", "method", "s, median", "hidden curves, degrees", "energy above the least, median",
@@ -103,41 +103,41 @@ def full_table(found: Fares) -> Table:
     ), cells  # fmt: skip
 
 
-def short_table(found: Fares) -> Table:
+def short_table(by_size: Fares) -> Table:
     """Error and seconds: a row for each method, a column for each size."""
-    ways = list(dict.fromkeys(way for of in found.values() for way in of))
+    ways = list(dict.fromkeys(way for of in by_size.values() for way in of))
     cells = []
     for way in ways:
-        fares = [of[way] for of in found.values()]
+        fares = [of[way] for of in by_size.values()]
         cells.append([f"`{way}`", *(f"{fare.cells()[1]}; {fare.seconds:.2g} s" for fare in fares)])
-    return ("method", *(f"{size} pixels" for size in found)), cells
+    return ("method", *(f"{size} pixels" for size in by_size)), cells
 
 
 def ranking(ways: dict[str, Fare], seconds: tuple[float, float] = (0.0, np.inf)) -> list[str]:
     """Ways that take more than the first and at most the second seconds, smallest error first."""
-    found = [
+    candidates = [
         (fare.error.mean, way)
         for way, fare in ways.items()
         if fare.error is not None and not fare.failed and seconds[0] < fare.seconds <= seconds[1]
     ]
-    return [way for _, way in sorted(found)]
+    return [way for _, way in sorted(candidates)]
 
 
-def recommendation(kept: Kept) -> list[str]:
+def recommendation(rows_of: RowsByPart) -> list[str]:
     """Two sentences: methods for drawing, and for the least energy."""
-    found = fares(kept["practice"])
-    if not found:
+    by_size = fares(rows_of["practice"])
+    if not by_size:
         return ["The methods are not measured yet."]
-    return [_for_drawing(found, kept["practice"]), _for_energy(found)]
+    return [_for_drawing(by_size, rows_of["practice"]), _for_energy(by_size)]
 
 
-def _for_drawing(found: Fares, rows: list[Row]) -> str:
+def _for_drawing(by_size: Fares, rows: list[Row]) -> str:
     """Recommended ways for drawing at each size, the next best, and slower ways with a smaller error."""
-    order = {size: ranking(ways, (0.0, QUICK)) for size, ways in found.items()}
+    order = {size: ranking(ways, (0.0, QUICK)) for size, ways in by_size.items()}
     best = {size: ways[0] for size, ways in order.items() if ways}
     if not best:
         return f"No way that takes {QUICK:g} s or less is measured yet."
-    mean = float(np.mean([_error(found, size, way) for size, way in best.items()]))
+    mean = float(np.mean([_error(by_size, size, way) for size, way in best.items()]))
     text = (
         f"On crossfield's own drawings, use {_grouped(best)} while drawing: of methods that take {QUICK:g} "
         f"s or less, it has the smallest mean error at hidden curves, {mean:.1f} degrees on average"
@@ -147,27 +147,27 @@ def _for_drawing(found: Fares, rows: list[Row]) -> str:
         second = max(set(others), key=lambda way: (others.count(way), way))
         at = [size for size, way in best.items() if way != second and second in order[size]]
         text += f" ({_paired(rows, best, second, at)} compared with `{second}`)"
-    slower = {size: ranking(found[size], (QUICK, np.inf))[:1] for size in best}
+    slower = {size: ranking(by_size[size], (QUICK, np.inf))[:1] for size in best}
     nearer = {
         s: way
         for s, ways in slower.items()
         for way in ways
-        if _error(found, s, way) < _error(found, s, best[s])
+        if _error(by_size, s, way) < _error(by_size, s, best[s])
     }
     ahead = [
         f"`{nearer[size]}` at {size} pixels ({_paired(rows, nearer, best[size], [size])})" for size in nearer
     ]
     text += f"; among slower ones, {', '.join(ahead)} is better" if ahead else "; no slower method is better"
-    none = {size: way for size in found if size not in best for way in ranking(found[size])[:1]}
+    none = {size: way for size in by_size if size not in best for way in ranking(by_size[size])[:1]}
     rest = [
-        f"at {s} pixels, where all take longer, it is `{way}` with {found[s][way].seconds:.2g} s"
+        f"at {s} pixels, where all take longer, it is `{way}` with {by_size[s][way].seconds:.2g} s"
         for s, way in none.items()
     ]
     return f"{'; '.join([text, *rest])}."
 
 
-def _error(found: Fares, size: int, way: str) -> float:
-    error = found[size][way].error
+def _error(by_size: Fares, size: int, way: str) -> float:
+    error = by_size[size][way].error
     return np.inf if error is None else error.mean
 
 
@@ -182,22 +182,22 @@ def _grouped(best: dict[int, str]) -> str:
 def _paired(rows: list[Row], after: dict[int, str], before: str, sizes: list[int]) -> str:
     """The paired difference of errors at some sizes, in words."""
     chosen = [row for row in errors.rows_with_error(rows) if row["size"] in sizes]
-    found = errors.change(
+    effect = errors.change(
         chosen, lambda row: name_of(row) == before, lambda row: name_of(row) == after[int(row["size"])]
     )
-    if found is None:
+    if effect is None:
         return "not measured yet"
-    return f"{found} degrees{'' if found.sure else ', which may be chance,'}"
+    return f"{effect} degrees{'' if effect.sure else ', which may be chance,'}"
 
 
-def _for_energy(found: Fares) -> str:
+def _for_energy(by_size: Fares) -> str:
     best = {
         size: min(ways, key=lambda way: (round(ways[way].over, 4), ways[way].seconds))
-        for size, ways in found.items()
+        for size, ways in by_size.items()
     }
     proven = [
         f"{fare.optimal} of {fare.runs} fields at {size}"
-        for size, ways in found.items()
+        for size, ways in by_size.items()
         for way, fare in ways.items()
         if way.startswith("prove") and fare.optimal
     ]
@@ -219,7 +219,7 @@ _SAME: Final = 1e-4
 """Relative difference of energies that count as equal."""
 
 
-def draw(kept: Kept, pictures: Path) -> None:
+def draw(rows_of: RowsByPart, pictures: Path) -> None:
     """The plot of this part."""
     panels = {
         f"{size} pixels": {
@@ -227,20 +227,20 @@ def draw(kept: Kept, pictures: Path) -> None:
             for way, fare in ways.items()
             if fare.error is not None
         }
-        for size, ways in fares(kept["practice"]).items()
+        for size, ways in fares(rows_of["practice"]).items()
     }
     if panels:
         plots.error_by_seconds(pictures / "evidence_practice.svg", panels)
 
 
-def sentences(kept: Kept) -> dict[str, str]:
+def sentences(rows_of: RowsByPart) -> dict[str, str]:
     """The sentences of this part by name."""
-    lower, tried = below_all_others(kept["practice"], MILP_WAY)
+    lower, tried = below_all_others(rows_of["practice"], MILP_WAY)
     text = f"`{MILP_WAY}` finds less energy than all other methods for {lower} of {tried} fields."
     return {"two_stages": text}
 
 
-def tables(kept: Kept) -> dict[str, Table]:
+def tables(rows_of: RowsByPart) -> dict[str, Table]:
     """The tables of this part by name."""
-    found = fares(kept["practice"])
-    return {"practice": full_table(found), "practice-in-short": short_table(found)}
+    by_size = fares(rows_of["practice"])
+    return {"practice": full_table(by_size), "practice-in-short": short_table(by_size)}

@@ -13,7 +13,7 @@ from .errors import Change, Kind, change, is_default, is_surface, rows_with_erro
 from .rows import Row, Table
 from .wording import percent
 
-Kept = dict[str, list[Row]]
+RowsByPart = dict[str, list[Row]]
 
 
 def made_by(way: str, *, norm: int = 2, strokes: float = STROKE_WEIGHT, skew: float = SKEW_WEIGHT) -> Kind:
@@ -66,10 +66,10 @@ def changes_table(rows: list[Row]) -> Table:
     return ("change", "hidden curves, degrees", "surfaces, degrees"), cells
 
 
-def _cell(found: Change | None) -> str:
-    if found is None:
+def _cell(effect: Change | None) -> str:
+    if effect is None:
         return ""
-    return f"{found.cell} ({found.pairs} pairs)"
+    return f"{effect.cell} ({effect.pairs} pairs)"
 
 
 def kind_of(row: Row) -> str:
@@ -81,10 +81,10 @@ def kind_of(row: Row) -> str:
 
 def ways_table(rows: list[Row]) -> Table:
     """Gap and error of every kind of field under default weights."""
-    found = errors.gaps(rows)
+    fields = errors.gaps(rows)
     cells = []
-    for kind in dict.fromkeys(kind_of(row) for row, _ in found):
-        mine = [(row, gap) for row, gap in found if kind_of(row) == kind]
+    for kind in dict.fromkeys(kind_of(row) for row, _ in fields):
+        mine = [(row, gap) for row, gap in fields if kind_of(row) == kind]
         line = [kind, str(len(mine)), percent(float(np.median([gap for _, gap in mine])))]
         for surfaces in (False, True):
             part = [row for row, _ in mine if is_surface(row) == surfaces]
@@ -118,9 +118,9 @@ def correlation_text(rows: list[Row]) -> str:
     for surfaces, words in ((False, "drawings"), (True, "surfaces")):
         for most, which in ((np.inf, "all fields"), (NEAR, f"those within {percent(NEAR)} of the optimum")):
             mine = [(r, gap) for r, gap in errors.gaps(rows) if is_surface(r) == surfaces and gap <= most]
-            found = errors.correlation(mine)
-            if found is not None and found.error is not None:
-                parts.append(f"{found.mean:+.2f} ± {found.error:.2f} over {found.count} {words}, {which}")
+            effect = errors.correlation(mine)
+            if effect is not None and effect.error is not None:
+                parts.append(f"{effect.mean:+.2f} ± {effect.error:.2f} over {effect.count} {words}, {which}")
     return (
         "Rank correlation of energy and error between the fields of one instance (1: less energy always "
         f"means less error): {'; '.join(parts)}."
@@ -131,11 +131,11 @@ def correlation_text(rows: list[Row]) -> str:
 
 def harmless_gaps(rows: list[Row]) -> str:
     """Sentence on the gaps between which fields of drawings become worse than the optimum."""
-    found = [each for each in errors.differences(errors.gaps(rows)) if not is_surface(each[0])]
-    gap, more = errors.medians([each[1] for each in found], [each[2] for each in found])
+    fields = [field for field in errors.differences(errors.gaps(rows)) if not is_surface(field[0])]
+    gap, more = errors.medians([field[1] for field in fields], [field[2] for field in fields])
     if not gap:
         return ""
-    after = max((place + 1 for place, each in enumerate(more) if each <= HARM), default=0)
+    after = max((place + 1 for place, field in enumerate(more) if field <= HARM), default=0)
     worse = f"more than {HARM:g} degrees worse than the minimum-energy field, in the median of a bin,"
     if after == len(gap):
         return f"No bin up to {percent(gap[-1])} above the optimum's energy is {worse[:-1]}."
@@ -154,7 +154,7 @@ HARM: Final = 0.5
 def weight_lines(rows: list[Row], which: str) -> dict[str, plots.Bars]:
     """Error by one of the weights: greedy and best field, drawings and surfaces, those with all weights."""
     other, usual = ("w_beta", SKEW_WEIGHT) if which == "w_strokes" else ("w_strokes", STROKE_WEIGHT)
-    found = {}
+    lines = {}
     for surfaces, words in ((False, "hidden curves"), (True, "surfaces")):
         for way, name in (("greedy", "greedy"), ("prove", "best")):
             mine = [
@@ -169,38 +169,38 @@ def weight_lines(rows: list[Row], which: str) -> dict[str, plots.Bars]:
                 part = [r for r in mine if r[which] == value and errors.case_of(r) in common]
                 mean = errors.mean_by_drawing(part, lambda row: row["error"])
                 if mean is not None:
-                    for kept, number in zip(line, (value, mean.mean, mean.error or 0.0), strict=True):
-                        kept.append(number)
+                    for column, number in zip(line, (value, mean.mean, mean.error or 0.0), strict=True):
+                        column.append(number)
             if len(line[0]) > 1:
-                found[f"{name}, {words}"] = line
-    return found
+                lines[f"{name}, {words}"] = line
+    return lines
 
 
-def draw(kept: Kept, pictures: Path) -> None:
+def draw(rows_of: RowsByPart, pictures: Path) -> None:
     """The plots of this part."""
-    found = errors.differences(errors.gaps(kept["quality"]))
+    fields = errors.differences(errors.gaps(rows_of["quality"]))
     panels: dict[str, dict[str, plots.Line]] = {}
     for surfaces, title in ((False, "hidden curves of drawings"), (True, "surfaces with a known answer")):
         panels[title] = {}
-        for kind in dict.fromkeys(kind_of(each[0]) for each in found):
-            mine = [each for each in found if kind_of(each[0]) == kind and is_surface(each[0]) == surfaces]
+        for kind in dict.fromkeys(kind_of(each[0]) for each in fields):
+            mine = [each for each in fields if kind_of(each[0]) == kind and is_surface(each[0]) == surfaces]
             panels[title][kind] = ([100 * gap for _, gap, _ in mine], [more for _, _, more in mine])
     plots.error_by_gap(pictures / "evidence_quality.svg", panels)
-    lines = {name: weight_lines(kept["quality"], name) for name in ("w_strokes", "w_beta")}
+    lines = {name: weight_lines(rows_of["quality"], name) for name in ("w_strokes", "w_beta")}
     titles = {"w_strokes": "weight of the strokes", "w_beta": "weight of the skew"}
     plots.error_by_weight(
         pictures / "evidence_weights.svg", {titles[name]: each for name, each in lines.items()}
     )
 
 
-def tables(kept: Kept) -> dict[str, Table]:
+def tables(rows_of: RowsByPart) -> dict[str, Table]:
     """The tables of this part by name."""
-    return {"changes": changes_table(kept["quality"]), "energies": ways_table(kept["quality"])}
+    return {"changes": changes_table(rows_of["quality"]), "energies": ways_table(rows_of["quality"])}
 
 
-def sentences(kept: Kept) -> dict[str, str]:
+def sentences(rows_of: RowsByPart) -> dict[str, str]:
     """The sentences of this part by name."""
-    rows = kept["quality"]
+    rows = rows_of["quality"]
     return {
         "proven": proven_text(rows),
         "correlation": correlation_text(rows),

@@ -76,9 +76,9 @@ def text(value: Any) -> str:
     return f"{value:.11g}" if isinstance(value, float) else " ".join(str(value).split())
 
 
-def number(given: str) -> float | None:
+def number(cell: str) -> float | None:
     """A number of a file; None for an empty text."""
-    return float(given) if given else None
+    return float(cell) if cell else None
 
 
 class Rows:
@@ -102,13 +102,13 @@ class Rows:
             with self._path.open("r+b") as file:
                 file.truncate(whole)
 
-    def append(self, run: Keyed, found: dict[str, Any]) -> None:
+    def append(self, run: Keyed, results: dict[str, Any]) -> None:
         """Add the row of a run; it is on the disk afterwards."""
         if run.key in self.done:
             raise ValueError(f"{run} has a row already")
         fresh = not self._path.exists() or not self._path.stat().st_size
         columns = self._asked + self._found
-        line = [*run.key, *(text(found.get(name)) for name in self._found)]
+        line = [*run.key, *(text(results.get(name)) for name in self._found)]
         with self._path.open("a", newline="", encoding="utf-8") as file:
             file.write((_line(columns) if fresh else "") + _line(line))
             file.flush()
@@ -133,9 +133,9 @@ def read(path: Path, columns: Names = COLUMNS, numbers: frozenset[str] = NUMBERS
         yield row_with_numbers(dict(zip(columns, line, strict=True)), numbers)
 
 
-def row_with_numbers(given: dict[str, str], numbers: frozenset[str]) -> Row:
+def row_with_numbers(cells: dict[str, str], numbers: frozenset[str]) -> Row:
     """A row with its numbers as numbers."""
-    return {name: number(value) if name in numbers else value for name, value in given.items()}
+    return {name: number(value) if name in numbers else value for name, value in cells.items()}
 
 
 def key_of(row: Row, asked: Names = ASKED) -> tuple[str, ...]:

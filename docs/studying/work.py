@@ -25,11 +25,11 @@ def perform(task: tuple[Run, Path | None]) -> dict[str, Any]:
     """The result of a run; an exception makes a failed run, and the study continues."""
     run, folder = task
     try:
-        found = field_row(run, folder)
+        row = field_row(run, folder)
     except Exception as error:  # noqa: BLE001 - a row records the exception
-        found = {"status": FAILED, "note": f"{type(error).__name__}: {error}"}
-    note = _FOLDERS.sub("", str(found.get("note") or ""))
-    return found | {"note": note[:_LONGEST], **_machine()}
+        row = {"status": FAILED, "note": f"{type(error).__name__}: {error}"}
+    note = _FOLDERS.sub("", str(row.get("note") or ""))
+    return row | {"note": note[:_LONGEST], **_machine()}
 
 
 def _machine() -> dict[str, Any]:
@@ -56,16 +56,16 @@ def carry_out(
     wanted = frozenset(parts)
     data.mkdir(parents=True, exist_ok=True)
     with library_lock(data, "a study", progress), open_executor(jobs, scheduler) as chosen:
-        kept = tables(data)
+        rows_of = tables(data)
         for stage in stages(plan, folder):
             runs = [run for run in stage.runs if not wanted or run.part in wanted]
-            runs = [run for run in runs if run.key not in kept[run.part].done]
+            runs = [run for run in runs if run.key not in rows_of[run.part].done]
             progress(f"{stage.name}: {len(runs)} of {len(stage.runs)} runs")
             tasks = Tasks(chosen, tasks_ahead(jobs, scheduler))
             for run in reversed(runs):  # the last one added is the first to be done
-                tasks.add(perform, (run, folder), partial(_keep, kept[run.part], run))
+                tasks.add(perform, (run, folder), partial(_keep, rows_of[run.part], run))
             tasks.run()
 
 
-def _keep(table: Rows, run: Run, found: dict[str, Any]) -> None:
-    table.append(run, found)
+def _keep(table: Rows, run: Run, row: dict[str, Any]) -> None:
+    table.append(run, row)

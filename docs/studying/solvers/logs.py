@@ -157,7 +157,7 @@ def _within(word: str) -> float | None:
 
 def root_bound(solver: str, text: str) -> float | None:
     """The last lower bound before the first branching, as the log rounds it; None where it has none."""
-    found = re.findall(_ROOT[solver], text, re.MULTILINE) if solver in _ROOT else []
-    if not found:
+    bounds = re.findall(_ROOT[solver], text, re.MULTILINE) if solver in _ROOT else []
+    if not bounds:
         return None
-    return _number(found[-1] if isinstance(found[-1], str) else "".join(found[-1]))
+    return _number(bounds[-1] if isinstance(bounds[-1], str) else "".join(bounds[-1]))

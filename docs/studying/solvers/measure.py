@@ -91,9 +91,9 @@ class Watch:
         own, everything = own_seconds(inside=self.inside)
         beside = max(0.0, busy_seconds(self.core) - self._busy - (everything - self._all))
         wall = time.monotonic() - self.began
-        found: Row = {"cpu": own - self._own, "wall": wall, "beside": beside}
+        facts: Row = {"cpu": own - self._own, "wall": wall, "beside": beside}
         repeated = beside > self.slack + SHARE * wall or self.over()
-        return found | ({"status": DISCARDED} if repeated else {})
+        return facts | ({"status": DISCARDED} if repeated else {})
 
     def over(self) -> bool:
         """Whether the study ends."""
@@ -169,12 +169,12 @@ def _narrowed(run: Run, problem: Problem, watch: Watch, certificates: Path) -> P
 
 def _windows(path: Path, instance: Instance) -> Windows:
     """The windows of a certificate, kept next to it: its check may take longer than a run."""
-    kept = path.with_suffix(".windows.npz")
-    if not kept.exists() or kept.stat().st_mtime < path.stat().st_mtime:
-        with replacing(kept) as file:
+    cache = path.with_suffix(".windows.npz")
+    if not cache.exists() or cache.stat().st_mtime < path.stat().st_mtime:
+        with replacing(cache) as file:
             np.savez(file, **asdict(remaining_windows(read_certificate(path, on=instance))))
-    with np.load(kept) as found:
-        return Windows(**{name: array if array.ndim else array.item() for name, array in found.items()})
+    with np.load(cache) as arrays:
+        return Windows(**{name: array if array.ndim else array.item() for name, array in arrays.items()})
 
 
 def _solved(run: Run, problem: Problem, watch: Watch) -> Row:
@@ -183,7 +183,7 @@ def _solved(run: Run, problem: Problem, watch: Watch) -> Row:
         facts: Row = {"version": solvers.version(run.solver)}
         watch.begin()
         try:
-            found = solvers.solve(
+            solution = solvers.solve(
                 problem, run.solver, folder=folder, limits=cf.Limits(run.limit, GAP, 1), stop=watch.late
             )
         except UnsupportedBySolverError as error:
@@ -191,12 +191,12 @@ def _solved(run: Run, problem: Problem, watch: Watch) -> Row:
         except (SolverError, SolutionError) as error:
             return facts | {"status": FAILED, "note": str(error).replace(folder, "")} | watch.row()
         facts |= {
-            "status": str(found.status),
-            "note": found.doubt,
-            "bound": found.bound,
-            "nodes": found.nodes,
+            "status": str(solution.status),
+            "note": solution.doubt,
+            "bound": solution.bound,
+            "nodes": solution.nodes,
         }
-        facts["objective"] = None if found.point is None else found.objective
+        facts["objective"] = None if solution.point is None else solution.objective
         facts |= watch.row()
         (log,) = Path(folder).glob("*.log")
         text = log.read_text(errors="replace")

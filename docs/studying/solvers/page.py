@@ -42,12 +42,12 @@ def solver_title(solver: str) -> str:
 def groups(rows: Iterable[Row], plan: Plan) -> dict[int, dict[Kind, list[Row]]]:
     """The rows of instances as they are, under the limit of the plan: by number of pairs and kind."""
     about = {name: count for count, names in plan.instances.items() for name in names}
-    found: dict[int, dict[Kind, list[Row]]] = {count: defaultdict(list) for count in plan.instances}
+    by_count: dict[int, dict[Kind, list[Row]]] = {count: defaultdict(list) for count in plan.instances}
     for row in rows:
         if row["instance"] in about and (row["turns"], row["limit"]) == (0, plan.limit):
             kind = row["formulation"], row["solver"], row["start"]
-            found[about[row["instance"]]][kind].append(row)
-    return found
+            by_count[about[row["instance"]]][kind].append(row)
+    return by_count
 
 
 def with_interval(values: np.ndarray, statistic: statistics.Statistic, form: str) -> str:
@@ -63,12 +63,12 @@ def count_solved(rows: list[Row]) -> str:
 
 def solved_table(rows: list[Row], plan: Plan) -> Table:
     """Solved instances and mean seconds of every kind; means of complete groups alone."""
-    found = groups(rows, plan)
+    by_count = groups(rows, plan)
     cells = []
     for formulation, solver, start in KINDS:
         line = [f"`{formulation}`", solver_title(solver), "" if solver == PROVE else start]
         for count, names in plan.instances.items():
-            mine = found[count][formulation, solver, start]
+            mine = by_count[count][formulation, solver, start]
             text = count_solved(mine) if mine else MISSING
             if len(mine) == len(names):
                 text += f", {with_interval(seconds(mine), shifted_geometric_mean, '.1f')} s"
@@ -272,14 +272,14 @@ def claims(rows: list[Row]) -> str:
 
 def _listed(rows: list[Row]) -> str:
     """The numbers of rows by solver and formulation."""
-    found = Counter(f"{solver_title(row['solver'])} on `{row['formulation']}`" for row in rows)
-    return "; ".join(f"{name} {count}" for name, count in sorted(found.items())) or "none"
+    counts = Counter(f"{solver_title(row['solver'])} on `{row['formulation']}`" for row in rows)
+    return "; ".join(f"{name} {count}" for name, count in sorted(counts.items())) or "none"
 
 
 def answer(rows: list[Row], plan: Plan) -> list[str]:
     """Answer on the reach of solvers, for the numbers of pairs with all cold runs done; then tightened."""
-    found = groups(rows, plan)
-    said = [_reach(found, plan, start) for start in STARTS]
+    by_count = groups(rows, plan)
+    said = [_reach(by_count, plan, start) for start in STARTS]
     if said[0] is None:
         unfinished = f"{len(rows)} of {plan.size} planned runs are done, and no number of pairs is complete."
         return [f"The measurement is under way: {unfinished}"]
@@ -299,13 +299,15 @@ def answer(rows: list[Row], plan: Plan) -> list[str]:
     return sentences
 
 
-def _reach(found: dict[int, dict[Kind, list[Row]]], plan: Plan, start: str) -> tuple[list[int], str] | None:
+def _reach(
+    by_count: dict[int, dict[Kind, list[Row]]], plan: Plan, start: str
+) -> tuple[list[int], str] | None:
     """The complete numbers of pairs, and how many instances any solver and `prove` solve of each."""
     kinds = [kind for kind in KINDS if kind[2] == start]
     complete = [
         count
         for count, names in plan.instances.items()
-        if all(len(found[count][kind]) == len(names) for kind in kinds)
+        if all(len(by_count[count][kind]) == len(names) for kind in kinds)
     ]
     if not complete:
         return None
@@ -314,7 +316,7 @@ def _reach(found: dict[int, dict[Kind, list[Row]]], plan: Plan, start: str) -> t
         mine = [kind for kind in kinds if kind[0] == formulation]
         by = [[kind for kind in mine if kind[1] != PROVE], [kind for kind in mine if kind[1] == PROVE]]
         solved = [
-            f"{series(len(_solved(found[count], some)) for count in complete)} by "
+            f"{series(len(_solved(by_count[count], some)) for count in complete)} by "
             f"{'at least one of ' if len(some) > 1 else ''}{series(solver_title(kind[1]) for kind in some)}"
             for some in by
             if some
@@ -323,9 +325,9 @@ def _reach(found: dict[int, dict[Kind, list[Row]]], plan: Plan, start: str) -> t
     return complete, "; ".join(parts)
 
 
-def _solved(found: dict[Kind, list[Row]], kinds: list[Kind]) -> set[str]:
+def _solved(by_kind: dict[Kind, list[Row]], kinds: list[Kind]) -> set[str]:
     """The instances that at least one of the kinds solves."""
-    return {row["instance"] for kind in kinds for row in found[kind] if is_solved(row)}
+    return {row["instance"] for kind in kinds for row in by_kind[kind] if is_solved(row)}
 
 
 def tables(rows: list[Row], plan: Plan) -> dict[str, Table]:

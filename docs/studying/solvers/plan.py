@@ -112,14 +112,14 @@ def make_instance(name: str, turns: int = 0) -> Instance:
     """The instance of that name with the default weights, turned by that many quarters."""
     kind, size, *seed = name.split()
     if kind in SAMPLES:
-        found = cf.sample(kind, int(size))
+        instance = cf.sample(kind, int(size))
     else:
         noise = 0.0 if kind == "pixels" else NOISE
         about = {"size": int(size), "strokes": kind, "mask_share": MASK_SHARE, "noise": noise}
-        found = cf.random_instance(int(seed[0]), **about)  # type: ignore[arg-type]
+        instance = cf.random_instance(int(seed[0]), **about)  # type: ignore[arg-type]
     for _ in range(turns):
-        found = found.turned()
-    return found
+        instance = instance.turned()
+    return instance
 
 
 ASKED: Final = tuple(each.name for each in fields(Run))
