@@ -44,18 +44,10 @@ class ExpectedArray(NamedTuple):
     kinds: str = "biuf"
 
 
-class Packing:
-    """A compressed .npz in the making: equal arrays, added in equal order, give equal bytes.
-
-    numpy.savez does not promise that.
-    """
-
-    def __init__(self) -> None:
-        self._buffer = io.BytesIO()
-        self._archive = zipfile.ZipFile(self._buffer, "w", zipfile.ZIP_DEFLATED)
-
-    def add(self, arrays: Arrays) -> None:
-        """Compress arrays and add them."""
+def pack_arrays(arrays: Arrays) -> bytes:
+    """The bytes of a compressed .npz: equal for equal arrays, which numpy.savez does not promise."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
             entry = io.BytesIO()
             little = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
@@ -63,19 +55,8 @@ class Packing:
             member = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
             member.compress_type = zipfile.ZIP_DEFLATED
             data = entry.getvalue()
-            self._archive.writestr(member, data, compresslevel=None if len(data) < _LONG else 1)
-
-    def finish(self) -> bytes:
-        """The bytes of the archive."""
-        self._archive.close()
-        return self._buffer.getvalue()
-
-
-def pack_arrays(arrays: Arrays) -> bytes:
-    """The bytes of a compressed .npz of these arrays."""
-    packing = Packing()
-    packing.add(arrays)
-    return packing.finish()
+            archive.writestr(member, data, compresslevel=None if len(data) < _LONG else 1)
+    return buffer.getvalue()
 
 
 class ArrayArchive:

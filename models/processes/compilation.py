@@ -29,27 +29,19 @@ _PARTS: Final = 2  # of shared work for each thread: one that takes longer than 
 
 def compiled(work: _Work) -> _Work:
     """The function compiled on its first call, and cached on disk where a folder is writable."""
-    dispatcher = compiled_if_needed(work)
-    _DISPATCHERS.append(dispatcher)
-    return dispatcher
+    return _make_dispatcher(work, fastmath=False)
 
 
 def compiled_in_any_order(work: _Work) -> _Work:
     """As `compiled`, for a function without nan whose result does not depend on the order of its terms."""
-    dispatcher = _make_dispatcher(work, fastmath=_ANY_ORDER)
-    _DISPATCHERS.append(dispatcher)
-    return dispatcher
-
-
-def compiled_if_needed(work: _Work, *, in_any_order: bool = False) -> _Work:
-    """As `compiled`, for a function that is not compiled in advance."""
-    return _make_dispatcher(work, fastmath=_ANY_ORDER if in_any_order else False)
+    return _make_dispatcher(work, fastmath=_ANY_ORDER)
 
 
 def _make_dispatcher(work: _Work, *, fastmath: bool | set[str]) -> _Work:
     dispatcher: Any = numba.njit(error_model="numpy", nogil=True, fastmath=fastmath)(work)
     with suppress(RuntimeError):  # no folder is writable
         dispatcher.enable_caching()
+    _DISPATCHERS.append(dispatcher)
     return cast("_Work", dispatcher)
 
 
