@@ -617,7 +617,6 @@ def declared(width, height):
     )
 
 
-USES = "".join(f'<g id="u{k}">' + f'<use href="#u{k - 1}"/>' * 10 + "</g>" for k in range(1, 12))
 REFUSED = {
     "empty.png": (b"", "is empty"),
     "text.png": (b"just text", "is not a whole picture"),
