@@ -15,7 +15,7 @@ from crossfield.export.bundle.manifest import read_manifest
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.licences import licence_error
-from crossfield.export.solvers_table import BUNDLED, PROGRAMS, SOLVERS, Refusal, Solver, StartFile
+from crossfield.export.solvers_table import BUNDLED, PROGRAMS, SOLVERS, Refusal, Solver
 from crossfield.models.errors import MissingSolverError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 
@@ -39,16 +39,6 @@ def test_a_solver_that_others_run_is_one_entry(tmp_path: Path, monkeypatch: pyte
     (manifest,) = tmp_path.glob("*.manifest.json")
     assert read_manifest(manifest).document["solvers"]["toy"]["format"] == "lp"
     assert PROGRAMS["cbc"].solvers == ("cbc", "toy")
-
-
-def test_a_solver_is_one_entry_and_the_module_of_its_program(monkeypatch: pytest.MonkeyPatch):
-    """HiGHS solves under another name, because everything is read from the table."""
-    twin = Solver("twin", "Twin", ("lp",), "highs", start=StartFile("highs", ".sol", "as HiGHS does"))
-    monkeypatch.setitem(SOLVERS, "twin", twin)
-    problem = cf.formulate(make_instance("hole"), "milp-mccormick", relax=True)
-    assert cf.solve(problem, "twin").objective == pytest.approx(
-        cf.solve(problem, "highs").objective, abs=1e-7
-    )
 
 
 def test_a_program_that_is_not_here_says_how_to_get_it():

@@ -97,13 +97,6 @@ def test_decimals_have_no_leading_zeros():
     assert bytes(digits(np.array([7, 123]), 4)) == b"00070123"
 
 
-@given(st.lists(st.integers(0, 2**31 - 1), min_size=1, max_size=30))
-def test_any_decimals(values):
-    assert text([Decimals(np.array(values, dtype=np.int32)), b" "], len(values)).split() == [
-        str(value).encode() for value in values
-    ]
-
-
 def test_raw_values_keep_their_zero_bytes():
     parts = [
         b"x",
@@ -123,17 +116,6 @@ def test_whole_numbers_close_together_are_words_too(steps, first):
     assert text([words(values), b" "], len(values)).decode().split() == [
         number_text(value) for value in values
     ]
-
-
-def test_a_tag_stands_before_every_word():
-    key = Words(word_table([b"_1", b"_2", b"_3"]), None)
-    name = TaggedWords(b"alpha", key)
-    assert name.width == 7
-    assert (
-        text([name, b"=", TaggedWords(b"p", key.at(np.array([2, 0, 1]))), b";"], 3)
-        == b"alpha_1=p_3;alpha_2=p_1;alpha_3=p_2;"
-    )
-    assert text([name.at(np.array([2])), b"!"], 1) == b"alpha_3!"
 
 
 @given(st.lists(st.tuples(*[st.booleans()] * 4), min_size=1, max_size=40), st.booleans())
