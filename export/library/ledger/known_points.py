@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from ....models.errors import CrossfieldError, InputError
+from ....models.errors import CrossfieldError, InputError, naming
 from ....models.field.field import Norm
 from ....models.field.file import field_of_json
 from ....models.instance.instance import Instance
@@ -54,7 +54,8 @@ class InstancePoints:
     def field(self, role: str) -> KnownField:
         """Return the field of a role in ROLES. Raises InstanceError for a damaged field."""
         facts = self.about["fields"][role]
-        return KnownField(field_of_json(self.files[facts["file"]]), Provenance.of(facts))
+        with naming(facts["file"]):
+            return KnownField(field_of_json(self.files[facts["file"]]), Provenance.of(facts))
 
     def certificates(self, instance: Instance, norms: Collection[Norm]) -> list[CheckedCertificate]:
         """Return the certificates in some norms, checked.
