@@ -202,8 +202,8 @@ SecondsPerMethod = Annotated[
 SecondsOfProof = Annotated[
     float,
     _time_limit(
-        help="Seconds for the proof and for its certificate, which is written and checked. They count from"
-        " when the sketch has been read and, once on a machine, the functions of proofs are compiled."
+        help="Seconds for the proof. They count from when the sketch has been read and, once on a machine,"
+        " the functions of proofs are compiled. Its certificate is checked and written afterwards."
     ),
 ]
 ProofGap = Annotated[

@@ -8,11 +8,11 @@ and proves the lemmas.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import cast
 
 import numpy as np
 
-from ..field.field import AbsoluteNorm, CrossField
+from ..field.field import AbsoluteNorm, CrossField, Norm
 from ..field.jumps import best_jumps
 from ..instance.angles import HALF, QUARTER
 from ..instance.grid import Floats
@@ -46,15 +46,15 @@ def forced_absolute(left: RemainingCells, target: Floats | None = None) -> Force
 class AbsoluteDescent(Descent):
     """A descent where pairs count with absolute values."""
 
-    norm: ClassVar[AbsoluteNorm]
+    norm: AbsoluteNorm
     forced = staticmethod(forced_absolute)
 
-    @classmethod
-    def first_field(cls, instance: Instance, start: CrossField | None, over: Over) -> CrossField:
+    @staticmethod
+    def first_field(instance: Instance, norm: Norm, start: CrossField | None, over: Over) -> CrossField:
         """The better one of the 2-norm's first field and the user's field, both fitted."""
-        fields = [super().first_field(instance, None, over)] + ([] if start is None else [start])
-        fitted = [alternate_absolute(field, cls.norm, over) for field in fields]
-        return min(fitted, key=lambda field: field.energy(cls.norm).total)
+        fields = [Descent.first_field(instance, 2, None, over)] + ([] if start is None else [start])
+        fitted = [alternate_absolute(field, cast("AbsoluteNorm", norm), over) for field in fields]
+        return min(fitted, key=lambda field: field.energy(norm).total)
 
     def first_level(self, centre: CrossField) -> Lattice:
         """The first lattice round a field: its strokes have the slopes of the best angles for its jumps."""
@@ -76,15 +76,3 @@ class AbsoluteDescent(Descent):
 
     def _find_better_field(self) -> bool:
         return False
-
-
-class DescentIn1Norm(AbsoluteDescent):
-    """A descent in the 1-norm."""
-
-    norm = 1
-
-
-class DescentInMixedNorm(AbsoluteDescent):
-    """A descent in the mixed norm."""
-
-    norm = "mixed"

@@ -1,5 +1,8 @@
 """Clusters: tables on the alphas of 2 x 2 pixels, which raise the bound where a field has a vortex.
 
+They tighten the relaxation, as in Sontag et al., Tightening LP relaxations for MAP using message passing (UAI
+2008); the tables are the dual variables of a quad's consistency with its pairs.
+
 The local polytope mixes fields with the vortex in other places, because its pairs need not agree round a
 quad. Let lambda_e(k_i, k_j) be tables on the alphas of the four pairs e of a quad. For any tables
 
@@ -36,7 +39,6 @@ from .min_plus import (
     least_beta_cost,
     least_value,
     min_plus,
-    min_plus_between,
 )
 from .passes import alpha_costs, reparametrised_costs, row_ends, shares_at
 from .state import Clusters, Indices, RowEnds, State
@@ -258,27 +260,28 @@ def _reduced_costs(table: int, rows: IndexTable, state: State) -> Floats:
     half = np.empty((shares_j.shape[0], shares_i.shape[1]))
     best = np.empty((shares_i.shape[0], shares_j.shape[0]))
     best[:] = np.inf
-    least = _least_of_rows(shares_i), _least_of_rows(shares_j)
+    least, reached = least_value(shares_i.reshape(-1)) + least_value(shares_j.reshape(-1)), np.inf
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
         betas_i, betas_j = beta_lines(pair, i, state, odd)
-        alpha_costs(pair, i, state, odd, in_alpha)
-        in_beta = least_beta_cost(betas_i, betas_j, (shares_i.shape[1], shares_j.shape[1]), state.power)
-        ends = _ends_that_may_lower(best, least, in_alpha, (rows_i, rows_j), in_beta)
-        if (ends[0] < ends[1]).any():
+        cheapest = alpha_costs(pair, i, state, odd, in_alpha)
+        cheapest += least_beta_cost(betas_i, betas_j, (shares_i.shape[1], shares_j.shape[1]), state.power)
+        if cheapest + least < reached:
             fill_product_over_beta(ragged, betas_i, betas_j, state.power, half)
-            sums = min_plus_between(shares_i, _transposed(half), ends)
-            _lower_between(best, sums, in_alpha, (rows_i, rows_j), ends)
+            reached = _lower_to(best, min_plus(shares_i, _transposed(half)), in_alpha, (rows_i, rows_j))
     _add_matrix(best, _negative_table(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
     return best
 
 
 @compiled
-def _least_of_rows(matrix: Floats) -> Floats:
-    least = np.empty(matrix.shape[0])
-    for x in range(least.size):
-        least[x] = least_value(matrix[x])
-    return least
+def _lower_to(best: Floats, sums: Floats, in_alpha: Floats, rows: tuple[Indices, Indices]) -> float:
+    """Lower the best sums to those of two tables, the second by all alphas; return the greatest."""
+    (rows_i, rows_j), greatest = rows, -np.inf
+    for x in range(best.shape[0]):
+        for y in range(best.shape[1]):
+            best[x, y] = min(best[x, y], sums[x, y] + in_alpha[rows_i[x + 1], rows_j[y + 1]])
+            greatest = max(greatest, best[x, y])
+    return greatest
 
 
 @compiled
@@ -289,37 +292,6 @@ def _chosen_row_ends(i: int, rows: Indices, state: State) -> RowEnds:
     for x in range(rows[0]):
         some[0][x], some[1][x] = begin[rows[x + 1]], end[rows[x + 1]]
     return some
-
-
-@compiled
-def _ends_that_may_lower(
-    best: Floats, least: tuple[Floats, Floats], in_alpha: Floats, rows: tuple[Indices, Indices], plus: float
-) -> RowEnds:
-    """The part of each row where a bound is below the best sum.
-
-    The bound is the sum of two least numbers, of a cost in alpha and of a constant.
-    """
-    (rows_i, rows_j), (first, second) = rows, least
-    begins, ends = np.zeros(best.shape[0], np.int64), np.zeros(best.shape[0], np.int64)
-    for x in range(best.shape[0]):
-        begin, end, costs = 0, best.shape[1], in_alpha[rows_i[x + 1]]
-        while begin < end and first[x] + second[begin] + costs[rows_j[begin + 1]] + plus >= best[x, begin]:
-            begin += 1
-        while begin < end and first[x] + second[end - 1] + costs[rows_j[end]] + plus >= best[x, end - 1]:
-            end -= 1
-        begins[x], ends[x] = begin, end
-    return begins, ends
-
-
-@compiled
-def _lower_between(
-    best: Floats, sums: Floats, in_alpha: Floats, rows: tuple[Indices, Indices], ends: RowEnds
-) -> None:
-    """Lower the best sums between the ends to those of two tables, the second by all alphas."""
-    rows_i, rows_j = rows
-    for x in range(best.shape[0]):
-        for y in range(ends[0][x], ends[1][x]):
-            best[x, y] = min(best[x, y], sums[x, y] + in_alpha[rows_i[x + 1], rows_j[y + 1]])
 
 
 @compiled

@@ -1,9 +1,9 @@
-"""The least costs on spanning trees of the grid with one label fixed, which exclude more labels than a pass.
+"""Min-marginals on trees of the grid, combs, which exclude more labels than those of a pass.
 
-After a forward pass, the cost of any labels exceeds the bound by at least their excesses: D + shares less the
-least of each pixel, and c - shares of each pair. On a tree, the least sum of these with one label fixed
-follows from messages along its pairs. A comb is such a tree: a row of pixels is its spine, and the columns
-that cross it are its teeth; or a column is its spine, and rows are its teeth.
+After a forward pass, the cost of any labels exceeds the bound by at least their excesses, the reparametrised
+costs: D + shares less the least of each pixel, and c - shares of each pair. On a tree, the least sum of these
+with one label fixed follows from messages along its pairs. A comb is such a tree: a row of pixels is its
+spine, and the columns that cross it are its teeth; or a column is its spine, and rows are its teeth.
 
 models/proof/check_certificate.py, 3, proves that cells are excluded rightly.
 """

@@ -73,8 +73,8 @@ def compile_all() -> None:
         instance = sample("mouse", 4).with_gauge("strokes")
         ends = Termination(Deadline(), never, gap=0.0, work=math.inf)
         with crew(1) as thread:
-            first = Descent.first_field(instance, None, never)
-            descent = Descent(instance, first, ends, thread, 0, 1, silent)
+            first = Descent.first_field(instance, 2, None, never)
+            descent = Descent(2, instance, first, ends, thread, 0, 1, silent)
             proof = descent.proof(0.0, descent.run())
             dual = Dual(Lattice.whole(proof.field, 2), thread)
             dual.add_clusters(1, proof.field)

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
@@ -129,10 +129,10 @@ class Descent:
     searched: seconds of the last search between levels.
     """
 
-    norm: ClassVar[Norm] = 2
     better_field = staticmethod(better_field)
     forced = staticmethod(forced)
 
+    norm: Norm
     instance: Instance
     best: CrossField
     ends: Termination
@@ -146,8 +146,8 @@ class Descent:
     searched: float = 0.0
     began: float = 0.0
 
-    @classmethod
-    def first_field(cls, instance: Instance, start: CrossField | None, over: Over) -> CrossField:
+    @staticmethod
+    def first_field(instance: Instance, _norm: Norm, start: CrossField | None, over: Over) -> CrossField:
         """The best of the first field, the user's field and, in time, the PolyVector start, each improved."""
         return best_start(instance, start, over, polyvector_start)
 

@@ -1,4 +1,4 @@
-"""The lattice of a level: for every pixel the labels (alpha, beta) to which the bound rounds its cross.
+"""The lattice of a refinement level: for every pixel the labels (alpha, beta) to which its cross is rounded.
 
 Label (k, l) of pixel i stands at alpha_i + h (k + o_i), beta_i + h (l + o_i) round a centre (alpha_i,
 beta_i), which is the cross of the best field known. The offset o is 0 on black and 1/2 on white pixels of the

@@ -1,7 +1,8 @@
 """Compiled (min,+) products: of two matrices, and of labels with the part of a pair's cost in beta.
 
-In the 2-norm, the product over beta is the lower envelope of parabolas, which takes a time linear in their
-number: Felzenszwalb and Huttenlocher, Distance transforms of sampled functions, Theory of Computing 8 (2012).
+Products over beta are distance transforms, which take a time linear in the number of labels: in the 2-norm
+the lower envelope of parabolas, and for absolute values a sweep each way (Felzenszwalb and Huttenlocher,
+Distance transforms of sampled functions, Theory of Computing 8, 2012).
 """
 
 from __future__ import annotations
@@ -24,39 +25,6 @@ class RightMatrix(NamedTuple):
     rows: Floats
     least: Floats
     sums: Floats
-
-
-@compiled
-def right_matrix(rows: Floats) -> RightMatrix:
-    """The right matrix of a product."""
-    least = np.empty(rows.shape[0])
-    for y in range(least.size):
-        least[y] = least_value(rows[y])
-    return RightMatrix(rows, least, np.empty(least.size))
-
-
-@compiled
-def lower_row(target: Floats, left: Floats, terms: RightMatrix, first: int, begin: int) -> float:
-    """Lower the target to the least of left[y] + rows[first + y, begin:], without y that cannot lower it.
-
-    Returns the greatest that is left.
-    """
-    sums, end, reached = terms.sums, begin + target.size, _greatest_value(target)
-    lowest = _add_up(left, terms.least[first : first + left.size], sums)
-    if lowest >= reached:
-        return reached
-    best = 0
-    while sums[best] > lowest:
-        best += 1
-    near, far = max(best - _NEAR, 0), min(best + _NEAR + 1, left.size)
-    for y in range(near, far):
-        if sums[y] < np.inf:
-            _lower(target, terms.rows[first + y, begin:end], left[y])
-    reached = _greatest_value(target)
-    for y in range(left.size):
-        if sums[y] < reached and not near <= y < far:
-            _lower(target, terms.rows[first + y, begin:end], left[y])
-    return _greatest_value(target)
 
 
 @compiled
@@ -88,13 +56,6 @@ def min_plus(left: Floats, right: Floats) -> Floats:
 
     Four rows with four terms at a time, so that few numbers are loaded and stored.
     """
-    ends = np.zeros(left.shape[0], np.int64), np.full(left.shape[0], right.shape[1])
-    return min_plus_between(left, right, ends)
-
-
-@compiled
-def min_plus_between(left: Floats, right: Floats, ends: RowEnds) -> Floats:
-    """The (min,+) product of two matrices between the ends of each row; elsewhere too great or inf."""
     out = np.empty((left.shape[0], right.shape[1]))
     out[:] = np.inf
     rows, terms = left.shape
@@ -105,10 +66,9 @@ def min_plus_between(left: Floats, right: Floats, ends: RowEnds) -> Floats:
         return out
     for begin in range(0, rows, 4):
         row = min(begin, rows - 4)
-        low, high = int(ends[0][row : row + 4].min()), int(ends[1][row : row + 4].max())
         first, end = _finite_columns(left, row)
         for y in range(first, end, 4):
-            _lower_four(out, left, right, (row, min(y, terms - 4)), (low, low, high))
+            _lower_four(out, left, right, (row, min(y, terms - 4)), (0, 0, right.shape[1]))
     return out
 
 
@@ -135,24 +95,6 @@ def least_value(values: Floats) -> float:
     least = np.inf
     for x in range(values.size):
         least = min(least, values[x])
-    return least
-
-
-@compiled_in_any_order
-def _greatest_value(values: Floats) -> float:
-    most = -np.inf
-    for x in range(values.size):
-        most = max(most, values[x])
-    return most
-
-
-@compiled_in_any_order
-def _add_up(values: Floats, others: Floats, sums: Floats) -> float:
-    """Fill in the sums of two arrays; return the least."""
-    least = np.inf
-    for x in range(values.size):
-        sums[x] = values[x] + others[x]
-        least = min(least, sums[x])
     return least
 
 
@@ -252,12 +194,12 @@ def least_beta_cost(line_i: Line, line_j: Line, counts: tuple[int, int], power: 
 @compiled
 def fill_product_over_beta(labels: RaggedMatrix, line_i: Line, line_j: Line, power: int, out: Floats) -> None:
     """Fill in the least over y of labels[row, y] + 2 B^2 or 2 |B|, at betas x of one end."""
+    backwards, h = line_j[1] < 0, line_i[1]
+    first = line_j[0] + line_j[1] * (labels.values.shape[1] - 1) if backwards else line_j[0]
     if power == 2:
-        backwards = line_j[1] < 0
-        first = line_j[0] + line_j[1] * (labels.values.shape[1] - 1) if backwards else line_j[0]
-        _fill_over_squares(labels, (first - line_i[0]) / line_i[1], 2 * line_i[1] * line_i[1], backwards, out)
+        _fill_over_squares(labels, (first - line_i[0]) / h, 2 * h * h, backwards, out)
     else:
-        _fill_over_sizes(labels, line_i, line_j, out)
+        _fill_over_sizes(labels, (first - line_i[0]) / h, 2 * h, backwards, out)
 
 
 @compiled
@@ -315,15 +257,25 @@ def _fill_from_envelope(room: _Room, apart: float, weight: float, out: Floats) -
 
 
 @compiled
-def _fill_over_sizes(labels: RaggedMatrix, line_i: Line, line_j: Line, out: Floats) -> None:
-    """Fill in the least over y of labels[row, y] + 2 |x - y|."""
-    cost = np.empty((labels.values.shape[1], out.shape[1]))
-    for y in range(cost.shape[0]):
-        for x in range(cost.shape[1]):
-            cost[y, x] = 2 * abs(line_i[0] + line_i[1] * x - (line_j[0] + line_j[1] * y))
-    terms = right_matrix(cost)
+def _fill_over_sizes(labels: RaggedMatrix, apart: float, weight: float, backwards: bool, out: Floats) -> None:
+    """Fill in the least over y of labels[row, y] + weight |x - y - apart|, counting y backwards or not."""
+    columns, ends = labels.values.shape[1], labels.ends
+    values = np.empty(columns)
     for row in range(labels.values.shape[0]):
-        begin, end = labels.ends[0][row], labels.ends[1][row]
-        out[row] = np.inf
-        if begin < end:
-            lower_row(out[row], labels.values[row, begin:end], terms, begin, 0)
+        begin, end = ends[0][row], ends[1][row]
+        if backwards:
+            begin, end = columns - end, columns - begin
+        for y in range(begin, end):
+            values[y] = labels.values[row, columns - 1 - y if backwards else y]
+        y, least = begin, np.inf  # of those y that are not above x
+        for x in range(out.shape[1]):
+            while y < end and y + apart <= x:
+                least = min(least, values[y] - weight * (y + apart))
+                y += 1
+            out[row, x] = least + weight * x
+        y, least = end - 1, np.inf  # of those that are not below
+        for x in range(out.shape[1] - 1, -1, -1):
+            while y >= begin and y + apart >= x:
+                least = min(least, values[y] + weight * (y + apart))
+                y -= 1
+            out[row, x] = min(out[row, x], least - weight * x)

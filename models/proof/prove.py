@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from typing import Final
 
 from ..arguments import check_arguments, check_count
 from ..field.field import CrossField, Norm, check_norm, field_in_windows
@@ -16,15 +15,12 @@ from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
 from ..processes.process_groups import catch_interrupts
 from ..smooth.sparse_systems import one_thread
-from .absolute_descent import DescentIn1Norm, DescentInMixedNorm
+from .absolute_descent import AbsoluteDescent
 from .certificate import REFUSALS, check_proof
 from .compiling import compile_proofs
 from .descent import Descent, Termination
 from .record import Proof
 from .stroked import extended, restricted, stroked_parts
-
-DESCENTS: Final[dict[Norm, type[Descent]]] = {1: DescentIn1Norm, 2: Descent, "mixed": DescentInMixedNorm}
-"""The descent of a proof, by norm."""
 
 
 @check_arguments
@@ -113,8 +109,9 @@ def prove(
         compile_proofs(progress, over)
         began = time.monotonic()
         ends = Termination(Deadline.after(seconds, end.clock), over, chosen.gap, work or math.inf)
-        first = DESCENTS[norm].first_field(part, start, ends.over)
-        descent = DESCENTS[norm](part, first, ends, threads, seed, jobs, progress)
+        kind = Descent if norm == 2 else AbsoluteDescent
+        first = kind.first_field(part, norm, start, ends.over)
+        descent = kind(norm, part, first, ends, threads, seed, jobs, progress)
         proof = descent.proof(0.0, descent.run())
     field = extended(proof.field, instance)
     energy = field.energy(norm).total

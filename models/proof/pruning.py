@@ -1,4 +1,7 @@
-"""Pruning of a level: the cells that may hold crosses of fields of at most the energy U.
+"""Pruning of a refinement level: the cells that may hold crosses of fields of at most the energy U.
+
+Labels are excluded by lower bounds of their min-marginals, the least energy with one label fixed. A pixel's
+box is the bounding box of the cells that are left, as in branch and bound.
 
 1. After a forward pass (models/proof/dual.py), label x of pixel i survives where `bound` + theta_i(x) - min
    theta_i <= U + tolerance, and in two further tests where `bound` + the excess of a comb (combs.py) is.

@@ -1,4 +1,4 @@
-"""Windows narrowed by a certificate, in the labels of the instance's gauge."""
+"""Bounds tightening: the windows of all variables that a certificate leaves, in the instance's gauge."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def test_proofs_and_searches_begin_at_most_at_the_polyvector_start():
     instance = cf.sample("mouse", 16)
     polyvector = improved_field(polyvector_start(instance)).energy().total
     assert polyvector < first_field(instance).energy().total - 1e-3
-    assert Descent.first_field(instance, None, lambda: False).energy().total <= polyvector + 1e-9
+    assert Descent.first_field(instance, 2, None, lambda: False).energy().total <= polyvector + 1e-9
     assert cf.search(instance, rounds=0).field.energy().total <= polyvector + 1e-9
 
 
