@@ -235,12 +235,3 @@ def run(**more):
 def test_grades_follow_the_runs_on_an_entry(status, runs, tangent, grade):
     """The best point has the objective 1; a claim of an optimum counts with a bound that proves it."""
     assert difficulty(status, 1.0, runs, tangent=tangent) == grade
-
-
-@pytest.mark.slow
-def test_sidecars_tell_density_and_difficulty(searched):
-    entry = read_library(searched).entry(f"{STEM}_exact")
-    assert entry["density"] == round(entry["instance"]["strokes"] / entry["instance"]["pixels"], 4)
-    assert entry["difficulty"] == "hard"
-    assert read_library(searched).entry(f"{STEM}_qp")["difficulty"] == "easy"
-    assert read_library(searched).entry(f"{STEM}_printed_milp")["difficulty"] == "open"

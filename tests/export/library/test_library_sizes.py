@@ -9,7 +9,6 @@ from crossfield.export.library.building.build import build
 from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError
-from forging import seal
 from libraries import HEAD
 
 pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
@@ -54,15 +53,6 @@ def test_a_size_that_does_not_suit_is_skipped_with_a_message(spec, tmp_path, cap
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert invoke(["library", "build", str(spec), "-o", str(folder), "-q", "--jobs", "2"]) == 0
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-
-
-def test_an_instance_that_is_skipped_without_need_is_found(spec, tmp_path):
-    folder = build(read_spec(spec), tmp_path / "library").folder
-    path = folder / "library.json"
-    index = json.loads(path.read_text())
-    path.write_text(json.dumps(index | {"skipped": index["skipped"] | {"cf_mouse_n002": COARSE}}))
-    seal(folder)
-    assert [defect.file for defect in verify_library(folder)] == ["library.json"]
 
 
 def test_a_library_of_which_nothing_is_left_is_an_error(spec, tmp_path):
