@@ -31,8 +31,9 @@ class Format:
 
     degree: greatest degree of a polynomial it holds (99: any function); module: of its writer in this folder;
     dialects: named variants, the default first; has_start: whether it has a place for a starting point;
-    is_default: whether it is written when no format is requested; command: a line that solves {model} and
-    writes {answer}; answers: suffix of that answer, so that those of several formats differ.
+    is_default: whether it is written when no format is requested; has_constant_column: whether the constant
+    of the objective is the cost of the column fixed to 1; command: a line that solves {model} and writes
+    {answer}; answers: suffix of that answer, so that those of several formats differ.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Format:
     dialects: tuple[str, ...] = ("",)
     has_start: bool = False
     is_default: bool = True
+    has_constant_column: bool = False
     command: str = ""
     answers: str = ".sol"
 
@@ -79,19 +81,24 @@ FORMATS: Final = {
             command="gams {model} --RESULTS={answer}", answers=".csv",
         ),
         Format(
-            "lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, "lp",
+            "lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK",
+            2, "lp", has_constant_column=True,
             command='scip -c "read {model}" -c optimize -c "write solution {answer}" -c quit',
             answers=".lp.sol",
         ),
         Format(
             "mps", "free MPS with QUADOBJ and QCMATRIX, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK",
-            2, "mps", command="gurobi_cl ResultFile={answer} {model}", answers=".mps.sol",
+            2, "mps", has_constant_column=True,
+            command="gurobi_cl ResultFile={answer} {model}", answers=".mps.sol",
         ),
         Format(
             "mod", "AMPL model in the paper's notation with its data in a .dat; the linear ones for GLPK too",
             ANY_DEGREE, "ampl", is_default=False,
         ),
-        Format("osil", "OSiL, XML, for SCIP and Optimization Services", ANY_DEGREE, "osil", is_default=False),
+        Format(
+            "osil", "OSiL, XML, for SCIP and Optimization Services",
+            ANY_DEGREE, "osil", is_default=False, has_constant_column=True,
+        ),
         Format(
             "qplib", "QPLIB's own format, at most quadratic",
             2, "qplib", has_start=True, is_default=False,

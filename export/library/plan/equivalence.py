@@ -39,6 +39,6 @@ def format_notes(problem: Problem, name: str) -> list[str]:
         return []
     lifting = held.formulation.lifted
     notes = [f"lifted: {lifting}; the class there is {held.problem_class}"] if lifting else []
-    if name in {"lp", "mps", "osil"} and CanonicalForm(held).constant:
+    if FORMATS[name].has_constant_column and CanonicalForm(held).constant:
         notes.append("the constant of the objective is the cost of the column that is fixed to 1")
     return notes
