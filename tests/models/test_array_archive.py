@@ -52,8 +52,8 @@ def test_an_array_too_many_is_named(kind):
 
 def test_numbers_of_half_precision_are_whole_or_refused_without_a_warning(recwarn):
     given = np.array([[0, 0], [1, 1]], dtype=np.float16)
-    found = Instance("tiny", np.ones((2, 2), bool), given, [0.3, 1.2], [1.0, 0.5])
-    assert found.sha256 == INSTANCE.sha256
+    instance = Instance("tiny", np.ones((2, 2), bool), given, [0.3, 1.2], [1.0, 0.5])
+    assert instance.sha256 == INSTANCE.sha256
     with pytest.raises(InstanceError, match="whole numbers of 32 bits"):
         Instance("tiny", np.ones((2, 2), bool), given + np.float16(0.5), [0.3, 1.2], [1.0, 0.5])
     assert not list(recwarn)

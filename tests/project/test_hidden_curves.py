@@ -91,9 +91,9 @@ def test_crosses_at_random_are_22_and_a_half_degrees_off(study):
     for name in ("mouse", "singular", "bottle"):
         for hidden in study.hidden.hidden_curves(*traced(study, name), 4):
             angles += [hidden.deviation(at_random(hidden.rest, rng)) for _ in range(40)]
-    found = study.hidden.summary(np.degrees(angles))
-    assert found.count == len(angles) > 400
-    assert abs(found.mean - 22.5) < 4 * found.error < 1.5
+    summary = study.hidden.summary(np.degrees(angles))
+    assert summary.count == len(angles) > 400
+    assert abs(summary.mean - 22.5) < 4 * summary.error < 1.5
 
 
 def test_the_nearer_line_counts_whichever_it_is(study):
@@ -112,10 +112,10 @@ def test_hiding_changes_neither_the_mask_nor_the_other_strokes(study):
     for name in ("mouse", "ring", "saddle"):
         instance, curve = traced(study, name)
         strokes = strokes_of(instance)
-        found = study.hidden.hidden_curves(instance, curve, 100)
-        assert len(found) > 3
-        assert [len(each.stroke) for each in found] == sorted((len(h.stroke) for h in found), reverse=True)
-        for hidden in found:
+        curves = study.hidden.hidden_curves(instance, curve, 100)
+        assert len(curves) > 3
+        assert [len(each.stroke) for each in curves] == sorted((len(h.stroke) for h in curves), reverse=True)
+        for hidden in curves:
             rest = hidden.rest
             gone = {tuple(pixel) for pixel in instance.stroke_pixels[hidden.stroke].tolist()}
             assert np.array_equal(rest.mask, instance.mask)
@@ -123,7 +123,7 @@ def test_hiding_changes_neither_the_mask_nor_the_other_strokes(study):
             assert study.hidden.SHORTEST <= len(gone) <= study.hidden.MOST * len(strokes)
             assert (curve[hidden.stroke] == hidden.number).all()
         assert {each.number for each in study.hidden.hidden_curves(instance, curve, 2)} == {
-            h.number for h in found[:2]
+            h.number for h in curves[:2]
         }
 
 
@@ -143,8 +143,8 @@ def test_a_field_on_other_pixels_is_refused(study):
 
 
 def test_the_summary_of_some_angles(study):
-    found = study.hidden.summary(np.array([1.0, 2.0, 6.0]))
-    assert (found.count, found.mean, found.median) == (3, 3.0, 2.0)
-    assert found.error == pytest.approx(np.sqrt(7 / 3))
+    summary = study.hidden.summary(np.array([1.0, 2.0, 6.0]))
+    assert (summary.count, summary.mean, summary.median) == (3, 3.0, 2.0)
+    assert summary.error == pytest.approx(np.sqrt(7 / 3))
     assert study.hidden.summary(np.array([4.0])).error is None
     assert study.hidden.summary(np.array([])) is None

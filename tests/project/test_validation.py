@@ -38,13 +38,13 @@ def test_a_run_without_a_program_keeps_its_last_results(validate, tmp_path, monk
     read = Check("small qp-fixed", "a.lp", "gurobi", "read", Verdict.AGREES)
     solve = Check("small qp-fixed", "a.lp", "gurobi", "solve", Verdict.AGREES, objective=0.5, seconds=1.0)
     run = validate.Run("strokes", "hull", Verification(tmp_path, [read, solve], {"gurobi": "99.1"}))
-    kept = validate.update_record([run])
-    assert kept == json.loads(validate.RECORD.read_text())
-    assert kept["gurobi"]["version"] == "99.1"
-    assert kept["gurobi"]["files"] == [1, 0, 0]
-    assert kept["gurobi"]["routes"] == [["`qp-fixed`", "Gurobi", "lp", "0.500000000", "", "1.0", "optimal"]]
-    assert {**kept, "gurobi": before["gurobi"]} == before
-    table, *results = validate.licences(kept, run.result.versions)[1:]
+    record = validate.update_record([run])
+    assert record == json.loads(validate.RECORD.read_text())
+    assert record["gurobi"]["version"] == "99.1"
+    assert record["gurobi"]["files"] == [1, 0, 0]
+    assert record["gurobi"]["routes"] == [["`qp-fixed`", "Gurobi", "lp", "0.500000000", "", "1.0", "optimal"]]
+    assert {**record, "gurobi": before["gurobi"]} == before
+    table, *results = validate.licences(record, run.result.versions)[1:]
     assert f"| {before['gams']['date']} |" in table
     assert "BARON | gms" in results[1]
     assert "| Gurobi | lp" not in results[1]

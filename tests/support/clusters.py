@@ -20,9 +20,9 @@ def started(arguments, log, words, environment):
             stdout=stream, stderr=subprocess.STDOUT, env=os.environ | environment,
         )  # fmt: skip
     while True:
-        found = re.search(words, log.read_text("utf-8", "replace"))
-        if found:
-            return process, found
+        result = re.search(words, log.read_text("utf-8", "replace"))
+        if result:
+            return process, result
         assert process.poll() is None, log.read_text("utf-8", "replace")
         time.sleep(0.05)
 

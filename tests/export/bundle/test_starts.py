@@ -71,11 +71,11 @@ def test_cplex_takes_it(name: str, suffix: str, tmp_path: Path):
     assert read.MIP_starts.get_num() == 1
     read.parameters.mip.limits.solutions.set(1)
     read.solve()
-    found = re.search(
+    result = re.search(
         r"MIP start 'start' defined initial solution with objective (\S+)\.$", log.getvalue(), re.MULTILINE
     )
-    assert found, log.getvalue()
-    assert float(found[1]) == pytest.approx(objective, abs=1e-4)  # it prints four digits
+    assert result, log.getvalue()
+    assert float(result[1]) == pytest.approx(objective, abs=1e-4)  # it prints four digits
     assert read.solution.get_objective_value() == pytest.approx(objective, rel=1e-9)
 
 
@@ -93,9 +93,9 @@ def test_highs_takes_it(suffix: str, tmp_path: Path):
     assert highs.readSolution(str(start), 0) == highspy.HighsStatus.kOk
     highs.run()
     text = log.read_text()
-    found = re.search(r"MIP start solution is feasible[,:] objective value is (\S+)", text)
-    assert found, text
-    assert float(found[1]) == pytest.approx(objective, rel=1e-9)
+    result = re.search(r"MIP start solution is feasible[,:] objective value is (\S+)", text)
+    assert result, text
+    assert float(result[1]) == pytest.approx(objective, rel=1e-9)
     assert "WARNING" not in text
 
 

@@ -71,8 +71,8 @@ def test_certificates_are_checked(folder, capsys, tmp_path):
     folder, report = folder
     certificate = of(folder, "certificate.npz")
     assert invoke(["prove", "--check", str(certificate), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found.items() <= report.items()
+    document = json.loads(capsys.readouterr().out)
+    assert document.items() <= report.items()
     assert invoke(["prove", "--check", str(certificate)]) == 0
     assert "the certificate is valid" in capsys.readouterr().out
     command = [sys.executable, "-I", check_certificate.__file__, str(certificate)]

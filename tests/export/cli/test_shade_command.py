@@ -37,10 +37,10 @@ def test_a_sample_gets_its_field_and_its_surface(tmp_path, capsys):
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "field.npz"}
     assert report(tmp_path / "out")["method"] == "bend"
     field = cf.read_field(tmp_path / "out" / "field.npz")
-    found = cf.surface(field)
+    lifted = cf.surface(field)
     heights = np.load(tmp_path / "out" / "heights.npy")
-    assert np.array_equal(heights, found.heights, equal_nan=True)
-    cf.write_surface(found, tmp_path / "again", drawing="mouse", scale=4)
+    assert np.array_equal(heights, lifted.heights, equal_nan=True)
+    cf.write_surface(lifted, tmp_path / "again", drawing="mouse", scale=4)
     for name in set(FILES) - {"surface.json"}:
         assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "out" / name).read_bytes(), name
 

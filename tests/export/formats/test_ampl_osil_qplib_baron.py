@@ -218,9 +218,9 @@ def test_glpk_reads_the_linear_ampl_model_as_the_problem(
     problem = problem_of(label)
     write(problem, tmp_path / "model.mod")
     points = feasible_points(problem)
-    found = glpk_program.evaluate(tmp_path / "model.mod", points)
-    assert behaviour_difference(found, problem, points) == ""
-    assert found.integer.sum() == problem.integer.sum()
+    values = glpk_program.evaluate(tmp_path / "model.mod", points)
+    assert behaviour_difference(values, problem, points) == ""
+    assert values.integer.sum() == problem.integer.sum()
 
 
 @pytest.mark.needs("glpk")
@@ -258,9 +258,9 @@ def test_scip_reads_osil_as_the_problem(label: str, tmp_path: Path):
     problem = problem_of(label)
     write(problem, tmp_path / "model.osil")
     points = feasible_points(problem)
-    found = scip_program.evaluate(tmp_path / "model.osil", points)
-    assert behaviour_difference(found, problem, points) == ""
-    assert np.isfinite(found.objective[2:]).all()
+    values = scip_program.evaluate(tmp_path / "model.osil", points)
+    assert behaviour_difference(values, problem, points) == ""
+    assert np.isfinite(values.objective[2:]).all()
 
 
 def scip_optimum(path: Path) -> float:
@@ -304,15 +304,15 @@ def test_pyqplib_reads_the_problem(label: str, tmp_path: Path):
 
     problem = held(label, "qplib")
     (tmp_path / "model.qplib").write_text(without_names(written(problem_of(label), tmp_path / "model.qplib")))
-    found = pyqplib.read_problem(str(tmp_path / "model.qplib"))
+    model = pyqplib.read_problem(str(tmp_path / "model.qplib"))
     low, high = limits(problem)
-    np.testing.assert_array_equal([found.var_lb, found.var_ub], [problem.lower, problem.upper])
-    np.testing.assert_array_equal([kind.name != "CONTINUOUS" for kind in found.var_types], problem.integer)
-    np.testing.assert_array_equal([found.cons_lb, found.cons_ub], [low, high])
+    np.testing.assert_array_equal([model.var_lb, model.var_ub], [problem.lower, problem.upper])
+    np.testing.assert_array_equal([kind.name != "CONTINUOUS" for kind in model.var_types], problem.integer)
+    np.testing.assert_array_equal([model.cons_lb, model.cons_ub], [low, high])
     points = points_of(problem, 5)
     objective, rows = values_at(problem, points)
-    assert_values([found.obj_val(point) for point in points], objective)
-    assert_values([found.cons_val(point) for point in points], rows)
+    assert_values([model.obj_val(point) for point in points], objective)
+    assert_values([model.cons_val(point) for point in points], rows)
 
 
 @pytest.mark.parametrize("name", ["qplib", "bar"])

@@ -62,8 +62,8 @@ def test_gams_reads_the_problem(label: str, tmp_path: Path, monkeypatch: pytest.
     problem = problem_of(label)
     write(problem, tmp_path / "model.gms")
     points = random_points(problem)
-    found = gams_program.evaluate(tmp_path / "model.gms", points)
-    assert behaviour_difference(found, problem, points) == ""
+    values = gams_program.evaluate(tmp_path / "model.gms", points)
+    assert behaviour_difference(values, problem, points) == ""
 
 
 @needs_gams

@@ -92,9 +92,9 @@ def test_a_solver_is_chosen_that_reads_the_products(two):
 def test_verify_compares_optima_across_formats(written, two, tmp_path):
     """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, not another optimum."""
     write_all(two, tmp_path, formulations=["minlp-quartic"], formats=["nl", "mps"], options={"relax": True})
-    found = verify(tmp_path, seconds=4.0, programs=["scip", "highs"])
-    assert found.failed_checks == []
-    solves = {f.file.rpartition(".")[2]: f for f in found.checks if f.step == "solve" and f.objective}
+    verification = verify(tmp_path, seconds=4.0, programs=["scip", "highs"])
+    assert verification.failed_checks == []
+    solves = {f.file.rpartition(".")[2]: f for f in verification.checks if f.step == "solve" and f.objective}
     weak, whole = solves["mps"], solves["nl"]
     assert weak.relaxes == whole.group != weak.group
     assert weak.objective < whole.objective - 0.04

@@ -45,8 +45,8 @@ def test_casadi_sees_the_problem(label: str, tmp_path: Path):
     problem, field = problem_of(label), make_field(problem_of(label).instance)
     write(problem, tmp_path / "model.nl", start=field)
     points = random_points(problem, 20)
-    found = casadi_program.evaluate(tmp_path / "model.nl", points)
-    assert behaviour_difference(found, problem, points) == ""
+    values = casadi_program.evaluate(tmp_path / "model.nl", points)
+    assert behaviour_difference(values, problem, points) == ""
     start = by_casadi(tmp_path / "model.nl").start
     np.testing.assert_array_equal(start, problem.point(field)[NlOrder(problem).order])
 
@@ -88,8 +88,8 @@ def test_scip_sees_the_problem(label: str, binary: bool, tmp_path: Path):
     problem = problem_of(label)
     write(problem, tmp_path / "model.nl", dialect="binary" if binary else "text")
     points = random_points(problem, 2)
-    found = scip_program.evaluate(tmp_path / "model.nl", points)
-    assert behaviour_difference(found, problem, points) == ""
+    values = scip_program.evaluate(tmp_path / "model.nl", points)
+    assert behaviour_difference(values, problem, points) == ""
 
 
 # the header

@@ -20,7 +20,7 @@ def one_stroke(theta=1.0, w=1.0, **given):
 def refusals(instance, folder):
     """Reasons of writers to refuse an instance, except polynomials beyond a format's degree."""
     manifests = write_all(instance, folder, formats=ALL)
-    reasons = [reason for each in manifests for reason in each.document["refused"].values()]
+    reasons = [reason for manifest in manifests for reason in manifest.document["refused"].values()]
     return [reason for reason in reasons if "nothing beyond" not in reason]
 
 
@@ -38,7 +38,8 @@ def test_the_advice_of_a_writer_helps(given, better, tmp_path):
     reasons = refusals(one_stroke(**given), tmp_path / "refused")
     assert reasons
     assert all(
-        "nearly horizontal exactly 0" in each and "larger (0 removes a term)" in each for each in reasons
+        "nearly horizontal exactly 0" in reason and "larger (0 removes a term)" in reason
+        for reason in reasons
     )
     assert not any(map(SCALAR.search, reasons))
     assert refusals(one_stroke(**better), tmp_path / "written") == []

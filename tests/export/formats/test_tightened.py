@@ -103,8 +103,8 @@ def test_no_better_field_is_cut_off(gauge, least, tmp_path):
         best = optimum(instance).with_best_jumps()
         beta = np.clip(best.beta + np.random.default_rng(seed).normal(0, 0.02, 4), -np.pi / 4, np.pi / 4)
         best, worse = sorted((best, replace(best, beta=beta)), key=lambda field: field.energy().total)
-        found = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
-        narrow = with_windows(formulate(instance, "minlp-parity"), remaining_windows(found))
+        certificate = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
+        narrow = with_windows(formulate(instance, "minlp-parity"), remaining_windows(certificate))
         assert narrow.violation(narrow.point(best)).worst < 1e-9
         plain = formulate(instance, "minlp-parity")
         checked += (narrow.upper - narrow.lower).sum() < 0.9 * (plain.upper - plain.lower).sum()

@@ -72,11 +72,11 @@ def test_objective_and_violations_are_those_of_the_problem(case, tmp_path):
     problem = problem_in_format(problem_of(case), FORMATS["mps"])
     write(problem_of(case), tmp_path / "m.mps.gz")
     for point in points_of(problem, count=2):
-        found = check(str(tmp_path / "m.mps.gz"), save_point(tmp_path / "p.sol", problem, point))
+        verdict = check(str(tmp_path / "m.mps.gz"), save_point(tmp_path / "p.sol", problem, point))
         ours, objective = problem.violation(point), problem.objective_value(point)
-        assert float(found.objective) == pytest.approx(objective, rel=1e-11, abs=1e-11)
+        assert float(verdict.objective) == pytest.approx(objective, rel=1e-11, abs=1e-11)
         for kind, value in (("bounds", ours.bounds), ("rows", ours.rows), ("integers", ours.integrality)):
-            assert float(found.violations[kind][0]) == pytest.approx(value, rel=1e-11, abs=1e-11)
+            assert float(verdict.violations[kind][0]) == pytest.approx(value, rel=1e-11, abs=1e-11)
 
 
 @for_each("name", [name for name in FORMULATIONS if name != "minlp-parity"])
@@ -85,15 +85,15 @@ def test_the_complete_point_of_a_field_is_feasible_also_without_its_zeros(name, 
     whole = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
     problem = problem_in_format(whole, FORMATS["mps"])
     write(whole, tmp_path / "m.mps")
-    found = check(
+    verdict = check(
         str(tmp_path / "m.mps"), save_point(tmp_path / "p.sol", problem, problem.point(field), zeros=False)
     )
-    assert found.worst < 1e-14
+    assert verdict.worst < 1e-14
     norm = 2 if problem.formulation.objective[0].expression.free_symbols and "l1" not in name else 1
     if name in {"minlp-quartic", "minlp-cubic", "miqp-exact", "qp-fixed"}:
-        assert float(label(found, "objective")) == pytest.approx(field.energy(norm).total, rel=1e-12)
+        assert float(label(verdict, "objective")) == pytest.approx(field.energy(norm).total, rel=1e-12)
     if name in {"milp-mccormick", "miqcp-bilinear-l1"}:
-        assert float(label(found, "objective")) == pytest.approx(field.energy(1).total, rel=1e-12)
+        assert float(label(verdict, "objective")) == pytest.approx(field.energy(1).total, rel=1e-12)
 
 
 @for_each("gauge", ["strokes", "box"])
@@ -103,11 +103,13 @@ def test_energies_of_an_instance_are_those_of_its_field(gauge, shape, tmp_path):
     write_instance(field.instance, tmp_path / "i.json")
     for name in ("minlp-parity", "milp-mccormick"):
         problem = formulate(field.instance, name)
-        found = check(str(tmp_path / "i.json"), save_point(tmp_path / "p.sol", problem, problem.point(field)))
-        said = [float(label(found, kind)) for kind in ("2-norm", "1-norm")]
+        verdict = check(
+            str(tmp_path / "i.json"), save_point(tmp_path / "p.sol", problem, problem.point(field))
+        )
+        said = [float(label(verdict, kind)) for kind in ("2-norm", "1-norm")]
         expected = [field.energy().total, field.energy(1).total]
         assert said == pytest.approx(expected, rel=1e-12, abs=1e-12)
-        assert found.worst < 1e-15
+        assert verdict.worst < 1e-15
 
 
 def test_integers_that_are_not_quite_whole_count_as_they_are(tmp_path):
@@ -151,9 +153,9 @@ def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_pat
     kind = file.split("_")[1]
     name = {"milp": "milp-mccormick", "qp": "qp-fixed", "quartic": "minlp-quartic"}[kind]
     write(formulate(tiny, name, p=np.array([0, 0, -1, 0]) if kind == "qp" else None), tmp_path / "m.mps")
-    found = check(str(tmp_path / "m.mps"), str(SOLUTIONS / file))
-    assert found.worst < 1e-5
-    assert float(label(found, "claimed").rsplit(" ", 1)[1].rstrip(")")) < 1e-6
+    verdict = check(str(tmp_path / "m.mps"), str(SOLUTIONS / file))
+    assert verdict.worst < 1e-5
+    assert float(label(verdict, "claimed").rsplit(" ", 1)[1].rstrip(")")) < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -215,12 +217,12 @@ def test_two_pixels_by_hand(tmp_path):
     """
     (tmp_path / "i.json").write_text(json.dumps(PAIR))
     (tmp_path / "p.sol").write_text(BY_HAND)
-    found = check(str(tmp_path / "i.json"), str(tmp_path / "p.sol"))
+    verdict = check(str(tmp_path / "i.json"), str(tmp_path / "p.sol"))
     squares = 2 * ((0.2 + math.pi / 2) ** 2 + 0.01) + 0.5 * 0.09 + 0.5 * 0.05
     absolute = 2 * (0.2 + math.pi / 2 + 0.1) + 0.5 * 0.3 + 0.5 * 0.3
-    assert float(label(found, "2-norm").split()[0]) == pytest.approx(squares, rel=1e-15)
-    assert float(label(found, "1-norm").split()[0]) == pytest.approx(absolute, rel=1e-15)
-    assert found.worst == 0
+    assert float(label(verdict, "2-norm").split()[0]) == pytest.approx(squares, rel=1e-15)
+    assert float(label(verdict, "1-norm").split()[0]) == pytest.approx(absolute, rel=1e-15)
+    assert verdict.worst == 0
 
 
 EVERYTHING = """* every section
@@ -298,9 +300,9 @@ def test_nothing_is_lost_to_rounding(tmp_path):
     columns = "x obj 1e16 c 1\n y obj 1\n z obj -1e16"
     (tmp_path / "m.mps").write_text(linear(columns, "FR B x\n FR B y\n FR B z"))
     (tmp_path / "p").write_text("x 1.0000000000000000000000000000000000000001\ny 1\nz 1\n")
-    found = check(str(tmp_path / "m.mps"), str(tmp_path / "p"))
-    assert Fraction(found.objective) == 1 + Fraction(10**16, 10**40)
-    assert Fraction(found.violations["rows"][0]) == Fraction(1, 10**40)
+    verdict = check(str(tmp_path / "m.mps"), str(tmp_path / "p"))
+    assert Fraction(verdict.objective) == 1 + Fraction(10**16, 10**40)
+    assert Fraction(verdict.violations["rows"][0]) == Fraction(1, 10**40)
 
 
 def test_columns_left_out_are_zero_or_what_they_are_fixed_to_and_those_that_solvers_add_are_passed_over(
@@ -308,10 +310,10 @@ def test_columns_left_out_are_zero_or_what_they_are_fixed_to_and_those_that_solv
 ):
     (tmp_path / "m.mps").write_text(linear("x obj 1 c 1\n ONE obj 2.5", "FR B x\n FX B ONE 1"))
     (tmp_path / "p").write_text("nlobjvar 17\n")
-    found = check(str(tmp_path / "m.mps"), str(tmp_path / "p"))
-    assert label(found, "objective") == "2.5"
-    assert label(found, "point") == "0 values, 2 columns left out, 1 that a solver added passed over"
-    assert found.worst == 0
+    verdict = check(str(tmp_path / "m.mps"), str(tmp_path / "p"))
+    assert label(verdict, "objective") == "2.5"
+    assert label(verdict, "point") == "0 values, 2 columns left out, 1 that a solver added passed over"
+    assert verdict.worst == 0
 
 
 # as a program

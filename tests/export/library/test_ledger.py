@@ -51,7 +51,9 @@ def test_every_shipped_record_counts_and_contradicts_nothing():
     """Each record is about a problem of today, its bound lies below its point, and its field is as stated."""
     spec = default_spec()
     ledger, points = read_ledger(spec.ledger.parent, spec.ledger.name), read_points(spec.points)
-    recipes = {entry.name: (each.recipe, entry) for each in plan_library(spec) for entry in each.entries}
+    recipes = {
+        entry.name: (planned.recipe, entry) for planned in plan_library(spec) for entry in planned.entries
+    }
     instances = {}
     for record in ledger.records:
         recipe, entry = recipes[record.entry]

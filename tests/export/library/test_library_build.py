@@ -106,9 +106,9 @@ def copy(built, tmp_path):
 
 def by_formulation(library, instance, facet="hull"):
     return {
-        each["formulation"]: each
-        for each in library.entries
-        if each["instance"]["file"] == f"{instance}.instance.json" and each["options"]["facet"] == facet
+        entry["formulation"]: entry
+        for entry in library.entries
+        if entry["instance"]["file"] == f"{instance}.instance.json" and entry["options"]["facet"] == facet
     }
 
 
@@ -218,7 +218,7 @@ def test_the_library_is_flat_and_sha256sums_lists_all_but_itself(built):
 
 
 def test_every_wanted_entry_is_there_in_every_format_or_refused(built):
-    printed = sum("facet" in each.option_names for each in FORMULATIONS.values())
+    printed = sum("facet" in formulation.option_names for formulation in FORMULATIONS.values())
     assert len(built.entries) == 2 * (len(FORMULATIONS) + printed) + len(FORMULATIONS)
     for document in built.entries:
         wanted = {"nl", "gms", "lp", "mps"} if document["rung"] == "tiny" else {"nl", "mps"}
@@ -238,7 +238,9 @@ def test_every_wanted_entry_is_there_in_every_format_or_refused(built):
 def test_the_instance_file_is_the_instance_of_the_drawing(built, spec):
     document = built.entry("cf_own_n004_milp")
     instance = read_instance(built.folder / document["instance"]["file"])
-    (wanted,) = (each.recipe for each in plan_library(read_spec(spec)) if each.recipe.name == "cf_own_n004")
+    (wanted,) = (
+        planned.recipe for planned in plan_library(read_spec(spec)) if planned.recipe.name == "cf_own_n004"
+    )
     assert instance.sha256 == document["instance"]["sha256"] == make_instance(wanted).sha256
     assert (document["source"]["sketch"], document["source"]["kind"]) == ("drawn by hand.svg", "file")
     assert (built.folder / "cf_own.sketch.svg").read_bytes() == svg_of_curves(
@@ -325,9 +327,9 @@ def test_points_are_feasible_beyond_the_tolerance_of_minlplib(built):
     for document in built.entries:
         assert document["best"]["violation"] <= 1e-12
         assert document["best"]["integrality"] == 0.0
-        found = read_solution(built.folder / document["best"]["point"], problem_of(built, document))
-        assert found.objective == pytest.approx(document["best"]["objective"], rel=1e-9, abs=1e-12)
-        assert found.unknown == 0
+        solution = read_solution(built.folder / document["best"]["point"], problem_of(built, document))
+        assert solution.objective == pytest.approx(document["best"]["objective"], rel=1e-9, abs=1e-12)
+        assert solution.unknown == 0
 
 
 def test_formulations_of_one_optimum_have_points_of_one_objective(built):

@@ -130,6 +130,6 @@ def test_points_with_a_damaged_document_are_refused(lib, change_it, words):
 
 def test_a_rung_may_do_without(tmp_path):
     spec = spec_of(tmp_path, SPEC.replace("[3]", "[3]\nprove = false"))
-    assert not any(each.recipe.prove for each in plan_library(spec))
+    assert not any(planned.recipe.prove for planned in plan_library(spec))
     for each in plan_library(default_spec()):
         assert each.recipe.prove == (NORMS if each.recipe.gauge == "strokes" else ())

@@ -63,19 +63,19 @@ def test_a_table_is_read_as_it_was_written(built):
 
 
 def test_the_metadata_describe_the_table(built):
-    found = json.loads((built.folder / CROISSANT).read_text())
-    (file,) = found["distribution"]
-    (records,) = found["recordSet"]
-    assert found["conformsTo"] == "http://mlcommons.org/croissant/1.1"
-    assert found["datePublished"] == "2026-11-22"
-    assert found["license"] == ["https://spdx.org/licenses/CC-BY-4.0.html"]
+    document = json.loads((built.folder / CROISSANT).read_text())
+    (file,) = document["distribution"]
+    (records,) = document["recordSet"]
+    assert document["conformsTo"] == "http://mlcommons.org/croissant/1.1"
+    assert document["datePublished"] == "2026-11-22"
+    assert document["license"] == ["https://spdx.org/licenses/CC-BY-4.0.html"]
     assert file["sha256"] == hashlib.sha256((built.folder / TABLE).read_bytes()).hexdigest()
     assert [each["source"]["extract"]["column"] for each in records["field"]] == list(COLUMNS)
 
 
 def test_a_library_without_a_release_states_no_version():
-    found = json.loads(croissant(replace(default_spec(), release=None), b""))
-    assert not found.keys() & {"version", "datePublished", "creator"}
+    document = json.loads(croissant(replace(default_spec(), release=None), b""))
+    assert not document.keys() & {"version", "datePublished", "creator"}
 
 
 @pytest.mark.needs("mlcroissant")

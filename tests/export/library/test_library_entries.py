@@ -22,9 +22,9 @@ REMEDY = "build `default` and copy its entries.csv to export/library/plan/entrie
 def built(tmp_path_factory):
     """A part of the library that ships, built; not to be changed."""
     spec = default_spec()
-    sketches = tuple(each for each in spec.sketches if each.name == "cyl")
-    rungs = tuple(replace(each, gauges=("strokes",)) for each in spec.rungs if each.name == "tiny")
-    sketches = tuple(replace(each, rungs=("tiny",), sizes=each.sizes[:1]) for each in sketches)
+    sketches = tuple(sketch for sketch in spec.sketches if sketch.name == "cyl")
+    rungs = tuple(replace(rung, gauges=("strokes",)) for rung in spec.rungs if rung.name == "tiny")
+    sketches = tuple(replace(sketch, rungs=("tiny",), sizes=sketch.sizes[:1]) for sketch in sketches)
     return build(replace(spec, sketches=sketches, rungs=rungs), tmp_path_factory.mktemp("built") / "library")
 
 
@@ -49,8 +49,8 @@ def test_the_table_that_ships_has_the_rows_of_a_build(built):
 
 @pytest.mark.slow
 def test_the_table_that_ships_is_that_of_a_build(tmp_path):
-    made = build(default_spec(), tmp_path / "library", jobs=2)
-    assert (made.folder / TABLE).read_bytes() == SHIPPED.read_bytes(), REMEDY
+    library = build(default_spec(), tmp_path / "library", jobs=2)
+    assert (library.folder / TABLE).read_bytes() == SHIPPED.read_bytes(), REMEDY
 
 
 def test_the_facts_are_those_of_the_sidecars(built):
@@ -71,11 +71,11 @@ def test_the_facts_are_those_of_the_sidecars(built):
 def test_model_files_have_the_bytes_of_a_build(built, tmp_path):
     chosen = [cf.entry(name) for name in built.document["entries"]]
     written = write_entries(tmp_path, chosen)
-    assert written == {each["name"]: set_of(each) for each in built.entries}
+    assert written == {entry["name"]: set_of(entry) for entry in built.entries}
     assert {path.name for path in tmp_path.iterdir()} == {
         name for names in written.values() for name in names
     }
-    for name in {name for each in built.entries for name in models_of(each)}:
+    for name in {name for entry in built.entries for name in models_of(entry)}:
         assert (tmp_path / name).read_bytes() == (built.folder / name).read_bytes()
 
 
@@ -116,7 +116,7 @@ def test_a_proof_finds_no_better_point_than_the_known_one():
 
 
 def test_a_rung_selects_entries():
-    assert {each.facts["rung"] for each in cf.entries(rung="tiny")} == {"tiny"}
+    assert {entry.facts["rung"] for entry in cf.entries(rung="tiny")} == {"tiny"}
 
 
 @for_each(

@@ -113,7 +113,7 @@ def test_a_bad_family_is_named_with_its_place_and_remedy(tmp_path, case):
 
 def test_a_family_that_states_nothing_more_has_the_recipes_of_before():
     """Digests of recipes are in every document, so a new key there would change files that exist."""
-    found = [each.recipe.document() for each in plan_library(default_spec())]
+    found = [planned.recipe.document() for planned in plan_library(default_spec())]
     assert {key for document in found for key in document} == {
         *("name", "sketch", "rung", "size", "seed", "gauge", "prove", "added")
     }
@@ -139,7 +139,7 @@ def test_a_split_holds_all_formulations_and_gauges_of_a_seed(built):
 
 
 def test_proven_points_are_optimal_under_the_gauge_strokes(built):
-    exact = [each for each in built.entries if each["formulation"] == "miqp-exact"]
+    exact = [entry for entry in built.entries if entry["formulation"] == "miqp-exact"]
     assert {(each["source"]["gauge"], each["status"]) for each in exact} == {
         ("strokes", "optimal"),
         ("box", "best known"),
@@ -153,8 +153,8 @@ def test_less_work_gives_the_same_instances_and_points_of_no_lower_energy(built,
     for points in ("none", "greedy"):
         (sketch,) = spec.sketches
         less = build(replace(spec, sketches=(replace(sketch, points=points),)), tmp_path / points)
-        assert {each["status"] for each in less.entries} == {"best known"}
-        assert {each["best"]["solver"] for each in less.entries} == {
+        assert {entry["status"] for entry in less.entries} == {"best known"}
+        assert {entry["best"]["solver"] for entry in less.entries} == {
             {"none": "crossfield (nearest stroke)", "greedy": "crossfield (greedy)"}[points]
         }
         names = [f"cf_fam_n003_s{seed}" for seed in range(3, 6)]

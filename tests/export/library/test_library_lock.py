@@ -142,9 +142,9 @@ def test_a_build_that_is_refused_leaves_nothing(tmp_path):
 def test_a_ledger_is_merged_before_it_is_written(lib, record, field, tmp_path):
     kept = add_record(lib, record, field)
     (tmp_path / "new").mkdir()
-    found = merge_ledgers(tmp_path / "new", read_ledger(lib), [record.entry], [])
+    ledger = merge_ledgers(tmp_path / "new", read_ledger(lib), [record.entry], [])
     assert list((tmp_path / "new").iterdir()) == []
-    assert found.read_field(kept).instance.sha256 == field.instance.sha256
-    write_ledger(found)
+    assert ledger.read_field(kept).instance.sha256 == field.instance.sha256
+    write_ledger(ledger)
     assert read_ledger(tmp_path / "new").records == (kept,)
     assert (tmp_path / "new" / kept.point).read_bytes() == (lib / kept.point).read_bytes()

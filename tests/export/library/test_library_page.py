@@ -27,9 +27,9 @@ def test_the_query_of_the_page_finds_entries():
         database.executemany(f"insert into entries values ({', '.join('?' * len(head))})", rows)
         names = [name for (name,) in database.execute(query)]
     assert names == [
-        each.name
-        for each in cf.entries()
-        if each.facts["formulation"] == "miqp-exact" and each.facts["pairs"] < 30
+        entry.name
+        for entry in cf.entries()
+        if entry.facts["formulation"] == "miqp-exact" and entry.facts["pairs"] < 30
     ]
 
 

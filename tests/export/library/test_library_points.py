@@ -133,7 +133,7 @@ def test_a_build_with_points_searches_for_nothing(searched, tmp_path):
     (known / f"{STEM}.about.json").write_text(json.dumps(about))
     made = library_of(tmp_path, 'points = "known"\n' + SPEC).folder
     fields = read_about(made / f"{SADDLE}.about.json")["fields"]
-    assert {each["energy_2norm"] for each in fields.values()} == {poor}
+    assert {field["energy_2norm"] for field in fields.values()} == {poor}
     assert read_library(made).entry(f"{STEM}_exact")["bounds"] == []
 
 
@@ -195,18 +195,18 @@ def test_the_points_that_ship_are_about_the_shipped_instances():
     spec = default_spec()
     assert sum(path.stat().st_size for path in spec.points.iterdir()) < 12_000_000
     points = read_points(spec.points)
-    for each in plan_library(spec):
-        given = points(each.recipe.name)
-        assert given.instance == make_instance(each.recipe).sha256
+    for planned in plan_library(spec):
+        given = points(planned.recipe.name)
+        assert given.instance == make_instance(planned.recipe).sha256
         for role in ROLES:
             field, facts = given.field(role).field, given.about["fields"][role]
             assert field.instance.sha256 == given.instance
             for norm in NORMS:
                 assert field.energy(norm).total == facts[f"energy_{norm}norm"]
-        certificates = given.certificates(make_instance(each.recipe), NORMS)
+        certificates = given.certificates(make_instance(planned.recipe), NORMS)
         assert all(found.facts["status"] == "optimal" for found in certificates)
-        if each.recipe.rung in {"tiny", "small"}:
-            assert tuple(found.norm for found in certificates) == each.recipe.prove
+        if planned.recipe.rung in {"tiny", "small"}:
+            assert tuple(found.norm for found in certificates) == planned.recipe.prove
 
 
 # Grades

@@ -64,17 +64,17 @@ def texts(library):
 
 @pytest.mark.slow
 def test_every_sketch_keeps_its_own_licence(mixed):
-    origins = {each["family"]: each.get("origin") for each in mixed.entries}
+    origins = {entry["family"]: entry.get("origin") for entry in mixed.entries}
     assert origins == {
         "mouse": {"author": "The crossfield authors", "license": "CC-BY-4.0", "source": "a built-in sample"},
         "hers": {"author": "A. Name", "license": "CC-BY-NC-4.0"},
         "found": None,
     }
-    assert [each["licence"] for each in mixed.entries] == ["CC-BY-4.0", "CC-BY-NC-4.0", None]
-    assert [each.get("added") for each in mixed.entries] == ["2026-02-03", None, None]
+    assert [entry["licence"] for entry in mixed.entries] == ["CC-BY-4.0", "CC-BY-NC-4.0", None]
+    assert [entry.get("added") for entry in mixed.entries] == ["2026-02-03", None, None]
     about = json.loads((mixed.folder / "cf_hers_n004.about.json").read_text())
     assert about["origin"] == origins["hers"]
-    assert all(each["references"] == list(REFERENCES) for each in mixed.entries)
+    assert all(entry["references"] == list(REFERENCES) for entry in mixed.entries)
     licence = texts(mixed)["LICENSE"]
     assert "- mouse: CC-BY-4.0; author: The crossfield authors; source: a built-in sample\n" in licence
     assert "- hers: CC-BY-NC-4.0; author: A. Name\n" in licence

@@ -291,14 +291,14 @@ def test_texts_of_files_are_escaped_everywhere(other_library, tmp_path):
 
 def test_every_internal_link_leads_somewhere_and_only_anchors_lead_out(site, pages):
     for name, page in pages.items():
-        targets = [each["href"] for each in page.all("a", "link")] + [
-            each["src"] for each in page.all("img", "script")
+        targets = [anchor["href"] for anchor in page.all("a", "link")] + [
+            image["src"] for image in page.all("img", "script")
         ]
         for target in targets:
             parts = urlsplit(target)
             if parts.scheme:
                 assert parts.scheme == "https"
-                assert target in [each["href"] for each in page.all("a")]
+                assert target in [anchor["href"] for anchor in page.all("a")]
                 continue
             path = (site / name).parent / unquote(parts.path) if parts.path else site / name
             assert path.resolve().is_relative_to(site)
@@ -324,10 +324,10 @@ def test_pages_are_well_formed_and_accessible(pages):
             == 1
         )
         assert len(set(page.ids)) == len(page.ids)
-        assert all("alt" in each for each in page.all("img"))
+        assert all("alt" in image for image in page.all("img"))
         assert len(page.all("caption")) == len(page.all("table"))
         assert all(each.get("scope") for each in page.all("th"))
-        assert all(each.get("aria-label") for each in page.all("nav"))
+        assert all(nav.get("aria-label") for nav in page.all("nav"))
         assert all(
             {"aria-label", "aria-labelledby"} & set(each)
             for _, each in page.elements
@@ -357,7 +357,7 @@ def test_an_entry_shows_its_sidecar(library, site, pages):
         assert {each for each in wanted if each not in texts} == set()
         source = "\n".join(text for _, text in page.texts)
         assert latex(problem_of(library, entry).formulation) in source
-        download = [each["href"] for each in page.all("a") if "download" in each]
+        download = [anchor["href"] for anchor in page.all("a") if "download" in anchor]
         assert {f"../files/{file['name']}" for file in entry["files"]} <= set(download)
 
 
@@ -635,7 +635,7 @@ def test_the_filtered_entries_are_downloaded_as_one_archive(browser, address, li
     wanted = set()
     for entry in ("cf_mouse_n006_milp", "cf_rand_n006_s1_milp"):
         sidecar = library.entry(entry)
-        wanted |= {f"{entry}.json", sidecar["instance"]["file"], *(each["name"] for each in sidecar["files"])}
+        wanted |= {f"{entry}.json", sidecar["instance"]["file"], *(file["name"] for file in sidecar["files"])}
     assert files == {each: (library.folder / each).read_bytes() for each in wanted}
 
 

@@ -55,9 +55,9 @@ def lib(built, tmp_path):
 
 def test_a_published_sketch_has_its_strokes_and_nothing_else_of_its_file(built):
     assert (built / "cf_evil.sketch.svg").read_text() == SHOWN
-    found = read_instance(built / "cf_evil_n008.instance.json")
+    instance = read_instance(built / "cf_evil_n008.instance.json")
     wanted = read(HOSTILE, 8, "evil.html")
-    assert (found.theta.tolist(), found.w.tolist()) == (wanted.theta.tolist(), wanted.w.tolist())
+    assert (instance.theta.tolist(), instance.w.tolist()) == (wanted.theta.tolist(), wanted.w.tolist())
     assert verify_library(built) == []
     for path in built.iterdir():
         for word in (b"evil.example", b"alert", b"evil title", b"foreignObject"):

@@ -33,8 +33,8 @@ def differentiated(problem, path):
     found = both(rng.normal(size=x.shape[0]), rng.normal(size=g.shape[0]))
     jacobian, second = (np.array(ca.DM(part)) for part in found)
     layout = CanonicalForm(problem).nl_order
-    starts = dict(zip(layout.rows, np.cumsum([0, *(each.count for each in layout.rows)]), strict=False))
-    rows = [starts[each] + at for each in problem.rows for at in range(each.count)]
+    starts = dict(zip(layout.rows, np.cumsum([0, *(family.count for family in layout.rows)]), strict=False))
+    rows = [starts[family] + at for family in problem.rows for at in range(family.count)]
     return jacobian[rows][:, layout.place], second[layout.place][:, layout.place]
 
 
@@ -59,9 +59,9 @@ def test_blocks_are_the_columns_that_no_entry_joins():
     sizes = sorted(
         len(set(rows)) for rows in {tuple(np.flatnonzero(row)) for row in joined[held.any(axis=1)]}
     )
-    found = hessian_blocks(hessian_pattern(problem))
-    assert found["average"] == sum(sizes) / len(sizes)
-    assert (found["count"], found["least"], found["greatest"]) == (len(sizes), sizes[0], sizes[-1])
+    blocks = hessian_blocks(hessian_pattern(problem))
+    assert blocks["average"] == sum(sizes) / len(sizes)
+    assert (blocks["count"], blocks["least"], blocks["greatest"]) == (len(sizes), sizes[0], sizes[-1])
     assert problem_counts(problem)["nonlinear_variables"] == sum(sizes)
 
 

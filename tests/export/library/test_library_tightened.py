@@ -59,7 +59,7 @@ def test_it_has_the_optimum_of_its_plain_entry_and_names_its_certificate(built):
         assert (narrow["status"], narrow["solved"]["by"]) == ("optimal", "certificate")
         stated = narrow["tightened"]
         assert (stated["certificate"], stated["plain"]) == (file, plain["name"])
-        assert plain["name"] in [each["entry"] for each in narrow["equivalent"]]
+        assert plain["name"] in [relation["entry"] for relation in narrow["equivalent"]]
         assert "tightened" not in plain
         windows = [problem_of(built, each).blocks["alpha"] for each in (narrow, plain)]
         width = [(block.upper - block.lower).sum() for block in windows]
@@ -87,8 +87,8 @@ def test_it_has_the_bytes_of_an_export_with_the_certificate(built, tmp_path, tok
 )
 def test_a_solver_finds_the_proven_optimum(built, token, solver):
     sidecar = built.entry(f"{STEM}_{token}_tight")
-    found = cf.solve(problem_of(built, sidecar), solver)
-    assert found.objective == pytest.approx(sidecar["best"]["objective"], abs=1e-6)
+    solution = cf.solve(problem_of(built, sidecar), solver)
+    assert solution.objective == pytest.approx(sidecar["best"]["objective"], abs=1e-6)
 
 
 def test_an_entry_without_a_certificate_is_skipped_with_its_reason(tmp_path):

@@ -88,7 +88,7 @@ def test_three_known_programs_of_different_makers_solve_an_entry_and_those_like_
     sidecar = read_sidecar(lib / f"{MILP}.json")
     assert (sidecar["status"], sidecar["solved"]["by"]) == ("optimal", "agreement")
     programs = sidecar["solved"]["programs"]
-    assert [each["solver"] for each in programs] == ["Bonmin", "CBC", "Gurobi", "HiGHS"]
+    assert [program["solver"] for program in programs] == ["Bonmin", "CBC", "Gurobi", "HiGHS"]
     assert programs[2]["via"] == BILINEAR
     assert f"=opt= {BILINEAR} " in (lib / "library.solu").read_text()
     assert verify_library(lib) == []
@@ -99,7 +99,7 @@ def test_a_bound_of_another_problem_is_never_taken(lib):
     for record in (other, record_of(lib, "Any", bound=0.001, status="limit")):
         add_record(lib, record)
     after = rebuild(lib).entry(MILP)
-    assert [each["bound"] for each in after["bounds"]] == [0.001]
+    assert [bound["bound"] for bound in after["bounds"]] == [0.001]
     assert after["status"] == "best known"
     assert len(read_ledger(lib).records) == 2
 
@@ -115,7 +115,7 @@ def test_a_bound_above_the_point_is_cut_or_refused(above, error, lib):
         assert f"has the bound {best + above!r}" in found["ledger.json"]
         return
     again = rebuild(lib).entry(MILP)
-    assert again["bound"] == best == max(each["bound"] for each in again["bounds"])
+    assert again["bound"] == best == max(bound["bound"] for bound in again["bounds"])
     assert (again["status"], again["gap"]) == ("claimed", 0.0)
     assert again["claimed"] == [{"solver": "S", "version": "1"}]
     assert verify_library(lib) == []
@@ -140,7 +140,7 @@ def test_measured_bounds_above_a_point_found_later_are_dropped_and_others_stay(l
 def test_solving_proves_optima_and_equivalent_entries_share_their_bounds(copy):
     assert "=opt= cf_a_n003_milp" not in (copy / "library.solu").read_text()
     records = solve_library(copy, solvers=["highs"], time_limit=250.0)
-    assert [(each["entry"], each["status"]) for each in records] == [
+    assert [(record["entry"], record["status"]) for record in records] == [
         ("cf_a_n003_milp", "optimal"),
         ("cf_a_n003_qp", "optimal"),
     ]
@@ -153,7 +153,7 @@ def test_solving_proves_optima_and_equivalent_entries_share_their_bounds(copy):
     solu = (copy / "library.solu").read_text().splitlines()
     tags = {"optimal": "=opt=", "claimed": "=best="}
     optima = [
-        f"{tags[each['status']]} {each['name']} {each['best']['objective']!r}" for each in library.entries
+        f"{tags[entry['status']]} {entry['name']} {entry['best']['objective']!r}" for entry in library.entries
     ]
     assert [line for line in solu if not line.startswith("=bestdual=")] == optima
     assert solve_library(copy, solvers=["highs"], time_limit=250.0) == []
@@ -186,8 +186,8 @@ def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others
     said = capfd.readouterr().out
     assert said == f"{copy / 'ledger.json'}: 2 new records, 2 from runs without a point\n"
     records = read_ledger(copy).records
-    assert {each.entry for each in records} == {"cf_a_n003_milp", "cf_a_n003_qp"}
-    assert {(each.status, each.seconds) for each in records} == {("no point", None)}
+    assert {record.entry for record in records} == {"cf_a_n003_milp", "cf_a_n003_qp"}
+    assert {(record.status, record.seconds) for record in records} == {("no point", None)}
 
 
 def interrupting(lines):
@@ -216,8 +216,8 @@ def test_an_interrupted_rebuild_is_completed_by_the_next_solve(copy):
     with pytest.raises(KeyboardInterrupt):
         solve_library(copy, solvers=["highs"], time_limit=250.0, progress=lines)
     findings = verify_library(copy)
-    assert {"ledger.json"} <= {each.file for each in findings}
-    assert not [each for each in findings if each.remedy.startswith("remove")]
+    assert {"ledger.json"} <= {finding.file for finding in findings}
+    assert not [finding for finding in findings if finding.remedy.startswith("remove")]
     assert [each["entry"] for each in solve_library(copy, solvers=["highs"], time_limit=250.0)] == [
         "cf_a_n003_qp"
     ]

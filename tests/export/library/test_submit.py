@@ -358,15 +358,15 @@ def test_a_certificate_needs_an_entry_of_its_norm(opened, sent, tmp_path):
 @pytest.mark.parametrize("norm, proven", [(1, {"milp", "bilin1"}), ("mixed", {"miqp"})])
 def test_a_certificate_counts_for_the_entries_of_its_norm_alone(lib, sent, tmp_path, norm, proven):
     instance = cf.read_certificate(sent / "s6.npz").field.instance
-    made = write_certificate(cf.prove(instance, norm=norm, jobs=1), tmp_path / "it.npz")
-    assert made.status == "optimal"
+    certificate = write_certificate(cf.prove(instance, norm=norm, jobs=1), tmp_path / "it.npz")
+    assert certificate.status == "optimal"
     submit_one(lib, sent / "s6.npz")
     result = submit_one(lib, tmp_path / "it.npz")
     assert (result.outcome, set(result.entries)) == ("accepted", {f"{STEM}_{name}" for name in proven})
     for name in proven:
         entry = entry_of(lib, f"{STEM}_{name}")
         assert (entry["status"], entry["solved"]["by"]) == ("optimal", "certificate")
-        assert entry["best"]["objective"] == pytest.approx(made.energy, abs=1e-9)
+        assert entry["best"]["objective"] == pytest.approx(certificate.energy, abs=1e-9)
     for name in ("exact", "cubic"):
         (bound,) = entry_of(lib, f"{STEM}_{name}")["bounds"]
         assert (lib / bound["certificate"]).read_bytes() == (sent / "s6.npz").read_bytes()
@@ -420,7 +420,7 @@ def test_submissions_at_one_moment_are_all_kept(lib, sent):
     others = [subprocess.Popen([*command, str(sent / name)]) for name in names]
     assert [other.wait() for other in others] == [0] * len(names)
     ledger = read_ledger(lib)
-    assert sorted(each.entry for each in ledger.records if each.point) == [MILP, f"{OTHER}_milp"]
+    assert sorted(record.entry for record in ledger.records if record.point) == [MILP, f"{OTHER}_milp"]
     assert sorted(each.instance for each in ledger.certificates) == [STEM, OTHER]
     assert verify_library(lib) == []
     assert not (lib / ".lock").exists()

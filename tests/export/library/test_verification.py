@@ -289,7 +289,7 @@ def test_all_formulations_and_formats_verify(tmp_path):
     text = text.replace('formats = ["nl", "mps"]\ncompress = true', 'facets = ["hull", "printed"]')
     library = library_of(tmp_path, text)
     assert len(library.entries) == 11
-    for each in library.entries:
-        assert {file["format"] for file in each["files"]} | set(each["refused"]) == {*FORMATS, "sol"}
+    for entry in library.entries:
+        assert {file["format"] for file in entry["files"]} | set(entry["refused"]) == {*FORMATS, "sol"}
     assert verify_library(tmp_path / "lib") == []
     assert read_library(tmp_path / "lib").document == library.document

@@ -282,7 +282,9 @@ def binary_sol(message, of, point):
     """An AMPL solution file in binary form, as the AMPL Solver Library writes it."""
     options = b"Options" + struct.pack("<8i", 3, 1, 1, 0, of.n_rows, 0, of.n_columns, of.n_columns)
     records = (b"binary", message, b"", options, b"", point.astype("<f8").tobytes(), struct.pack("<2i", 0, 0))
-    return b"".join(struct.pack("<i", len(each)) + each + struct.pack("<i", len(each)) for each in records)
+    return b"".join(
+        struct.pack("<i", len(record)) + record + struct.pack("<i", len(record)) for record in records
+    )
 
 
 def bears_out(solution):
@@ -331,8 +333,8 @@ def damages(data):
 def test_damaged_answers_are_refused_or_told_as_they_are(answers, tmp_path):
     for name, (data, of) in answers.items():
         for number, damaged in enumerate(damages(data)):
-            found = attempt(tmp_path / "x", damaged, of)
-            assert found is None or bears_out(found), (name, number)
+            solution = attempt(tmp_path / "x", damaged, of)
+            assert solution is None or bears_out(solution), (name, number)
 
 
 def test_a_repeated_line_of_cbc_drops_no_columns(tmp_path):

@@ -48,9 +48,9 @@ def test_other_spellings_of_names_are_read(rename, tmp_path):
     write(MILP, tmp_path / "m.mps")
     path = tmp_path / "x.sol"
     path.write_text(listed(renamed(rename)))
-    found = read_solution(path, MILP)
-    assert (found.status, found.unknown) == ("feasible", 0)
-    assert found.point.tolist() == [value for _, value in ENTRIES]
+    solution = read_solution(path, MILP)
+    assert (solution.status, solution.unknown) == ("feasible", 0)
+    assert solution.point.tolist() == [value for _, value in ENTRIES]
     assert check_point.check(str(tmp_path / "m.mps"), str(path)).worst < 1e-14
 
 

@@ -107,10 +107,10 @@ def test_integers_near_a_whole_number_are_rounded_and_others_kept(tmp_path, fiel
     assert rounded.point[first] == point[first]
     assert rounded.rounded == pytest.approx(0.4 * ROUND, rel=1e-6)
     assert rounded.violation.integrality == 0
-    kept = read_solution(by_name(tmp_path / "far.sol", names_of(problem), far), problem)
-    assert kept.point[first] == far[first]
-    assert kept.violation.integrality == pytest.approx(0.125)
-    assert kept.field.p.tolist() == field.p.tolist()
+    solution = read_solution(by_name(tmp_path / "far.sol", names_of(problem), far), problem)
+    assert solution.point[first] == far[first]
+    assert solution.violation.integrality == pytest.approx(0.125)
+    assert solution.field.p.tolist() == field.p.tolist()
 
 
 def test_continuous_columns_are_never_rounded(tmp_path, field):

@@ -222,11 +222,11 @@ def test_the_point_of_cbc_is_judged_and_not_its_words(tmp_path, words, status):
     data = text(f"{B}_milp_optimal.sol")
     head = re.match(rb"Optimal", data)
     (tmp_path / "x.sol").write_bytes(words.encode() + data[head.end() :])
-    found = read_solution(tmp_path / "x.sol", problem("milp"), identified=status == INFEASIBLE)
-    assert (found.status, bool(found.doubt)) == (status, False)
+    solution = read_solution(tmp_path / "x.sol", problem("milp"), identified=status == INFEASIBLE)
+    assert (solution.status, bool(solution.doubt)) == (status, False)
     if status == "feasible":
-        assert found.message == words
-        assert found.objective == pytest.approx(OPTIMA["milp"], abs=2e-6)
+        assert solution.message == words
+        assert solution.objective == pytest.approx(OPTIMA["milp"], abs=2e-6)
 
 
 def test_glpk_has_no_names_and_tells_lp_from_mps():

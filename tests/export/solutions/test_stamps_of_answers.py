@@ -168,10 +168,10 @@ def test_an_answer_proves_nothing_about_another_problem(write_answer, model, suf
     files = tmp_path / f"model.{model}", tmp_path / f"answer.{suffix}"
     cf.write(solved, files[0])
     write_answer(*files)
-    own = read_solution(files[1], solved)
-    assert own.identified
-    assert own.status in {own.claimed, "feasible"}
-    assert own.caveat == ""
+    solution = read_solution(files[1], solved)
+    assert solution.identified
+    assert solution.status in {solution.claimed, "feasible"}
+    assert solution.caveat == ""
     for name, other in OTHERS.items():
         with pytest.raises(SolutionError, match=r"answer\.\w+: is of another problem: it states"):
             pytest.fail(f"{name}: {read_solution(files[1], other())}")
@@ -185,8 +185,8 @@ def test_baron_repeats_the_stamp(tmp_path):
     cf.write(problem, tmp_path / "model.bar")
     program = Path(package.submodule_search_locations[0]) / "baron"
     subprocess.run([program, "model.bar"], cwd=tmp_path, capture_output=True, check=False)
-    own = read_solution(tmp_path / "res.lst", problem)
-    assert (own.identified, own.status, own.unknown) == (True, "optimal-global", 0)
+    solution = read_solution(tmp_path / "res.lst", problem)
+    assert (solution.identified, solution.status, solution.unknown) == (True, "optimal-global", 0)
     heavier = replace(problem.instance, stroke_coefficient=1.5000001)
     with pytest.raises(SolutionError, match=r"res\.lst: is of another problem"):
         read_solution(tmp_path / "res.lst", formulate(heavier, problem.name))

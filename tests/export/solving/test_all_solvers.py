@@ -28,9 +28,9 @@ def test_a_solver_that_is_given_the_optimum_has_no_worse_point(best):
     with Solvers() as solvers:
         for solver in STARTS:
             if not PROGRAMS[SOLVERS[solver].program].missing:
-                found = solvers.solve(problem, solver, limits=Limits(20.0, ENOUGH, 1), start=best)
-                assert found.objective == pytest.approx(optimum, abs=1e-6), solver
-                assert found.nodes is not None
-                assert found.nodes >= 0
-                assert found.seconds is not None
-                assert found.seconds > 0
+                solution = solvers.solve(problem, solver, limits=Limits(20.0, ENOUGH, 1), start=best)
+                assert solution.objective == pytest.approx(optimum, abs=1e-6), solver
+                assert solution.nodes is not None
+                assert solution.nodes >= 0
+                assert solution.seconds is not None
+                assert solution.seconds > 0

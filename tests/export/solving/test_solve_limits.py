@@ -17,12 +17,12 @@ def test_without_time_the_start_is_the_answer(tmp_path, name):
     instance = cf.sample("skew", 6)
     start = cf.greedy_field(instance)
     problem = cf.formulate(instance, name, p=start.p if name == "qp-fixed" else None)
-    found = cf.solve(problem, folder=tmp_path, start=start, limits=cf.Limits(1e-6))
-    assert found.status == Status.LIMIT_WITH_POINT
-    assert "nothing better than the start" in found.message
+    solution = cf.solve(problem, folder=tmp_path, start=start, limits=cf.Limits(1e-6))
+    assert solution.status == Status.LIMIT_WITH_POINT
+    assert "nothing better than the start" in solution.message
     norm = 1 if name == "milp-mccormick" else 2
-    assert found.objective == pytest.approx(start.energy(norm).total, rel=1e-9)
-    assert found.bound is None
+    assert solution.objective == pytest.approx(start.energy(norm).total, rel=1e-9)
+    assert solution.bound is None
     assert not list(tmp_path.glob("*.log"))
     assert cf.solve(problem, limits=cf.Limits(1e-6)).status == Status.LIMIT_WITHOUT_POINT
 
@@ -63,9 +63,9 @@ def test_a_complete_answer_of_a_killed_solver_counts(solver, status, tmp_path, s
     """SCIP's file states no status; HiGHS' states the proof, which is then the solver's own claim."""
     problem, _ = skew
     with KilledSolvers() as solvers:
-        found = solvers.solve(problem, solver, folder=tmp_path, limits=cf.Limits(60.0))
-    assert (found.claimed, found.doubt) == (status, "")
-    assert found.objective == pytest.approx(cf.solve(problem, solver).objective, abs=1e-6)
+        solution = solvers.solve(problem, solver, folder=tmp_path, limits=cf.Limits(60.0))
+    assert (solution.claimed, solution.doubt) == (status, "")
+    assert solution.objective == pytest.approx(cf.solve(problem, solver).objective, abs=1e-6)
 
 
 def test_a_cut_answer_of_a_killed_solver_is_not_read(tmp_path, skew):
@@ -76,11 +76,11 @@ def test_a_cut_answer_of_a_killed_solver_is_not_read(tmp_path, skew):
 
     with KilledSolvers() as solvers:
         solvers.child("highs").spoil = cut
-        found = solvers.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(60.0))
-        assert (found.status, found.point) == (Status.LIMIT_WITHOUT_POINT, None)
+        solution = solvers.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(60.0))
+        assert (solution.status, solution.point) == (Status.LIMIT_WITHOUT_POINT, None)
         assert not list(tmp_path.glob("*.sol")) + list(tmp_path.glob(".part*"))
-        found = solvers.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(60.0), start=start)
-    assert (found.status, found.start_returned) == (Status.LIMIT_WITH_POINT, True)
+        solution = solvers.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(60.0), start=start)
+    assert (solution.status, solution.start_returned) == (Status.LIMIT_WITH_POINT, True)
     assert not list(tmp_path.glob(".part*"))
 
 
@@ -107,10 +107,10 @@ def test_an_event_ends_a_solve_with_its_best_point(tmp_path):
     start, asked = cf.greedy_field(cf.sample("bottle", 12)), threading.Event()
     problem = cf.formulate(start.instance, "milp-mccormick")
     asked.set()
-    found = cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(600.0), start=start, stop=asked)
-    assert found.interrupted
-    assert found.objective <= problem.objective_value(problem.point(start)) + 1e-6
-    assert found.field.instance.sha256 == start.instance.sha256
+    solution = cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(600.0), start=start, stop=asked)
+    assert solution.interrupted
+    assert solution.objective <= problem.objective_value(problem.point(start)) + 1e-6
+    assert solution.field.instance.sha256 == start.instance.sha256
 
 
 @pytest.mark.parametrize(
@@ -121,9 +121,9 @@ def test_an_event_at_the_start_of_an_executable_is_no_error_of_it(solver, tmp_pa
     start, asked = cf.greedy_field(cf.sample("bottle", 12)), threading.Event()
     problem = cf.formulate(start.instance, "milp-mccormick")
     asked.set()
-    found = cf.solve(problem, solver, folder=tmp_path, limits=cf.Limits(600.0), start=start, stop=asked)
-    assert found.interrupted
-    assert (found.status, found.doubt) == (Status.LIMIT_WITH_POINT, "")
+    solution = cf.solve(problem, solver, folder=tmp_path, limits=cf.Limits(600.0), start=start, stop=asked)
+    assert solution.interrupted
+    assert (solution.status, solution.doubt) == (Status.LIMIT_WITH_POINT, "")
 
 
 def test_an_event_ends_a_run_with_the_fields_so_far(tmp_path):

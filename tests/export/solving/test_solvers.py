@@ -85,8 +85,8 @@ def bounds(instance):
 def least_squares(instance, p):
     rows, sides, weights = residual_rows(instance, p)
     root = np.sqrt(weights)
-    found = lsq_linear(rows * root[:, None], sides * root, bounds(instance), method="bvls", tol=1e-14)
-    return 2 * found.cost
+    result = lsq_linear(rows * root[:, None], sides * root, bounds(instance), method="bvls", tol=1e-14)
+    return 2 * result.cost
 
 
 def least_deviations(instance, p):
@@ -94,14 +94,14 @@ def least_deviations(instance, p):
     count, columns = rows.shape
     lower, upper = bounds(instance)
     identity = np.eye(count)
-    found = linprog(
+    result = linprog(
         np.concatenate([np.zeros(columns), weights]),
         A_ub=np.block([[rows, -identity], [-rows, -identity]]),
         b_ub=np.concatenate([sides, -sides]),
         bounds=[*zip(lower, upper, strict=True), *[(0, None)] * count],
         method="highs-ds",
     )
-    return found.fun
+    return result.fun
 
 
 def by_enumeration(instance, inner):
@@ -340,9 +340,9 @@ def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch
         monkeypatch,
     )
     problem = cf.formulate(instance, "milp-mccormick")
-    found = cf.solve(problem, "highs", folder=tmp_path / "files", limits=cf.Limits(2.0), start=start)
-    assert found.status == Status.LIMIT_WITH_POINT
-    assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-12)
+    solution = cf.solve(problem, "highs", folder=tmp_path / "files", limits=cf.Limits(2.0), start=start)
+    assert solution.status == Status.LIMIT_WITH_POINT
+    assert solution.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-12)
     assert not list((tmp_path / "files").glob("*.start"))
 
 
@@ -362,12 +362,12 @@ def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_pat
     problem, files = cf.formulate(cf.sample("mouse", 8), "milp-mccormick"), tmp_path / "files"
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        found = cf.solve(
+        solution = cf.solve(
             problem, "highs", folder=files, limits=cf.Limits(2.0), start=cf.greedy_field(problem.instance)
         )
     finally:
         signal.signal(signal.SIGINT, before)
-    assert found.status == Status.LIMIT_WITH_POINT
+    assert solution.status == Status.LIMIT_WITH_POINT
     assert "asked to end" in next(files.glob("*.log")).read_text()
 
 

@@ -159,9 +159,9 @@ def test_options_and_packed_files(tmp_path: Path):
     write_all(
         instance, tmp_path / "options", formulations=names, options=chosen, dialects=dialects, compress=True
     )
-    found = verify(tmp_path / "options")
-    assert found.failed_checks == []
-    assert {f.program for f in found.checks if f.verdict == Verdict.AGREES} >= {"highs", "casadi"}
+    verification = verify(tmp_path / "options")
+    assert verification.failed_checks == []
+    assert {f.program for f in verification.checks if f.verdict == Verdict.AGREES} >= {"highs", "casadi"}
 
 
 # what is wrong is noticed
@@ -243,10 +243,10 @@ def test_a_file_that_is_not_the_manifests_is_not_tried(tmp_path: Path):
     path = tmp_path / "small.qp-fixed.lp"
     path.write_bytes(path.read_bytes() + b"\n")
     (tmp_path / "small.qp-fixed.mps").unlink()
-    found = verify(tmp_path, programs=["highs"])
-    assert [f.file for f in found.failed_checks] == ["small.qp-fixed.lp", "small.qp-fixed.mps"]
-    assert all("export again" in f.reason for f in found.checks)
-    assert not found.is_ok
+    verification = verify(tmp_path, programs=["highs"])
+    assert [f.file for f in verification.failed_checks] == ["small.qp-fixed.lp", "small.qp-fixed.mps"]
+    assert all("export again" in f.reason for f in verification.checks)
+    assert not verification.is_ok
 
 
 @needing("scip")
@@ -268,10 +268,10 @@ def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
 def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     write_all(on_grid(1, 2), tmp_path, formulations=["qp-fixed"], formats=["lp"])
     monkeypatch.setitem(PROGRAMS, "xpress", replace(PROGRAMS["xpress"], needs="no_such_package"))
-    found = verify(tmp_path, programs=["highs", "xpress"])
-    assert found.absent == {"xpress": "Xpress is not installed; pip install xpress"}
-    assert {f.program for f in found.checks} == {"highs"}
-    assert found.is_ok
+    verification = verify(tmp_path, programs=["highs", "xpress"])
+    assert verification.absent == {"xpress": "Xpress is not installed; pip install xpress"}
+    assert {f.program for f in verification.checks} == {"highs"}
+    assert verification.is_ok
 
 
 @pytest.mark.slow
@@ -302,8 +302,8 @@ def test_a_folder_without_manifests_is_an_error(tmp_path: Path):
 def test_an_answer_of_xpress_that_was_cut_short_has_all_columns(tmp_path: Path):
     problem = formulate(sample("skew", 5), "minlp-quartic")
     with Solvers() as solvers:
-        found = solvers.solve(problem, "xpress", folder=tmp_path, limits=Limits(1.0, threads=1))
-    assert found.point is None or len(found.point) == found.problem.n_columns
+        solution = solvers.solve(problem, "xpress", folder=tmp_path, limits=Limits(1.0, threads=1))
+    assert solution.point is None or len(solution.point) == solution.problem.n_columns
 
 
 # the table of capabilities is true
@@ -355,11 +355,11 @@ def proves(solvers: Solvers, held: Problem, path: Path, solver: str, optimum: fl
     """Whether the solver, run all the same, returns the optimum with that status."""
     files, limits = SolveFiles.for_model(path, solver), Limits(1.0, 0.0, 1)
     try:
-        found = solvers.solve_file(held, solver, files, limits, Deadline.after(21.0), precise=True)
+        solution = solvers.solve_file(held, solver, files, limits, Deadline.after(21.0), precise=True)
     except CrossfieldError:
         return False
     return (
-        found.claimed.startswith("optimal")
-        and found.reported is not None
-        and is_same_optimum(found.reported, optimum)
+        solution.claimed.startswith("optimal")
+        and solution.reported is not None
+        and is_same_optimum(solution.reported, optimum)
     )

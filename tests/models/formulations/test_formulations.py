@@ -166,10 +166,10 @@ def test_parallel_strokes_and_two_families_cost_nothing(degrees):
     pixels = np.array([[0, 0], [0, 2], [2, 0], [2, 2]])
     theta = np.radians(np.array([degrees[0], degrees[1], degrees[1], degrees[0]]))
     instance = Instance("lines", np.ones((3, 3), bool), pixels, theta, np.ones(4))
-    found = solve(formulate(instance, "milp-mccormick"), "highs", limits=Limits(250))
-    assert found.status == "optimal-global"
-    assert found.objective < 9 * 1e-6 * QUARTER + 1e-9
-    assert found.field.energy(1).total == pytest.approx(found.objective, abs=1e-7)
+    solution = solve(formulate(instance, "milp-mccormick"), "highs", limits=Limits(250))
+    assert solution.status == "optimal-global"
+    assert solution.objective < 9 * 1e-6 * QUARTER + 1e-9
+    assert solution.field.energy(1).total == pytest.approx(solution.objective, abs=1e-7)
 
 
 def sketch(gauge="strokes", seed=4):
@@ -189,9 +189,9 @@ def sketch(gauge="strokes", seed=4):
 
 
 def optimum(instance, name="milp-mccormick", **options):
-    found = solve(formulate(instance, name, **options), "highs", limits=Limits(250, gap=0))
-    assert found.status == "optimal-global"
-    return found.objective
+    solution = solve(formulate(instance, name, **options), "highs", limits=Limits(250, gap=0))
+    assert solution.status == "optimal-global"
+    return solution.objective
 
 
 @pytest.mark.parametrize("seed", [4, 5])

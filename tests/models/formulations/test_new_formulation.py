@@ -61,7 +61,7 @@ def test_it_is_listed(toy, instance):
 def test_it_is_written_solved_and_read(toy, instance, solver, tmp_path):
     problem, field = cf.formulate(instance, "toy"), cf.greedy_field(instance)
     (manifest,) = write_all(instance, tmp_path, formulations=["toy"], formats=tuple(FORMATS), start=field)
-    assert {each["format"] for each in manifest.document["files"]} == set(FORMATS)
+    assert {file["format"] for file in manifest.document["files"]} == set(FORMATS)
     assert set(manifest.document["solvers"]) == set(SOLVERS)
     assert read_manifest(manifest.path).problem().sha256 == problem.sha256
     solution = cf.solve(problem, solver, folder=tmp_path / "solve", start=field)

@@ -150,9 +150,9 @@ def test_violations_are_found():
     assert (point[problem.blocks["gamma"].slice] >= np.abs(field.residual_r) - 1e-15).all()
     worse = point.copy()
     worse[problem.blocks["gamma"].offset] -= 0.25
-    found = problem.violation(worse)
-    assert found.rows == pytest.approx(0.25)
-    assert found.worst_family in {"c22", "c23"}
+    violation = problem.violation(worse)
+    assert violation.rows == pytest.approx(0.25)
+    assert violation.worst_family in {"c22", "c23"}
     assert tight.count == len(field.instance.theta)
     worse = point.copy()
     worse[problem.blocks["beta"].offset] = -QUARTER - 0.125

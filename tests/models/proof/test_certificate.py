@@ -100,9 +100,9 @@ def test_a_part_without_strokes_has_no_cost_at_the_optimum(norm, tmp_path):
     beta = proof.field.beta + np.where(instance.grid.rows + instance.grid.columns == 0, 0.1, 0.0)
     worse = CrossField(instance, proof.field.alpha, beta, proof.field.p)
     energy = worse.energy(norm).total
-    found = write_certificate(replace(proof, field=worse, energy=energy, levels=proof.levels[:1]), path)
-    assert (found.status, read_certificate(path).status) == ("gap", "gap")
-    assert found.bound <= written.energy
+    certificate = write_certificate(replace(proof, field=worse, energy=energy, levels=proof.levels[:1]), path)
+    assert (certificate.status, read_certificate(path).status) == ("gap", "gap")
+    assert certificate.bound <= written.energy
 
 
 @pytest.mark.slow
@@ -121,9 +121,9 @@ def test_a_field_that_is_not_optimal_is_never_certified(tmp_path):
             beta = np.clip(good.beta + rng.normal(0, size, 4), -np.pi / 4, np.pi / 4)
             worse = CrossField(good.instance, good.alpha, beta, good.p)
             assert worse.energy().total > good.energy().total + 1e-7
-            found = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
-            assert found.status == "gap"
-            assert found.proven.bound <= good.energy().total
+            certificate = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
+            assert certificate.status == "gap"
+            assert certificate.proven.bound <= good.energy().total
             arrays = check_certificate.read_arrays(str(tmp_path / "it.npz"))
             assert "status is claimed as optimal" in refusal(with_head(arrays, status="optimal"))
 
@@ -141,11 +141,11 @@ def test_a_changed_byte_of_the_file_is_told_or_changes_nothing(written, tmp_path
     for at in rng.integers(0, len(data), 100):
         other.write_bytes(data[:at] + bytes([data[at] ^ (1 << rng.integers(8))]) + data[at + 1 :])
         try:
-            found = check_certificate.check_arrays(check_certificate.read_arrays(str(other)))
+            verdict = check_certificate.check_arrays(check_certificate.read_arrays(str(other)))
         except WRONG:
             refused_forgeries += 1
             continue
-        assert (found.status, found.energy, found.bound) == (claim.status, claim.energy, claim.bound)
+        assert (verdict.status, verdict.energy, verdict.bound) == (claim.status, claim.energy, claim.bound)
     assert refused_forgeries > 70
 
 

@@ -39,9 +39,9 @@ def test_fields_with_a_vortex_are_proven_at_the_least_energy_over_all_jumps(tmp_
         if len(cf.greedy_field(instance).singularities.index) == 0:
             continue
         proof = cf.prove(instance, jobs=1)
-        found = cf.write_certificate(proof, tmp_path / "it.npz")
-        assert found.status == "optimal", seed
-        assert found.bound <= exact(instance) + 1e-9
+        certificate = cf.write_certificate(proof, tmp_path / "it.npz")
+        assert certificate.status == "optimal", seed
+        assert certificate.bound <= exact(instance) + 1e-9
         seen += len(proof.field.singularities.index)
     assert seen
 

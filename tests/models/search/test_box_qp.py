@@ -179,5 +179,5 @@ def test_pinned_angles_of_a_part_without_strokes_stay():
     mask = np.array([[True, True, False, True, True]])
     instance = Instance("parts", mask, np.array([[0, 0]]), np.array([0.3]), np.ones(1))
     alpha = np.array([0.3, 0.3, 0.7, 0.7])
-    found = reproducible_field(CrossField(instance, alpha, np.zeros(4), np.zeros(2, int)))
-    assert found.alpha.tolist() == alpha.tolist()
+    field = reproducible_field(CrossField(instance, alpha, np.zeros(4), np.zeros(2, int)))
+    assert field.alpha.tolist() == alpha.tolist()

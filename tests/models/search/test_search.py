@@ -159,18 +159,18 @@ def test_same_seed_gives_the_same_bits_in_one_process_and_in_two(gauge):
 def test_a_large_grid_is_searched_from_coarse_to_fine_by_patches():
     instance = cf.sample("mouse", 40)
     seen = []
-    found = cf.search(instance, rounds=2, progress=seen.append)
-    assert found.field.energy().total < first_field(instance).energy().total
-    assert (found.rounds, found.ended) == (2, "rounds")
+    result = cf.search(instance, rounds=2, progress=seen.append)
+    assert result.field.energy().total < first_field(instance).energy().total
+    assert (result.rounds, result.ended) == (2, "rounds")
     assert [line.split(" after ")[1] for line in seen] == ["1 rounds", "2 rounds"]
 
 
 @pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
 def test_a_search_without_time_gives_a_field_within_its_bounds(name):
     instance = cf.sample(name, 24)
-    found = cf.search(instance, limits=cf.Limits(1e-9), jobs=1)
-    assert (found.rounds, found.ended) == (0, "time")
-    assert_feasible(found.field)
+    result = cf.search(instance, limits=cf.Limits(1e-9), jobs=1)
+    assert (result.rounds, result.ended) == (0, "time")
+    assert_feasible(result.field)
 
 
 class Hourglass:
@@ -213,9 +213,9 @@ def test_a_patch_without_time_is_not_whole_and_its_walk_stops():
 
 def test_an_event_ends_a_search_with_the_best_field_so_far():
     instance, asked = cf.sample("ring", 10), threading.Event()
-    found = cf.search(instance, jobs=1, progress=lambda line: asked.set(), stop=asked)
-    assert (found.rounds, found.ended) == (1, "interrupted")
-    assert found.field.energy().total <= first_field(instance).energy().total + 1e-9
+    result = cf.search(instance, jobs=1, progress=lambda line: asked.set(), stop=asked)
+    assert (result.rounds, result.ended) == (1, "interrupted")
+    assert result.field.energy().total <= first_field(instance).energy().total + 1e-9
 
 
 CHILD = """

@@ -30,38 +30,38 @@ def test_every_patch_faces_the_viewer_and_its_lines_stay_apart(name):
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("size", [24, 48])
 def test_strokes_of_both_families_cover_the_documented_share(name, size):
-    made = analytic(name, size)
-    instance = made.instance
+    surface = analytic(name, size)
+    instance = surface.instance
     assert max(instance.mask.shape) == size
     assert instance.grid.parts == 1
     assert len(instance.theta) / instance.grid.size == pytest.approx(SURFACES[name].share, abs=0.06)
     assert (instance.w >= LEAST_WEIGHT).all()
     at = instance.stroke_index
-    on_u = line_difference(instance.theta, made.u_angle[at]) < 1e-12
-    on_v = line_difference(instance.theta, made.v_angle[at]) < 1e-12
+    on_u = line_difference(instance.theta, surface.u_angle[at]) < 1e-12
+    on_v = line_difference(instance.theta, surface.v_angle[at]) < 1e-12
     assert (on_u | on_v).all()
     assert 0.1 < on_u.mean() < 0.9
 
 
 def test_rulings_of_the_cylinder_are_parallel():
-    made = analytic("tilted_cylinder", 32)
-    assert np.ptp(made.v_angle) < 1e-12
-    assert np.degrees(made.v_angle[0]) == pytest.approx(110)  # upright, spun by 20 degrees
+    surface = analytic("tilted_cylinder", 32)
+    assert np.ptp(surface.v_angle) < 1e-12
+    assert np.degrees(surface.v_angle[0]) == pytest.approx(110)  # upright, spun by 20 degrees
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_exact_field_is_regular_and_explains_every_stroke(name):
-    made = analytic(name, 32)
-    field = CrossField.from_lines(made.instance, made.u_angle, made.v_angle)
-    assert field.cross_error(made.u_angle, made.v_angle).max() < 1e-9
+    surface = analytic(name, 32)
+    field = CrossField.from_lines(surface.instance, surface.u_angle, surface.v_angle)
+    assert field.cross_error(surface.u_angle, surface.v_angle).max() < 1e-9
     assert field.energy().strokes < 1e-18
     assert len(field.singularities.row) == 0
 
 
 @pytest.mark.parametrize("size", [24, 48])
 def test_strokes_on_a_third_of_the_cylinder_determine_the_crosses(size):
-    made = analytic("tilted_cylinder", size)
-    error = np.degrees(polyvector_field(made.instance).cross_error(made.u_angle, made.v_angle))
+    surface = analytic("tilted_cylinder", size)
+    error = np.degrees(polyvector_field(surface.instance).cross_error(surface.u_angle, surface.v_angle))
     assert np.median(error) < 5
 
 

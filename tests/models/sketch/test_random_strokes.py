@@ -18,9 +18,9 @@ PAPER = {"stroke_weight": 24 / 24, "skew_weight": 1e-6}
 def test_the_library_that_ships_has_the_instances_of_the_generator():
     for seed in (1, 2, 3):
         name = f"cf_rand_n024_s{seed}"
-        made = cf.random_instance(seed, size=24, mask_share=0.75, name=name, **PAPER)
+        instance = cf.random_instance(seed, size=24, mask_share=0.75, name=name, **PAPER)
         about = json.loads((POINTS / f"{name}.about.json").read_text())
-        assert made.sha256 == about["instance"]["sha256"]
+        assert instance.sha256 == about["instance"]["sha256"]
 
 
 @for_each("strokes", STROKES)
@@ -32,26 +32,26 @@ def test_seed_and_options_decide_alone(strokes):
 
 def test_the_digits_of_curves_do_not_change():
     """Families that others have built depend on them."""
-    made = cf.random_instance(7, size=8, strokes="curved", mask_share=0.9, noise=0.1, share=0.3)
-    assert made.source == (
+    instance = cf.random_instance(7, size=8, strokes="curved", mask_share=0.9, noise=0.1, share=0.3)
+    assert instance.source == (
         "random strokes on a ragged mask, seed 7, strokes curved, share 0.3, mask_share 0.9, noise 0.1"
     )
-    assert made.sha256 == "cedec9ecc29910a874d3ed8f162c316e973ea4b22b6736a7271d4d5d0e78a870"
+    assert instance.sha256 == "cedec9ecc29910a874d3ed8f162c316e973ea4b22b6736a7271d4d5d0e78a870"
 
 
 @for_each("strokes, share", [("pixels", 0.1), ("pixels", 1.0), ("straight", 0.1), ("curved", 0.4)])
 def test_strokes_have_their_share(strokes, share):
-    made = cf.random_instance(1, size=20, strokes=strokes, share=share)
-    assert made.mask.all()
+    instance = cf.random_instance(1, size=20, strokes=strokes, share=share)
+    assert instance.mask.all()
     wanted = round(share * 400)
-    assert wanted <= len(made.theta) <= wanted + (0 if strokes == "pixels" else 40)
-    assert 0.1 <= made.w.min() <= made.w.max() <= 1
+    assert wanted <= len(instance.theta) <= wanted + (0 if strokes == "pixels" else 40)
+    assert 0.1 <= instance.w.min() <= instance.w.max() <= 1
 
 
 def test_a_ragged_mask_is_one_part_of_its_share():
-    made = cf.random_instance(2, size=40, mask_share=0.8)
-    assert made.grid.parts == 1
-    assert 0.7 < made.mask.mean() < 0.85
+    instance = cf.random_instance(2, size=40, mask_share=0.8)
+    assert instance.grid.parts == 1
+    assert 0.7 < instance.mask.mean() < 0.85
 
 
 def neighbours_that_differ(instance):

@@ -143,9 +143,9 @@ def test_rounds_end_when_the_time_is_over():
     energies = []
     for rounds in (1, 2, 3):
         calls.clear()
-        found = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: over(rounds))
+        field = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: over(rounds))
         assert len(calls) == rounds + 1
-        energies.append(_Bend.of(start, HARMONIC, HOLD).at(np.concatenate([found.u_angle, found.v_angle]))[0])
+        energies.append(_Bend.of(start, HARMONIC, HOLD).at(np.concatenate([field.u_angle, field.v_angle]))[0])
     assert energies == sorted(energies, reverse=True)
     whole = bend_field(start)
     assert np.array_equal(bend_field(start, stop=lambda: False).alpha, whole.alpha)

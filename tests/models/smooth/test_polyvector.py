@@ -55,5 +55,5 @@ def test_one_pixel_under_the_heaviest_strokes_is_solved():
             "one", [[True]], [[0, 0]], [theta], [1.0], stroke_coefficient=1e6, skew_coefficient=0.0
         )
         for hold in HOLDS:
-            found = polyvector_field(one, hold=hold)
-            assert found.stroke_deviation.max() < 1e-6
+            field = polyvector_field(one, hold=hold)
+            assert field.stroke_deviation.max() < 1e-6

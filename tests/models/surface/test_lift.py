@@ -50,11 +50,11 @@ def middle(true, slant=None):
 @for_each("name, most", [("vase", 3), ("ellipsoid", 3)])
 def test_exact_crosses_lead_to_the_surface(name, most):
     true, field = exact(name, 16)
-    found = cf.surface(field)
-    assert error(found, true) <= most
-    assert apart(found.normals, true.normals).mean() < 90  # the default side is the true one
-    assert found.doubts == ()
-    assert found.confidence.mean() > 0.9
+    lifted = cf.surface(field)
+    assert error(lifted, true) <= most
+    assert apart(lifted.normals, true.normals).mean() < 90  # the default side is the true one
+    assert lifted.doubts == ()
+    assert lifted.confidence.mean() > 0.9
 
 
 @pytest.mark.parametrize("size", [pytest.param(48, marks=pytest.mark.slow), 16])
@@ -69,9 +69,9 @@ def test_a_hint_chooses_among_surfaces_of_the_same_crosses(name, size):
 
 def test_what_has_no_such_family_says_so():
     _, field = exact("vase", 16)
-    found = cf.surface(field)
-    assert found.firmness > 0.01
-    assert len(found.freedom) == 1
+    lifted = cf.surface(field)
+    assert lifted.firmness > 0.01
+    assert len(lifted.freedom) == 1
 
 
 def test_a_hint_and_flip_choose_the_side():
@@ -139,13 +139,13 @@ def constant(mask, u=0.3, v=1.3):
     "mask", [np.ones((1, 1)), np.ones((1, 7)), np.ones((6, 1)), np.eye(4), np.indices((5, 6)).sum(axis=0) % 2]
 )
 def test_any_mask_has_heights_at_the_corners_of_its_pixels(mask):
-    found = cf.surface(constant(mask))
+    lifted = cf.surface(constant(mask))
     used = np.zeros(np.add(mask.shape, 1), dtype=bool)
     for row, column in np.argwhere(mask):
         used[row : row + 2, column : column + 2] = True
-    assert (np.isfinite(found.heights) == used).all()
-    assert apart(found.normals, np.array([0, 0, 1.0])).max() < 75
-    assert found.confidence.min() > 0.5  # one slope explains one cross; touching corners tie them
+    assert (np.isfinite(lifted.heights) == used).all()
+    assert apart(lifted.normals, np.array([0, 0, 1.0])).max() < 75
+    assert lifted.confidence.min() > 0.5  # one slope explains one cross; touching corners tie them
 
 
 def test_parts_of_the_mask_are_independent():
@@ -168,38 +168,38 @@ def test_an_end_in_time_leaves_the_best_so_far():
     errors = []
     for most in (0, 8, 10_000):
         left = iter(range(most))
-        found = cf.surface(field, stop=lambda left=left: next(left, None) is None)
-        assert np.isfinite(found.normals).all()
-        assert any("time" in doubt for doubt in found.doubts) == (most < 10_000)
-        errors.append(error(found, true))
+        lifted = cf.surface(field, stop=lambda left=left: next(left, None) is None)
+        assert np.isfinite(lifted.normals).all()
+        assert any("time" in doubt for doubt in lifted.doubts) == (most < 10_000)
+        errors.append(error(lifted, true))
     assert errors[2] < errors[0] / 5
-    assert found.heights.tobytes() == cf.surface(field).heights.tobytes()
+    assert lifted.heights.tobytes() == cf.surface(field).heights.tobytes()
 
 
 def test_crosses_at_right_angles_give_a_flat_sheet_and_the_doubt():
     field = cf.power_field(cf.sample("bottle", 12))
     square = cf.CrossField(field.instance, field.alpha, 0 * field.beta, field.p)
-    found = cf.surface(square)
-    (doubt,) = found.doubts
+    lifted = cf.surface(square)
+    (doubt,) = lifted.doubts
     assert "nearly flat" in doubt
-    assert apart(found.normals, np.array([0, 0, 1.0])).mean() < 1
+    assert apart(lifted.normals, np.array([0, 0, 1.0])).mean() < 1
 
 
 @pytest.mark.slow
 @for_each("name", ["mouse", "bottle", "saddle", "cylinder_bend", "singular"])
 def test_samples_are_trusted_but_not_at_singular_spots(name):
     field = bent(cf.sample(name, 24))
-    found = cf.surface(field)
-    assert found.doubts == ()
+    lifted = cf.surface(field)
+    assert lifted.doubts == ()
     at = field.instance.grid.number[field.singularities.row, field.singularities.column]
-    assert (found.confidence[at] == 0).all()
+    assert (lifted.confidence[at] == 0).all()
 
 
 def test_crosses_of_no_surface_are_doubted():
     instance = cf.sample("mouse", 12)
     angle = np.random.default_rng(0).uniform(0, np.pi, (2, instance.grid.size))
-    found = cf.surface(cf.CrossField.from_lines(instance, *angle))
-    (unfit,) = (doubt for doubt in found.doubts if "no one surface" in doubt)
+    lifted = cf.surface(cf.CrossField.from_lines(instance, *angle))
+    (unfit,) = (doubt for doubt in lifted.doubts if "no one surface" in doubt)
     assert 0 < unfit.index("not curvature lines") < unfit.index("hidden lines")
-    assert any("singular spots" in doubt for doubt in found.doubts)
-    assert found.confidence.mean() < 0.7
+    assert any("singular spots" in doubt for doubt in lifted.doubts)
+    assert lifted.confidence.mean() < 0.7
