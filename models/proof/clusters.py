@@ -8,7 +8,7 @@ quad. Let lambda_e(k_i, k_j) be tables on the alphas of the four pairs e of a qu
 
     sum over pairs of c_e = sum over pairs of (c_e + lambda_e) + sum over quads of - (sum of lambda_e).
 
-Rounding by one threshold gives all alphas one joint distribution (models/proof/check_certificate.py, 2). So
+Rounding by one threshold gives all alphas one joint distribution (docs/proofs.md, 4). So
 in the bound, a pair costs c_e + lambda_e, and a quad adds the least of - sum lambda_e over the labels of its
 four alphas. The cost of a pair, for jumps of one parity, is still a term in alpha plus a term in beta.
 

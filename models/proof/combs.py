@@ -5,7 +5,7 @@ costs: D + shares less the least of each pixel, and c - shares of each pair. On 
 with one label fixed follows from messages along its pairs. A comb is such a tree: a row of pixels is its
 spine, and the columns that cross it are its teeth; or a column is its spine, and rows are its teeth.
 
-models/proof/check_certificate.py, 3, proves that cells are excluded rightly.
+Lemma 3a of docs/proofs.md proves that cells are excluded rightly.
 """
 
 from __future__ import annotations

@@ -43,35 +43,35 @@ from .record import EXACT, LevelRecord, Proof
 from .rounding import Rounding, better_field
 
 # Levels
-COARSEST: Final = 16  # steps in pi/2 of the first level: with fewer it drops nothing
-_FINEST: Final = 2**16  # steps in pi/2 of the last one: spacings of 2e-5 rad are as fine as certificates need
-MOST_LABELS: Final = 50_000_000  # labels of a level, some 100 bytes each
+COARSEST: Final = 16  # steps in pi/2 of the first level, whose passes cost least
+_FINEST: Final = 2**16  # steps in pi/2 of the last one: finer ones come near the digits of centres
+MOST_LABELS: Final = 50_000_000  # labels of a level, for memory: each takes some 100 bytes
 _TABLES: Final = 4  # numbers of tables that take as much memory as a label
 _DECIMALS: Final = 7  # digits of centres in rad: their last digits differ between processors
-_SETTLED: Final = 4  # spacings after which another centre costs more than it helps
+_SETTLED: Final = 4  # spacings after which little is lost where the centre is another field
 _NEAR: Final = 0.75  # share of pi/4 from the centre to an alpha near both ends of the labels
 
 # Passes
-_PASSES: Final = 3  # passes forwards and backwards between two roundings: a rounding takes as long as one
-_MOST_ROUNDS: Final = 40  # roundings of a level
-_SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on: a finer one closes more
+_PASSES: Final = 3  # passes forwards and backwards between two roundings, which do another one
+_MOST_ROUNDS: Final = 40  # roundings of a level, in case that the bound creeps
+_SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on, if labels do not grow
 _SLOWEST: Final = 0.005  # the same where the finer level would be too large
 _FEW: Final = 600_000  # labels of which passes take less time than one more level of the certificate
 _FEWER: Final = 0.5  # share of more labels that are left, at which passes go on over these only
-_RECORD: Final = 11  # passes that take as long as a record, with combs and two passes before it
+_RECORD: Final = 11  # passes that take as long as a record with combs, and two before it
 
 # Clusters
-_CLUSTERS: Final = 24  # quads that become clusters, later half of them: a vortex needs some 20
+_CLUSTERS: Final = 24  # quads that become clusters, later half of them: a vortex' gap lies in few pixels
 _CLUSTERS_OF_ALL: Final = 0.08  # the same as a share of all quads, if that is more
 _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above which there are more
 
 # Fields
 _BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
-_WIDE: Final = 0.01  # relative gap of the first level above which a poor field may cause it: a search follows
+_WIDE: Final = 0.01  # relative gap of the first level above which a poor field may cause it
 _SEARCH: Final = 0.05  # share of the time left for a search between levels
 _ROUNDS: Final = 5  # rounds of a search without a limit of time
 
-_ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which shares are rounded when it first is smaller
+_ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which a first smaller one is rounded: few digits may do
 
 
 @dataclass

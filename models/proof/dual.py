@@ -258,7 +258,7 @@ class Dual:
     def _rounding_margins(self) -> tuple[float, float]:
         """Margin that the checker takes off the bound of a pass, and adds to the energy for combs.
 
-        It is more than this process rounds. See models/proof/check_certificate.py, 6 and `Pass`.
+        It is more than this process rounds. See `ForwardPass` in models/proof/check_certificate.py.
         """
         lattice, (shares, costs) = self.lattice, self._greatest_sizes()
         instance, n, m = lattice.instance, len(lattice.count), len(lattice.p)
@@ -267,9 +267,7 @@ class Dual:
         size += lattice.h * np.abs(lattice.alpha_first) + lattice.h * lattice.alpha_count
         size += lattice.h * np.abs(lattice.beta_first) + lattice.h * lattice.beta_count
         pixels = float(np.sum((weight + skew) * size * size)) + 4 * n * shares
-        pair = (
-            (3 + 4 * float(size.max())) ** 2 + costs + 4 * shares
-        )  # angles and jumps, squared; tables; excesses
+        pair = (3 + 4 * float(size.max())) ** 2 + costs + 4 * shares  # angles and jumps, tables, excesses
         unit = 2 * check_certificate.ROUNDING * check_certificate.PRECISION
         sides = check_certificate.sliver_slack(weight, skew, _LEVELS)
         return unit * (2 * pixels + m * pair) + sides, 4 * unit * m * pair

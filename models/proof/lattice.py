@@ -10,7 +10,7 @@ Where pairs count with absolute values, the lattice is common to all pixels inst
 multiple of h, and pairs lose nothing.
 
 The discrete costs of the labels are in the mean at most the energy of the crosses that they represent.
-models/proof/check_certificate.py, 2 and 5, states and proves this.
+Sections 3 and 9 of docs/proofs.md state and prove this.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ box is the bounding box of the cells that are left, as in branch and bound.
 
 1. After a forward pass (models/proof/dual.py), label x of pixel i survives where `bound` + theta_i(x) - min
    theta_i <= U + tolerance, and in two further tests where `bound` + the excess of a comb (combs.py) is.
-   models/proof/check_certificate.py, 3, proves the tests.
+   Section 5 of docs/proofs.md proves the tests.
 2. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and in each test one of them
    survives.
 3. The next level has the same centres. If it also has the same spacing, it allows the vertices of the cells
