@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 
@@ -11,13 +10,11 @@ import pytest
 from cases import make_field, make_instance, make_problem
 from crossfield.export.bundle.manifest import read_manifest
 from crossfield.export.bundle.problem_files import write_all, write_problem
-from crossfield.export.bundle.starts import STARTS
-from crossfield.export.formats.registry import FORMATS, format_of, write
+from crossfield.export.formats.registry import FORMATS, write
 from crossfield.models.errors import (
     FormulationError,
     InputError,
     InstanceError,
-    OutputError,
     UnsupportedByFormatError,
 )
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -47,32 +44,6 @@ def test_round_trip(name, options, gauge, tmp_path):
     np.testing.assert_array_equal(found.lower, problem.lower)
     if name == "qp-fixed":
         np.testing.assert_array_equal(found.jumps, problem.jumps)
-
-
-def test_contents(tmp_path):
-    problem = make_problem("milp-mccormick", make_instance())
-    document = write_problem(problem, tmp_path, start=make_field(problem.instance)).document
-    grid = problem.instance.grid
-    pairs, strokes = len(grid.first), len(problem.instance.theta)
-    assert document["counts"] == {
-        "columns": problem.n_columns, "binary": pairs, "integer": pairs, "rows": problem.n_rows,
-        "pixels": grid.size, "pairs": pairs, "stroke_pixels": strokes,
-    }  # fmt: skip
-    facts = [document[key] for key in ("class", "convex", "jumps", "refused")]
-    assert facts == ["MILP", True, None, {}]
-    assert sum(block["count"] for block in document["columns"]) == problem.n_columns
-    assert [block["first"] for block in document["columns"]] == [
-        block.offset for block in problem.blocks.values()
-    ]
-    assert sum(family["count"] for family in document["rows"]) == problem.n_rows
-    names = [entry["name"] for entry in document["files"]]
-    assert names == [f"tiny.milp-mccormick.{suffix}" for suffix in ("nl", "row", "col", "gms", "lp", "mps")]
-    for entry in document["files"]:
-        data = (tmp_path / entry["name"]).read_bytes()
-        assert (entry["bytes"], entry["sha256"]) == (len(data), hashlib.sha256(data).hexdigest())
-    starts = {f"tiny.milp-mccormick.{solver}{entry.suffix}" for solver, entry in STARTS.items()}
-    expected = {*names, *starts, "tiny.instance.json", "tiny.milp-mccormick.manifest.json"}
-    assert {path.name for path in tmp_path.iterdir()} == expected
 
 
 def test_refused_and_lifted_formats_are_listed(tmp_path):
@@ -225,33 +196,6 @@ def test_problems_that_no_manifest_records(tmp_path):
         write(fixed, tmp_path / "fixed.mod")
     assert [path.name for path in tmp_path.iterdir()] == ["single.lp"]
     write(fixed, tmp_path / "fixed.gms")
-
-
-def test_unknown_formats_dialects_and_folders(tmp_path):
-    problem = make_problem("qp-fixed", make_instance())
-    with pytest.raises(InputError, match="no format 'ps'; choose one of nl, gms, lp, mps"):
-        write_problem(problem, tmp_path, formats=["ps"])
-    with pytest.raises(InputError, match=r"model\.ps: no format has the suffix 'ps'"):
-        write(problem, tmp_path / "model.ps")
-    with pytest.raises(
-        InputError, match=r"model\.nl: there is no dialect 'indexed' of nl; choose one of text, b"
-    ):
-        write(problem, tmp_path / "model.nl", dialect="indexed")
-    with pytest.raises(
-        InputError, match="no dialect 'text' of lp; it has one form, so leave the dialect out"
-    ):
-        write(problem, tmp_path / "model.lp", dialect="text")
-    with pytest.raises(InputError, match="no format 'nk'; choose one of nl, gms, lp, mps"):
-        write_problem(problem, tmp_path, dialects={"nk": "binary"})
-    with pytest.raises(OutputError, match="cannot be written"):
-        write(problem, tmp_path / "absent" / "model.lp")
-    assert list(tmp_path.iterdir()) == []
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be created"):
-        write_problem(problem, tmp_path / "file", formats=["lp"])
-    assert format_of("a.b.mps.gz").name == "mps"
-    with pytest.raises(InputError, match=r"MODEL\.PS\.GZ: no format has the suffix 'PS'"):
-        format_of("MODEL.PS.GZ")
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -13,7 +13,6 @@ from pathlib import Path
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.cli.app import invoke
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models import input_limits
 from crossfield.models.array_archive import ArrayArchive, ExpectedArray, pack_arrays
@@ -174,32 +173,6 @@ def test_small_files_do_not_take_much_memory(tmp_path):
     assert found["big.png"][1] < 450
 
 
-def test_errors_name_the_limits_of_drawings(monkeypatch):
-    """Each with a small limit in place of the real one."""
-    from crossfield.models.sketch import path_data, style_sheet, svg
-
-    for module, name, most, text in (
-        (svg, "MAX_TAGS", 5, "tags and attributes"),
-        (svg, "MAX_ELEMENTS", 2, "elements"),
-        (svg, "MAX_USES", 1, "<use> elements"),
-        (svg, "MAX_USE_DEPTH", 0, "nested"),
-        (svg, "MAX_DATA", 20, "characters of paths"),
-        (svg, "MAX_CURVES", 3, "segments of curves"),
-        (path_data, "MAX_CURVES", 1, "segments of curves"),
-        (style_sheet, "MAX_STYLE", 3, "style sheets have more than"),
-        (style_sheet, "MAX_RULE_CHECKS", 2, "comparisons"),
-    ):
-        drawing = SVG.format(
-            f'<style>path{{fill:none}}</style><g id="a">{STROKES}</g><use href="#a"/><use href="#a"/>'
-        ).encode()
-        assert len(read_svg(drawing).points) == 6
-        with monkeypatch.context() as patch:
-            patch.setattr(module, name, most)
-            with pytest.raises(InputError, match=re.escape(text)) as caught:
-                read_svg(drawing)
-            assert re.search(r"more than \d+ ", str(caught.value))
-
-
 STRANGE_SVG = {
     **{
         f"{data} without a move": (f'<path stroke="black" d="{data}"/>', "not with a move (M)")
@@ -346,32 +319,6 @@ def test_damaged_headers_are_refused_without_a_warning(tmp_path, header):
         ArrayArchive(buffer.getvalue()).arrays({"u": ExpectedArray(1, 10)})
 
 
-def test_pictures_are_the_same_for_any_number_of_rows_per_band(tmp_path, monkeypatch):
-    from crossfield.models.sketch import bitmap
-
-    rng = np.random.default_rng(3)
-    shades = np.where(rng.random((90, 130, 1)) < 0.1, rng.integers(0, 200, (90, 130, 3)), 255).astype(
-        np.uint8
-    )
-    shades[30:34] = 20
-    for name, image in {
-        "rgb.png": Image.fromarray(shades),
-        "grey.png": Image.fromarray(shades[..., 0]),
-        "deep.png": Image.fromarray(shades[..., 0].astype(np.uint16) * 256),
-        "float.tiff": Image.fromarray(shades[..., 0].astype(np.float32)),
-        "alpha.png": Image.fromarray(np.dstack([shades, 255 - shades[..., :1]])),
-        "palette.gif": Image.fromarray(shades).quantize(16),
-    }.items():
-        image.save(tmp_path / name)
-        whole = bitmap.read_bitmap((tmp_path / name).read_bytes(), 4)
-        with monkeypatch.context() as patch:
-            patch.setattr(bitmap, "_BAND", 400)
-            banded = bitmap.read_bitmap((tmp_path / name).read_bytes(), 4)
-            mask = bitmap.read_white_pixels((tmp_path / name).read_bytes())
-        np.testing.assert_array_equal(whole.ink, banded.ink)
-        np.testing.assert_array_equal(mask, bitmap.read_white_pixels((tmp_path / name).read_bytes()))
-
-
 def test_texts_from_files_are_safe_in_messages(tmp_path):
     strange = "a\x1b[31m\u202eb\u200b\x07\x9b\udcffc\u2028d"
     assert printable(strange) == r"a\x1b[31m\u202eb\u200b\x07\x9b\udcffc d"
@@ -446,45 +393,3 @@ def test_written_files_obey_the_umask(tmp_path):
         finally:
             os.umask(before)
         assert (tmp_path / f"{mask}.json").stat().st_mode & 0o777 == 0o666 & ~mask
-
-
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from crossfield.models.storage import replacing
-with replacing(Path(sys.argv[1])) as stream:
-    stream.write(b"half")
-    stream.flush()
-    if sys.argv[2] == "dies":
-        os.kill(os.getpid(), signal.SIGKILL)
-    print("writing", flush=True)
-    sys.stdin.read()
-"""
-
-
-def test_only_files_of_killed_processes_are_removed(tmp_path):
-    if os.name == "nt":
-        pytest.skip("Windows does not report whether a process is alive")
-    target = tmp_path / "a.json"
-    target.write_text("whole")
-    (tmp_path / ".a.json.mine.part").write_text("of somebody else")
-    (tmp_path / ".a.json.00000000-1-0a.part").write_text("of another machine")
-    assert subprocess.run([sys.executable, "-c", KILLED, target, "dies"], check=False).returncode < 0
-    assert len(list(tmp_path.iterdir())) == 4
-    with subprocess.Popen(
-        [sys.executable, "-c", KILLED, target, "waits"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as other:
-        assert other.stdout.readline() == b"writing\n"
-        assert (
-            len(list(tmp_path.iterdir())) == 4
-        )  # the file of the dead process was removed, a file of the running one was added
-        assert invoke(["instance", "mouse", "--size", "6", "-o", str(target)]) == 0
-        assert target.read_bytes() != b"half"
-        other.communicate()
-    assert other.returncode == 0
-    assert target.read_bytes() == b"half"
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        ".a.json.00000000-1-0a.part",
-        ".a.json.mine.part",
-        "a.json",
-    ]

@@ -211,20 +211,6 @@ PAIR = {
 BY_HAND = "alpha_00_00 0.1\nalpha_00_01 0.3\nbeta_00_00 0.2\nbeta_00_01 -0.1\np1_00_00_r 1\np2_00_00_r -1\n"
 
 
-def test_two_pixels_by_hand(tmp_path):
-    """A = 0.1 - 0.3 - pi/2, B = -0.2 + 0.1, R = 0.1 + 0.2; weights 2 (pair), 2 x 0.25 (stroke),
-    0.5 (skew).
-    """
-    (tmp_path / "i.json").write_text(json.dumps(PAIR))
-    (tmp_path / "p.sol").write_text(BY_HAND)
-    verdict = check(str(tmp_path / "i.json"), str(tmp_path / "p.sol"))
-    squares = 2 * ((0.2 + math.pi / 2) ** 2 + 0.01) + 0.5 * 0.09 + 0.5 * 0.05
-    absolute = 2 * (0.2 + math.pi / 2 + 0.1) + 0.5 * 0.3 + 0.5 * 0.3
-    assert float(label(verdict, "2-norm").split()[0]) == pytest.approx(squares, rel=1e-15)
-    assert float(label(verdict, "1-norm").split()[0]) == pytest.approx(absolute, rel=1e-15)
-    assert verdict.worst == 0
-
-
 EVERYTHING = """* every section
 NAME everything FREE
 ROWS

@@ -130,17 +130,6 @@ def test_degenerate_pixels_are_marked(tmp_path):
     assert (across, down) == pytest.approx((0.75, 0.75), abs=0.02)
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1)])
-@pytest.mark.parametrize("kind", ["overview", "energy"])
-def test_odd_shapes(tmp_path, shape, kind):
-    instance = instance_of(np.ones(shape), 0, 0, theta=0.3)
-    count = instance.grid.size
-    field = CrossField(
-        instance, np.full(count, 0.3), np.zeros(count), np.zeros(len(instance.grid.first), dtype=np.int32)
-    )
-    assert draw(field, tmp_path / "a.png", kind=kind).stat().st_size > 1000
-
-
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "instance"])
 def test_an_instance_alone_has_no_field(tmp_path, kind):
     with pytest.raises(InputError, match="an instance without a field"):

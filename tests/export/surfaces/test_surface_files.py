@@ -103,17 +103,6 @@ def test_the_folder_has_every_file_the_same_twice_whatever_the_users_settings(tm
     assert not any("second" in key for key in facts)
 
 
-def test_a_scale_is_that_of_all_pictures_and_light_and_facts_are_used(tmp_path):
-    surface = ball(10)
-    about = {"method": "bend"}
-    one = write_surface(surface, tmp_path / "one", scale=3, light=cf.Light(0.0, 0.5), about=about)
-    other = write_surface(surface, tmp_path / "other", scale=3, light=cf.Light(3.0, 0.5))
-    assert {size_of(path)[:2] for path in one.glob("*.png")} == {(30, 30)}
-    assert (one / "normals.png").read_bytes() == (other / "normals.png").read_bytes()
-    assert (one / "shaded.png").read_bytes() != (other / "shaded.png").read_bytes()
-    assert json.loads((one / "surface.json").read_text())["method"] == "bend"
-
-
 def test_strokes_of_the_drawing_lie_over_the_surface(tmp_path):
     instance = cf.sample("mouse", 16)
     flat = surface_of(instance.mask, lambda x, _: 0 * x)

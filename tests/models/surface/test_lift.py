@@ -163,19 +163,6 @@ def test_parts_of_the_mask_are_independent():
     assert both[:, wide:] == pytest.approx(alone[:, ::-1], abs=0.05, nan_ok=True)
 
 
-def test_an_end_in_time_leaves_the_best_so_far():
-    true, field = exact("spheroid", 16)
-    errors = []
-    for most in (0, 8, 10_000):
-        left = iter(range(most))
-        lifted = cf.surface(field, stop=lambda left=left: next(left, None) is None)
-        assert np.isfinite(lifted.normals).all()
-        assert any("time" in doubt for doubt in lifted.doubts) == (most < 10_000)
-        errors.append(error(lifted, true))
-    assert errors[2] < errors[0] / 5
-    assert lifted.heights.tobytes() == cf.surface(field).heights.tobytes()
-
-
 def test_crosses_at_right_angles_give_a_flat_sheet_and_the_doubt():
     field = cf.power_field(cf.sample("bottle", 12))
     square = cf.CrossField(field.instance, field.alpha, 0 * field.beta, field.p)
