@@ -20,7 +20,7 @@ from .certificate import REFUSALS, check_proof
 from .compiling import compile_proofs
 from .descent import Descent, Termination
 from .record import Proof
-from .stroked import extended, restricted, stroked_parts
+from .stroked_parts import extended, restricted, stroked_parts
 
 
 @check_arguments
