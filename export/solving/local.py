@@ -248,7 +248,7 @@ class Solvers:
         stop: Stop | None = None,
     ) -> Solution:
         """Solve a problem; parameters, result and errors are those of the function `solve`."""
-        limits = Limits.bounded(limits)
+        limits = Limits.finite_or_default(limits)
         deadline = Deadline.after(limits.time_limit)
         with _open_folder(folder) as place:
             taking = choose_format(problem, solver)

@@ -89,7 +89,7 @@ class Request:
 
     def __post_init__(self) -> None:
         """Refuse limits without a time limit. Raises InputError."""
-        Limits.bounded(self.limits)
+        Limits.finite_or_default(self.limits)
 
     def deadline(self) -> Deadline:
         """Return the end of the time limit, counted from now."""

@@ -113,7 +113,7 @@ def run(
     """
     should_stop = stop_function(stop)
     underlay = None if drawing is None else read_underlay(drawing, on=instance)
-    limits, folder = Limits.bounded(limits), make_folder(folder)
+    limits, folder = Limits.finite_or_default(limits), make_folder(folder)
     progress(plan_sentence(limits))
     watch = Stopwatch()
     progress("greedy field")

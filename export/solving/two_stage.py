@@ -96,7 +96,7 @@ def find_jumps(
     beyond 10 x 10 pixels. limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError,
     SolutionError.
     """
-    limits = Limits.bounded(limits)
+    limits = Limits.finite_or_default(limits)
     deadline = Deadline.after(limits.time_limit)
     start = start or first_field(instance, deadline.share(_STARTING).passed)
     foreign = set(Options.__dataclass_fields__) - set(FORMULATIONS["milp-mccormick"].option_names)
@@ -147,7 +147,7 @@ def two_stage(
         As for `solve`.
 
     """
-    limits = Limits.bounded(limits)
+    limits = Limits.finite_or_default(limits)
     deadline = Deadline.after(limits.time_limit)
     first = limits.until(jumps_until(deadline))
     milp = find_jumps(instance, folder=folder, limits=first, start=start, stop=stop, **options)

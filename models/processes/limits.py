@@ -52,7 +52,7 @@ class Limits:
         check_jobs(self.threads, "threads", least=0)
 
     @classmethod
-    def bounded(cls, limits: Limits | None) -> Limits:
+    def finite_or_default(cls, limits: Limits | None) -> Limits:
         """The limits of work that needs a time limit; the defaults for None. Raises InputError for none."""
         limits = limits or cls()
         if limits.time_limit == math.inf:

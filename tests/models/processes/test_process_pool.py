@@ -8,9 +8,8 @@ import time
 import pytest
 from children import descendants
 from crossfield.models.errors import InputError
-from crossfield.models.processes import process_pool as module
 from crossfield.models.processes.child_program import WorkerError
-from crossfield.models.processes.job_counts import MOST, check_jobs
+from crossfield.models.processes.job_counts import MOST, check_jobs, cores
 from crossfield.models.processes.process_pool import parallel_map, process_pool
 
 
@@ -170,4 +169,4 @@ def test_how_many_may_be_asked_for_is_said():
             check_jobs(count)
     with pytest.raises(InputError, match="got 100000"), parallel_map(abs, 100000):
         pass
-    assert 1 <= module.cores() <= (os.cpu_count() or 1)
+    assert 1 <= cores() <= (os.cpu_count() or 1)
