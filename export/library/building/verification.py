@@ -7,6 +7,7 @@ which replace every search. Points are also checked by the exact program that ev
 from __future__ import annotations
 
 import gzip
+import os
 import tempfile
 import zlib
 from collections.abc import Collection, Iterator, Mapping
@@ -114,6 +115,10 @@ def _find_differences(
     folder: Path, named: Collection[str], jobs: int, progress: Progress
 ) -> Iterator[Defect]:
     """Files that a build does not make or makes otherwise, and wrong points; not those named before."""
+    if not (folder / INDEX).is_file():
+        if INDEX not in named:
+            yield Defect(INDEX, "is missing", _FETCH)
+        return
     try:
         library = read_library(folder)
         stated = library.document["generator"]
@@ -135,10 +140,11 @@ def _find_differences(
                 elif _read_unpacked(folder / name) != _read_unpacked(again / name):
                     yield Defect(name, "is not what a build makes", remedy)
             progress("points")
-            wrong = _find_wrong_points(folder, rebuilt, jobs)
-            yield from (defect for defect in wrong if defect.file not in named)
+            yield from _find_wrong_points(folder, rebuilt, named, jobs)
     except CrossfieldError as error:
-        yield Defect.of(error, INDEX)
+        defect = Defect.of(error, INDEX)
+        if defect.file not in named or (folder / defect.file).exists():  # else it is named as missing
+            yield defect
 
 
 def _read_unpacked(path: Path) -> bytes:
@@ -149,28 +155,34 @@ def _read_unpacked(path: Path) -> bytes:
     return data
 
 
-def _find_wrong_points(folder: Path, library: Library, jobs: int) -> list[Defect]:
+def _find_wrong_points(folder: Path, library: Library, named: Collection[str], jobs: int) -> list[Defect]:
+    """Best known points that are not feasible; damaged files are not checked."""
     defects: list[Defect] = []
     with open_executor(jobs, None) as chosen:
         tasks = Tasks(chosen, tasks_ahead(jobs, None))
         for sidecar in library.entries:
-            tasks.add(_check_point, (folder, sidecar), defects.extend)
+            point, models = sidecar["best"]["point"], _checked_models(sidecar)
+            intact = [model for model in models if not {point, model} & set(named)]
+            tasks.add(_check_point, (folder, point, intact), defects.extend)
         tasks.run()
     return defects
 
 
-def _check_point(task: tuple[Path, Mapping[str, Any]]) -> list[Defect]:
-    """The defects of the best known point of an entry, against its .mps and its instance."""
-    folder, sidecar = task
-    point, defects = sidecar["best"]["point"], []
+def _checked_models(sidecar: Mapping[str, Any]) -> list[str]:
+    """The files against which a point is checked: the .mps, and the instance unless jumps are data."""
     models = [file["name"] for file in sidecar["files"] if file["format"] == "mps"]
-    if sidecar["jumps"] is None:  # an instance does not have the jumps that are data
-        models.append(sidecar["instance"]["file"])
+    return [*models, sidecar["instance"]["file"]] if sidecar["jumps"] is None else models
+
+
+def _check_point(task: tuple[Path, str, list[str]]) -> list[Defect]:
+    """Check a point against models; return its defects."""
+    folder, point, models = task
+    defects = []
     for model in models:
         try:
             result = check(str(folder / model), str(folder / point))
         except BadInputError as error:
-            what = str(error).replace(f"{folder}/", "")
+            what = str(error).replace(f"{folder}{os.sep}", "")
             defects.append(Defect(point, f"the checker refuses it: {what}"))
             continue
         if result.worst > FEASIBLE:
