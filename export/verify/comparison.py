@@ -131,7 +131,7 @@ def behaviour_difference(reported: Behaviour, problem: Problem, points: Points) 
     """First difference between the behaviour of a file and the problem; empty without one."""
     columns, rows = name_list(column_names(problem)), names_of_rows(problem)
     lacking = set(columns) - set(reported.columns) if reported.may_lack else set()
-    wanted = [name for name in columns if name not in lacking & _unused(problem, columns)]
+    wanted = [name for name in columns if name not in lacking & _columns_in_no_term(problem, columns)]
     strangers = _name_difference(reported.columns, wanted, "columns") or _name_difference(
         reported.rows, rows, "rows"
     )
@@ -163,7 +163,7 @@ def behaviour_difference(reported: Behaviour, problem: Problem, points: Points) 
     )
 
 
-def _unused(problem: Problem, columns: list[str]) -> set[str]:
+def _columns_in_no_term(problem: Problem, columns: list[str]) -> set[str]:
     """Names of columns that stand in no term."""
     used = np.zeros(problem.n_columns, dtype=bool)
     for family in (*problem.objective, *problem.rows):

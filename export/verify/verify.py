@@ -135,7 +135,7 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_ModelFi
                 words = "is not the file that the manifest describes; export again"
                 broken.append(Check(*about, Verdict.FAILED, words))
                 continue
-            path = _unpacked(source, place)
+            path = _unpack_file(source, place)
             if not FORMATS[entry["format"]].is_model(path.name):
                 continue
             held = problem_in_format(problem, FORMATS[entry["format"]])
@@ -151,7 +151,7 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_ModelFi
     return subjects, broken
 
 
-def _unpacked(source: Path, folder: Path) -> Path:
+def _unpack_file(source: Path, folder: Path) -> Path:
     """An uncompressed copy of the file."""
     path = folder / source.name.removesuffix(".gz")
     if source.suffix == ".gz":
@@ -232,15 +232,15 @@ class _ProgramChecks:
         return f"{held.n_columns} columns and {held.n_rows} rows; the free edition takes {self.program.free}"
 
     def _solve(self, subject: _ModelFile, solver: str, seconds: float) -> Check:
-        def ended(verdict: Verdict, words: str) -> Check:
+        def result(verdict: Verdict, words: str) -> Check:
             return subject.check(solver, "solve", verdict, words)
 
         if refusal := _refusal(solver, subject, "solve"):
-            return ended(Verdict.REFUSED, refusal)
+            return result(Verdict.REFUSED, refusal)
         if local := _refusal(solver, subject, "local"):
-            return ended(Verdict.NOT_TRIED, local)
+            return result(Verdict.NOT_TRIED, local)
         if missing := SOLVERS[solver].missing:
-            return ended(Verdict.NOT_TRIED, missing)
+            return result(Verdict.NOT_TRIED, missing)
         files = SolveFiles.for_model(subject.path, solver)
         limits = Limits(seconds, GAP, threads=1)
         try:
@@ -248,9 +248,9 @@ class _ProgramChecks:
                 subject.held, solver, files, limits, Deadline.after(seconds + LATE), precise=True
             )
         except UnsupportedBySolverError:
-            return ended(Verdict.NOT_TRIED, self._too_large(subject))
+            return result(Verdict.NOT_TRIED, self._too_large(subject))
         except CrossfieldError as error:
-            return ended(Verdict.FAILED, str(error))
+            return result(Verdict.FAILED, str(error))
         return _judge_answer(subject, solver, solution)
 
 

@@ -61,7 +61,7 @@ class Words:
         return int(self.table.shape[1])
 
     @cached_property
-    def _padded(self) -> bool:
+    def _has_padding(self) -> bool:
         return bool((self.table[:, -1] == 0).any())
 
     @cached_property
@@ -71,7 +71,7 @@ class Words:
     def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
         """The words of these records."""
         words = self._words[start:stop] if self.codes is None else self._words.take(self.codes[start:stop])
-        return words, self._padded
+        return words, self._has_padding
 
     def at(self, codes: NDArray[Any]) -> Words:
         """Return this table with other codes."""

@@ -88,16 +88,16 @@ class _Pipeline:
     def __call__(self, chunks: list[bytes], *, wait: bool) -> None:
         """Pass chunks to the tasks. wait: process them here, so that a small file starts no thread."""
         if wait:
-            self._settle(0)
+            self._wait_until(0)
             for task in self._tasks:
                 task(chunks)
         else:
-            self._settle(len(self._tasks) * _SHARES)
+            self._wait_until(len(self._tasks) * _SHARES)
             self._waiting += [
                 pool.submit(task, chunks) for pool, task in zip(self._pools, self._tasks, strict=True)
             ]
 
-    def _settle(self, most: int) -> None:
+    def _wait_until(self, most: int) -> None:
         """Wait until at most that many are in progress."""
         while len(self._waiting) > most:
             self._waiting.popleft().result()
@@ -109,7 +109,7 @@ class _Pipeline:
         for pool in self._pools:
             pool.shutdown(cancel_futures=kind is not None)
         if kind is None:
-            self._settle(0)
+            self._wait_until(0)
 
 
 def gzip_chunks(chunks: Iterable[bytes]) -> Iterator[bytes]:

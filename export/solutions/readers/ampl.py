@@ -206,9 +206,9 @@ class _Records:
         if not 0 <= count <= _MOST_OPTIONS or len(numbers) != count + 4:
             raise self.fault(f"the Options record of {len(record)} bytes announces {count} options")
         *options, rows, duals, columns, values = numbers
-        return self._checked(_Counts(rows, duals, columns, values, _stamps(options)))
+        return self._check_counts(_Counts(rows, duals, columns, values, _stamps(options)))
 
-    def _checked(self, counts: _Counts) -> _Counts:
+    def _check_counts(self, counts: _Counts) -> _Counts:
         if min(counts[:4]) < 0 or counts.complaint:
             raise self.fault(counts.complaint or "a count is negative")
         return counts

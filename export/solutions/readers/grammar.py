@@ -213,10 +213,10 @@ class TextLayout:
 
     def _heads(self, text: bytes) -> Iterator[tuple[int, re.Match[bytes]]]:
         """The places of the signature, and its matches. A pattern that begins with a line end is faster."""
-        first = _compiled(self)["first head"].match(text)
+        first = _compile_patterns(self)["first head"].match(text)
         if first:
             yield 0, first
-        for match in _compiled(self)["later head"].finditer(text, first.end() if first else 0):
+        for match in _compile_patterns(self)["later head"].finditer(text, first.end() if first else 0):
             yield match.start() + 1, match
 
     def answers(self, data: bytes) -> Iterator[bytes]:
@@ -235,7 +235,7 @@ class TextLayout:
 
 
 @cache
-def _compiled(layout: TextLayout) -> dict[str, re.Pattern[bytes]]:
+def _compile_patterns(layout: TextLayout) -> dict[str, re.Pattern[bytes]]:
     """The patterns of a layout, compiled: signature, begin, end, and claims and refusals by number."""
     lines = {"begin": layout.begin, "end": layout.end}
     lines.update({f"refusal {at}": pattern for at, (pattern, _) in enumerate(layout.refusals)})
@@ -266,7 +266,7 @@ class Scan:
 
     def __init__(self, data: bytes, layout: TextLayout) -> None:
         self.layout = layout
-        self.patterns = _compiled(layout)
+        self.patterns = _compile_patterns(layout)
         self.form = _forms(layout)[0]
         self.chosen = len(layout.forms) == 1
         for literal, pattern, replacement in layout.rewrites:
@@ -294,7 +294,7 @@ class Scan:
                 if at == len(self.data):
                     break
             end = self.data.index(b"\n", at)
-            if inside and (entry := self._uncommented(at, end)):
+            if inside and (entry := self._entry_before_comment(at, end)):
                 yield self._entries(self.form.split(entry), at, at)
                 at = end + 1
                 continue
@@ -325,7 +325,7 @@ class Scan:
             self.cut = names[-1]
         return names, values
 
-    def _uncommented(self, at: int, end: int) -> bytes:
+    def _entry_before_comment(self, at: int, end: int) -> bytes:
         """The entry on a line that ends in a comment, or nothing."""
         mark = self.data.find(b" " + self.layout.comment, at, end) if self.layout.comment else -1
         entry = self.data[at:mark] + b"\n" if mark > at else b""
