@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
 
 SVG = (
@@ -65,35 +64,10 @@ def test_chains_do_not_depend_on_how_the_drawing_is_turned(study):
         assert counts(chains[0]) == counts(chains[1]) == counts(chains[2])
 
 
-def test_only_drawings_with_lines_record_curves(study):
-    torus = cf.sample("torus_patch", 16)
-    assert np.array_equal(study.tracing.curves_of(torus, "torus_patch"), study.tracing.chains(torus))
-    assert len(counts(traced(study, "saddle", 16)[1])) == 10
-    with pytest.raises(InputError, match=r"mouse: draws nothing at \d+ stroke pixels of saddle"):
-        study.tracing.curves_of(cf.sample("saddle", 16), "mouse")
-
-
 def strokes_of(instance):
     """Direction and reliability by pixel."""
     pixels = map(tuple, instance.stroke_pixels.tolist())
     return dict(zip(pixels, zip(instance.theta, instance.w, strict=True), strict=True))
-
-
-def at_random(instance, rng):
-    """Crosses in any direction, with lines at right angles."""
-    grid = instance.grid
-    return CrossField(instance, rng.uniform(0, np.pi, grid.size), np.zeros(grid.size), 0 * grid.first)
-
-
-def test_crosses_at_random_are_22_and_a_half_degrees_off(study):
-    rng = np.random.default_rng(5)
-    angles = []
-    for name in ("mouse", "singular", "bottle"):
-        for hidden in study.hidden.hidden_curves(*traced(study, name), 4):
-            angles += [hidden.deviation(at_random(hidden.rest, rng)) for _ in range(40)]
-    summary = study.hidden.summary(np.degrees(angles))
-    assert summary.count == len(angles) > 400
-    assert abs(summary.mean - 22.5) < 4 * summary.error < 1.5
 
 
 def test_the_nearer_line_counts_whichever_it_is(study):
@@ -134,17 +108,3 @@ def test_a_part_of_the_mask_keeps_a_stroke(study):
     instance = cf.Instance("two", mask, pixels, np.full(15, np.pi / 2), np.ones(15))
     curve = np.tile(np.array([0, 1, 2], dtype=np.int32), 5)
     assert [hidden.number for hidden in study.hidden.hidden_curves(instance, curve, 9)] == [1, 2]
-
-
-def test_a_field_on_other_pixels_is_refused(study):
-    (hidden,) = study.hidden.hidden_curves(*traced(study, "mouse"), 1)
-    with pytest.raises(InstanceError, match="not on the pixels of mouse"):
-        hidden.deviation(cf.greedy_field(cf.sample("bottle", 12)))
-
-
-def test_the_summary_of_some_angles(study):
-    summary = study.hidden.summary(np.array([1.0, 2.0, 6.0]))
-    assert (summary.count, summary.mean, summary.median) == (3, 3.0, 2.0)
-    assert summary.error == pytest.approx(np.sqrt(7 / 3))
-    assert study.hidden.summary(np.array([4.0])).error is None
-    assert study.hidden.summary(np.array([])) is None

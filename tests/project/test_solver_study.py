@@ -1,12 +1,7 @@
-"""The study of solvers: its rule on load, its statistics, and its reading of logs."""
+"""The study of solvers: its statistics, and its reading of logs."""
 
 from __future__ import annotations
 
-import math
-import os
-import subprocess
-import sys
-import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,25 +11,8 @@ import pytest
 @pytest.fixture(scope="module")
 def study(docs_module):
     """The modules of the study."""
-    names = ("logs", "measure", "plan", "statistics")
+    names = ("logs", "plan", "statistics")
     return SimpleNamespace(**{name: docs_module(f"studying.solvers.{name}") for name in names})
-
-
-def test_a_run_beside_other_work_on_its_core_is_to_be_repeated(study):
-    core = min(os.sched_getaffinity(0))
-    program = (
-        f"import os, time\nos.sched_setaffinity(0, {{{core}}})\nend = time.time() + 3\n"
-        "while time.time() < end: pass"
-    )
-    detached = ["sh", "-c", '"$0" -c "$1" >/dev/null 2>&1 &', sys.executable, program]
-    watch = study.measure.Watch(core, 1.0, math.inf)
-    watch.begin()
-    subprocess.run(detached, check=True)
-    time.sleep(2.5)
-    assert watch.late()
-    row = watch.row()
-    assert row["status"] == study.statistics.DISCARDED
-    assert row["beside"] > 0.2
 
 
 def row(study, seconds, status="optimal-global", objective=2.0, bound=2.0, limit=300.0, **more):

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import places
@@ -49,25 +46,3 @@ def test_no_run_has_two_rows(study):
     for part in study.rows.PARTS:
         keys = [study.rows.key_of(row) for row in kept[part]]
         assert len(keys) == len(set(keys)) > 0
-
-
-@pytest.mark.slow
-def test_a_quick_study_makes_its_page(study, tmp_path):
-    program = (
-        f"import sys; sys.path.insert(0, {str(DOCS)!r})\n"
-        "from dataclasses import replace\nfrom pathlib import Path\n"
-        "from studying import page, plan, work\n"
-        "small = replace(plan.QUICK, quality=(12,), quality_limit=0.5,\n"
-        "                practice=(12,), practice_limit=0.5, quick_search=0.2)\n"
-        "if __name__ == '__main__':\n"
-        f"    work.carry_out(small, Path({str(tmp_path)!r}), jobs=2)\n"
-        f"    page.write_page(Path({str(tmp_path)!r}), Path({str(tmp_path)!r}), small)\n"
-    )
-    script = tmp_path / "small.py"
-    script.write_text(program)
-    environment = os.environ | {"OMP_NUM_THREADS": "1"}
-    subprocess.run([sys.executable, str(script)], check=True, env=environment)
-    assert "still missing" not in (tmp_path / "evidence.md").read_text()
-    for name in ("quality", "weights", "practice"):
-        assert (tmp_path / "pictures" / f"evidence_{name}.svg").read_bytes().startswith(b"<?xml")
-    assert not list(tmp_path.glob(".lock"))
