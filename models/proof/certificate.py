@@ -163,14 +163,14 @@ def _level_arrays(level: LevelRecord) -> Arrays:
 
 def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels) -> Arrays:
     """The cuts and the multipliers of the last step; none where it is not convex."""
-    from .forced import last_step_pieces  # loads solvers
+    from .last_step import minimise_on_boxes  # loads solvers
 
-    terms, last = passed.terms, passed.last
+    terms, last, instance = passed.terms, passed.last, proof.levels[0].instance
     if last is not None and check_certificate.is_convex(terms, last):
-        cuts, multipliers = last_step_pieces(proof.levels[0], last, proof.energy)
-    else:
-        cuts, multipliers = np.zeros(0, np.int32), np.zeros((0, 2 * (len(terms.first) + len(terms.white))))
-    return {"cuts": cuts, "multipliers": multipliers}
+        minimum = minimise_on_boxes(instance, terms, last, proof.energy)
+        return {"cuts": minimum.cuts, "multipliers": minimum.multipliers}
+    size = 2 * (len(terms.first) + len(terms.white))
+    return {"cuts": np.zeros(0, np.int32), "multipliers": np.zeros((0, size))}
 
 
 @check_arguments

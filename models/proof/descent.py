@@ -3,8 +3,8 @@
 Each refinement level has half the spacing of the one before, or the same spacing with fewer labels. On a
 level the dual rises by passes (models/proof/dual.py), fields are rounded from it (rounding.py), and cells
 that cannot hold a better field are dropped (pruning.py), until the jumps are forced and a convex problem is
-left (forced.py). A better field that is found on a coarse lattice becomes the centre: the levels begin anew
-round it. On a finer lattice little is lost where the centre is another field.
+left (last_step.py). A better field that is found on a coarse lattice becomes the centre: the levels begin
+anew round it. On a finer lattice little is lost where the centre is another field.
 
 The labels of a level are those that the gap of the level before leaves. While passes close that gap, most of
 them can be dropped, and the work of a pass falls faster than the gap. A record of the level justifies that.
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -33,10 +33,10 @@ from ..processes.limits import Limits
 from ..search.improvement import improved_field
 from ..search.search import search
 from ..search.starts import best_start, polyvector_start
-from .check_certificate import MOST_COUNT
+from .check_certificate import MOST_COUNT, has_forced_jump, is_convex
 from .clusters import table_sizes
 from .dual import Dual
-from .forced import forced
+from .last_step import energy_terms, last_step_on, minimise_on_boxes
 from .lattice import Lattice, nearest_labels
 from .pruning import RemainingCells, finer_lattice, smaller_lattice
 from .record import EXACT, LevelRecord, Proof
@@ -130,7 +130,6 @@ class Descent:
     """
 
     better_field = staticmethod(better_field)
-    forced = staticmethod(forced)
 
     norm: Norm
     instance: Instance
@@ -263,15 +262,16 @@ class Descent:
 
     def _solve_if_forced(self, left: RemainingCells) -> None:
         """Count the jumps that are forced, and if all choices are, solve the convex problem that is left."""
-        chain, (_, _, jumps) = self.chain, nearest_labels(self.best, left.lattice)
-        choices = self.forced(replace(left, lattice=replace(left.lattice, p=jumps)))
-        chain.forced = int(choices.pairs.sum())
-        if choices.everything:
+        chain, terms = self.chain, energy_terms(self.instance, self.norm)
+        step = last_step_on(left, terms, self.best)
+        chain.forced = int(has_forced_jump(terms, step.p, step.boxes).sum())
+        if is_convex(terms, step):
             energy = self.energy(self.best)
-            solution, bound, *_ = choices.least(energy, self.ends.over)
-            chain.convex = max(chain.convex, min(bound, chain.levels[-1].energy))
-            if bound < energy:
-                better = field_in_windows(self.instance, solution.alpha, solution.beta, solution.p)
+            minimum = minimise_on_boxes(self.instance, terms, step, energy, self.ends.over)
+            chain.convex = max(chain.convex, min(minimum.bound, chain.levels[-1].energy))
+            if minimum.bound < energy:
+                field = minimum.field
+                better = field_in_windows(self.instance, field.alpha, field.beta, field.p)
                 self._offer(self.improve_field(better, self.ends.over))
 
     def _add_clusters(self, dual: Dual) -> None:

@@ -9,11 +9,11 @@ from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.compilation import crew
 from crossfield.models.proof import check_certificate
-from crossfield.models.proof.absolute_descent import forced_absolute
 from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.check_certificate import has_forced_jump
 from crossfield.models.proof.dual import Dual
+from crossfield.models.proof.last_step import energy_terms
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import RemainingCells
 from crossfield.models.search.absolute_fit import Residuals, absolute_fit, fit_absolute
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
@@ -177,10 +177,8 @@ def test_a_forced_jump_is_the_best_one_everywhere_in_its_boxes(norm):
         p = rng.integers(-1, 2)
         middle = np.array([[0.5, 0.5 + HALF * p], rng.uniform(-0.7, 0.7, 2)]) + rng.normal(0, 0.2, (2, 2))
         low, high = middle - rng.uniform(0, 0.2, (2, 2)), middle + rng.uniform(0, 0.2, (2, 2))
-        field = cf.CrossField(instance, middle[0], middle[1], [p])
-        lattice = Lattice.common(field, norm, np.zeros(1), 4)
-        left = RemainingCells(lattice, lattice.allowed, low[0], high[0], low[1], high[1])
-        if not forced_absolute(left).pairs[0]:
+        boxes = np.stack([low[0], high[0], low[1], high[1]], axis=1)
+        if not has_forced_jump(energy_terms(instance, norm), np.array([p]), boxes)[0]:
             continue
         found += 1
         alpha, beta = rng.uniform(low[..., None], high[..., None], (2, 2, 200))

@@ -24,7 +24,7 @@ from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
-from crossfield.models.proof.forced import last_step_pieces
+from crossfield.models.proof.last_step import minimise_on_boxes
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.tightening import remaining_windows
 from exhaustive import optimum, random_instance, sketch
@@ -451,7 +451,7 @@ def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(norm, written):
     for seed in (1, 3, 4, 7):
         _, arrays = written(seed)
         (terms, _), proof = check_certificate.terms_of(arrays), proven(seed)
-        terms.norm, lattice = norm, replace(proof.levels[0], norm=norm)
+        terms.norm = norm
         for away in (0.0, 0.0, 0.0, 0.0, 0.15, 0.3):
             edge = terms.theta[0] + rng.choice([-1, 1]) * (np.pi / 4 + away)
             alpha = edge + rng.normal(0, 0.02, 4)
@@ -463,7 +463,7 @@ def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(norm, written):
             step = check_certificate.last_step(terms, boxes, alpha, p)
             if not check_certificate.is_convex(terms, step):
                 continue
-            cuts, multipliers = last_step_pieces(lattice, step, np.inf)
+            _, _, cuts, multipliers = minimise_on_boxes(proof.field.instance, terms, step, np.inf)
             low, size = boxes[:, ::2], boxes[:, 1::2] - boxes[:, ::2]
             points = low + rng.random((400, 4, 2)) ** rng.choice([0.1, 1, 10], (400, 1, 1)) * size
             energies = [free_energy(proof.field.instance, *point.T, norm) for point in points]
