@@ -210,7 +210,7 @@ def take_array(arrays: dict[str, Array], name: str, kind: str, *shape: int | Non
 
 
 class NumberBlocks:
-    """NumberBlocks of numbers: whole multiples of a unit each, stored by their differences modulo 2^32."""
+    """Blocks of numbers: whole multiples of a unit each, stored by their differences modulo 2^32."""
 
     def __init__(self, arrays: dict[str, Array], name: str, counts: Array) -> None:
         """counts: how many numbers each block has."""
@@ -902,7 +902,7 @@ def excess_over_windows(theta: Array, boxes: Array) -> Array:
 
 
 def linear_bound(terms: EnergyTerms, step: LastStep, piece: BoxPiece, multipliers: Array) -> float:
-    """Lemma 5: a lower bound of F in a piece, from any multipliers l of all residuals (2m + 2n,).
+    """Lemma 6: a lower bound of F in a piece, from any multipliers l of all residuals (2m + 2n,).
 
     With phi(r) >= l r - l^2/4 for squares, and >= l r for absolute values and |l| <= 1, the bound is linear
     in the angles. So is the deduction of Lemma 5 where u carries a stroke beyond its window.

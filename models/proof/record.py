@@ -66,8 +66,8 @@ class LevelRecord(Lattice):
         cls, lattice: Lattice, arrays: tuple[Arrays, Arrays], *, bound: float, energy: float
     ) -> Self:
         """The record of shares and tables on a lattice, which is without cached arrays."""
-        given = {each.name: getattr(lattice, each.name) for each in fields(Lattice)}
-        return cls(**given, shares=arrays[0], tables=arrays[1], bound=bound, energy=energy)
+        values = {entry.name: getattr(lattice, entry.name) for entry in fields(Lattice)}
+        return cls(**values, shares=arrays[0], tables=arrays[1], bound=bound, energy=energy)
 
 
 @dataclass(frozen=True, eq=False)
