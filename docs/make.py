@@ -20,6 +20,7 @@ from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.formulations.latex import latex
 from crossfield.models.formulations.symbols import VARIABLES
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
+from crossfield.models.instance.symmetries import turned
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.smooth.polyvector import HOLDS
 from PIL import Image
@@ -161,7 +162,7 @@ def write_errata() -> None:
     for seed in range(1, 4):
         for gauge in GAUGES:
             instance = random_instance(2, 3, seed, gauge)
-            both = [optimum(moved, "miqp-exact") for moved in (instance, instance.turned())]
+            both = [optimum(moved, "miqp-exact") for moved in (instance, turned(instance))]
             gauges.append(
                 [
                     str(seed),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -32,7 +32,9 @@ class HiddenCurve:
         """The instance without the curve's strokes; its mask and its other strokes stay."""
         shown = np.ones(len(self.instance.theta), dtype=bool)
         shown[self.stroke] = False
-        return self.instance.with_strokes(shown)
+        instance = self.instance
+        pixels, theta, w = instance.stroke_pixels[shown], instance.theta[shown], instance.w[shown]
+        return replace(instance, stroke_pixels=pixels, theta=theta, w=w)
 
     def deviation(self, field: CrossField) -> float:
         """The mean angle, in [0, pi/2] radians, from the curve to the nearer line of a field on its grid."""

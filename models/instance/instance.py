@@ -334,60 +334,6 @@ class Instance(Pictured):
         side, power = max(self.mask.shape), _POWERS[term]
         return round_to_digits(getattr(self, f"{term}_coefficient") * side**power / REFERENCE**power)
 
-    def with_strokes(self, kept: Bools) -> Instance:
-        """Return the same instance with a part of its strokes.
-
-        Parameters
-        ----------
-        kept
-            Stroke pixels to keep, bool (s,).
-
-        Returns
-        -------
-        Instance
-            The instance.
-
-        Raises
-        ------
-        NoStrokeError
-            If no stroke is left.
-        InstanceError
-            For another shape, and for other values than True and False.
-
-        """
-        kept = np.asarray(kept)
-        if kept.dtype != bool or kept.shape != self.theta.shape:
-            raise InstanceError(f"kept needs {len(self.theta)} values True or False, one per stroke pixel")
-        return replace(self, stroke_pixels=self.stroke_pixels[kept], theta=self.theta[kept], w=self.w[kept])
-
-    def turned(self) -> Instance:
-        """The instance of the sketch turned by a quarter counter-clockwise."""
-        row, column = self.stroke_pixels.T
-        pixels = np.stack([self.mask.shape[1] - 1 - column, row], axis=1)
-        return self._move(np.rot90(self.mask), pixels, 1, HALF)
-
-    def mirrored(self) -> Instance:
-        """The instance of the sketch mirrored left to right."""
-        row, column = self.stroke_pixels.T
-        pixels = np.stack([row, self.mask.shape[1] - 1 - column], axis=1)
-        return self._move(self.mask[:, ::-1], pixels, -1, np.pi)
-
-    def transposed(self) -> Instance:
-        """The instance mirrored at its main diagonal: rows and columns are exchanged."""
-        return self._move(self.mask.T, self.stroke_pixels[:, ::-1], -1, -HALF)
-
-    def _move(self, mask: Bools, pixels: Ints, sense: int, turn: float) -> Instance:
-        """The instance with its stroke pixels moved and every theta changed to sense theta + turn."""
-        order = np.lexsort((pixels[:, 1], pixels[:, 0]))
-        return replace(
-            self,
-            mask=mask,
-            stroke_pixels=pixels[order],
-            theta=sense * self.theta[order] + turn,
-            w=self.w[order],
-            reading=None,
-        )
-
     def facts(self) -> dict[str, Any]:
         """Name, origin, sizes and weights, as reports list them."""
         return {

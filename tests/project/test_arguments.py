@@ -105,7 +105,6 @@ cf.Instance("a", **pixel, origin=3)                      | origin has shape ()
 cf.Instance("a", **pixel, gauge=["box"])                 | no gauge ['box']; choose one of strokes, box
 cf.Instance("a", **pixel, source=3)                      | source is 3; give text
 instance.with_weights(stroke_weight="1")                 | stroke_weight is '1'; give a number
-instance.with_strokes([True])                            | kept needs 8 values True or False
 cf.draw(3, folder / "a.png")                             | what is 3; give a CrossField or an Instance
 cf.draw(field, 3)                                        | path is 3; give text or a path
 cf.preview(None)                                         | what is None; give a CrossField

@@ -8,6 +8,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.field.field import CrossField
+from crossfield.models.instance.symmetries import mirrored, turned
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100"><g fill="none" stroke="black">{}</g></svg>'
@@ -60,7 +61,7 @@ def test_a_stroke_that_redraws_another_is_hidden_with_it(study, tmp_path):
 def test_chains_do_not_depend_on_how_the_drawing_is_turned(study):
     for name in ("mouse", "singular", "torus_patch"):
         instance = cf.sample(name, 24)
-        chains = [study.tracing.chains(each) for each in (instance, instance.turned(), instance.mirrored())]
+        chains = [study.tracing.chains(each) for each in (instance, turned(instance), mirrored(instance))]
         assert counts(chains[0]) == counts(chains[1]) == counts(chains[2])
 
 

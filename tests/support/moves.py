@@ -2,13 +2,14 @@
 
 import numpy as np
 from crossfield.models.instance.angles import HALF
+from crossfield.models.instance.symmetries import mirrored, transposed, turned
 
 MOVES = {
-    "turned": (np.rot90, lambda angle: angle + HALF),
-    "mirrored": (lambda picture: picture[:, ::-1], lambda angle: np.pi - angle),
-    "transposed": (lambda picture: picture.T, lambda angle: -HALF - angle),
+    turned: (np.rot90, lambda angle: angle + HALF),
+    mirrored: (lambda picture: picture[:, ::-1], lambda angle: np.pi - angle),
+    transposed: (lambda picture: picture.T, lambda angle: -HALF - angle),
 }
-"""By the method of Instance: the new picture, and the new angle in radians."""
+"""By the function that moves an instance: the new picture, and the new angle in radians."""
 
 
 def lines(field):

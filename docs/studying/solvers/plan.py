@@ -10,6 +10,7 @@ from typing import Final
 
 import crossfield as cf
 from crossfield.models.instance.instance import Instance
+from crossfield.models.instance.symmetries import turned
 from crossfield.models.sketch.samples import SAMPLES
 
 from ..rows import DATA as FOLDER
@@ -118,7 +119,7 @@ def make_instance(name: str, turns: int = 0) -> Instance:
         about = {"size": int(size), "strokes": kind, "mask_share": MASK_SHARE, "noise": noise}
         instance = cf.random_instance(int(seed[0]), **about)  # type: ignore[arg-type]
     for _ in range(turns):
-        instance = instance.turned()
+        instance = turned(instance)
     return instance
 
 

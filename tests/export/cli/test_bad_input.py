@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
+from crossfield.models.instance.symmetries import turned
 from crossfield.models.memory import available_memory
 from loops import for_each
 from PIL import Image, ImageDraw
@@ -100,7 +101,7 @@ def files(tmp_path, monkeypatch, instance):
         document = json.loads(Path("tiny.json").read_text())
         change(document)
         Path(name).write_text(json.dumps(document))
-    cf.write_field(cf.greedy_field(instance.turned()), "other.npz")
+    cf.write_field(cf.greedy_field(turned(instance)), "other.npz")
 
 
 NO_SUCH_FORMULATION = (

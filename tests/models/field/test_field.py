@@ -7,6 +7,7 @@ from crossfield.models.field.field import DEGENERATE, CrossField, field_in_windo
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
+from crossfield.models.instance.symmetries import mirrored, transposed, turned
 from exhaustive import assert_feasible, random_field, random_instance
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,9 +18,9 @@ pytestmark = pytest.mark.numeric
 
 SEEDS = st.integers(0, 2**32 - 1)
 MOVES = {
-    "turned": (np.rot90, lambda alpha, beta: (alpha + HALF, beta), 1),
-    "mirrored": (np.fliplr, lambda alpha, beta: (np.pi - alpha, -beta), -1),
-    "transposed": (np.transpose, lambda alpha, beta: (-HALF - alpha, -beta), -1),
+    turned: (np.rot90, lambda alpha, beta: (alpha + HALF, beta), 1),
+    mirrored: (np.fliplr, lambda alpha, beta: (np.pi - alpha, -beta), -1),
+    transposed: (np.transpose, lambda alpha, beta: (-HALF - alpha, -beta), -1),
 }
 
 
@@ -211,11 +212,11 @@ def test_relabelled_is_inside_every_bound(seed, gauge):
     assert_feasible(field)
 
 
-@pytest.mark.parametrize("name", MOVES)
+@pytest.mark.parametrize("moved_instance", MOVES)
 @given(seed=SEEDS)
-def test_energies_are_those_of_the_moved_field(name, seed):
+def test_energies_are_those_of_the_moved_field(moved_instance, seed):
     field = random_field(random_instance(seed), seed)
-    moved = moved_field(field, name)
+    moved = moved_field(field, moved_instance)
     for norm in (1, 2):
         assert moved.energy(norm).smooth == pytest.approx(field.energy(norm).smooth, abs=1e-9)
         assert moved.energy(norm).beta == pytest.approx(field.energy(norm).beta, abs=1e-9)
@@ -224,10 +225,10 @@ def test_energies_are_those_of_the_moved_field(name, seed):
     assert sorted(moved.singularities.index) == sorted(field.singularities.index)
 
 
-def moved_field(field, name):
+def moved_field(field, moved_instance):
     """The field on the moved instance, pixel by pixel and pair by pair."""
-    move, angles, sign = MOVES[name]
-    instance = getattr(field.instance, name)()
+    move, angles, sign = MOVES[moved_instance]
+    instance = moved_instance(field.instance)
     old = move(field.instance.grid.number)[instance.mask]
     jump = {}
     for i, j, p in zip(field.instance.grid.first, field.instance.grid.second, field.p, strict=True):

@@ -10,6 +10,7 @@ from cases import make_instance
 from crossfield.models.errors import InstanceError
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import GAUGES, Instance
+from crossfield.models.instance.symmetries import mirrored, transposed, turned
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -161,29 +162,29 @@ def test_four_turns_two_mirrors_two_transpositions_change_nothing(instance):
             and np.allclose(np.exp(2j * moved.theta), np.exp(2j * instance.theta))
         )
 
-    assert same(instance.turned().turned().turned().turned())
-    assert same(instance.mirrored().mirrored())
-    assert same(instance.transposed().transposed())
-    assert same(instance.turned().transposed().mirrored())
+    assert same(turned(turned(turned(turned(instance)))))
+    assert same(mirrored(mirrored(instance)))
+    assert same(transposed(transposed(instance)))
+    assert same(mirrored(transposed(turned(instance))))
 
 
 def test_turned_by_hand():
     instance = Instance(**GOOD)
-    turned = instance.turned()
-    assert turned.mask.tolist() == [[True, False], [True, True], [True, True]]
-    assert turned.stroke_pixels.tolist() == [[1, 0], [2, 1]]
-    assert turned.theta == pytest.approx([0.5 + HALF, 3.0 - HALF])
-    assert turned.w.tolist() == [1.0, 0.25]
+    moved = turned(instance)
+    assert moved.mask.tolist() == [[True, False], [True, True], [True, True]]
+    assert moved.stroke_pixels.tolist() == [[1, 0], [2, 1]]
+    assert moved.theta == pytest.approx([0.5 + HALF, 3.0 - HALF])
+    assert moved.w.tolist() == [1.0, 0.25]
 
 
 def test_mirrored_and_transposed_by_hand():
     instance = Instance("one", np.ones((1, 3), bool), [[0, 0]], [np.radians(30)], [1.0])
-    mirrored, transposed = instance.mirrored(), instance.transposed()
-    assert mirrored.stroke_pixels.tolist() == [[0, 2]]
-    assert np.degrees(mirrored.theta) == pytest.approx([150])
+    left_right, diagonal = mirrored(instance), transposed(instance)
+    assert left_right.stroke_pixels.tolist() == [[0, 2]]
+    assert np.degrees(left_right.theta) == pytest.approx([150])
     # Mirrored at the line of -45 degrees: 30 becomes -90 - 30 = -120, the line of 60 degrees.
-    assert transposed.mask.shape == (3, 1)
-    assert np.degrees(transposed.theta) == pytest.approx([60])
+    assert diagonal.mask.shape == (3, 1)
+    assert np.degrees(diagonal.theta) == pytest.approx([60])
 
 
 def test_sha256_tells_contents_apart():

@@ -12,6 +12,7 @@ import pytest
 from children import interrupted
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.instance.instance import Instance
+from crossfield.models.instance.symmetries import mirrored, transposed, turned
 from exhaustive import exact, optimum, random_instance, sketch
 
 pytestmark = pytest.mark.numeric
@@ -75,7 +76,7 @@ def test_turned_and_mirrored_sketches_have_the_same_proven_optimum():
     instance = random_instance(8, shape=(4, 3))
     proofs = [
         cf.prove(each, jobs=1)
-        for each in (instance, instance.turned(), instance.mirrored(), instance.transposed())
+        for each in (instance, turned(instance), mirrored(instance), transposed(instance))
     ]
     assert {proof.status for proof in proofs} == {"optimal"}
     np.testing.assert_allclose([proof.energy for proof in proofs], proofs[0].energy, atol=1e-8)

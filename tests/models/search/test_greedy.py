@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
+from crossfield.models.instance.symmetries import mirrored, transposed, turned
 from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.nearest_stroke import nearest_strokes
@@ -100,7 +101,7 @@ def test_large_grids_are_grown_by_local_updates():
     assert field.singularities.index.tolist() == [0.25]
 
 
-MOVES = {"turned": np.rot90, "mirrored": np.fliplr, "transposed": np.transpose}
+MOVES = {turned: np.rot90, mirrored: np.fliplr, transposed: np.transpose}
 
 
 def same_cells(instance, moved, move):
@@ -113,13 +114,13 @@ def same_cells(instance, moved, move):
     return (np.append(order, -1)[nearest_strokes(moved)] == move(cells)[moved.mask]).all()
 
 
-@pytest.mark.parametrize("name", MOVES)
-def test_greedy_energy_is_that_of_the_moved_sketch(name):
+@pytest.mark.parametrize("move", MOVES)
+def test_greedy_energy_is_that_of_the_moved_sketch(move):
     compared = 0
     for seed in range(60):
         instance = random_instance(seed, strokes=4)
-        moved = getattr(instance, name)()
-        if same_cells(instance, moved, MOVES[name]):
+        moved = move(instance)
+        if same_cells(instance, moved, MOVES[move]):
             compared += instance.grid.size > 9
             assert greedy_field(moved).energy().total == pytest.approx(
                 greedy_field(instance).energy().total, rel=1e-6, abs=1e-9
@@ -127,11 +128,11 @@ def test_greedy_energy_is_that_of_the_moved_sketch(name):
     assert compared > 5
 
 
-@pytest.mark.parametrize("name", MOVES)
-def test_power_energy_is_that_of_the_moved_sketch(name):
+@pytest.mark.parametrize("move", MOVES)
+def test_power_energy_is_that_of_the_moved_sketch(move):
     for seed in range(4):
         instance = some_curves(12, seed)
-        moved = getattr(instance, name)()
+        moved = move(instance)
         assert power_field(moved).energy().total == pytest.approx(
             power_field(instance).energy().total, rel=1e-6
         )
@@ -140,7 +141,7 @@ def test_power_energy_is_that_of_the_moved_sketch(name):
 def test_turns_of_a_sketch_with_ties_have_close_energies():
     instance = some_curves()
     energies = [
-        greedy_field(moved).energy().total for moved in (instance, instance.turned(), instance.mirrored())
+        greedy_field(moved).energy().total for moved in (instance, turned(instance), mirrored(instance))
     ]
     assert max(energies) < 1.2 * min(energies)
 

@@ -8,6 +8,7 @@ from crossfield.export.solving.methods import Candidate
 from crossfield.export.solving.report import Report
 from crossfield.export.solving.run import START
 from crossfield.models.errors import InputError
+from crossfield.models.instance.symmetries import turned
 from crossfield.models.sketch.samples import sample_svg, samples
 from PIL import Image, ImageDraw
 from scipy import ndimage
@@ -112,4 +113,4 @@ def test_what_the_reader_says_is_no_part_of_the_instance(tmp_path):
     assert again.sha256 == instance.sha256
     assert again.reading is None
     assert instance.with_gauge("box").with_weights(stroke_weight=2.0).reading is instance.reading
-    assert instance.turned().reading is None
+    assert turned(instance).reading is None

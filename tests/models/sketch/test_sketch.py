@@ -10,6 +10,7 @@ import pytest
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.file import read_instance, write_instance
+from crossfield.models.instance.symmetries import mirrored, transposed, turned
 from crossfield.models.sketch.bitmap import read_bitmap
 from crossfield.models.sketch.cover import Frame, cover_by_segments
 from crossfield.models.sketch.curves import flatten
@@ -233,9 +234,9 @@ def test_moving_a_drawing_moves_its_instance(seed, size):
     ]
     body = f'<path d="{"".join(paths)}" {BLACK}/>'
     plain = read(svg(body), size)
-    assert_same(read(moved(body, "0 -1 1 0 0 100"), size), plain.turned(), angle=1e-5)
-    assert_same(read(moved(body, "-1 0 0 1 100 0"), size), plain.mirrored(), angle=1e-5)
-    assert_same(read(moved(body, "0 1 1 0 0 0"), size), plain.transposed(), angle=1e-5)
+    assert_same(read(moved(body, "0 -1 1 0 0 100"), size), turned(plain), angle=1e-5)
+    assert_same(read(moved(body, "-1 0 0 1 100 0"), size), mirrored(plain), angle=1e-5)
+    assert_same(read(moved(body, "0 1 1 0 0 0"), size), transposed(plain), angle=1e-5)
     assert_same(read(moved(body, "3 0 0 3 7 -5"), size), plain, angle=1e-5)
 
 
@@ -244,9 +245,9 @@ def test_moving_a_bitmap_moves_its_instance(size):
     image = drawn(300)
     plain = read(png(image), size, "a.png")
     for move, expected in (
-        (Image.Transpose.ROTATE_90, plain.turned()),
-        (Image.Transpose.FLIP_LEFT_RIGHT, plain.mirrored()),
-        (Image.Transpose.TRANSPOSE, plain.transposed()),
+        (Image.Transpose.ROTATE_90, turned(plain)),
+        (Image.Transpose.FLIP_LEFT_RIGHT, mirrored(plain)),
+        (Image.Transpose.TRANSPOSE, transposed(plain)),
     ):
         assert_same(read(png(image.transpose(move)), size, "a.png"), expected, angle=1e-3, weight=1e-4)
 

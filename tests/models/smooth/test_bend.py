@@ -78,11 +78,11 @@ def test_the_energy_falls_and_the_singularities_stay(name):
     assert bend_energy(again, hold) <= bend_energy(field, hold) * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("name", MOVES)
-def test_the_field_moves_with_the_sketch(name):
-    move, turn = MOVES[name]
+@pytest.mark.parametrize("moved_instance", MOVES)
+def test_the_field_moves_with_the_sketch(moved_instance):
+    move, turn = MOVES[moved_instance]
     for instance in (cf.sample("mouse", 20), cf.sample("singular", 16)):
-        start, other = polyvector_field(instance, hold=max(HOLDS)), getattr(instance, name)()
+        start, other = polyvector_field(instance, hold=max(HOLDS)), moved_instance(instance)
 
         def there(field, mask=other.mask):
             return [turn(move(field.image(line)))[mask] for line in lines(field)]

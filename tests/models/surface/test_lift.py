@@ -118,11 +118,11 @@ def test_how_crosses_are_written_does_not_matter():
     assert cf.surface(other).heights == pytest.approx(cf.surface(field).heights, abs=1e-6, nan_ok=True)
 
 
-@pytest.mark.parametrize("name", MOVES)
-def test_the_surface_moves_with_the_sketch(name):
-    move, turn = MOVES[name]
+@pytest.mark.parametrize("moved_instance", MOVES)
+def test_the_surface_moves_with_the_sketch(moved_instance):
+    move, turn = MOVES[moved_instance]
     _, field = exact("spheroid", 12)
-    other = getattr(field.instance, name)()
+    other = moved_instance(field.instance)
     there = [turn(move(field.image(line)))[other.mask] for line in lines(field)]
     moved = cf.surface(cf.CrossField.from_lines(other, *there)).heights
     assert moved == pytest.approx(move(cf.surface(field).heights), abs=0.05, nan_ok=True)
