@@ -241,6 +241,7 @@ def test_read_passes_on_no_proof_of_another_gauge(tmp_path, capsys):
         assert invoke(["export", instance, "-f", MILP, "-F", "mps", "-o", str(tmp_path / gauge), "-q"]) == 0
     (model,) = (tmp_path / "box").glob("*.mps")
     by_highs(model, tmp_path / "answer.sol", 0)
+    capsys.readouterr()
 
     def read(gauge):
         (manifest,) = (tmp_path / gauge).glob("*.manifest.json")
