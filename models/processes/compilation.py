@@ -7,6 +7,7 @@ Python.
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -62,7 +63,23 @@ def _is_cached(dispatcher: Any) -> bool:
     """Whether there is an index of compiled code for the function (`*.nbi`, named after its first line)."""
     code, folder = dispatcher.py_func.__code__, dispatcher.stats.cache_path
     named = f"*.{code.co_name}-{code.co_firstlineno}.*.nbi"
-    return folder is None or any(Path(folder).glob(named))
+    return folder is None or any(_is_readable(index) for index in Path(folder).glob(named))
+
+
+def _is_readable(index: Path) -> bool:
+    """Whether an index can be loaded; one that an older version left, with other classes, is removed.
+
+    Numba does not get as far as comparing the age of such an index.
+    """
+    try:
+        with index.open("rb") as stream:
+            pickle.load(stream)  # noqa: S301 - the version of Numba, which wrote the file
+            pickle.load(stream)  # noqa: S301 - signatures, whose types are those of arguments
+    except Exception:  # noqa: BLE001 - pickles raise anything
+        with suppress(OSError):
+            index.unlink()
+        return False
+    return True
 
 
 class Crew:
