@@ -112,7 +112,7 @@ def _incident_rows(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints
     the right one, so the rows of a pixel are those of its pairs to the left, upwards, to the right and
     downwards, in this order.
     """
-    instance, kind = family.problem.instance, SLOTS[family.family.over][term.symbols[0]][1]
+    instance, kind = family.instance, SLOTS[family.family.over][term.symbols[0]][1]
     if kind == "itself":
         row = (
             None

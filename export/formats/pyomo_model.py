@@ -108,7 +108,7 @@ def _variables(block: Block, index: list[ElementIndex], domain: Any, point: Floa
 
 def _constraints(family: PlacedFamily, columns: list[Any]) -> pyo.Constraint:
     """The rows of a family, left and right side as declared."""
-    declared = element_indices(family.problem.instance, family.family.over)
+    declared = element_indices(family.instance, family.family.over)
     index = [declared[element] for element in family.elements.tolist()]
     sides = (
         _values(family, side, columns)

@@ -26,7 +26,7 @@ def name_list(matrix: np.ndarray[Any, Any]) -> list[str]:
 
 def names_of_rows(problem: Problem) -> list[str]:
     """Names of all rows of a problem."""
-    return name_list(row_names(problem)) if problem.rows else []
+    return name_list(row_names(problem.rows)) if problem.rows else []
 
 
 def problem_algebra(problem: Problem) -> Algebra:
@@ -36,7 +36,7 @@ def problem_algebra(problem: Problem) -> Algebra:
     at, value = row_terms(problem.rows, 1)
     products, product = row_terms(problem.rows, 2)
     return Algebra.of(
-        [*name_list(column_names(problem)), form.one.decode()],
+        [*name_list(column_names(problem.instance, problem.blocks)), form.one.decode()],
         names_of_rows(problem) or ["c_ONE"],
         lower=np.concatenate([problem.lower, ones]),
         upper=np.concatenate([problem.upper, ones]),
@@ -129,7 +129,7 @@ def _value_difference(what: str, values: Floats, expected: Floats, accuracy: flo
 
 def behaviour_difference(reported: Behaviour, problem: Problem, points: Points) -> str:
     """First difference between the behaviour of a file and the problem; empty without one."""
-    columns, rows = name_list(column_names(problem)), names_of_rows(problem)
+    columns, rows = name_list(column_names(problem.instance, problem.blocks)), names_of_rows(problem)
     lacking = set(columns) - set(reported.columns) if reported.may_lack else set()
     wanted = [name for name in columns if name not in lacking & _columns_in_no_term(problem, columns)]
     strangers = _name_difference(reported.columns, wanted, "columns") or _name_difference(

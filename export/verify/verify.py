@@ -168,7 +168,7 @@ def _test_points(problem: Problem) -> Points:
     feasible = [problem.point(random_field(problem, seed)) for seed in range(FEASIBLE)]
     values = np.concatenate([anywhere, np.array(feasible)])
     objective = np.array([problem.objective_value(point) for point in values])
-    return Points(name_list(column_names(problem)), values, objective, RANDOM)
+    return Points(name_list(column_names(problem.instance, problem.blocks)), values, objective, RANDOM)
 
 
 def random_field(problem: Problem, seed: int) -> CrossField:

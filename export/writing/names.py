@@ -62,4 +62,4 @@ class Names:
     @cached_property
     def all(self) -> Words:
         """Names of all columns in order, padded to one length."""
-        return Words(column_names(self._problem), None)
+        return Words(column_names(self._problem.instance, self._problem.blocks), None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,8 @@ from scipy import sparse
 
 from ..errors import SolverError, UnsupportedBySolverError
 from ..instance.grid import Bools, Floats, Ints
-from .families import ANY_DEGREE, PlacedFamily, row_sides
-from .names import Bytes, column_names, row_names
-
-if TYPE_CHECKING:
-    from .problem import Problem
+from .families import ANY_DEGREE, PlacedFamily, merge_terms, row_sides
+from .names import Bytes
 
 QUADRATIC: Final = 2
 """Greatest degree of what arrays hold."""
@@ -98,35 +95,45 @@ class ProblemArrays:
         return values
 
 
-def problem_arrays(problem: Problem, *, names: bool) -> ProblemArrays:
-    """Return the arrays of a problem."""
-    size, places = len(problem.lower), _rows_by_tag(problem.rows)
-    at, cost = problem.merged_objective(1, up_to=QUADRATIC)
+def problem_arrays(
+    objective: tuple[PlacedFamily, ...],
+    rows: tuple[PlacedFamily, ...],
+    columns: tuple[Floats, Floats, Bools],
+    names: tuple[Bytes, Bytes] | None,
+) -> ProblemArrays:
+    """Return the arrays of a problem.
+
+    columns: lower and upper bounds, and whether they are integer. names: of columns and rows.
+    """
+    size, places = len(columns[0]), _rows_by_tag(rows)
+    (_, constant), (at, cost), products_of_costs = (
+        merge_terms(objective, degree, size, up_to=QUADRATIC) for degree in range(QUADRATIC + 1)
+    )
     c = np.zeros(size)
     c[at[:, 0]] = cost
-    entries, values = row_terms(problem.rows, 1, up_to=QUADRATIC)
-    products, factors = row_terms(problem.rows, 2, up_to=QUADRATIC)
-    lower, upper = row_sides(problem.rows)
+    entries, values = row_terms(rows, 1, up_to=QUADRATIC)
+    products, factors = row_terms(rows, 2, up_to=QUADRATIC)
+    lower, upper = row_sides(rows)
     a = sparse.csr_array((values, tuple(entries.T)), shape=(len(lower), size))
     a.eliminate_zeros()
-    nonlinear = [family for family in (*problem.objective, *problem.rows) if family.degree > QUADRATIC]
+    nonlinear = [family for family in (*objective, *rows) if family.degree > QUADRATIC]
     for family in nonlinear:
         at_rows = places.get(family.family.tag, slice(0))
         lower[at_rows], upper[at_rows] = -np.inf, np.inf
     return ProblemArrays(
         c=c,
-        constant=float(problem.merged_objective(0, up_to=QUADRATIC)[1][0]),
-        q=quadratic_matrix(*problem.merged_objective(2, up_to=QUADRATIC), size),
+        constant=float(constant[0]),
+        q=quadratic_matrix(*products_of_costs, size),
         a=a,
         row_lower=lower,
         row_upper=upper,
         row_products=products,
         row_factors=factors,
-        lower=problem.lower.copy(),
-        upper=problem.upper.copy(),
-        integer=problem.integer.copy(),
-        column_names=_decode_names(column_names(problem)) if names else None,
-        row_names=_decode_names(row_names(problem)) if names else None,
+        lower=columns[0].copy(),
+        upper=columns[1].copy(),
+        integer=columns[2].copy(),
+        column_names=_decode_names(names[0]) if names else None,
+        row_names=_decode_names(names[1]) if names else None,
         nonlinear=tuple(family.family.tag for family in nonlinear),
         family_rows=places,
     )

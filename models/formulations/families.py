@@ -6,18 +6,16 @@ import builtins
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, cached_property, reduce
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
 from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import Instance
 from .declaration import Family
 from .symbols import SCALARS, SLOTS, IndexSet, index_map, numpy_function
-
-if TYPE_CHECKING:
-    from .problem import Problem
 
 Coefficient = float | Floats
 Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]
@@ -74,13 +72,15 @@ class Monomial:
 class PlacedFamily:
     """A family placed on an instance: where its elements are and which columns its symbols mean.
 
-    elements: indices into the family's index set, shape (count,). `terms` is None unless it is a
-    polynomial.
+    elements: indices into the family's index set, shape (count,). blocks, quantities: columns and arrays
+    that symbols may mean, by name. `terms` is None unless it is a polynomial.
     """
 
     family: Family
-    problem: Problem
     elements: Ints
+    instance: Instance
+    blocks: dict[str, Block]
+    quantities: dict[str, Any]
 
     @property
     def count(self) -> int:
@@ -91,7 +91,7 @@ class PlacedFamily:
     def variables(self) -> tuple[sp.Symbol, ...]:
         """Symbols that mean columns."""
         slots = SLOTS[self.family.over]
-        return tuple(symbol for symbol in self.family.symbols if slots[symbol][0] in self.problem.blocks)
+        return tuple(symbol for symbol in self.family.symbols if slots[symbol][0] in self.blocks)
 
     def column_of(self, symbol: sp.Symbol) -> Ints:
         """Column of the symbol at each element, shape (count,)."""
@@ -101,11 +101,11 @@ class PlacedFamily:
 
     def block(self, symbol: sp.Symbol) -> Block:
         """The block of columns that a symbol means."""
-        return self.problem.blocks[SLOTS[self.family.over][symbol][0]]
+        return self.blocks[SLOTS[self.family.over][symbol][0]]
 
     def inside(self, symbol: sp.Symbol) -> Ints | None:
         """The symbol's place in its block at each element, (count,); None: the element's own."""
-        index = index_map(self.problem.instance, SLOTS[self.family.over][symbol][1])
+        index = index_map(self.instance, SLOTS[self.family.over][symbol][1])
         if isinstance(index, slice):
             return None if self.covers_index_set else self.elements
         return index if self.covers_index_set else index[self.elements]
@@ -125,9 +125,9 @@ class PlacedFamily:
 
     def _datum(self, symbol: sp.Symbol) -> Any:
         if symbol in SCALARS:
-            return getattr(self.problem.instance, SCALARS[symbol])
+            return getattr(self.instance, SCALARS[symbol])
         name, kind = SLOTS[self.family.over][symbol]
-        values = self.problem.data[name][index_map(self.problem.instance, kind)]
+        values = self.quantities[name][index_map(self.instance, kind)]
         return values if self.covers_index_set else values[self.elements]
 
     @cached_property
@@ -201,6 +201,26 @@ def monomials(family: Family, variables: tuple[sp.Symbol, ...]) -> Monomials | N
         for powers, value in terms
         if value != 0
     )
+
+
+def merge_terms(
+    families: Iterable[PlacedFamily], degree: int, columns: int, *, up_to: int = ANY_DEGREE
+) -> tuple[Ints, Floats]:
+    """Terms of a degree of a sum, each set of columns once: columns (k, degree), coefficients (k,).
+
+    columns: number of the problem's columns. up_to: greatest degree of the families that are counted.
+    """
+    chosen = [family for family in families if family.degree <= up_to]
+    terms = [(term, family) for family in chosen for term in family.of_degree(degree)]
+    coefficients = [np.broadcast_to(term.coefficient, (family.count,)) for term, family in terms]
+    if degree == 0:
+        total = sum(float(np.sum(values)) for values in coefficients)
+        return np.zeros((1, 0), np.int32), np.array([total])
+    if not terms:
+        return np.zeros((0, degree), np.int32), np.zeros(0)
+    index = np.concatenate([sort_factors(term.factors) for term, _ in terms])
+    scale = np.concatenate([family.scale for _, family in terms])
+    return merge_monomials(index, np.concatenate(coefficients), scale, columns)
 
 
 def sort_factors(factors: tuple[Ints, ...]) -> Ints:

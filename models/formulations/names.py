@@ -9,6 +9,7 @@ model.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -18,8 +19,7 @@ from ..instance.instance import Instance
 from .symbols import IndexSet, pixel_of
 
 if TYPE_CHECKING:
-    from .families import PlacedFamily
-    from .problem import Problem
+    from .families import Block, PlacedFamily
 
 Bytes = NDArray[np.uint8]
 """Texts as rows of bytes, padded with NUL on the right."""
@@ -85,19 +85,17 @@ def stack_names(matrices: list[Bytes]) -> Bytes:
     return out
 
 
-def column_names(problem: Problem) -> Bytes:
+def column_names(instance: Instance, blocks: dict[str, Block]) -> Bytes:
     """Names of all columns in column order, shape (columns, width), padded with NUL."""
-    return stack_names(
-        [element_names(problem.instance, block.name, block.over) for block in problem.blocks.values()]
-    )
+    return stack_names([element_names(instance, block.name, block.over) for block in blocks.values()])
 
 
 def family_names(family: PlacedFamily) -> Bytes:
     """Names of the rows of a family, shape (count, width), no padding."""
-    names = element_names(family.problem.instance, family.family.tag, family.family.over)
+    names = element_names(family.instance, family.family.tag, family.family.over)
     return names if family.covers_index_set else names[family.elements]
 
 
-def row_names(problem: Problem) -> Bytes:
+def row_names(rows: Iterable[PlacedFamily]) -> Bytes:
     """Names of all rows in row order, shape (rows, width), padded with NUL."""
-    return stack_names([family_names(family) for family in problem.rows])
+    return stack_names([family_names(family) for family in rows])

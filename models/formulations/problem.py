@@ -25,7 +25,7 @@ from ..instance.instance import Instance, whole_numbers
 from ..previews import table_of
 from .catalogue import declare, lift_products, norm_of
 from .declaration import Family, Formulation
-from .families import ANY_DEGREE, Block, PlacedFamily, merge_monomials, sort_factors
+from .families import ANY_DEGREE, Block, PlacedFamily, merge_terms
 from .symbols import NARROWED, SLOTS, VARIABLES, Variable, count_elements, index_map, numpy_function
 from .windows import Windows
 
@@ -219,7 +219,10 @@ class Problem:
         return self._place_families(self.formulation.rows)
 
     def _place_families(self, families: tuple[Family, ...]) -> tuple[PlacedFamily, ...]:
-        placed = (PlacedFamily(family, self, self._elements(family)) for family in families)
+        placed = (
+            PlacedFamily(family, self._elements(family), self.instance, self.blocks, self.data)
+            for family in families
+        )
         return tuple(family for family in placed if family.count)
 
     def _elements(self, family: Family) -> Ints:
@@ -278,17 +281,7 @@ class Problem:
             Columns, shape (k, degree), and coefficients, shape (k,). For the constant k is 1.
 
         """
-        chosen = [family for family in self.objective if family.degree <= up_to]
-        terms = [(term, family) for family in chosen for term in family.of_degree(degree)]
-        coefficients = [np.broadcast_to(term.coefficient, (family.count,)) for term, family in terms]
-        if degree == 0:
-            total = sum(float(np.sum(values)) for values in coefficients)
-            return np.zeros((1, 0), np.int32), np.array([total])
-        if not terms:
-            return np.zeros((0, degree), np.int32), np.zeros(0)
-        index = np.concatenate([sort_factors(term.factors) for term, _ in terms])
-        scale = np.concatenate([family.scale for _, family in terms])
-        return merge_monomials(index, np.concatenate(coefficients), scale, self.n_columns)
+        return merge_terms(self.objective, degree, self.n_columns, up_to=up_to)
 
     def to_arrays(self, *, names: bool = True) -> ProblemArrays:
         """Return the problem up to degree 2 as NumPy arrays and SciPy matrices.
@@ -305,8 +298,11 @@ class Problem:
 
         """
         from .arrays import problem_arrays  # it loads SciPy, which files do not need
+        from .names import column_names, row_names
 
-        return problem_arrays(self, names=names)
+        columns = self.lower, self.upper, self.integer
+        named = (column_names(self.instance, self.blocks), row_names(self.rows)) if names else None
+        return problem_arrays(self.objective, self.rows, columns, named)
 
     def to_highs(self) -> Any:
         """Return a `highspy.Highs` with the problem, passed by arrays; its output is switched off.

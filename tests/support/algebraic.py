@@ -172,8 +172,8 @@ def parse_text(parser: Lark, transformer: Arithmetic, text: str) -> Any:
 
 def difference(model: Model, problem: Problem, start: Floats | None = None) -> str:
     """The first difference between a model and a problem; empty if there is none."""
-    columns = names_of(column_names(problem))
-    rows = names_of(row_names(problem)) if problem.rows else []
+    columns = names_of(column_names(problem.instance, problem.blocks))
+    rows = names_of(row_names(problem.rows)) if problem.rows else []
     for what, found, expected in (("column", model.columns, columns), ("row", model.rows, rows)):
         for name in sorted(set(found) ^ set(expected)):
             return f"a {what} {name} too {'many' if name in found else 'few'}"
@@ -198,7 +198,7 @@ def difference(model: Model, problem: Problem, start: Floats | None = None) -> s
 
 def _row_difference(model: Model, problem: Problem, points: Floats, values: Values) -> str:
     """The first row that differs, both turned to say `>=` or `==`."""
-    names = iter(names_of(row_names(problem)) if problem.rows else [])
+    names = iter(names_of(row_names(problem.rows)) if problem.rows else [])
     for family in problem.rows:
         sense = family.family.sense
         for expected in np.array([family.values(point) for point in points]).T:

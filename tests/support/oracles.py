@@ -52,7 +52,9 @@ def by_gurobi(path: Path) -> Model:
 def random_points(problem: Problem, count: int = 5, beside: Sequence[Floats] = ()) -> Points:
     """Random points by column name, then feasible ones `beside` them, and the objective there."""
     values = np.stack([*points_of(problem, count), *beside])
-    return Points(names_of(column_names(problem)), values, values_at(problem, values)[0], count)
+    return Points(
+        names_of(column_names(problem.instance, problem.blocks)), values, values_at(problem, values)[0], count
+    )
 
 
 def browser() -> str | None:

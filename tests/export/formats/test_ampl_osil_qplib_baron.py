@@ -54,7 +54,9 @@ def written(problem: Problem, path: Path, **given: Any) -> str:
 
 
 def names(problem: Problem) -> tuple[list[str], list[str]]:
-    return names_of(column_names(problem)), names_of(row_names(problem)) if problem.rows else []
+    return names_of(column_names(problem.instance, problem.blocks)), names_of(
+        row_names(problem.rows)
+    ) if problem.rows else []
 
 
 def limits(problem: Problem) -> tuple[Any, Any]:

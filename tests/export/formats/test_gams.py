@@ -52,7 +52,9 @@ def solved(folder: Path, problem: Problem, *options: str) -> tuple[float, np.nda
     results = run_gams(folder, text_of(problem), *options)
     assert results["solver_status"] == 1
     assert results["model_status"] in {1, 2, 8}
-    return results["objective"], np.array([results[name] for name in names_of(column_names(problem))])
+    return results["objective"], np.array(
+        [results[name] for name in names_of(column_names(problem.instance, problem.blocks))]
+    )
 
 
 @needs_gams
@@ -76,7 +78,7 @@ def test_a_start_comes_back_under_our_names(label: str, tmp_path: Path):
     results = run_gams(tmp_path, text_of(problem, start=start), *convert)
     head, names = list(results)[:3], list(results)[3:]
     assert head == ["model_status", "solver_status", "objective"]
-    assert names == names_of(column_names(problem))
+    assert names == names_of(column_names(problem.instance, problem.blocks))
     assert results["objective"] == pytest.approx(problem.objective_value(start), rel=1e-14)
     np.testing.assert_allclose([results[name] for name in names], start, rtol=1e-15, atol=0)
 

@@ -54,7 +54,7 @@ def test_readers_see_the_problem(label: str, reader: str, suffix: str, tmp_path:
     model = READERS[reader](path)
     if reader != "scip":  # SCIP sorts columns by type
         assert [name for name in model.columns if not name.startswith("ONE_")] == names_of(
-            column_names(problem)
+            column_names(problem.instance, problem.blocks)
         )
     if reader == "highs":  # Gurobi lists quadratic rows after the others
         assert model.rows == problem_algebra(problem).rows
@@ -110,7 +110,9 @@ def test_names_suit_every_reader(label: str):
     problem = problem_of(label)
     problems = [problem, held(label)] if label in LOW_DEGREE else [problem]
     for each in problems:
-        names = names_of(column_names(each)) + (names_of(row_names(each)) if each.rows else [])
+        names = names_of(column_names(each.instance, each.blocks)) + (
+            names_of(row_names(each.rows)) if each.rows else []
+        )
         assert (
             len({name.lower() for name in [*names, CanonicalForm(each).one.decode(), "obj", "c_one"]})
             == each.n_columns + each.n_rows + 3
@@ -125,9 +127,9 @@ def test_names_on_the_largest_grid_are_15_long_at_most(name: str):
     mask[:, -2:] = True
     instance = Instance("largest", mask, np.array([[1, 9998]]), np.array([3.0]), np.ones(1))
     problem = make_problem(name, instance)
-    names = names_of(column_names(problem))
+    names = names_of(column_names(problem.instance, problem.blocks))
     assert {"alpha_0000_9998", "beta_0001_9997"} < set(names)
-    assert max(map(len, names + names_of(row_names(problem)))) == 15
+    assert max(map(len, names + names_of(row_names(problem.rows)))) == 15
 
 
 # text
@@ -159,7 +161,7 @@ def test_lp_keeps_to_the_common_subset(label: str):
     assert not {"Generals", "Binaries"} & set(sections) or problem.integer.any()
     assert {"Minimize", "Subject To", "Bounds", "End"} <= set(sections)
     parts = dict(re.findall(r"^(\w[\w ]*)\n((?: .*\n)*)", text, re.MULTILINE))
-    names = [CanonicalForm(problem).one.decode(), *names_of(column_names(problem))]
+    names = [CanonicalForm(problem).one.decode(), *names_of(column_names(problem.instance, problem.blocks))]
 
     linear, _, products = parts["Minimize"].partition(" + [\n")
     assert re.findall(r"[+-] \S+ ([A-Za-z]\w+)\n", linear) == names
@@ -182,7 +184,9 @@ def test_lp_keeps_to_the_common_subset(label: str):
     ]
     assert sorted(match[2] for match in bounds if match) == sorted(names)
     whole = [name.strip() for title in ("Generals", "Binaries") for name in parts.get(title, "").splitlines()]
-    assert sorted(whole) == sorted(np.array(names_of(column_names(problem)))[problem.integer].tolist())
+    assert sorted(whole) == sorted(
+        np.array(names_of(column_names(problem.instance, problem.blocks)))[problem.integer].tolist()
+    )
 
 
 @for_each("label", LOW_DEGREE)
@@ -203,7 +207,7 @@ def test_mps_keeps_to_the_common_subset(label: str):
     columns = [line.split() for line in parts["COLUMNS"]]
     assert all(len(line) == 3 for line in columns)
     assert [line[0] for line in columns if line[1] == "obj"] == [
-        *names_of(column_names(problem)),
+        *names_of(column_names(problem.instance, problem.blocks)),
         CanonicalForm(problem).one.decode(),
     ]
     markers = [line[2] for line in columns if line[1] == "'MARKER'"]

@@ -36,7 +36,9 @@ def test_model_is_the_problem(label: str):
     problem = problem_of(label)
     model = to_pyomo(problem)
     columns = columns_of(model, problem)
-    assert [our_name(variable) for variable in columns] == names_of(column_names(problem))
+    assert [our_name(variable) for variable in columns] == names_of(
+        column_names(problem.instance, problem.blocks)
+    )
     assert [-math.inf if v.lb is None else v.lb for v in columns] == problem.lower.tolist()
     assert [math.inf if v.ub is None else v.ub for v in columns] == problem.upper.tolist()
     assert [v.is_integer() for v in columns] == problem.integer.tolist()

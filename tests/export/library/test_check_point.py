@@ -42,7 +42,7 @@ def script(tmp_path_factory):
 
 def save_point(path, problem, point, *, zeros=True):
     """A list of names and values as any program might write it."""
-    pairs = zip(names_of(column_names(problem)), point.tolist(), strict=True)
+    pairs = zip(names_of(column_names(problem.instance, problem.blocks)), point.tolist(), strict=True)
     path.write_text("".join(f"{name} {value!r}\n" for name, value in pairs if zeros or value != 0))
     return str(path)
 

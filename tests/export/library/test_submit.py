@@ -301,7 +301,7 @@ def point_of(lib):
 
 def written(problem, point, folder):
     """The point as a list of names and values."""
-    pairs = zip(name_list(column_names(problem)), point.tolist(), strict=True)
+    pairs = zip(name_list(column_names(problem.instance, problem.blocks)), point.tolist(), strict=True)
     path = folder / "mine.sol"
     path.write_text("=obj= 0\n" + "".join(f"{name} {value!r}\n" for name, value in pairs))
     return path

@@ -73,7 +73,7 @@ def by_names(problem, values):
     from cases import names_of
     from crossfield.models.formulations.names import column_names
 
-    pairs = zip(names_of(column_names(problem)), map(float, values), strict=True)
+    pairs = zip(names_of(column_names(problem.instance, problem.blocks)), map(float, values), strict=True)
     return "".join(f"{name} {value!r}\n" for name, value in pairs)
 
 

@@ -20,7 +20,7 @@ def entries_of(formulation, instance=INSTANCE):
     """Names and values of the point of a field."""
     problem = formulate(instance, formulation)
     point = problem.point(FIELD if instance is INSTANCE else cf.greedy_field(instance))
-    return list(zip(names_of(column_names(problem)), point.tolist(), strict=True))
+    return list(zip(names_of(column_names(problem.instance, problem.blocks)), point.tolist(), strict=True))
 
 
 ENTRIES = entries_of("milp-mccormick")

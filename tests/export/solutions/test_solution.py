@@ -26,7 +26,7 @@ def problem_of(field, name, **options):
 
 
 def names_of(problem):
-    return [bytes(row).rstrip(b"\0").decode() for row in column_names(problem)]
+    return [bytes(row).rstrip(b"\0").decode() for row in column_names(problem.instance, problem.blocks)]
 
 
 def by_name(path, names, values, *, objective=1.0, status="Optimal"):

@@ -44,7 +44,7 @@ from loops import for_each
 
 
 def names_of(name):
-    matrix = np.ascontiguousarray(column_names(problem(name)))
+    matrix = np.ascontiguousarray(column_names(problem(name).instance, problem(name).blocks))
     return matrix.view(f"S{matrix.shape[1]}").ravel()
 
 
