@@ -191,12 +191,10 @@ class _Template:
         self._lay_out(cells, stop - start)
         for hole, key in self._holes:
             hole[: stop - start] = cells[key]
-        line = self._matrix[: stop - start]
-        if self._optional:
-            line, padded = line.copy(), True
-        for pieces, present in self._optional:
-            line[~present[start:stop], self._ends[pieces.start] : self._ends[pieces.stop]] = 0
-        return line.reshape(-1), padded
+        present = [where[start:stop] for _, where in self._optional]
+        if all(where.all() for where in present):
+            return self._matrix[: stop - start].reshape(-1), padded
+        return self._chosen(present), padded
 
     def _lay_out(self, cells: dict[int, Cells], rows: int) -> None:
         """Set literals and the positions of holes after a width has changed."""
@@ -221,6 +219,41 @@ class _Template:
     def _column(self, first: int, kind: Any) -> Cells:
         """The column of the matrix that begins at a byte, one item per record."""
         return np.ndarray((len(self._matrix),), kind, self._matrix, first, (self._matrix.shape[1],))
+
+    def _chosen(self, present: Sequence[Bools]) -> Bytes:
+        """The bytes of the present records without their missing pieces.
+
+        Few patterns of presence occur: adjacent bytes of one pattern are moved for all of its
+        records at once.
+        """
+        pattern = sum(where.astype(np.intp) << bit for bit, where in enumerate(present))
+        there = np.bincount(pattern)
+        found = {
+            number: self._stretches([bool(number >> bit & 1) for bit in range(len(present))])
+            for number in np.flatnonzero(there).tolist()
+        }
+        lengths = np.zeros(len(there), dtype=np.intp)
+        lengths[list(found)] = [sum(last - first for first, last in runs) for runs in found.values()]
+        ends = np.cumsum(lengths[pattern])
+        line = np.empty(ends[-1], dtype=np.uint8)
+        for number, runs in found.items():
+            at = np.flatnonzero(pattern == number)
+            to = ends[at] - lengths[number]
+            for first, last in runs:
+                kind = f"V{last - first}"
+                anywhere = np.ndarray((len(line) - (last - first) + 1,), kind, line, 0, (1,))
+                anywhere[to] = self._column(first, kind)[at]
+                to += last - first
+        return line
+
+    def _stretches(self, present: Sequence[bool]) -> list[tuple[int, int]]:
+        """First and last byte of adjacent pieces in a record that has these optional pieces."""
+        cuts = [0]
+        for (place, _), there in zip(self._optional, present, strict=True):
+            if not there:
+                cuts += [self._ends[place.start], self._ends[place.stop]]
+        cuts.append(self._ends[-1])
+        return [(first, last) for first, last in zip(cuts[::2], cuts[1::2], strict=True) if first < last]
 
 
 def cells_of_rows(matrix: Bytes) -> Cells:
