@@ -110,7 +110,7 @@ def two_parts(tmp_path_factory):
         ImageDraw.Draw(mask).rectangle(box, fill=255)
     sketch.save(folder / "cross.png")
     mask.save(folder / "mask.png")
-    options = ["--size", "6", "--stroke-weight", "0.2", "--time-limit", "3", "--threads", "1"]
+    options = ["--size", "6", "--stroke-weight", "0.2", "--time-limit", "10", "--threads", "1"]
     sketch = [str(folder / "cross.png"), "--mask", str(folder / "mask.png")]
     out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
