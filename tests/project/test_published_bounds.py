@@ -68,7 +68,7 @@ def of_the_ledger() -> Iterator[Values]:
         problem = instance, FORMULATIONS[TOKENS[token]].minimises
         if instance.endswith("_printed"):
             problem = instance, token
-        yield problem, [record["primal"]], [record["bound"]]
+        yield problem, [record.get("primal")], [record.get("bound")]
 
 
 def largest_excess(values: Iterator[Values]) -> tuple[float, Any]:
