@@ -16,10 +16,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse import linalg
 
 from ..errors import CrossfieldError
 from ..field.field import AbsoluteNorm, CrossField, Norm
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
 _TOLERANCE: Final = 1e-11
+_TOUCHING: Final = 1e-7  # radians from a side of the box within which Clarabel means the side
 _DECIMALS: Final = 12
 
 
@@ -166,10 +168,30 @@ def _solve_program(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats)
         raise CrossfieldError(f"Clarabel found no angles for given jumps: {solution.status}")
     # Extreme weights may end it early. The numbers are then worse, but any of them are valid.
     angles = np.clip(np.array(solution.x)[:n], lower, upper)
+    if not m:
+        angles = _polish(curved, square.T @ (force * goal) - tilt, angles, lower, upper)
     above, below = np.split(np.array(solution.z)[: 2 * m], 2)
     multipliers = 2 * (terms.matrix @ angles + terms.constant)
     multipliers[rows] = (above - below) / weight
     return angles, multipliers
+
+
+def _polish(curved: Any, linear: Floats, angles: Floats, lower: Floats, upper: Floats) -> Floats:
+    """A step of Newton's method for the angles off the sides of the box, which gives them their last digits.
+
+    A bound from multipliers loses the slope that is left at them times the side of the box.
+    """
+    free = np.flatnonzero(np.minimum(angles - lower, upper - angles) > _TOUCHING)
+    slope = curved @ angles + linear
+    try:
+        step = linalg.splu(sparse.csc_matrix(curved)[free][:, free]).solve(-slope[free])
+    except (RuntimeError, ValueError):  # singular, or nothing is free
+        return angles
+    polished = angles.copy()
+    polished[free] = np.clip(angles[free] + step, lower[free], upper[free])
+    change = polished - angles
+    is_lower = change @ (slope + curved @ change / 2) <= 0
+    return polished if is_lower else angles
 
 
 def _clarabel_settings() -> clarabel.DefaultSettings:

@@ -463,9 +463,10 @@ def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(norm, written):
             step = check_certificate.last_step(terms, boxes, alpha, p)
             if not check_certificate.is_convex(terms, step):
                 continue
-            _, _, cuts, multipliers = minimise_on_boxes(proof.field.instance, terms, step, np.inf)
+            best, _, cuts, multipliers = minimise_on_boxes(proof.field.instance, terms, step, 1e6)
             low, size = boxes[:, ::2], boxes[:, 1::2] - boxes[:, ::2]
             points = low + rng.random((400, 4, 2)) ** rng.choice([0.1, 1, 10], (400, 1, 1)) * size
+            points = [*points, np.stack([best.alpha, best.beta], axis=1)]
             energies = [free_energy(proof.field.instance, *point.T, norm) for point in points]
             for noise in (0.0, 0.1):
                 parts = {"cuts": cuts, "multipliers": multipliers + rng.normal(0, noise, multipliers.shape)}

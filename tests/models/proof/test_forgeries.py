@@ -74,7 +74,7 @@ def modest(name, arrays):
     try:
         terms, _ = check_certificate.terms_of(arrays)
         energy, _ = check_certificate.energy_of(terms, *check_certificate.field_of(arrays, terms))
-    except REFUSED:
+    except (*REFUSED, ValueError, TypeError, KeyError, IndexError, OverflowError):  # as in `check_arrays`
         return []
     return [with_head(arrays, status="gap", energy=energy, bound=0.0)]
 
