@@ -86,12 +86,11 @@ class Request:
 
 def prove_sketch(sketch: Sketch, size: int, request: Request, weights: Sequence[str] = ()) -> Facts:
     """Result of `crossfield prove` for a sketch, size of its certificate, and seconds of its check."""
-    folder = request.work / f"{sketch.name}_{size}{'_paper' if weights else ''}_proof"
-    command = [
-        *("prove", *sketch.arguments, "--size", str(size), *weights),
-        *("--time-limit", str(request.seconds)),
-        *("--json", "-o", str(folder)),
-    ]
+    name = f"{sketch.name}_{size}{'_paper' if weights else ''}"
+    instance, folder = request.work / f"{name}.json", request.work / f"{name}_proof"
+    make = ["instance", *sketch.arguments, "--size", str(size), *weights, "-o", str(instance)]
+    subprocess.run([sys.executable, "-m", "crossfield", *make], check=True, stdout=subprocess.DEVNULL)
+    command = ["prove", str(instance), "--time-limit", str(request.seconds), "--json", "-o", str(folder)]
     facts = run_command(command, folder, sketch.name)
     (certificate,) = folder.glob("*.certificate.npz")
     begin = time.perf_counter()
