@@ -72,8 +72,8 @@ def write_problem(
 
     """
     if not is_recordable(problem):
-        what = f"{problem.name} with columns fixed or products lifted"
-        raise InputError(f"a manifest cannot record {what}; write it as a single file")
+        changed = f"{problem.name} with columns fixed or products lifted"
+        raise InputError(f"a manifest cannot record {changed}; write it as a single file")
     formats = tuple(formats)
     _check_formats(formats, dialects or {}, [problem.formulation])
     return _write_problem_files(

@@ -140,15 +140,15 @@ class Command(TyperCommand):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Fill the help texts of the command and of its parameters, then show them."""
         # A line break in a docstring begins no paragraph.
-        described = re.sub(r"(?<!\n)\n(?!\n)", " ", self._shown(self.help or ""))
+        described = re.sub(r"(?<!\n)\n(?!\n)", " ", self._fill_and_escape(self.help or ""))
         example = EXAMPLES.get(ctx.command_path.partition(" ")[2])
         self.help = f"Example: {example}\n\n{described}" if example else described
         for parameter in self.params:
             if text := getattr(parameter, "help", None):
-                parameter.help = self._shown(text)  # type: ignore[attr-defined]
+                parameter.help = self._fill_and_escape(text)  # type: ignore[attr-defined]
         super().format_help(ctx, formatter)
 
-    def _shown(self, text: str) -> str:
+    def _fill_and_escape(self, text: str) -> str:
         """The text with names from the tables, its brackets escaped where they would be markup."""
         from rich.markup import escape
 

@@ -154,15 +154,6 @@ def render(parts: Sequence[Piece | OptionalPieces], count: int, *, padded: bool 
         yield line[line != 0].tobytes() if padded and gaps else line.tobytes()
 
 
-def record_matrix(parts: Pieces, count: int) -> Bytes:
-    """The records as a matrix of bytes (count, width), padding kept."""
-    if count == 0:
-        return np.zeros(
-            (0, sum(len(part) if isinstance(part, bytes) else part.width for part in parts)), np.uint8
-        )
-    return _Template(parts).line(0, count)[0].reshape(count, -1)
-
-
 class _Template:
     """The pieces of a record and the bytes of the present block: literals stay, holes are filled again.
 
