@@ -75,7 +75,6 @@ OTHERS = {
     ),
     "gzip": (shutil.which("gzip"), "gzip", "apt install gzip"),
     "distributed": (importlib.util.find_spec("distributed"), "distributed", "pip install '.[cluster]'"),
-    "mlcroissant": (importlib.util.find_spec("mlcroissant"), "mlcroissant", "pip install mlcroissant"),
 }
 """Programs that `verify` does not know: a sign that they are here, their names,
 and what to do where they are not.

@@ -32,7 +32,6 @@ from ..documents.standalone import standalone_program
 from ..ledger.ledger import LEDGER, read_ledger
 from ..plan.recipe import NORMS, InstancePlan, norm_minimised
 from ..plan.spec import RUNGS, Spec
-from .dataset import CROISSANT, croissant
 from .table import TABLE, table
 
 CHECKER: Final = "check_point.py"
@@ -81,8 +80,7 @@ def general_files(
     if context["certified"]:
         checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
     index = _index_document(spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
-    rows = table(folder, sidecars)
-    facts = {SOLU: _solu_content(sidecars), TABLE: rows, CROISSANT: croissant(spec, rows)}
+    facts = {SOLU: _solu_content(sidecars), TABLE: table(folder, sidecars)}
     return texts | drawings | checkers | facts | {INDEX: document_bytes(index)}
 
 

@@ -85,7 +85,7 @@ def _are_equal(first: CrossField, second: CrossField) -> bool:
 def _instance_document(instance: Instance, task: InstanceTask, fields: dict[str, Any]) -> dict[str, Any]:
     given = {"given": task.given.sha256} if task.given and task.given.sha256 else {}
     recipe = task.recipe
-    stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added, "split": recipe.split}
+    stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added}
     return given | {
         "format": ABOUT_FORMAT,
         "version": VERSION,

@@ -16,7 +16,7 @@ from ..plan.recipe import entry_name
 from .tasks import EntryTask
 
 _OF_INSTANCE = ("family", "title", "rung", "generator", "source", "instance")
-_OF_SKETCH = ("origin", "added", "split")  # absent if not stated
+_OF_SKETCH = ("origin", "added")  # absent if not stated
 
 
 def sidecar_of(

@@ -1,4 +1,4 @@
-"""The table of all entries of a library: features, labels and splits, one row per entry."""
+"""The table of all entries of a library: features and labels, one row per entry."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ OPEN: Final = "open"  # the status `best known` of a sidecar, in one word
 
 @dataclass(frozen=True)
 class TableColumn:
-    """A column: the type of its values, its meaning, and its value from a sidecar. None: unknown."""
+    """A column: the type of its values, and its value from a sidecar. None: unknown."""
 
     kind: type[str | int | float | bool]
-    meaning: str
     value: Callable[[dict[str, Any]], Any]
 
 
@@ -70,65 +69,51 @@ def _optimum(sidecar: dict[str, Any]) -> float | None:
 
 
 COLUMNS: Final[Mapping[str, TableColumn]] = {
-    "name": TableColumn(str, "Name of the entry.", _fact("name")),
-    "instance": TableColumn(str, "Name of the instance.", _instance_name),
-    "family": TableColumn(str, "Short name of the sketch.", _fact("family")),
-    "rung": TableColumn(str, "Class of sizes.", _fact("rung")),
-    "split": TableColumn(str, "Set for machine learning: train, validation or test.", _fact("split")),
-    "gauge": TableColumn(str, "Window of alpha: strokes or box.", _fact("source", "gauge")),
-    "formulation": TableColumn(str, "Formulation.", _fact("formulation")),
-    "facet": TableColumn(str, "Facet (26): hull or printed.", _fact("options", "facet")),
-    "tightened": TableColumn(
-        bool, "In the windows of a certificate.", lambda sidecar: "tightened" in sidecar
-    ),
-    "problem_class": TableColumn(str, "Class of the problem, as MILP.", _fact("class")),
-    "probtype": TableColumn(str, "Three letters as in QPLIB.", _fact("probtype")),
-    "convex": TableColumn(bool, "Whether the continuous relaxation is convex.", _fact("convex")),
-    "seed": TableColumn(int, "Seed of a random sketch.", _fact("source", "seed")),
-    "size": TableColumn(int, "Pixels on the longer side.", _fact("source", "size")),
-    "pixels": TableColumn(int, "Pixels in the mask.", _fact("instance", "pixels")),
-    "strokes": TableColumn(int, "Pixels with a direction.", _fact("instance", "strokes")),
-    "pairs": TableColumn(int, "Pairs of neighbours.", _fact("instance", "pairs")),
-    "density": TableColumn(float, "Share of the pixels with a direction.", _fact("density")),
-    "columns": TableColumn(int, "Columns.", _counts("variables")),
-    "rows": TableColumn(int, "Rows.", _counts("constraints")),
-    "integers": TableColumn(int, "Integer columns, binary ones too.", _counts("binary", "integer")),
-    "binaries": TableColumn(int, "Binary columns.", _counts("binary")),
-    "equalities": TableColumn(int, "Rows that are equations.", _counts("equalities")),
-    "nonzeros": TableColumn(int, "Nonzeros of the rows.", _counts("nonzeros")),
-    "nonlinear_nonzeros": TableColumn(int, "Nonzeros in nonlinear terms.", _counts("nonlinear_nonzeros")),
-    "quadratic_rows": TableColumn(int, "Quadratic rows.", _counts("quadratic_constraints")),
-    "nonlinear_rows": TableColumn(
-        int, "Rows beyond quadratic ones.", _counts("polynomial_constraints", "general_constraints")
-    ),
-    "linear_terms": TableColumn(int, "Linear terms of the objective.", _counts("objective_linear_terms")),
-    "quadratic_terms": TableColumn(
-        int, "Quadratic terms of the objective.", _counts("objective_quadratic_terms")
-    ),
+    "name": TableColumn(str, _fact("name")),
+    "instance": TableColumn(str, _instance_name),
+    "family": TableColumn(str, _fact("family")),
+    "rung": TableColumn(str, _fact("rung")),
+    "gauge": TableColumn(str, _fact("source", "gauge")),
+    "formulation": TableColumn(str, _fact("formulation")),
+    "facet": TableColumn(str, _fact("options", "facet")),
+    "tightened": TableColumn(bool, lambda sidecar: "tightened" in sidecar),
+    "problem_class": TableColumn(str, _fact("class")),
+    "probtype": TableColumn(str, _fact("probtype")),
+    "convex": TableColumn(bool, _fact("convex")),
+    "seed": TableColumn(int, _fact("source", "seed")),
+    "size": TableColumn(int, _fact("source", "size")),
+    "pixels": TableColumn(int, _fact("instance", "pixels")),
+    "strokes": TableColumn(int, _fact("instance", "strokes")),
+    "pairs": TableColumn(int, _fact("instance", "pairs")),
+    "density": TableColumn(float, _fact("density")),
+    "columns": TableColumn(int, _counts("variables")),
+    "rows": TableColumn(int, _counts("constraints")),
+    "integers": TableColumn(int, _counts("binary", "integer")),
+    "binaries": TableColumn(int, _counts("binary")),
+    "equalities": TableColumn(int, _counts("equalities")),
+    "nonzeros": TableColumn(int, _counts("nonzeros")),
+    "nonlinear_nonzeros": TableColumn(int, _counts("nonlinear_nonzeros")),
+    "quadratic_rows": TableColumn(int, _counts("quadratic_constraints")),
+    "nonlinear_rows": TableColumn(int, _counts("polynomial_constraints", "general_constraints")),
+    "linear_terms": TableColumn(int, _counts("objective_linear_terms")),
+    "quadratic_terms": TableColumn(int, _counts("objective_quadratic_terms")),
     "nonlinear_terms": TableColumn(
         int,
-        "Terms of the objective beyond quadratic ones.",
         _counts("objective_higher_terms", "objective_general_terms"),
     ),
-    "vortices": TableColumn(
-        int, "Singularities of the best known field in the entry's norm.", _fact("vortices")
-    ),
-    "objective": TableColumn(float, "Objective of the best known point.", _fact("best", "objective")),
-    "optimum": TableColumn(float, "The same if it is proven optimal.", _optimum),
-    "bound": TableColumn(float, "Best dual bound.", _fact("bound")),
-    "gap": TableColumn(float, "Relative gap between both.", _fact("gap")),
-    "status": TableColumn(str, "Status: optimal, claimed or open.", _status),
-    "solved": TableColumn(str, "Kind of proof: certificate, tangent or agreement.", _fact("solved", "by")),
-    "difficulty": TableColumn(str, "Grade: easy, hard or open.", _fact("difficulty")),
-    "proof_seconds": TableColumn(
-        float, "Seconds of the fastest run that proved the optimum.", _proof_seconds
-    ),
-    "jumps_file": TableColumn(
-        str, "File of the field with the jumps of the best point.", _fact("jumps_file")
-    ),
-    "licence": TableColumn(str, "Licence.", _fact("licence")),
+    "vortices": TableColumn(int, _fact("vortices")),
+    "objective": TableColumn(float, _fact("best", "objective")),
+    "optimum": TableColumn(float, _optimum),
+    "bound": TableColumn(float, _fact("bound")),
+    "gap": TableColumn(float, _fact("gap")),
+    "status": TableColumn(str, _status),
+    "solved": TableColumn(str, _fact("solved", "by")),
+    "difficulty": TableColumn(str, _fact("difficulty")),
+    "proof_seconds": TableColumn(float, _proof_seconds),
+    "jumps_file": TableColumn(str, _fact("jumps_file")),
+    "licence": TableColumn(str, _fact("licence")),
 }
-"""The columns in order."""
+"""The columns in order; docs/library.md states their meanings."""
 
 
 def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:

@@ -35,15 +35,6 @@ def release_facts(spec: Spec) -> dict[str, Any]:
     return {"title": spec.title, **({"authors": []} if spec.release is None else spec.release.document())}
 
 
-def citation_of(spec: Spec) -> str:
-    """Return one line that cites a library."""
-    release = release_facts(spec)
-    authors = f"{', '.join(release['authors'])}: " if release["authors"] else ""
-    version = f", version {release['version']}" if "version" in release else ""
-    day = f", {release['date']}" if "date" in release else ""
-    return f"{authors}{spec.title}{version}{day}"
-
-
 def licence_terms(sketches: Sequence[Sketch]) -> dict[str, Any]:
     """Return the licences of sketches for the texts of a library.
 

@@ -25,7 +25,7 @@ NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
 class InstanceRecipe:
     """Recipe of an instance. seed: of random sketches; prove: the norms in which to prove its optimum.
 
-    added: the day of its addition to the library; split: train, validation or test; empty if not stated.
+    added: the day of its addition to the library; empty if not stated.
     """
 
     name: str
@@ -36,7 +36,6 @@ class InstanceRecipe:
     gauge: str
     prove: tuple[Norm, ...] = ()
     added: str = ""
-    split: str = ""
 
     def document(self) -> dict[str, Any]:
         """Return everything that determines its content, as JSON."""
@@ -49,8 +48,7 @@ class InstanceRecipe:
             "origin": self.sketch.origin.document(),
             **self.sketch.settings(),
         }
-        stated = {field.name: getattr(self, field.name) for field in fields(self)} | {"sketch": sketch}
-        return {key: value for key, value in stated.items() if (key, value) != ("split", "")}
+        return {field.name: getattr(self, field.name) for field in fields(self)} | {"sketch": sketch}
 
 
 @dataclass(frozen=True)
@@ -147,10 +145,9 @@ def _instances(sketch: Sketch, rung: Rung, norms: tuple[Norm, ...]) -> list[Inst
             gauge,
             prove=norms if gauge == "strokes" else (),  # bounds are weak under the gauge `box`
             added=max(sketch.added, rung.added),
-            split=split,
         )
         for size in sketch.sizes_on(rung)
-        for seed, split in zip(sketch.seeds, sketch.splits, strict=True)
+        for seed in sketch.seeds
         for gauge in rung.gauges
     ]
 

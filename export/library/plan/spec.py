@@ -6,10 +6,9 @@ names in tables, and combinations of keys. Files are relative to the folder of t
 
 from __future__ import annotations
 
-import hashlib
 import re
 import tomllib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
@@ -28,7 +27,7 @@ from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS, problem_in_format
 from ...solvers_table import smallest_problem
-from .splits import check_splits, seeds_document, seeds_of, split_document, splits_of
+from .seeds import seeds_document, seeds_of
 
 FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
@@ -116,8 +115,8 @@ class Sketch:
     """Source of instances: a sample, a file with its mask, or random strokes of some seeds.
 
     what: the sample, the file's own name, or the shape of a random mask. sizes: by rung, if they differ from
-    the rung's. splits: one per seed. points: a word of POINTS. random: options of `random_instance`.
-    drawing, mask: published bytes.
+    the rung's. points: a word of Effort. random: options of `random_instance`. drawing, mask: published
+    bytes.
     """
 
     name: str
@@ -128,7 +127,6 @@ class Sketch:
     origin: Origin
     sizes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     seeds: tuple[int | None, ...] = (None,)
-    splits: tuple[str, ...] = ("",)
     points: Effort = "search"
     random: tuple[tuple[str, Any], ...] = ()
     drawing: bytes = b""
@@ -156,13 +154,6 @@ class Sketch:
         """The stated weights by name; the coefficients of the paper replace a missing one."""
         return {key: value for key, value in self.random if key in WEIGHTS}
 
-    def sources(self) -> Iterator[tuple[str, str, str]]:
-        """Yield each source that has a split, the split and its own name."""
-        drawn = hashlib.sha256(self.drawing).hexdigest()[:12] if self.drawing else self.what
-        for seed, split in zip(self.seeds, self.splits, strict=True):
-            if split:
-                yield (f"{self.kind} {drawn}" if seed is None else f"seed {seed}"), split, self.name
-
     def settings(self) -> dict[str, Any]:
         """Return the stated options of its instances that have a default, other than sizes."""
         points = {} if self.points == "search" else {"points": self.points}
@@ -181,7 +172,7 @@ class Sketch:
         head: dict[str, Any] = {"name": self.name, "title": self.title, "rungs": list(self.rungs)}
         head["sizes"] = {rung: list(sizes) for rung, sizes in self.sizes}
         head |= self.origin.document() | ({"added": self.added} if self.added else {})
-        head |= self.settings() | split_document(self.seeds, self.splits)
+        head |= self.settings()
         if self.kind == "sample":
             return head | {"sample": self.what}
         if self.kind == "random":
@@ -315,7 +306,6 @@ def _read_document(document: dict[str, Any], folder: Path) -> Spec:
             f"sketches[{name[0]}].name: {name[1]!r} is the name of two sketches; give each its own"
         )
     _check_entries(formulations, [rung for rung in rungs if any(rung.name in s.rungs for s in sketches)])
-    check_splits(source for sketch in sketches for source in sketch.sources())
     proven = [sketch.name for sketch in sketches if sketch.points == "proven"]
     if proven and all(FORMULATIONS[formulation].minimises == AT_JUMPS for formulation in formulations):
         raise InputError(
@@ -448,7 +438,6 @@ def _read_sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[R
         sizes=tuple((rung, _whole_numbers(sizes[rung])) for rung in wanted if rung in sizes),
         origin=Origin.of(table),
         added=check_day(table.get("added", ""), f"{place}added"),
-        splits=splits_of(table.get("split", ""), what.get("seeds", (None,)), f"{place}split"),
         points=table.get("points", "search"),
         **what,
     )

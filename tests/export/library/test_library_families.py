@@ -1,4 +1,4 @@
-"""Families of random instances: seeds, splits and points of a specification, and their builds."""
+"""Families of random instances: seeds and points of a specification, and their builds."""
 
 import json
 import tomllib
@@ -29,11 +29,10 @@ random = "full"
 seeds = "1-5"
 share = 0.3
 points = "proven"
-split = { train = "1-3", validation = [4], test = [5] }
 """
 
 
-SMALL = SPEC.replace('"1-5"', '"3-5"').replace('"1-3"', "[3]")
+SMALL = SPEC.replace('"1-5"', '"3-5"')
 """The same with fewer instances, for builds."""
 
 
@@ -63,7 +62,6 @@ def content(folder):
         ("", ""),
         ('seeds = "1-5"', "seeds = [3, 1, 5, 4, 2]"),
         ("share = 0.3", 'share = 0.3\nstrokes = "curved"\nnoise = 0.1\nskew_weight = 1e-3'),
-        ('{ train = "1-3", validation = [4], test = [5] }', '"test"'),
         ('points = "proven"', 'points = "none"'),
     ],
 )
@@ -73,40 +71,19 @@ def test_the_document_of_a_specification_is_that_specification(tmp_path, old, ne
     assert again == spec
 
 
-SAMPLES = '[[sketches]]\nname = "{}"\nsample = "mouse"\nsplit = "{}"\n'
-OTHER = SPEC[SPEC.index("[[sketches]]") :].replace('"fam"', '"two"')
 BAD = {
     "range that falls": ('"1-5"', '"5-1"', "sketches[0].seeds: '5-1' must rise"),
     "range too long": ('"1-5"', '"1-200000"', "by less than 100000"),
-    "seed twice": ("[4]", "[3]", "sketches[0].split: seed 3 is in train and in validation"),
-    "seed without a split": ("validation = [4], ", "", "sketches[0].split: seed 4 has no split"),
-    "split of another seed": ("[5]", "[5, 6]", "sketches[0].split: 6 is not in seeds"),
-    "unknown split": (
-        "validation",
-        "holdout",
-        "sketches[0].split.holdout: is unknown; the keys here are train",
-    ),
     "proof of fixed jumps": ('"exact", "milp"', '"qp"', "formulations: fam has proven points"),
     "share of nothing": ("0.3", "0", "sketches[0].share: must be a number above 0"),
-    "one seed in two splits": (
-        "",
-        OTHER.replace('"1-3"', "[1, 2, 4]").replace("[4], ", "[3], "),
-        "seed 3 is in train of fam and in validation of two",
-    ),
-    "one sample in two splits": (
-        "",
-        SAMPLES.format("a", "train") + SAMPLES.format("b", "test"),
-        "sample mouse is in train of a and in test of b",
-    ),
 }
 
 
 @for_each("case", BAD)
 def test_a_bad_family_is_named_with_its_place_and_remedy(tmp_path, case):
     old, new, words = BAD[case]
-    text = SPEC.replace(old, new) if old else f"{SPEC}\n{new}"
     with pytest.raises(InputError) as error:
-        read_spec(written(tmp_path, text))
+        read_spec(written(tmp_path, SPEC.replace(old, new)))
     assert words in str(error.value)
     assert "spec.toml" in str(error.value)
 
@@ -124,18 +101,10 @@ def test_a_family_that_states_nothing_more_has_the_recipes_of_before():
     assert sketch["seeds"] == [1, 2, 3]
     assert sketch.keys() <= tomllib.loads(SPEC)["sketches"][0].keys() | {
         *("title", "rungs", "sizes", "author", "license", "source", "added")
-    } - {"share", "points", "split"}
+    } - {"share", "points"}
 
 
 # The build
-
-
-def test_a_split_holds_all_formulations_and_gauges_of_a_seed(built):
-    found = {}
-    for entry in built.entries:
-        found.setdefault(entry["source"]["seed"], set()).add(entry["split"])
-    assert found == {3: {"train"}, 4: {"validation"}, 5: {"test"}}
-    assert len(built.entries) == 3 * 2 * 2
 
 
 def test_proven_points_are_optimal_under_the_gauge_strokes(built):
@@ -190,7 +159,7 @@ def test_a_large_certificate_of_an_optimum_is_kept(tmp_path, monkeypatch):
     """It was left out with its field, although it proved the optimum."""
     monkeypatch.setattr(fields, "_MOST_BYTES", 1)  # which any certificate exceeds
     text = SMALL.replace('"3-5"', "[524]").replace("[3]", "[5]").replace("0.3", "0.2")
-    text = text.replace('"exact", "milp"', '"exact"').replace(', "box"', "").replace("split", "# split")
+    text = text.replace('"exact", "milp"', '"exact"').replace(', "box"', "")
     (entry,) = build(read_spec(written(tmp_path, text)), tmp_path / "library").entries
     assert (entry["status"], entry["best"]["solver"]) == ("optimal", "crossfield (prove)")
     assert (tmp_path / "library" / "cf_fam_n005_s524.certificate.npz").exists()

@@ -27,7 +27,6 @@ name = "rand"
 random = "full"
 seeds = [1]
 points = "proven"
-split = "test"
 """
 STEM = "cf_rand_n003_s1"
 CERTIFICATES = {"exact": f"{STEM}.certificate.npz", "milp": f"{STEM}.l1.certificate.npz"}
@@ -53,7 +52,7 @@ def test_it_has_the_optimum_of_its_plain_entry_and_names_its_certificate(built):
     assert [name for name in built.document["entries"] if "qp" not in name and "box" not in name] == names
     for token, file in CERTIFICATES.items():
         narrow, plain = built.entry(f"{STEM}_{token}_tight"), built.entry(f"{STEM}_{token}")
-        for key in ("status", "bound", "gap", "split", "instance"):
+        for key in ("status", "bound", "gap", "instance"):
             assert narrow[key] == plain[key]
         assert narrow["best"]["objective"] == plain["best"]["objective"]
         assert (narrow["status"], narrow["solved"]["by"]) == ("optimal", "certificate")
