@@ -7,14 +7,14 @@ from importlib.metadata import version as installed
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from crossfield.export.library.site.formulas import lines_of, mathml
-from crossfield.templates import ENVIRONMENT
 from docutils.nodes import SkipNode
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-sys.path.insert(0, str(Path(__file__).parent))  # for the extension beside this file
+sys.path.insert(0, str(Path(__file__).parent))  # for the modules beside this file
+
+from formulas import mathml, model_table
 
 project = "crossfield"
 author = "The crossfield authors"
@@ -52,8 +52,7 @@ def _block(writer: Any, node: Any) -> None:
     """Write a formula on lines of its own, and a model as a table."""
     source = node.astext()
     if source.startswith(r"\begin{aligned}"):
-        template = ENVIRONMENT.get_template("site/model.html.j2")
-        writer.body.append(template.render(name=node.parent[0].astext(), lines=lines_of(source)))
+        writer.body.append(model_table(node.parent[0].astext(), source))
     else:
         writer.body.append(f'<div class="math">{mathml(source)}</div>')
     raise SkipNode

@@ -1,8 +1,7 @@
-"""Marks of a picture (lines, dots, areas, words), and those of an instance and its field."""
+"""Marks of a picture (lines, dots, areas), and those of an instance and its field."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -62,18 +61,7 @@ class Area:
     opacity: float = 1.0
 
 
-@dataclass(frozen=True)
-class Label:
-    """A line of text. anchor: `start`, `middle` or `end`, the part at (x, y). turned: degrees, clockwise."""
-
-    text: str
-    x: float
-    y: float
-    anchor: str = "start"
-    turned: float = 0.0
-
-
-Mark = Lines | Dots | Area | Label
+Mark = Lines | Dots | Area
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,11 +161,6 @@ class GridFrame:
 def straight_line(points: Floats) -> Floats:
     """The pieces (k - 1, 2, 2) of a polyline (k, 2)."""
     return np.stack([points[:-1], points[1:]], axis=1)
-
-
-def segments(ends: Iterable[Iterable[float]]) -> list[Floats]:
-    """Straight lines, each given as (x, y, x, y)."""
-    return [np.array(segment, dtype=np.float64).reshape(1, 2, 2) for segment in ends]
 
 
 def cover_by_boxes(chosen: Bools) -> Floats:

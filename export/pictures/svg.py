@@ -8,25 +8,21 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Iterator
-from html import escape
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...models.instance.grid import Floats
-from .marks import Area, Dots, Label, Layer, Lines, Mark, Sheet
+from .marks import Area, Dots, Layer, Lines, Mark, Sheet
 from .underlay import Underlay, ink_colours, size_in_units
 
-LABEL: Final = "#555e68"
-"""The colour of text."""
 _FINENESS: Final = 20_000.0  # steps of coordinates along the longer side of the page, at least
 _COARSE: Final = 3_000.0  # the same for a browser
 _SPACES: Final = (
     'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
     'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'
 )
-_FONT: Final = 'font-family="system-ui,sans-serif" font-size="10"'
 
 
 def sheet_svg(sheet: Sheet) -> bytes:
@@ -83,7 +79,7 @@ def _mark_elements(part: Mark, step: float) -> Iterator[str]:
         return _line_elements(part, step)
     if isinstance(part, Dots):
         return _dot_elements(part, step)
-    return _area_element(part, step) if isinstance(part, Area) else _text_element(part)
+    return _area_element(part, step)
 
 
 def _ink_image(ink: NDArray[np.uint8], scale: float) -> str:
@@ -143,15 +139,6 @@ def _area_element(part: Area, step: float) -> Iterator[str]:
     )
     if data:
         yield f'<path fill="{part.colour}"{_opacity_attribute(part.opacity)} d="{data}"/>'
-
-
-def _text_element(part: Label) -> Iterator[str]:
-    x, y = f"{part.x:.5g}", f"{part.y:.5g}"
-    turn = f' transform="rotate({part.turned:g} {x} {y})"' if part.turned else ""
-    yield (
-        f'<text x="{x}" y="{y}" fill="{LABEL}" {_FONT} text-anchor="{part.anchor}"{turn}>'
-        f"{escape(part.text)}</text>"
-    )
 
 
 def _opacity_attribute(opacity: float) -> str:

@@ -10,31 +10,27 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE, Area, GridFrame, Layer, Lines, Mark, Sheet
-from .svg import LABEL, web_sheet_svg
+from .svg import web_sheet_svg
 
-SIDE: Final = 320.0
+_SIDE: Final = 320.0
 CROSSES_UP_TO: Final = 12  # longer side of a grid with crosses at all pixels; larger ones have streamlines
-GRID: Final = "#e4e6ea"
-EDGE: Final = "#8b929c"
-CUT: Final = "#c3c8ce"
+_GRID: Final = "#e4e6ea"
+_EDGE: Final = "#8b929c"
 _SHADE: Final = "#e1e4e9"
 _FAINT: Final = "#d3d6db"
 _NIGHT: Final = {  # colours in dark mode by those in light mode
     PAPER: "#1d2126",
     _SHADE: "#3a424c",
-    GRID: "#30363d",
-    EDGE: "#7d8590",
-    CUT: "#4a525c",
+    _GRID: "#30363d",
+    _EDGE: "#7d8590",
     STROKE: "#ff7b72",
     _FAINT: "#3d444d",
     FAMILIES[0]: "#41b3c5",
     FAMILIES[1]: "#f0a35e",
     POSITIVE: "#ff6b70",
     NEGATIVE: "#7c9cff",
-    LABEL: "#a3acb6",
 }
 _MARGIN: Final = 7.0
-_CHARACTER: Final = 6.2  # the widest digits and letters of usual fonts at the size of the labels
 _SPACING: Final = 10.0  # between streamlines of one family
 _CELLS_FROM: Final = 9.0  # units of a pixel from which on its sides are drawn
 
@@ -63,29 +59,21 @@ def field_picture(field: CrossField) -> bytes:
     return _page_around_mask(frame, [*_mask_marks(frame), *strokes, *lines, *frame.singularities(field, 4.6)])
 
 
-def marks_picture(left: float, top: float, right: float, bottom: float, marks: Iterable[Mark]) -> bytes:
-    """The SVG of marks on a page between these sides, with colours for both modes."""
-    x, y, width, height = (round(value, 1) for value in (left, top, right - left, bottom - top))
-    return web_sheet_svg(Sheet((x, y, width, height), (Layer("", tuple(marks)),)), _NIGHT)
-
-
-def text_width(text: str) -> float:
-    """Room for a line of text in the units of the picture, whatever font the reader has."""
-    return _CHARACTER * len(text)
-
-
 def _web_frame(instance: Instance) -> GridFrame:
-    return GridFrame(instance, (0.0, 0.0), SIDE / float(np.ptp(np.argwhere(instance.mask), axis=0).max() + 1))
+    return GridFrame(
+        instance, (0.0, 0.0), _SIDE / float(np.ptp(np.argwhere(instance.mask), axis=0).max() + 1)
+    )
 
 
 def _mask_marks(frame: GridFrame) -> list[Area | Lines]:
     """The mask, its pixels where they are large enough, and its outline."""
-    cells = [frame.sides(GRID, 0.8, between=True)] if frame.pixel >= _CELLS_FROM else []
-    return [frame.area(PAPER, frame.instance.mask), *cells, frame.sides(EDGE, 1.2)]
+    cells = [frame.sides(_GRID, 0.8, between=True)] if frame.pixel >= _CELLS_FROM else []
+    return [frame.area(PAPER, frame.instance.mask), *cells, frame.sides(_EDGE, 1.2)]
 
 
 def _page_around_mask(frame: GridFrame, marks: Iterable[Mark]) -> bytes:
     inside = np.argwhere(frame.instance.mask)[:, ::-1]
     left, top = (frame.pixel * inside.min(axis=0) - _MARGIN).tolist()
     right, bottom = (frame.pixel * (inside.max(axis=0) + 1) + _MARGIN).tolist()
-    return marks_picture(left, top, right, bottom, marks)
+    x, y, width, height = (round(value, 1) for value in (left, top, right - left, bottom - top))
+    return web_sheet_svg(Sheet((x, y, width, height), (Layer("", tuple(marks)),)), _NIGHT)

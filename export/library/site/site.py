@@ -31,7 +31,6 @@ from ..building.table import role_of
 from ..documents.checksums import SUMS, is_intact, read_checksums
 from ..documents.documents import Library, about_file, files_of_instance, read_about, read_library
 from ..plan.spec import RUNGS
-from .study import study_entry
 
 ASSETS: Final = ("site.css", "site.js", "icon.svg")  # copied from the templates
 FOLDERS: Final = ("entry", "files", "instance", "pictures")
@@ -210,8 +209,7 @@ def _write_pages(
             files=files_of_instance(instance.about),
         )
         for entry in instance.entries:
-            details = study_entry(library, entry, stage / "pictures")
-            write(f"entry/{entry['name']}.html", "entry", shown=instance, entry=entry, study=details)
+            write(f"entry/{entry['name']}.html", "entry", shown=instance, entry=entry)
     return written
 
 

@@ -16,13 +16,11 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from browsing import CONTRAST, find, served, show, sideways
 from crossfield.export.cli.app import invoke
-from crossfield.export.library.documents.documents import problem_of
 from crossfield.export.library.site.site import count, write_site
 from crossfield.export.pictures.draw import count_singularities
 from crossfield.export.pictures.marks import FAMILIES, NEGATIVE, POSITIVE, STROKE
 from crossfield.models.errors import InputError, InstanceError, OutputError
 from crossfield.models.field.file import read_field
-from crossfield.models.formulations.latex import latex
 from crossfield.models.instance.file import read_instance
 from libraries import library_of
 
@@ -306,8 +304,6 @@ def test_an_entry_shows_its_sidecar(library, site, pages):
             *(repr(bound["bound"] + 0.0) for bound in entry["bounds"]),
         ]
         assert {each for each in wanted if each not in texts} == set()
-        source = "\n".join(text for _, text in page.texts)
-        assert latex(problem_of(library, entry).formulation) in source
         download = [anchor["href"] for anchor in page.all("a") if "download" in anchor]
         assert {f"../files/{file['name']}" for file in entry["files"]} <= set(download)
 
@@ -323,7 +319,7 @@ def test_the_command_that_a_page_shows_checks_the_point(site, pages):
         assert (done.returncode, done.stderr) == (0, "")
 
 
-# pictures and mathematics
+# pictures
 
 
 def test_pictures_hold_the_strokes_and_the_singularities(library, site):
@@ -341,12 +337,6 @@ def test_pictures_hold_the_strokes_and_the_singularities(library, site):
         dots = {each.get("fill"): len(each) for each in drawn if each.tag.endswith("}g")}
         assert (dots.get(POSITIVE, 0), dots.get(NEGATIVE, 0)) == (sum(index > 0), sum(index < 0))
         assert count_singularities(field).startswith(f"{len(index) or 'no'} singularit")
-
-
-# structure
-
-
-# runs, origin and citation
 
 
 # in a browser
@@ -579,6 +569,5 @@ def test_pages_fit_a_phone_and_can_be_read_in_both_modes(browser, address, page)
     for scheme in ("light", "dark"):
         show(browser, width=390, height=844, scheme=scheme)
         browser.get(f"{address}/{page}")
-        browser.execute_script("document.querySelectorAll('details').forEach(each => each.open = true)")
         assert sideways(browser) == ([390, 390], [])
         assert browser.execute_script(CONTRAST)[0][0] >= 4.5

@@ -1,4 +1,4 @@
-"""Formulas as MathML in pieces, so that long ones wrap on a narrow page."""
+"""Formulas of the pages as MathML in pieces, so that long ones wrap on a narrow page."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 from typing import Final
 
+from crossfield.templates import ENVIRONMENT
 from defusedxml.ElementTree import fromstring
+from latex2mathml.converter import convert
 
 _LABEL: Final = re.compile(r" \\quad \\text\{(.*)\}$")
 _NAMESPACE: Final = ' xmlns="http://www.w3.org/1998/Math/MathML"'
@@ -19,6 +22,12 @@ _BRACKETS: Final = {"(": 1, "[": 1, "{": 1, ")": -1, "]": -1, "}": -1}
 _SCRIPTED: Final = frozenset({"msub", "msup", "msubsup"})
 _WIDE: Final = 2.0
 """Width in em of the space that separates formulas on one line."""
+
+
+def model_table(name: str, source: str) -> str:
+    """Return a model as a table in HTML. source: LaTeX in an environment `aligned`."""
+    template = Path(__file__).with_name("model.html.j2").read_text(encoding="utf-8")
+    return ENVIRONMENT.from_string(template).render(name=name, lines=lines_of(source))
 
 
 @cache
@@ -46,8 +55,6 @@ def mathml(formula: str) -> str:
     Browsers break no line inside an element `math`. Environments such as `aligned` are not supported:
     `lines_of` splits them.
     """
-    from latex2mathml.converter import convert
-
     if not formula:
         return ""
     root = fromstring(convert(formula, display="block").replace(_NAMESPACE, ""))
