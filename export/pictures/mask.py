@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -16,14 +15,10 @@ from ...models.storage import replacing
 
 Page = tuple[float, float, float, float]
 
-_TINT: Final = (170, 195, 255)  # of bridged gaps; so light that it counts as white
-
 
 @check_arguments
 def write_mask(instance: Instance, path: str | Path) -> Path:
     """Write the mask of an instance as a PNG: white where the field is solved for, black elsewhere.
-
-    Gaps in the outline that were closed are light blue, which counts as white.
 
     Parameters
     ----------
@@ -46,7 +41,7 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
         If the file cannot be written.
 
     """
-    from PIL import Image, ImageDraw
+    from PIL import Image
 
     path, page = Path(path), _page(instance)
     if page is None:
@@ -57,14 +52,6 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
         )
     white = mask_on_page(instance, page)
     image = Image.fromarray(np.where(white, np.uint8(255), np.uint8(0)))
-    if instance.reading is not None and instance.reading.openings:
-        line = Image.new("L", image.size, 0)
-        scale = np.array(image.size) / page[2:]
-        width = max(1, round(instance.pixel_size * float(scale.mean()) / 2))
-        for ends in (np.array(instance.reading.openings) - page[:2]) * scale:
-            ImageDraw.Draw(line).line(ends.ravel().tolist(), fill=255, width=width)
-        where = Image.fromarray(np.minimum(np.asarray(image), np.asarray(line)))
-        image = Image.composite(Image.new("RGB", image.size, _TINT), image.convert("RGB"), where)
     with replacing(path) as stream:
         image.save(stream, "PNG")
     return path

@@ -14,11 +14,10 @@ from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
 from ..shading.raster import Raster, raster
 from .canvas import draw_smooth_image, paint
-from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, GridFrame, Lines
+from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, GridFrame
 
 COLLAPSED: Final = "#b9a3d6"
 OUTSIDE: Final = "#ececec"
-OPENING: Final = "#3056d3"
 
 _DOTS_PER_POINT: Final = 3  # of a surface, as in a PNG
 SPACING: Final = 6.5  # points between streamlines of one family in a panel of full size
@@ -61,15 +60,11 @@ class PanelContent:
 
 
 def draw_instance(axes: Any, picture: PanelContent) -> None:
-    """Mask and strokes, and the gaps in the outline that were bridged when the drawing was read."""
-    frame, reading = picture.frame, picture.instance.reading
-    openings = () if reading is None else reading.openings
-    origin, scale = picture.instance.origin, picture.unit / picture.instance.pixel_size
-    gaps = [scale * (np.array(ends) - origin)[None] for ends in openings]
+    """Mask and strokes."""
+    frame = picture.frame
     paint(axes, [frame.area(OUTSIDE, ~picture.instance.mask)])
     paint(axes, frame.strokes(STROKE, max(1.1 * picture.ink, min(0.22 * picture.unit, 2.6))))
     _draw_border(axes, picture)
-    paint(axes, [Lines(OPENING, 2.6 * picture.ink, gaps)])
 
 
 def draw_crosses(axes: Any, picture: PanelContent) -> None:

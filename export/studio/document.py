@@ -22,7 +22,7 @@ from ...models.sketch.curves import Curves, lines_as_cubics
 from ...models.sketch.read import Silhouette, name_from_text
 
 Mark = Literal["line", "cut", "ignored"]
-EditKind = Literal["paint", "erase", "toggle", "gap"]
+EditKind = Literal["paint", "erase", "toggle"]
 _Read = TypeVar("_Read")
 
 FORMAT: Final = "crossfield-studio"
@@ -45,7 +45,7 @@ class Stroke:
 class MaskEdit:
     """A change of the mask: a brush of a radius along points (k, 2), or a click at the first point.
 
-    toggle: includes or excludes the area between strokes that was clicked. gap: opens a bridged gap.
+    toggle: includes or excludes the area between strokes that was clicked.
     """
 
     kind: EditKind

@@ -16,10 +16,9 @@ from scipy import ndimage
 from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats, Ints
-from ...models.instance.instance import SKEW_WEIGHT, Instance, Reading
+from ...models.instance.instance import SKEW_WEIGHT, Instance
 from ...models.processes.child_program import is_stopped
 from ...models.sketch.cover import LEAST_WEIGHT, Frame, curve_pixels, fit_frame
-from ...models.sketch.outline import enclosed_region
 from ...models.sketch.read import drop_silhouette, find_mask, instance_of_mask
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field
@@ -31,7 +30,6 @@ from .document import Document, MaskEdit
 _Result = TypeVar("_Result")
 
 _MOST_KEPT: Final = 4
-NEAR: Final = 4.0  # pixels between a click on a gap and the gap
 OUT, IN, LEFT_OUT, STROKE = range(4)
 """Kinds of pixels: outside, solved for, enclosed but left out, and covered by a stroke that cuts."""
 
@@ -42,14 +40,13 @@ class OvertakenError(CrossfieldError):
 
 @dataclass(frozen=True, eq=False)
 class DrawnInstance:
-    """An instance, the kind (h, w) of each pixel, the gaps with whether they are open, and its strokes.
+    """An instance, the kind (h, w) of each pixel, and its strokes.
 
     strokes: number of the stroke and of the stroke pixel for each pair of them, (k, 2).
     """
 
     instance: Instance
     kinds: Ints
-    gaps: tuple[tuple[Floats, bool], ...]
     strokes: Ints
 
 
@@ -59,7 +56,7 @@ def read_drawn(document: Document, size: int | None = None) -> DrawnInstance:
     frame = fit_frame(curves.box, size or document.size, margin=True)
     covers = curves.covers(frame)
     mask, reading = find_mask(curves, covers, frame)
-    edited, gaps = _edit_mask(document.mask, mask, covers.walls, reading, frame)
+    edited = _edit_mask(document.mask, mask, covers.walls, frame)
     left_out = edited | _enclosed_parts(~edited & ~covers.walls)
     mask = edited & ~covers.cuts
     if document.silhouette == "outer":
@@ -74,7 +71,7 @@ def read_drawn(document: Document, size: int | None = None) -> DrawnInstance:
     pairs = np.stack([owner, number[row, column]], axis=1)
     pairs = pairs[pairs[:, 1] >= 0].astype(np.int32)
     kinds = np.select([covers.cuts, mask, left_out], [STROKE, IN, LEFT_OUT], OUT).astype(np.int32)
-    return DrawnInstance(_scale_weights(instance, document.weights, pairs), kinds, gaps, pairs)
+    return DrawnInstance(_scale_weights(instance, document.weights, pairs), kinds, pairs)
 
 
 def _scale_weights(instance: Instance, weights: Floats, pairs: Ints) -> Instance:
@@ -86,20 +83,9 @@ def _scale_weights(instance: Instance, weights: Floats, pairs: Ints) -> Instance
     return replace(instance, w=instance.w * np.where(mean > 0, mean, 1.0))
 
 
-def _edit_mask(
-    edits: tuple[MaskEdit, ...], solve: Bools, walls: Bools, reading: Reading, frame: Frame
-) -> tuple[Bools, tuple[tuple[Floats, bool], ...]]:
-    """The mask after the edits in their order, and the gaps with whether they are open."""
-    ends = np.array(reading.openings).reshape(-1, 2, 2)
-    closed = np.ones(len(ends), dtype=bool)
-    for edit in edits:
-        if edit.kind == "gap" and len(ends):
-            away = np.hypot(*(ends.mean(axis=1) - edit.points[0]).T)
-            closed[(away == away.min()) & (away <= NEAR * frame.pixel)] ^= True
-    left = np.zeros_like(solve)
-    if not closed.all():
-        left = _mostly_chosen_parts(solve & ~_close_walls(walls, ends[closed], frame), solve & ~walls)
-    mask = solve & ~left
+def _edit_mask(edits: tuple[MaskEdit, ...], mask: Bools, walls: Bools, frame: Frame) -> Bools:
+    """The mask after the edits in their order."""
+    left = np.zeros_like(mask)
     cells, _ = ndimage.label(~walls)
     for edit in edits:
         if edit.kind == "toggle":
@@ -108,33 +94,16 @@ def _edit_mask(
             mask, left = (
                 (mask & ~cell, left | cell) if gone else (mask | cell | _find_rim(cell, walls), left & ~cell)
             )
-        elif edit.kind != "gap":
+        else:
             brushed = _brushed_pixels(edit, frame)
             mask = mask | brushed if edit.kind == "paint" else mask & ~brushed
     # Strokes that only bound areas without a field would be thin parts of their own.
-    mask = mask & ~(_find_rim(left, walls) & ~_find_rim(mask & ~walls, walls))
-    return mask, tuple(zip(ends, (~closed).tolist(), strict=True))
-
-
-def _mostly_chosen_parts(chosen: Bools, area: Bools) -> Bools:
-    """The connected parts of an area of which more than half is chosen."""
-    label, count = ndimage.label(area)
-    share = ndimage.mean(chosen, label, np.arange(count + 1))
-    return np.asarray((share > 0.5)[label] & area)
+    return mask & ~(_find_rim(left, walls) & ~_find_rim(mask & ~walls, walls))
 
 
 def _find_rim(area: Bools, walls: Bools) -> Bools:
     """The pixels of strokes next to an area."""
     return np.asarray(ndimage.binary_dilation(area, np.ones((3, 3), dtype=bool)) & walls)
-
-
-def _close_walls(walls: Bools, bridges: Floats, frame: Frame) -> Bools:
-    """The region inside of the walls and these bridges (m, 2, 2)."""
-    closed = walls.copy()
-    if len(bridges):
-        _, row, column = curve_pixels(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
-        closed[row, column] = True
-    return enclosed_region(closed)
 
 
 def _find_cell(cells: Ints, point: Floats, frame: Frame) -> Bools:

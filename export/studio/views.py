@@ -51,7 +51,6 @@ def _field_view(document: Document, drawn: DrawnInstance, field: CrossField) -> 
         "wanted": document.size,
         "frame": {"x": x, "y": y, "pixel": pixel, "rows": len(drawn.kinds), "columns": drawn.kinds.shape[1]},
         "kinds": encode_array(drawn.kinds, "u1"),
-        "gaps": [{"ends": ends.tolist(), "open": is_open} for ends, is_open in drawn.gaps],
         "warnings": list(instance.reading.warnings) if instance.reading else [],
         "mask": encode_array(instance.mask, "u1"),
         "u": encode_array(field.u_angle, "f4"),

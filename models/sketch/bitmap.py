@@ -22,7 +22,6 @@ from ..input_limits import MAX_PIXELS, MAX_SIDE
 from ..instance.grid import Bools, Floats
 from .colour import REDDISH, ink_of, redness
 from .cover import Box, Cover, Covers, Frame, block_means
-from .thinning import thin_shape
 from .tiff import unpack_tiff
 
 Ink = NDArray[np.float32]
@@ -43,8 +42,6 @@ _BAND: Final = 1 << 20  # pixels of a picture that are processed together
 _BLUR: Final = 1.0  # pixels, of the gradient
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
 _INK: Final = 0.3  # least ink of a pixel that belongs to a stroke
-_THINNED: Final = 512  # pixels on the longer side of a bitmap while its ends are sought
-_TAIL: Final = 11  # pixels round the end of a thinned line that determine its continuation
 _COLOUR_SHARE: Final = 0.03  # of all ink, for red and for other strokes, before the two are separated
 
 
@@ -96,26 +93,6 @@ class Bitmap:
             )
         nothing = Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
         return Covers(self._cover_by_ink(self.ink, frame, width), nothing, width)
-
-    def ends(self) -> Floats:
-        """Ends of strokes, in pixels of the file: points and directions of continuation (n, 2, 2)."""
-        # A stroke extends half its width beyond its thinned line, which is far below the gaps that count.
-        from scipy import ndimage
-
-        block = max(1.0, max(self.ink.shape) / _THINNED)
-        rows, columns = (np.arange(int(side / block) + 1) * block for side in self.ink.shape)
-        small = block_means(self.ink, rows, columns)
-        line = thin_shape(small * max(1.0, block / self.stroke_width) > _INK)
-        neighbours = ndimage.convolve(line.astype(np.uint8), np.ones((3, 3), dtype=np.uint8), mode="constant")
-        row, column = np.nonzero(line & (neighbours == 2))
-        # From the middle of the line near its end to the end.
-        mean = [
-            ndimage.uniform_filter(part * line, _TAIL, mode="constant")[row, column]
-            for part in (np.ones(line.shape), *np.indices(line.shape, dtype=np.float64)[::-1])
-        ]
-        middle = np.stack(mean[1:], axis=1) / mean[0][:, None]
-        ends = np.stack([column, row], axis=1)
-        return self.reduction * np.stack([(ends + 0.5) * block, (ends - middle) * block], axis=1)
 
     def _cover_by_ink(self, ink: Ink, frame: Frame, width: float) -> Cover:
         rows, columns = (edges / self.reduction for edges in frame.edges)

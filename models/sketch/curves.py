@@ -14,7 +14,6 @@ from ..instance.grid import Bools, Floats, Ints
 from .cover import Box, Covers, Frame, cover_by_segments
 
 _FLATNESS: Final = 0.02  # of a pixel
-_SAME: Final = 1e-6  # of the longer side: ends that lie closer together are one point
 _BOX_TOLERANCE: Final = 1e-4  # of the longer side: far below a pixel of any grid that can be solved
 
 
@@ -52,17 +51,6 @@ class Curves:
             corners = flatten(self.points, _BOX_TOLERANCE * span)[0].reshape(-1, 2)
         (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
         return left, top, right, bottom
-
-    def ends(self) -> Floats:
-        """Ends that no other curve shares: points and directions of continuation (n, 2, 2)."""
-        ends = np.concatenate([self.points[:, 0], self.points[:, 3]])
-        inside = np.concatenate([self.points[:, 1:], self.points[:, 2::-1]])
-        grain = max(_SAME * float(np.ptp(ends, axis=0).max()), np.finfo(float).tiny)
-        apart = (np.abs(inside - ends[:, None]) > grain).any(axis=-1)
-        nearest = inside[np.arange(len(ends)), np.argmax(apart, axis=1)]
-        _, first, times = np.unique(np.round(ends / grain), axis=0, return_index=True, return_counts=True)
-        free = np.sort(first[times == 1])
-        return np.stack([ends[free], ends[free] - nearest[free]], axis=1)
 
     def segments(self, frame: Frame) -> tuple[Floats, Ints, Bools]:
         """Segments (m, 2, 2), the number (m,) of each segment's curve, and which (m,) are curvature lines."""

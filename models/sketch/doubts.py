@@ -6,12 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.angles import line_difference, line_of, vector_length
+from ..instance.angles import line_difference, line_of
 from ..instance.grid import Bools, Floats
 from .cover import Box, Cover, Frame
 from .outline import THICK, convex_area, drop_narrow_parts
 
-_MOST_PLACES: Final = 5  # in one warning
 BLOCK: Final = 4  # side in pixels of a block filled by strokes; no sample has one from 16 pixels on
 CROWDED: Final = 0.1  # least share of the solved pixels in blocks filled by strokes that causes a warning
 LOOSE: Final = 0.08  # least share of stroke pixels that bound nothing, which causes a warning
@@ -21,20 +20,6 @@ _WIDE: Final = 3  # bins of directions, 15 degrees, that count as one
 _BESIDE: Final = 0.45  # least share of the box in the strokes beside an area between the box and the body
 _TOUCHES: Final = 4  # most strokes that end at a box round a body; lines across a sheet end at its border
 OFF: Final = 0.01  # least share of the solved pixels more than a pixel off the page that causes a warning
-
-
-def describe_gaps(bridges: Floats) -> str | None:
-    """The gaps in the outline that bridges (m, 2, 2) closed."""
-    if not len(bridges):
-        return None
-    wide = vector_length(*(bridges[:, 1] - bridges[:, 0]).T)
-    order = np.argsort(-wide, kind="stable")
-    places = [f"{_describe_point(bridges[k].mean(axis=0))} over {wide[k]:.4g}" for k in order[:_MOST_PLACES]]
-    more = f" and {len(order) - _MOST_PLACES} more" if len(order) > _MOST_PLACES else ""
-    return (
-        f"outline open here: {', '.join(places)}{more}; it is taken as closed by a straight line, "
-        "draw it on or give a mask if that is wrong"
-    )
 
 
 def describe_open_drawing(region: Bools) -> str | None:

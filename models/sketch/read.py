@@ -21,12 +21,10 @@ from ..instance.angles import line_of
 from ..instance.grid import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading
 from .bitmap import read_white_pixels
-from .bridges import close_outline
 from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
 from .doubts import (
     describe_box,
     describe_crowding,
-    describe_gaps,
     describe_loose_strokes,
     describe_off_page,
     describe_open_drawing,
@@ -176,27 +174,24 @@ def frame_around_white(white: Bools, page: Box, size: int) -> tuple[Frame, Bools
 
 
 def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Reading]:
-    """The inside of the outline, its gaps bridged, without the strokes that cut; and doubts about it."""
+    """The inside of the outline without the strokes that cut, and doubts about it."""
     walls = covers.walls
     if not walls.any():
         raise NoStrokeError("no stroke is left on so coarse a grid; choose a larger size")
-    closed, bridges = close_outline(walls, drawing.ends(), frame)
-    region = find_inside(closed)
+    region = find_inside(walls)
     mask = keep_parts_with_strokes(region & ~covers.cuts, covers.lines.weight)
     if not mask.any():
         raise NoStrokeError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
         )
     warnings = _list_warnings(
-        describe_gaps(bridges),
         describe_open_drawing(region),
-        describe_loose_strokes(closed, region, frame),
-        describe_box(closed, region, covers.lines + covers.others),
+        describe_loose_strokes(walls, region, frame),
+        describe_box(walls, region, covers.lines + covers.others),
         describe_crowding(covers.filled, mask, frame),
         describe_off_page(mask, frame, drawing.page),
     )
-    gaps = tuple(((a, b), (c, d)) for (a, b), (c, d) in bridges.tolist())
-    return mask, Reading(drawing.page, warnings, gaps)
+    return mask, Reading(drawing.page, warnings)
 
 
 def _list_warnings(*doubts: str | None) -> tuple[str, ...]:

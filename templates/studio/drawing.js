@@ -153,11 +153,6 @@ export function paintBase(view, { doc, chosen, field, lines, mode, suspects }) {
   }
   context.setLineDash([]);
   if (!field) return;
-  for (const { ends: [[ax, ay], [bx, by]], open } of field.gaps) {
-    context.strokeStyle = open ? ink.minus : "#f5a523"; context.lineWidth = 5 * thin; context.setLineDash(open ? [2 * thin, 9 * thin] : []);
-    context.beginPath(); context.moveTo(ax, ay); context.lineTo(bx, by); context.stroke();
-  }
-  context.setLineDash([]);
   if (mode !== "none") for (const [x, y, index] of field.singularities) {
     context.fillStyle = index > 0 ? ink.plus : ink.minus;
     context.beginPath(); context.arc(x, y, 5 * thin, 0, 7); context.fill();

@@ -153,7 +153,7 @@ function doubts() {
     const row = element("div", ""); row.className = "row"; row.append(...actions); items.push(element("li", text, row));
   };
   const { field, surface } = state;
-  for (const text of field?.warnings ?? []) item(`Mask: ${text}.`, action("Areas and gaps", () => choose("area")), action("Paint the mask", () => choose("paint")));
+  for (const text of field?.warnings ?? []) item(`Mask: ${text}.`, action("Areas", () => choose("area")), action("Paint the mask", () => choose("paint")));
   const some = [...new Set([...field?.suspects ?? [], ...surface?.suspects ?? []])].filter(k => state.doc.strokes[k]?.mark === "line");
   state.suspects = new Set(some);
   if (some.length) item(`${some.length === 1 ? "1 stroke does" : `${some.length} strokes do`} not fit. Probably they are not curvature lines; otherwise they may be hidden lines.`,
@@ -255,10 +255,8 @@ function finish({ tool, path, radius, mark: kind, pressure }) {
     const strokes = erased(state.doc.strokes, path, radius);
     state.chosen.clear(); if (strokes.length !== state.doc.strokes.length || strokes.some((stroke, k) => stroke !== state.doc.strokes[k])) commit({ strokes });
   } else if (tool === "paint" || tool === "unpaint") editMask({ kind: tool === "paint" ? "paint" : "erase", points: path, radius: rounded(radius) });
-  else if (tool === "area") {
-    const [x, y] = first, gap = state.field?.gaps.find(({ ends: [[ax, ay], [bx, by]] }) => Math.hypot((ax + bx) / 2 - x, (ay + by) / 2 - y) < REACH / left.scale + Math.hypot(ax - bx, ay - by) / 2);
-    editMask(gap ? { kind: "gap", radius: 0, points: [(gap.ends[0][0] + gap.ends[1][0]) / 2, (gap.ends[0][1] + gap.ends[1][1]) / 2] } : { kind: "toggle", points: first, radius: 0 });
-  } else if (tool === "turn") turn({ path }, true);
+  else if (tool === "area") editMask({ kind: "toggle", points: first, radius: 0 });
+  else if (tool === "turn") turn({ path }, true);
 }
 const editMask = edit => commit(doc => ({ ...doc, mask: [...doc.mask, edit] }));
 

@@ -126,29 +126,6 @@ def test_an_enclosed_area_that_was_left_out_is_included_by_a_click():
     assert read_drawn(edits).instance.mask.sum() > found.instance.mask.sum()
 
 
-OPEN = [
-    {"points": [56, 10, 10, 10, 10, 90, 110, 90, 110, 10, 64, 10], "mark": "line", "weight": 1},
-    {"points": [10, 40, 60, 55, 110, 40], "mark": "line", "weight": 1},
-    {"points": [60, 55, 60, 90], "mark": "line", "weight": 1},
-]
-"""An outline with a gap at the top."""
-
-
-def test_a_bridged_gap_is_opened_and_closed_by_a_click():
-    closed = read_drawn(document(strokes=OPEN, size=64))
-    ((ends, is_open),) = closed.gaps
-    assert not is_open
-    opened_ = read_drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap")))
-    assert [gap for _, gap in opened_.gaps] == [True]
-    instance = opened_.instance
-    above = int((30 - instance.origin[1]) / instance.pixel_size)
-    assert closed.instance.mask[:above].any()
-    assert not instance.mask[:above].any()
-    assert instance.mask[above:].any()
-    again = read_drawn(document(strokes=OPEN, size=64, mask=click(*ends.mean(axis=0), "gap") * 2))
-    assert again.instance.sha256 == closed.instance.sha256
-
-
 def test_hints_are_placed_on_pixels_and_those_outside_are_left_out():
     hints = [{"x": 30, "y": 25, "slant": 40, "tilt": 90}, {"x": -9, "y": 500, "slant": 40, "tilt": 90}]
     given = document(hints=hints)

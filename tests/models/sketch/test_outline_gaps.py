@@ -21,45 +21,10 @@ def in_black(*paths, page="0 0 100 100"):
     return read(drawing([(path, "black") for path in paths], page), 48)
 
 
-def middles(instance):
-    return np.array(instance.reading.openings).mean(axis=1)
-
-
-def test_a_compartment_with_a_gap_is_kept_in_svg_and_bitmap():
-    whole = in_black("M10 30H90V70H10Z", "M50 30V70")
-    instance = in_black("M84 30H10V70H90V30", "M50 30V70")  # a gap at a corner
-    assert (instance.mask == whole.mask).all()
-    assert instance.reading.openings == (((84, 30.0), (90.0, 30.0)),)
-    assert instance.reading.warnings[0].startswith("outline open here: (87, 30) over 6; ")
-    image = Image.new("L", (400, 400), 255)
-    draw = ImageDraw.Draw(image)
-    draw.line((336, 120, 40, 120, 40, 280, 360, 280, 360, 120), fill=0, width=4)
-    draw.line((200, 120, 200, 280), fill=0, width=4)
-    bitmap = read(png(image), 64, "a.png")
-    assert np.abs(middles(bitmap) - (348, 120)).max() < 5
-    assert bitmap.mask.sum() * bitmap.pixel_size**2 == pytest.approx(324 * 164, rel=0.08)
-
-
-def test_a_stroke_that_stops_short_of_another_is_carried_on_to_it():
-    instance = in_black("M90 25V75", "M84 30H10V70H84", "M50 30V70")
-    assert np.abs(middles(instance) - [(87, 30), (87, 70)]).max() < 1
-    whole = in_black("M90 25V75", "M90 30H10V70H90", "M50 30V70")
-    assert (instance.mask == whole.mask).all()
-
-
 @pytest.mark.parametrize("size", [24, pytest.param(48, marks=pytest.mark.slow)])
 def test_closed_drawings_have_no_opening_and_no_warning(size):
     for name in SKETCHES:
         assert cf.sample(name, size).reading.warnings == ()
-
-
-def test_ends_that_do_not_go_on_in_each_other_are_no_gap():
-    fork = "M20 90V10H30V60H70V10H80V90Z"
-    prongs = in_black(fork, "M25 80V14", "M75 80V14", "M30 30H21", "M70 30H79")
-    assert prongs.reading.warnings == ()
-    assert (prongs.mask == in_black(fork).mask).all()
-    overshoots = in_black("M10 40H90V90H10Z", "M30 80V20", "M36 80V20", "M42 80V20")
-    assert not overshoots.reading.openings
 
 
 def test_what_encloses_nothing_is_solved_as_a_rectangle_and_said_to_be():
@@ -163,13 +128,3 @@ def test_thinning_leaves_lines_of_one_pixel():
     assert not ndimage.binary_opening(line, np.ones((2, 2))).sum() > 4
     neighbours = ndimage.convolve(line.astype(int), np.ones((3, 3)), mode="constant")
     assert (line & (neighbours == 2)).sum() == 2
-
-
-def test_bridged_gaps_are_drawn_and_tinted_in_the_mask(tmp_path):
-    instance = in_black("M84 30H10V70H90V30", "M50 30V70")
-    picture = np.asarray(Image.open(cf.draw(instance, tmp_path / "a.png", kind="instance")).convert("RGB"))
-    assert (picture == (0x30, 0x56, 0xD3)).all(axis=-1).sum() > 50
-    mask = np.asarray(Image.open(cf.write_mask(instance, tmp_path / "m.png")))
-    tinted = np.argwhere((mask != mask[..., :1]).any(axis=-1))
-    assert np.abs(tinted.mean(axis=0) - (30, 87)).max() < 2
-    assert (mask[tuple(tinted.T)].mean(axis=-1) > 127.5).all()
