@@ -1,4 +1,4 @@
-"""The processes behind the page: one for fields, surfaces, files and proofs each. The newest edit wins."""
+"""The processes behind the page: one for fields, surfaces and files each. The newest edit wins."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager
-from pathlib import Path
 from typing import Any, Final
 
 from ...models.processes.child import Child, KilledError
@@ -15,7 +14,7 @@ from ...models.processes.deadline import Over, never
 from .session import OvertakenError
 from .views import load_module
 
-KINDS: Final = ("fields", "surfaces", "files", "proofs")
+KINDS: Final = ("fields", "surfaces", "files")
 _MOST_TABS: Final = 100  # whose newest edits are remembered
 
 
@@ -49,24 +48,15 @@ class Desk(AbstractContextManager["Desk"]):
                 self._newest.popitem(last=False)
         return lambda: self._newest.get(page, edit) != edit
 
-    def submit(
-        self,
-        kind: str,
-        work: Callable[..., Any],
-        *arguments: Any,
-        stop: Over = never,
-        log: Path | None = None,
-    ) -> Future[Any]:
+    def submit(self, kind: str, work: Callable[..., Any], *arguments: Any, stop: Over = never) -> Future[Any]:
         """The result of work in the process of a kind. It raises OvertakenError once `stop` returns True."""
-        return self._threads[kind].submit(self._call, self._children[kind], work, arguments, stop, log)
+        return self._threads[kind].submit(self._call, self._children[kind], work, arguments, stop)
 
     @staticmethod
-    def _call(
-        child: Child, work: Callable[..., Any], arguments: tuple[Any, ...], stop: Over, log: Path | None
-    ) -> Any:
+    def _call(child: Child, work: Callable[..., Any], arguments: tuple[Any, ...], stop: Over) -> Any:
         if stop():
             raise OvertakenError("a newer edit replaced this one")
         try:
-            return child.call(work, *arguments, stop=stop, log=log).value
+            return child.call(work, *arguments, stop=stop).value
         except KilledError as error:
             raise OvertakenError("a newer edit replaced this one") from error

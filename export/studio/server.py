@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import secrets
 import socket
-import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, wait
 from contextlib import suppress
@@ -36,14 +35,12 @@ from .desk import Desk
 from .document import SIZES
 from .files import DOWNLOADS, download
 from .opening import open_drawing
-from .proving import prove_step, read_progress
 from .session import OvertakenError
 from .views import field_step, lines_step, surface_step
 
 LOOPBACK: Final = "127.0.0.1"
 COARSE: Final = 48  # pixels of the field that is shown before a finer one
 _FINE: Final = 64  # pixels from which on there is a coarse field first
-_TICK: Final = 0.4  # seconds between two looks at the progress of a proof
 _FILES: Final = {
     "studio.css": "text/css",
     "studio.js": "text/javascript",
@@ -120,7 +117,6 @@ class Page:
             Route("/sample/{name}", self.sample),
             Route("/open", self.open, methods=["POST"]),
             Route("/compute", self.compute, methods=["POST"]),
-            Route("/prove", self.prove, methods=["POST"]),
             Route("/stop", self.stop, methods=["POST"]),
             Route("/download", self.download, methods=["POST"]),
             Route("/{name}", self.file),
@@ -166,11 +162,6 @@ class Page:
         size, lines = _parse_number(request, "size"), "lines" in request.query_params
         return _stream_response(self._compute_views(data, size, stop, lines=lines))
 
-    async def prove(self, request: Request) -> Response:
-        """Energy and bound of a document, as lines of JSON while they improve."""
-        data, stop = await self._edit(request)
-        return _stream_response(self._report_proof(data, stop))
-
     async def stop(self, request: Request) -> Response:
         """End the work on earlier edits of a page."""
         await self._edit(request)
@@ -212,20 +203,6 @@ class Page:
             yield self.desk.submit("fields", lines_step, field, stop=stop).result()
         yield surface.result()
         yield {"stage": "done"}
-
-    def _report_proof(self, data: bytes, stop: Over) -> Iterator[dict[str, Any]]:
-        with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-            log = Path(folder) / "progress"
-            proof, shown = self.desk.submit("proofs", prove_step, data, stop=stop, log=log), None
-            while not proof.done():
-                with suppress(TimeoutError):
-                    proof.exception(_TICK)
-                text = log.read_text("utf-8", "replace") if log.exists() else ""
-                progress = read_progress(text[-10_000:])
-                if progress is not None and progress != shown:
-                    shown = progress
-                    yield progress
-            yield proof.result()
 
 
 def _parse_number(request: Request, name: str) -> int:

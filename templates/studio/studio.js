@@ -8,7 +8,7 @@ const $ = selector => document.querySelector(selector), all = selector => [...do
 const page = crypto.randomUUID(), KEPT = "crossfield-studio", FILE = `${KEPT}-file`, REACH = 9, RETRY = 3000;
 const state = {
   history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "line", live: null, brush: null, edit: 0,
-  field: null, lines: null, surface: null, mode: "crosses", kind: "shaded", lamp: LAMP_AT, suspects: new Set(), opened: null, proving: null,
+  field: null, lines: null, surface: null, mode: "crosses", kind: "shaded", lamp: LAMP_AT, suspects: new Set(), opened: null,
 };
 state.doc = state.history.now;
 const left = new View($("#drawing"), () => refresh()), right = new View($("#surface"), () => refresh());
@@ -98,7 +98,6 @@ async function* lined(response) {
 }
 async function request() {
   waiting?.abort(); clearTimeout(lost);
-  stopProof();
   const doc = state.doc, edit = ++state.edit;
   document.documentElement.dataset.state = "busy"; begun = performance.now(); state.first = true;
   if (!doc.strokes.some(stroke => stroke.mark === "line")) {
@@ -139,7 +138,7 @@ function take(found) {
   refresh();
 }
 
-// Numbers, doubts, proof.
+// Numbers, doubts.
 const degrees = value => `${value.toFixed(1)}°`;
 function numbers({ numbers: n, frame }) {
   const facts = { Grid: `${frame.columns} × ${frame.rows}`, Pixels: n.pixels, "Stroke pixels": n.strokes, Deviation: `${degrees(n.deviation)} mean`,
@@ -162,28 +161,6 @@ function doubts() {
   for (const text of surface?.freedom ?? []) item(`Free: ${text}.`, ...text.startsWith("inside out") ? [action("Flip", flip)] : []);
   if (!items.length) items.push(element("li", surface ? "None." : "Not computed yet."));
   $("#doubts").replaceChildren(...items);
-}
-function stopProof() {
-  if (!state.proving) return;
-  state.proving.abort(); state.proving = null; $("#prove").textContent = "Prove in the background";
-  $("#proof").textContent = "The proof ended, because it was stopped or the drawing has changed.";
-  fetch(`stop?page=${page}-proof&edit=${++state.edit}`, { method: "POST" }).catch(() => {});
-}
-async function prove() {
-  if (state.proving) { stopProof(); return; }
-  if (!state.field) { status("There is no field to prove."); return; }
-  const own = state.proving = new AbortController(); $("#prove").textContent = "Stop the proof"; $("#proof").textContent = "Starting. The first proof on a machine compiles its functions, for up to a minute.";
-  try {
-    const response = await ask(`prove?page=${page}-proof&edit=${state.edit}`, { method: "POST", body: JSON.stringify(state.doc), signal: own.signal });
-    for await (const found of lined(response)) {
-      if (own !== state.proving) return;
-      if (found.stage !== "proof") { $("#proof").textContent = found.message ?? "ended"; continue; }
-      $("#gap").hidden = false; $("#gap-meter").value = Math.max(0, Math.min(1, found.bound / (found.energy || 1)));
-      $("#proof").textContent = `Lowest energy found ${found.energy.toPrecision(5)}, proven bound ${found.bound.toPrecision(5)}, gap ${(100 * found.gap).toFixed(2)} %.`
-        + (found.done ? ` ${found.status === "optimal" ? "Proven optimal." : "Time was over."} The field shown has ${found.own.toPrecision(5)}; it bends less, which the energy does not count.` : "");
-    }
-  } catch (error) { if (error.name !== "AbortError") missing(); }
-  if (own === state.proving) { state.proving = null; $("#prove").textContent = "Prove in the background"; }
 }
 
 // Controls.
@@ -400,7 +377,7 @@ async function download(what) {
 }
 function dialog(title, ...content) { $("#dialog h2").textContent = title; $("#dialog div").replaceChildren(...content); $("#dialog").showModal(); }
 const actions = {
-  undo: () => step(-1), redo: () => step(1), save, flip, prove, delete: remove, retry: request, dismiss: () => banner(""),
+  undo: () => step(-1), redo: () => step(1), save, flip, delete: remove, retry: request, dismiss: () => banner(""),
   open: () => $("#file").click(), unhint: () => commit({ hints: [] }),
   empty: () => { if (mayReplace()) start({ ...emptyDocument(), size: state.doc.size }); },
   help: () => dialog("Help", $("#help").content.cloneNode(true)),
@@ -440,7 +417,7 @@ all("input[name=surface]").forEach(each => each.addEventListener("change", () =>
 // Keys.
 const keys = {
   d: () => choose("draw"), v: () => choose("select"), e: () => choose("erase"), b: () => choose("paint"), n: () => choose("unpaint"), a: () => choose("area"), r: () => choose("turn"),
-  1: () => mark("line"), 2: () => mark("cut"), 3: () => mark("ignored"), f: flip, p: prove, q: () => next("field"), w: () => next("surface"),
+  1: () => mark("line"), 2: () => mark("cut"), 3: () => mark("ignored"), f: flip, q: () => next("field"), w: () => next("surface"),
   delete: remove, backspace: remove, escape: () => { closeMenus(); state.live = state.arrow = null; select([]); }, "?": actions.help,
   "+": () => { left.zoom(1.25); refresh(); }, "-": () => { left.zoom(0.8); refresh(); }, 0: () => { left.fit(pageBox(state.doc)); right.zoomed = false; right.resize(); refresh(); },
   "ctrl+z": () => step(-1), "ctrl+shift+z": () => step(1), "ctrl+y": () => step(1), "ctrl+s": save, "ctrl+o": actions.open, "ctrl+a": () => select(state.doc.strokes.map((_, k) => k)),

@@ -319,16 +319,3 @@ def test_a_doubt_is_followed_by_its_suggestion(empty, tmp_path):
     marks = [stroke["mark"] for stroke in document(settled(browser))["strokes"]]
     assert marks == ["cut", *["line"] * 7, "cut", "cut"]
     assert "do not fit" not in find(browser, "#doubts").text
-
-
-def test_a_proof_runs_beside_the_drawing_and_ends_with_an_edit(empty, tmp_path):
-    browser = pebble(empty, tmp_path, size=16)
-    find(browser, "#prove").click()
-    proof = find(browser, "#proof")
-    until(browser, lambda _: "proven bound" in proof.text)
-    find(browser, "#prove").click()
-    pebble(browser, tmp_path, size=40)
-    find(browser, "#prove").click()
-    find(browser, "#silhouette").click()
-    assert "drawing has changed" in proof.text
-    assert find(settled(browser), "#prove").text == "Prove in the background"

@@ -114,14 +114,6 @@ def test_files_are_opened_and_refused(page):
     assert (status, "picture" in json.loads(body)["message"]) == (422, True)
 
 
-@pytest.mark.slow
-def test_a_proof_reports_its_gap(page):
-    *_, last = page.steps("prove?page=h-proof&edit=1", changed(size=8))
-    assert last["done"]
-    assert last["bound"] <= last["energy"] <= last["own"] + 1e-9
-    assert last["status"] in {"optimal", "gap"}
-
-
 def test_too_long_a_body_is_refused_before_it_is_read(page):
     status, _, body = page.ask("open?name=a.svg", b"<", headers={"Content-Length": "300000000"})
     assert (status, "simplify" in json.loads(body)["message"]) == (422, True)
