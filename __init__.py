@@ -13,7 +13,7 @@ Options are keywords, and one word has one meaning in every function:
   The work then ends early and returns the best result so far.
 - `start`: a field to begin with.
 
-Results have the field that was found as `.field`: `Search`, `Proof`, `Solution`, `TwoStage` and `Report`.
+Results have the field that was found as `.field`: `Search`, `Proof`, `Solution` and `Report`.
 """
 
 from __future__ import annotations
@@ -39,9 +39,6 @@ if TYPE_CHECKING:
     from .export.solving.local import solve as solve
     from .export.solving.report import Report as Report
     from .export.solving.run import run as run
-    from .export.solving.two_stage import TwoStage as TwoStage
-    from .export.solving.two_stage import fit_angles as fit_angles
-    from .export.solving.two_stage import two_stage as two_stage
     from .export.surfaces.files import write_surface as write_surface
     from .models.errors import CrossfieldError as CrossfieldError
     from .models.errors import FormulationError as FormulationError
@@ -110,7 +107,6 @@ _HOME: Final = {
     "SolutionError": ".models.errors",
     "SolverError": ".models.errors",
     "Surface": ".models.surface.surface",
-    "TwoStage": ".export.solving.two_stage",
     "UnsupportedByFormatError": ".models.errors",
     "UnsupportedBySolverError": ".models.errors",
     "analytic": ".models.sketch.surfaces",
@@ -118,7 +114,6 @@ _HOME: Final = {
     "draw": ".export.pictures.draw",
     "entries": ".export.library.building.shipped_entries",
     "entry": ".export.library.building.shipped_entries",
-    "fit_angles": ".export.solving.two_stage",
     "formulate": ".models.formulations.problem",
     "greedy_field": ".models.search.greedy",
     "improved_field": ".models.search.improvement",
@@ -140,7 +135,6 @@ _HOME: Final = {
     "solve": ".export.solving.local",
     "surface": ".models.surface.lift",
     "to_pyomo": ".export.formats.pyomo_model",
-    "two_stage": ".export.solving.two_stage",
     "with_integers_fixed": ".models.formulations.problem",
     "write": ".export.formats.registry",
     "write_all": ".export.bundle.problem_files",

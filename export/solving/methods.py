@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ...models.field.field import CrossField, field_in_windows
+from ...models.formulations.problem import formulate
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock, Deadline, Over, Progress, never, silent
 from ...models.processes.job_counts import cores
@@ -20,12 +21,14 @@ from ...models.search.starts import best_start, first_field, polyvector_start
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
 from ..solutions.solution import Solution
-from .two_stage import find_jumps, fit_angles, jumps_until
+from .local import solve
 
 if TYPE_CHECKING:
     from ...models.proof.record import Proof
 
 _STARTING: Final = 0.5  # share of the seconds for the field from which solvers start
+_ANGLES: Final = 0.2  # share of the seconds for the second of two stages
+_ANGLES_LEAST: Final = 2.0  # seconds for it: its process has to start
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,22 +226,26 @@ def _find_in_two_stages(request: Request) -> Iterator[Candidate]:
     request.progress(
         f"HiGHS: MILP for the jumps, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far"
     )
-    milp = find_jumps(
-        request.instance,
-        folder=request.folder,
-        limits=limits,
-        start=start,
-        stop=request.stop,
-    )
+    # Without a start HiGHS finds no good field beyond 10 x 10 pixels.
+    problem = formulate(request.instance, "milp-mccormick")
+    milp = solve(problem, folder=request.folder, limits=limits, start=start, stop=request.stop)
     yield _solution_candidate("MILP", milp)
     files = time.perf_counter() - begin - (milp.seconds or 0.0)
     if deadline.left() <= files or request.stop():  # those of the second stage take about as long
         return
     request.progress("Ipopt: angles for the jumps of the MILP")
+    problem = formulate(request.instance, "qp-fixed", p=milp.field.p)
     rest = request.limits.until(deadline)
     yield _solution_candidate(
-        "two-stage", fit_angles(milp.field, folder=request.folder, limits=rest, stop=request.stop)
+        "two-stage",
+        solve(problem, "ipopt", folder=request.folder, limits=rest, start=milp.field, stop=request.stop),
     )
+
+
+def jumps_until(deadline: Deadline) -> Deadline:
+    """Deadline of the first stage: a fifth or 2 s before the whole deadline, but not before half the time."""
+    left = deadline.left()
+    return deadline.later(-min(max(_ANGLES * left, _ANGLES_LEAST), left / 2))
 
 
 METHODS: Final = {

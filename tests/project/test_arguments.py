@@ -20,7 +20,6 @@ def names(tmp_path_factory):
         "field": cf.greedy_field(instance),
         "problem": cf.formulate(instance, "milp-mccormick"),
         "pixel": {"mask": np.ones((1, 1), bool), "stroke_pixels": [[0, 0]], "theta": [0.0], "w": [1.0]},
-        "few": cf.Limits(1.0),
     }
 
 
@@ -110,7 +109,6 @@ cf.draw(field, 3)                                        | path is 3; give text 
 cf.preview(None)                                         | what is None; give a CrossField
 cf.entry(3)                                              | name is 3; give text
 cf.entries(rung=3)                                       | rung is 3; give text or None
-cf.fit_angles(instance)                                  | field is an Instance
 cf.solve(instance)                                       | problem is an Instance; give a Problem
 cf.solve(problem, folder=3)                              | folder is 3; give text or a path or None
 cf.surface(field, hints="ab")                            | hints is 'ab'; give a list of Hints
@@ -119,8 +117,6 @@ cf.surface(field, flip="no")                             | flip is 'no'; give Tr
 cf.Hint(0.5, 0, 0.1)                                     | row is 0.5; give a whole number
 cf.Light("x")                                            | azimuth is 'x'; give a number
 cf.to_pyomo(instance)                                    | problem is an Instance
-cf.two_stage(instance, relax="no", limits=few)           | relax is 'no'
-cf.two_stage(instance, colour=3, limits=few)             | no option 'colour'; the options are facet
 cf.write(problem, None)                                  | path is None; give text or a path
 cf.write(problem, folder / "a.lp", start=instance)       | start is an Instance
 cf.write_all(instance, folder, formats="lp")             | formats is 'lp'; give a list of texts

@@ -7,6 +7,7 @@ import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
+from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.search.starts import first_field
 
 
@@ -104,7 +105,7 @@ def test_a_stamp_begins_the_hash_of_the_manifest(ring, tmp_path):
 
 def test_a_run_leaves_manifests_beside_its_solves(ring, tmp_path):
     """The second stage's jumps are the MILP's: only a manifest of its own can read its solution."""
-    cf.two_stage(ring, folder=tmp_path, limits=cf.Limits(5.0))
+    list(METHODS["two-stage"].find(Request(ring, tmp_path, cf.Limits(5.0))))
     manifest = cf.read_manifest(only(tmp_path, "*.qp-fixed.manifest.json"))
     solution = cf.read_solution(only(tmp_path, "*.qp-fixed.ipopt.sol"), manifest.problem())
     assert solution.violation.worst < 1e-6

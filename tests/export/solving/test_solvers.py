@@ -403,7 +403,6 @@ def test_only_a_search_and_a_proof_go_without_a_time_limit(tmp_path):
     for work in (
         lambda: cf.solve(cf.formulate(instance, "milp-mccormick"), limits=endless),
         lambda: cf.run(instance, tmp_path, limits=endless),
-        lambda: cf.two_stage(instance, limits=endless),
         lambda: Request(instance, tmp_path, endless),
     ):
         with pytest.raises(InputError, match="needs a finite time limit"):

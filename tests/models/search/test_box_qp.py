@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from crossfield.export.solving.two_stage import fit_angles
+from crossfield.export.solving.local import solve
 from crossfield.models.field.field import CrossField
+from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
 from crossfield.models.search.box_qp import fit_in_box
@@ -112,7 +113,8 @@ def test_same_optimum_as_ipopt_on_the_file(name, size):
         np.zeros(instance.grid.size),
         random_field(instance, size).p,
     )
-    best, other = fit_in_box(centre), fit_angles(centre).field
+    problem = formulate(instance, "qp-fixed", p=centre.p)
+    best, other = fit_in_box(centre), solve(problem, "ipopt", start=centre).field
     assert assert_optimal(best) > 10
     assert best.energy().total == pytest.approx(other.energy().total, rel=1e-8)
 
