@@ -22,7 +22,7 @@ from crossfield.models.instance.file import write_instance
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.tightening import remaining_windows
 from exhaustive import exact, optimum, random_instance
-from plain_prover import proof_of
+from proofs_round_fields import prove_round
 
 TWO_NORM = ("minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact", "qp-fixed")
 SAID = "narrowed to what a proof leaves"
@@ -35,7 +35,7 @@ def proof(tmp_path_factory):
     field = optimum(instance)
     assert field.energy().total == pytest.approx(exact(instance), abs=1e-12)
     path = tmp_path_factory.mktemp("proof") / "it.npz"
-    return write_certificate(proof_of(field, levels=4), path), path
+    return write_certificate(prove_round(field, levels=4), path), path
 
 
 def problems(proof, name):
@@ -103,7 +103,7 @@ def test_no_better_field_is_cut_off(gauge, least, tmp_path):
         best = optimum(instance).with_best_jumps()
         beta = np.clip(best.beta + np.random.default_rng(seed).normal(0, 0.02, 4), -np.pi / 4, np.pi / 4)
         best, worse = sorted((best, replace(best, beta=beta)), key=lambda field: field.energy().total)
-        certificate = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
+        certificate = write_certificate(prove_round(worse, levels=4), tmp_path / "it.npz")
         narrow = with_windows(formulate(instance, "minlp-parity"), remaining_windows(certificate))
         assert narrow.violation(narrow.point(best)).worst < 1e-9
         plain = formulate(instance, "minlp-parity")

@@ -28,7 +28,7 @@ from crossfield.models.proof.last_step import minimise_on_boxes
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.tightening import remaining_windows
 from exhaustive import optimum, random_instance, sketch
-from plain_prover import proof_of
+from proofs_round_fields import prove_round
 
 PROGRAM = Path(check_certificate.__file__)
 WRONG = (check_certificate.NotProvenError, check_certificate.UnreadableError)
@@ -36,7 +36,7 @@ WRONG = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 
 @cache
 def proven(seed):
-    return proof_of(optimum(random_instance(seed, (2, 2), 4)), levels=4)
+    return prove_round(optimum(random_instance(seed, (2, 2), 4)), levels=4)
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +121,7 @@ def test_a_field_that_is_not_optimal_is_never_certified(tmp_path):
             beta = np.clip(good.beta + rng.normal(0, size, 4), -np.pi / 4, np.pi / 4)
             worse = CrossField(good.instance, good.alpha, beta, good.p)
             assert worse.energy().total > good.energy().total + 1e-7
-            certificate = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
+            certificate = write_certificate(prove_round(worse, levels=4), tmp_path / "it.npz")
             assert certificate.status == "gap"
             assert certificate.proven.bound <= good.energy().total
             arrays = check_certificate.read_arrays(str(tmp_path / "it.npz"))

@@ -10,7 +10,7 @@ from crossfield.models.errors import InputError
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from exhaustive import optimum, random_instance, sketch
-from plain_prover import proof_of
+from proofs_round_fields import prove_round
 
 pytest.importorskip("resource")  # of POSIX
 
@@ -43,7 +43,7 @@ def arrays(tmp_path_factory):
     folder, found = tmp_path_factory.mktemp("certificates"), {}
     for pair in (False, True):
         instance = random_instance(0, (1, 2), 2) if pair else sketch(np.ones((1, 1), bool), np.ones((1, 1)))
-        write_certificate(proof_of(optimum(instance), levels=1), folder / "it.npz")
+        write_certificate(prove_round(optimum(instance), levels=1), folder / "it.npz")
         found[pair] = check_certificate.read_arrays(str(folder / "it.npz"))
     return found
 

@@ -8,7 +8,6 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
-import plain_prover
 import pytest
 from allowed_labels import with_allowed
 from archives import forged, members_of, npy, packed
@@ -21,6 +20,7 @@ from crossfield.models.proof.clusters import zero_clusters
 from crossfield.models.proof.prove import prove
 from crossfield.models.search.absolute_fit import alternate_absolute
 from exhaustive import optimum, random_instance
+from proofs_round_fields import prove_round
 
 REFUSED = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 KINDS = ("optimal", "a window binds", "a worse field", "tables", "norm 1", "norm mixed")
@@ -37,7 +37,7 @@ def proof_of_kind(kind):
     field = optimum(random_instance(seed, (2, 2), 4))
     if kind == "a worse field":
         field = CrossField(field.instance, field.alpha, field.beta + np.array([0, 0.01, 0, 0]), field.p)
-    proof = plain_prover.proof_of(field, levels=3, most=800)
+    proof = prove_round(field, levels=3)
     if kind == "tables":
         *before, last = proof.levels
         clusters = zero_clusters(last, np.zeros(1, int))

@@ -1,0 +1,22 @@
+"""Proofs round a given field, which need not be a good one: `prove` would search for a better one."""
+
+from crossfield.models.processes.compilation import crew
+from crossfield.models.proof.dual import Dual
+from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.pruning import finer_lattice
+from crossfield.models.proof.record import LevelRecord, Proof
+
+
+def prove_round(field, levels, steps=8):
+    """A proof in the 2-norm on so many levels round a field, the first with `steps` in pi/2."""
+    energy, records = field.energy().total, []
+    with crew(1) as hands:
+        dual = Dual(Lattice.whole(field, steps), hands)
+        while True:
+            dual.ascend(8)
+            records.append(LevelRecord.of_dual(dual, energy))
+            left = dual.remaining_cells(records[-1].bound, energy)
+            if len(records) == levels or left.is_empty:
+                break
+            dual.move(finer_lattice(left))
+    return Proof(field, energy, max(record.bound for record in records), 0, tuple(records), 0.0, "gap")
