@@ -8,7 +8,7 @@ import sys
 
 import places
 import pytest
-from browsing import find, served, show, sideways
+from browsing import served, show, sideways
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 
 pytestmark = pytest.mark.slow
@@ -90,12 +90,6 @@ def test_a_model_has_every_line_of_its_declaration(browser, address):
     assert browser.execute_script(f"return {models}") == [
         len(each.objective) + len(each.rows) + len(each.variables) for each in declared
     ]
-
-
-def test_a_search_finds_a_page(browser, address):
-    browser.get(f"{address}/search.html?q=troubleshooting")
-    browser.implicitly_wait(10)
-    assert "Troubleshooting" in find(browser, "ul.search li a").text
 
 
 @pytest.mark.parametrize("page", ["index", "tutorials/drawing", "guides/solvers", "reference/api"])

@@ -45,9 +45,3 @@ def test_the_wheel_holds_the_tree_byte_by_byte(wheel):
     found = {name: content for name, content in wheel.items() if ".dist-info/" not in name}
     assert sorted(expected) == sorted(found)
     assert all(found[name] == content for name, content in expected.items())
-
-
-def test_crossfield_is_the_only_top_level_name(wheel):
-    tops = {name.split("/")[0] for name in wheel}
-    assert {top for top in tops if not top.endswith(".dist-info")} == {"crossfield"}
-    assert len(tops) == 2

@@ -334,23 +334,6 @@ def test_list_shows_all_tables(crossfield):
         assert name in text
 
 
-def assert_fits(text, *, but=()):
-    """Every line of the tables has at most 80 characters; titles and lines with paths may be longer."""
-    long = [
-        line
-        for line in text.splitlines()
-        if len(line.rstrip()) > 80 and not any(word in line for word in but)
-    ]
-    assert long == []
-
-
-def test_tables_fit_80_columns(crossfield, instance_file, two_parts):
-    assert_fits(crossfield("list"))
-    assert_fits(two_parts[1][1], but=("/", "separate parts"))
-    assert_fits(crossfield("export tiny.json -o e"), but=("/", "not written"))
-    assert_fits(crossfield("solve tiny.json -f qp-fixed -o e"), but=("/",))
-
-
 def in_terminal(arguments, columns=80):
     """Exit code and output of a command line on a terminal."""
     leader, follower = pty.openpty()

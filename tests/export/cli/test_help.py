@@ -115,15 +115,6 @@ def test_a_flag_is_shown_without_a_value(text):
         assert "bool" not in text(command).lower(), command
 
 
-def test_the_options_of_all_commands_are_counted(capsys):
-    """Prints the table; the commands start. At most 120 options are wanted."""
-    numbers = {name: sum(each.param_type_name == "option" for each in c.params) for name, c in commands_of()}
-    with capsys.disabled():
-        print("", *(f"{count:4} {name}" for name, count in numbers.items()), sep="\n")
-        print(f"{sum(numbers.values()):4} options of {len(numbers)} commands")
-    assert all(invoke([*name.split(), "--help"]) == 0 for name in numbers)
-
-
 def test_files_and_samples_have_the_same_default_size(tmp_path, capsys):
     import crossfield as cf
 

@@ -14,7 +14,6 @@ from cases import CASES, make_field, make_problem, names_of, problem_of
 from crossfield.export.formats import gams
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import gams as gams_program
-from crossfield.export.solving.local import solve
 from crossfield.export.verify.comparison import behaviour_difference
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.formulations.names import column_names
@@ -48,15 +47,6 @@ def run_gams(folder: Path, text: bytes, *options: str) -> dict[str, float]:
     return {name: float(value) for name, value in pairs if name != "problem"}
 
 
-def solved(folder: Path, problem: Problem, *options: str) -> tuple[float, np.ndarray]:
-    results = run_gams(folder, text_of(problem), *options)
-    assert results["solver_status"] == 1
-    assert results["model_status"] in {1, 2, 8}
-    return results["objective"], np.array(
-        [results[name] for name in names_of(column_names(problem.instance, problem.blocks))]
-    )
-
-
 @needs_gams
 @for_each("label", CHOSEN)
 def test_gams_reads_the_problem(label: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -83,26 +73,6 @@ def test_a_start_comes_back_under_our_names(label: str, tmp_path: Path):
     np.testing.assert_allclose([results[name] for name in names], start, rtol=1e-15, atol=0)
 
 
-@needs_gams
-@for_each("label", SOLVED)
-def test_optimum_is_that_of_another_solver(label: str, tmp_path: Path):
-    problem = problem_of(label)
-    value, point = solved(tmp_path, problem)
-    assert value == pytest.approx(solve(problem, "highs").objective, rel=1e-6)
-    assert problem.objective_value(point) == pytest.approx(value, rel=1e-9)
-    assert problem.violation(point).worst < 1e-6
-
-
-@needs_gams
-def test_exact_convex_model_has_the_energy_of_its_field(tmp_path: Path):
-    """The point of `miqp-exact` by CPLEX costs the same in (8), and at most as much as any tried field."""
-    problem = problem_of("miqp-exact shape=row")
-    value, point = solved(tmp_path, problem, "miqcp=cplex")
-    quartic = make_problem("minlp-quartic", problem.instance)
-    assert quartic.objective_value(quartic.point(problem.field(point))) == pytest.approx(value, rel=1e-5)
-    assert all(make_field(problem.instance, seed).energy().total >= value - 1e-9 for seed in range(20))
-
-
 @for_each("label", CHOSEN)
 def test_text_is_plain(label: str):
     problem = problem_of(label)
@@ -116,16 +86,6 @@ def test_text_is_plain(label: str):
     assert not re.search(
         r"^\s*(\$include|\$call|execute|put|file)\b", before_switch, re.IGNORECASE | re.MULTILINE
     )
-
-
-@needs_gams
-def test_no_lists_of_names_end_open(tmp_path: Path):
-    """Declarations that end on the last place of a line, before and after it: of 8 to 28 pixels."""
-    for count in range(8, 29, 5):
-        instance = Instance("line", np.ones((1, count), bool), [[0, 0], [0, 5]], [0.3, 2.0], [0.5, 0.9])
-        problem = make_problem("miqp-mccormick", instance, relax=True)
-        _, point = solved(tmp_path, problem)
-        assert problem.violation(point).worst < 1e-6
 
 
 def test_golden_file():

@@ -7,7 +7,6 @@ import gzip
 import json
 import math
 import re
-import subprocess
 import sys
 import tracemalloc
 from fractions import Fraction
@@ -45,12 +44,6 @@ def save_point(path, problem, point, *, zeros=True):
     pairs = zip(names_of(column_names(problem.instance, problem.blocks)), point.tolist(), strict=True)
     path.write_text("".join(f"{name} {value!r}\n" for name, value in pairs if zeros or value != 0))
     return str(path)
-
-
-def run(script, *arguments):
-    """The checker as users run it, without any installed package."""
-    command = [sys.executable, "-I", "-S", str(script), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def called(capsys, *arguments):

@@ -1,6 +1,5 @@
 """Builds of a specification: content, correctness, and the same bytes in every way."""
 
-import gzip
 import hashlib
 import json
 import os
@@ -251,48 +250,6 @@ def test_the_instance_file_is_the_instance_of_the_drawing(built, spec):
 
 
 # Points, checked with readers of other projects
-
-
-def highs_model(path, tmp_path):
-    """The model that HiGHS reads from an .mps."""
-    plain = tmp_path / "model.mps"
-    plain.write_bytes(gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes())
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", "false")
-    assert highs.readModel(str(plain)) == highspy.HighsStatus.kOk
-    return highs
-
-
-@pytest.mark.parametrize(
-    "name", ["cf_own_n004_milp", "cf_own_n004_printed_milp", "cf_own_n004_box_milp", "cf_rand_n006_s2_milp"]
-)
-def test_highs_finds_the_point_of_a_milp_feasible_with_the_sidecars_objective(built, tmp_path, name):
-    document = built.entry(name)
-    (mps,) = (file["name"] for file in document["files"] if file["format"] == "mps")
-    highs = highs_model(built.folder / mps, tmp_path)
-    first, *lines = (built.folder / document["best"]["point"]).read_text().splitlines()
-    values = {key: float(value) for key, value in map(str.split, lines)}
-    model = highs.getLp()
-    point = highspy.HighsSolution()
-    point.col_value = [values.pop(key, 0.0) for key in model.col_names_]
-    assert values == {}
-    assert highs.setSolution(point) == highspy.HighsStatus.kOk
-    x, rows = np.array(point.col_value), np.array(highs.getSolution().row_value)
-    assert (x >= np.array(model.col_lower_) - 1e-9).all()
-    assert (x <= np.array(model.col_upper_) + 1e-9).all()
-    assert (rows >= np.array(model.row_lower_) - 1e-9).all()
-    assert (rows <= np.array(model.row_upper_) + 1e-9).all()
-    integer = [kind == highspy.HighsVarType.kInteger for kind in model.integrality_]
-    assert (x[integer] == np.round(x[integer])).all()
-    objective = float(x @ np.array(model.col_cost_) + model.offset_)
-    assert objective == pytest.approx(document["best"]["objective"], rel=1e-12)
-    assert float(first.split()[1]) == pytest.approx(objective, rel=1e-12)
-    counted = document["counts"]
-    assert (model.num_row_, highs.getNumNz(), sum(integer)) == (
-        counted["constraints"],
-        counted["nonzeros"],
-        counted["binary"] + counted["integer"],
-    )
 
 
 @pytest.mark.parametrize(

@@ -137,24 +137,6 @@ def test_less_work_gives_the_same_instances_and_points_of_no_lower_energy(built,
 
 
 @pytest.mark.slow
-def test_an_interrupted_family_goes_on_where_it_was_with_the_same_bytes(built, tmp_path):
-    made = []
-
-    def stop_after_some(line):
-        made.append(line)
-        if len(made) == 5:
-            raise KeyboardInterrupt
-
-    spec = read_spec(written(tmp_path, SMALL))
-    with pytest.raises(KeyboardInterrupt):
-        build(spec, tmp_path / "library", progress=stop_after_some)
-    done = {line.split(": ")[1] for line in made}
-    build(spec, tmp_path / "library", jobs=2, progress=made.append)
-    assert not done & {line.split(": ")[1] for line in made[5:-1]}
-    assert content(tmp_path / "library") == content(built.folder)
-
-
-@pytest.mark.slow
 def test_a_large_certificate_of_an_optimum_is_kept(tmp_path, monkeypatch):
     """It was left out with its field, although it proved the optimum."""
     monkeypatch.setattr(fields, "_MOST_BYTES", 1)  # which any certificate exceeds

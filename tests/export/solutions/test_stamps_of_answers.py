@@ -19,10 +19,12 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import read_raw
 from crossfield.export.solutions.solution import read_solution
+from crossfield.export.solving.local import SolveFiles, Solvers
 from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.problem import formulate, with_windows
 from crossfield.models.formulations.windows import Windows
+from crossfield.models.processes.deadline import Deadline
 
 MILP = "milp-mccormick"
 KEPT = {"optimal-global", "optimal-local", "infeasible", "unbounded"}
@@ -74,56 +76,17 @@ def by_highs(model, answer, style):
     highs.writeSolution(str(answer), style)
 
 
-def by_scip(model, answer):
-    pyscipopt = pytest.importorskip("pyscipopt")
-    scip = pyscipopt.Model()
-    scip.hideOutput()
-    scip.readProblem(str(model))
-    scip.optimize()
-    scip.writeBestSol(str(answer))
-    # The shell of SCIP writes the status before the solution, its library does not.
-    answer.write_text("solution status: optimal solution found\n" + answer.read_text())
+def by(solver):
+    """A function that has a solver of the table answer a model file."""
 
+    def write_answer(model, answer):
+        files = SolveFiles.for_model(model, solver)._replace(solution=answer)
+        with Solvers() as solvers:
+            solvers.solve_file(
+                formulate(instance_of(), MILP), solver, files, cf.Limits(60.0), Deadline.after(120.0)
+            )
 
-def by_cbc(model, answer):
-    command = ["cbc", str(model), "solve", "solution", str(answer)]
-    subprocess.run(command, check=True, capture_output=True)
-
-
-def by_glpk(model, answer):
-    kind = "--lp" if model.suffix == ".lp" else "--freemps"
-    subprocess.run(["glpsol", kind, str(model), "-w", str(answer)], check=True, capture_output=True)
-
-
-def by_gurobi(model, answer):
-    import gurobipy
-
-    with (
-        gurobipy.Env(params={"OutputFlag": 0}) as environment,
-        gurobipy.read(str(model), environment) as read,
-    ):
-        read.optimize()
-        read.write(str(answer))
-
-
-def by_cplex(model, answer):
-    import cplex
-
-    with cplex.Cplex(str(model)) as problem:
-        for stream in (problem.set_log_stream, problem.set_results_stream, problem.set_warning_stream):
-            stream(None)
-        problem.solve()
-        problem.solution.write(str(answer))
-
-
-def by_xpress(model, answer):
-    import xpress
-
-    problem = xpress.problem()
-    problem.controls.outputlog = 0
-    problem.readProb(str(model))
-    problem.optimize()
-    problem.writeSlxSol(str(answer))
+    return write_answer
 
 
 def by_ampl_library(model, answer):
@@ -139,33 +102,22 @@ def by_ampl_library(model, answer):
     answer.write_text(re.sub(r"(?<=Options\n)3\n1\n1\n0\n", options, answer.read_text()))
 
 
-def needing(program, *values):
-    return pytest.param(*values, marks=pytest.mark.needs(program), id=f"{program} {' '.join(values[1:])}")
-
-
+TABLE = {"highs": "mps", "scip": "lp mps osil", "cbc": "lp mps", "glpk": "lp mps", "gurobi": "lp mps"}
+TABLE |= {"cplex": "lp mps", "xpress": "mps"}
 WRITERS = [
-    pytest.param(lambda model, answer: by_highs(model, answer, 0), "mps", "sol", id="highs mps, style 0"),
-    pytest.param(lambda model, answer: by_highs(model, answer, 4), "lp", "sol", id="highs lp, style 4"),
-    pytest.param(by_scip, "lp", "sol", id="scip lp"),
-    pytest.param(by_scip, "mps", "sol", id="scip mps"),
-    pytest.param(by_scip, "osil", "sol", id="scip osil"),
-    needing("cbc", by_cbc, "lp", "sol"),
-    needing("cbc", by_cbc, "mps", "sol"),
-    needing("glpk", by_glpk, "lp", "sol"),
-    needing("glpk", by_glpk, "mps", "sol"),
-    needing("gurobi", by_gurobi, "lp", "json"),
-    needing("gurobi", by_gurobi, "mps", "sol"),
-    needing("cplex", by_cplex, "lp", "sol"),
-    needing("cplex", by_cplex, "mps", "sol"),
-    needing("xpress", by_xpress, "mps", "slx"),
-    needing("asl", by_ampl_library, "nl", "sol"),
+    *((by(solver), suffix, solver) for solver, suffixes in TABLE.items() for suffix in suffixes.split()),
+    (lambda model, answer: by_highs(model, answer, 4), "lp", "highs"),  # without columns at 0
+    (by_ampl_library, "nl", "asl"),
 ]
 
 
-@pytest.mark.parametrize("write_answer, model, suffix", WRITERS)
+@pytest.mark.parametrize(
+    "write_answer, model",
+    [pytest.param(*ways, marks=pytest.mark.needs(program)) for *ways, program in WRITERS],
+)
 @pytest.mark.filterwarnings("ignore")
-def test_an_answer_proves_nothing_about_another_problem(write_answer, model, suffix, solved, tmp_path):
-    files = tmp_path / f"model.{model}", tmp_path / f"answer.{suffix}"
+def test_an_answer_proves_nothing_about_another_problem(write_answer, model, solved, tmp_path):
+    files = tmp_path / f"model.{model}", tmp_path / "answer.sol"
     cf.write(solved, files[0])
     write_answer(*files)
     solution = read_solution(files[1], solved)

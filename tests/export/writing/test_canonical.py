@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import re
-
-from cases import LOW_DEGREE, make_field, make_instance, make_problem, problem_of
-from crossfield.export.formats.registry import FORMATS, problem_in_format
+from cases import make_field, make_instance, make_problem
+from crossfield.export.formats.registry import FORMATS
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.formulations.problem import with_integers_fixed
-from loops import for_each
 
 
 def lines_of(form: CanonicalForm, name: str) -> list[str]:
@@ -20,16 +17,6 @@ def named(form: CanonicalForm, file: str) -> list[str]:
     """Names of columns in the form's order for a file."""
     names = [name.decode() for name in form.column_names] + [form.one.decode()]
     return [names[column] for column in form.order(file)]
-
-
-@for_each("label", LOW_DEGREE)
-def test_columns_stand_in_lp_and_mps_in_the_order_of_the_form(label: str):
-    form = CanonicalForm(problem_in_format(problem_of(label), FORMATS["lp"]))
-    lp, mps = lines_of(form, "lp"), lines_of(form, "mps")
-    limits = lp[lp.index("Bounds") + 1 :]
-    assert [m[1] for line in limits if (m := re.search(r"<= (\w+) <=", line))] == named(form, "lp")
-    assert [m[1] for line in mps if (m := re.fullmatch(r" (\w+) obj \S+", line))] == named(form, "mps")
-    assert form.column_count == len(form.order("lp")) == form.problem.n_columns + 1
 
 
 def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import DEGENERATE, CrossField, field_in_windows
-from crossfield.models.field.jumps import best_jumps
+from crossfield.models.field.jumps import best_jumps, free_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.symmetries import mirrored, transposed, turned
@@ -163,6 +163,7 @@ def test_best_jumps_beat_every_jump_in_the_bounds(seed, gauge):
     assert mine == pytest.approx(cost.min(axis=0), abs=1e-9)
     # The bounds cut off nothing that would be better.
     assert mine == pytest.approx((a * a + b * b).min(axis=0), abs=1e-9)
+    assert free_jumps(instance, field.alpha, field.beta)[1] == pytest.approx(2 * mine, abs=1e-9)
 
 
 @given(SEEDS, st.sampled_from([1, 2]))

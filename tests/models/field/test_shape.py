@@ -25,12 +25,6 @@ def test_the_shape_is_what_vectors_say(seed):
     assert 0 < shape.narrow_pixels == np.mean(apart(*lines(field)) < 45) < 1
 
 
-def test_lines_are_a_right_angle_less_twice_the_skew_apart():
-    field = random_field(cf.sample("mouse", 12), 0)
-    assert field.angle_between == pytest.approx(np.pi / 2 - 2 * np.abs(field.beta), abs=1e-12)
-    assert field.shape.narrow_pixels == np.mean(np.abs(field.beta) > np.pi / 8)
-
-
 def test_a_stroke_may_be_followed_by_either_line_and_45_degrees_are_not_narrow():
     instance = cf.sample("mouse", 12)
     alpha, jumps = instance.alpha_lower + np.pi / 4, np.zeros(len(instance.grid.first))

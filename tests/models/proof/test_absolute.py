@@ -67,20 +67,6 @@ def test_other_cuts_than_those_of_the_multipliers_are_refused(cuts, tmp_path):
         check_certificate.check_arrays(forged)
 
 
-@NORMS
-@pytest.mark.parametrize("seed, strokes", [(0, 4), (1, 1), (2, 4), (38, 4)])
-def test_certificates_are_confirmed(norm, seed, strokes, tmp_path):
-    proof = cf.prove(random_instance(seed, (2, 2), strokes), norm=norm, jobs=1)
-    path = tmp_path / "it.npz"
-    written = write_certificate(proof, path)
-    assert written.status == proof.status == "optimal"
-    assert written.norm == norm
-    assert proof.energy == proof.field.energy(norm).total
-    assert written.energy == pytest.approx(proof.energy, rel=1e-14, abs=1e-14)  # another order of the sums
-    read = cf.read_certificate(path)
-    assert (read.norm, read.status, read.bound) == (norm, "optimal", written.bound)
-
-
 def test_boxes_that_reach_no_skew_of_one_sign_force_jumps_in_the_checker_too(tmp_path):
     """The checker's boxes are wider by a margin, so their ends at 0 lie beyond it."""
     instance = cf.entry("cf_rand_n006_s1_miqp").instance
