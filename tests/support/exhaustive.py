@@ -2,12 +2,17 @@
 a second opinion on greedy fields and searches.
 """
 
+import itertools
+import math
+
 import numpy as np
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
+from crossfield.models.instance.terms import parity_sign
 from crossfield.models.search.box_qp import fit_in_box
+from scipy.optimize import LinearConstraint, lsq_linear, milp
 
 
 def sketch(mask, theta, skew_coefficient=1e-6, gauge="strokes", w=None):
@@ -89,19 +94,87 @@ def least_energy(instance, jumps):
     """The least energy for each row of jumps, all of one parity, by dense least squares on the residuals;
     no windows.
     """
-    grid, size = instance.grid, instance.grid.size
-    pairs, terms = np.arange(len(grid.first)), instance.stroke_terms
-    strokes = np.arange(len(terms.pixel))
-    a, b = np.zeros((2, len(pairs), 2 * size))
-    a[pairs, grid.first], a[pairs, grid.second] = 1, -1
-    b[pairs, size + grid.first], b[pairs, size + grid.second] = 1 - 2 * (jumps[0] & 1), -1
-    r = np.zeros((len(strokes), 2 * size))
-    r[strokes, terms.pixel], r[strokes, size + terms.pixel] = 1, 1
-    root = np.sqrt(terms.weight)
-    skew = np.sqrt(instance.skew_coefficient) * np.eye(2 * size)[size:]
-    rows = np.concatenate([np.sqrt(2) * a, np.sqrt(2) * b, root[:, None] * r, skew])
-    right = np.zeros((len(jumps), len(rows)))
-    right[:, : len(pairs)] = -np.sqrt(2) * HALF * jumps
-    right[:, 2 * len(pairs) : 2 * len(pairs) + len(strokes)] = root * terms.goal
-    basis = np.linalg.qr(rows)[0]
+    rows, goal, weight = terms(instance, jumps[0])
+    root = np.sqrt(weight)
+    right = np.tile(goal, (len(jumps), 1))
+    right[:, : jumps.shape[1]] = -HALF * jumps
+    right *= root
+    basis = np.linalg.qr(rows * root[:, None])[0]
     return np.sum((right - (right @ basis) @ basis.T) ** 2, axis=1)
+
+
+def least_squares(instance):
+    """The least 2-norm energy, over all jumps whose least energy without windows is low enough."""
+    jumps = np.concatenate(list(every_jump(instance)))
+    free = np.concatenate([least_energy(instance, part) for part in every_jump(instance)])
+    best = math.inf
+    for number in np.argsort(free, kind="stable"):
+        if free[number] >= best:
+            break
+        best = min(best, least_in_windows(instance, jumps[number]))
+    return best
+
+
+def least_in_windows(instance, p):
+    """The energy of the best field with jumps p."""
+    rows, goal, weight = terms(instance, p)
+    root = np.sqrt(weight)
+    x = lsq_linear(rows * root[:, None], goal * root, windows(instance), method="bvls", tol=1e-14).x
+    return float(weight @ (rows @ x - goal) ** 2)
+
+
+def terms(instance, p):
+    """All residuals as rows x - goal of the angles x = (alpha, beta), and their weights."""
+    grid, n, strokes = instance.grid, instance.grid.size, instance.stroke_terms
+    unit, none = np.eye(n), np.zeros((n, n))
+    a = np.hstack([unit[grid.first] - unit[grid.second], none[grid.first]])
+    b = np.hstack([none[grid.first], parity_sign(p)[:, None] * unit[grid.first] - unit[grid.second]])
+    r = np.hstack([unit[strokes.pixel], unit[strokes.pixel]])
+    rows = np.vstack([a, b, r, np.hstack([none, unit])])
+    goal = np.concatenate([-HALF * np.asarray(p), np.zeros(len(b)), strokes.goal, np.zeros(n)])
+    skew = np.full(n, instance.skew_coefficient)
+    return rows, goal, np.concatenate([np.full(2 * len(a), 2.0), strokes.weight, skew])
+
+
+def windows(instance):
+    """Least and greatest angles (alpha, beta)."""
+    beta = np.full(instance.grid.size, QUARTER)
+    lower, upper = np.concatenate([instance.alpha_lower, -beta]), np.concatenate([instance.alpha_upper, beta])
+    return lower, np.maximum(upper, lower + 1e-15)
+
+
+def least_absolute(instance):
+    """The least 1-norm energy by HiGHS, one linear program with integers for each parity of all jumps."""
+    m = len(instance.grid.first)
+    ends = [np.ceil((low - np.array([0, 1])) / 2) for low in instance.p_min]
+    optima = [math.inf]
+    for parities in itertools.product((0, 1), repeat=m):
+        parity = np.array(parities, int)
+        rows, goal, weight = terms(instance, parity)
+        r, size = len(rows), rows.shape[1]
+        turns = np.zeros((r, m))  # of the integers q, with p = 2 q + parity
+        turns[:m] = np.pi * np.eye(m)
+        lower, upper = windows(instance)
+        low = [end[bit] for end, bit in zip(ends, parities, strict=True)]
+        high = np.floor((instance.p_max - parity) / 2)
+        if (high < low).any():
+            continue
+        both = [np.hstack([sign * rows, sign * turns, -np.eye(r)]) for sign in (1, -1)]
+        bounds = [
+            np.concatenate([lower, low, np.zeros(r)]),
+            np.concatenate([upper, high, np.full(r, np.inf)]),
+        ]
+        cost = np.concatenate([np.zeros(size + m), weight / max(weight.max(), 1.0)])
+        integrality = np.concatenate([np.zeros(size), np.ones(m), np.zeros(r)])
+        result = milp(
+            cost,
+            integrality=integrality,
+            bounds=bounds,
+            constraints=LinearConstraint(np.vstack(both), ub=np.concatenate([goal, -goal])),
+            options={"mip_rel_gap": 0.0},
+        )
+        if result.x is not None:
+            x = np.clip(result.x[:size], lower, upper)
+            q = np.round(result.x[size : size + m])
+            optima.append(float(weight @ np.abs(rows @ x + turns @ q - goal)))
+    return min(optima)

@@ -1,6 +1,5 @@
 """Local solvers: right optima, limits, starts, interrupts, and refusals by name."""
 
-import itertools
 import math
 import re
 import signal
@@ -27,8 +26,8 @@ from crossfield.models.errors import (
     UnsupportedBySolverError,
 )
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from exhaustive import least_absolute, least_squares, random_instance
 from loops import for_each
-from scipy.optimize import linprog, lsq_linear
 
 SOLVED = {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
 
@@ -40,74 +39,11 @@ def one_pixel(gauge, skew_coefficient):
     )
 
 
-def random_instance(height, width, seed, *, gauge="strokes", strokes=0.6, skew_coefficient=1e-2):
-    rng = np.random.default_rng(seed)
-    mask = np.ones((height, width), dtype=bool)
-    pixels = np.argwhere(rng.random(mask.shape) < strokes)
-    theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.2, 1, len(pixels))
-    return cf.Instance(
-        f"random_{seed}", mask, pixels, theta, w, gauge=gauge, skew_coefficient=skew_coefficient
-    )
-
-
 def formulated(instance, name, *, relax=False):
     recipe = FORMULATIONS[name]
     return cf.formulate(
         instance, name, p=cf.greedy_field(instance).p if recipe.fixed else None, relax=relax or None
     )
-
-
-def residual_rows(instance, p):
-    """Matrix and right side of all residuals A, B, R, beta at fixed jumps, and their weights, by hand."""
-    grid = instance.grid
-    rows, sides, weights = [], [], []
-    for i, j, jump in zip(grid.first, grid.second, p, strict=True):
-        a, b = np.zeros((2, 2 * grid.size))
-        a[i], a[j] = 1, -1
-        b[grid.size + i], b[grid.size + j] = 1 - 2 * (jump % 2), -1
-        rows, sides, weights = [*rows, a, b], [*sides, -np.pi / 2 * jump, 0.0], [*weights, 2.0, 2.0]
-    for at, theta, w in zip(instance.stroke_index, instance.target, instance.w, strict=True):
-        r = np.zeros(2 * grid.size)
-        r[at] = r[grid.size + at] = 1
-        rows, sides, weights = [*rows, r], [*sides, theta], [*weights, instance.stroke_coefficient * w]
-    for at in range(grid.size):
-        r = np.zeros(2 * grid.size)
-        r[grid.size + at] = 1
-        rows, sides, weights = [*rows, r], [*sides, 0.0], [*weights, instance.skew_coefficient]
-    return np.array(rows), np.array(sides), np.array(weights)
-
-
-def bounds(instance):
-    quarter = np.full(instance.grid.size, np.pi / 4)
-    return np.concatenate([instance.alpha_lower, -quarter]), np.concatenate([instance.alpha_upper, quarter])
-
-
-def least_squares(instance, p):
-    rows, sides, weights = residual_rows(instance, p)
-    root = np.sqrt(weights)
-    result = lsq_linear(rows * root[:, None], sides * root, bounds(instance), method="bvls", tol=1e-14)
-    return 2 * result.cost
-
-
-def least_deviations(instance, p):
-    rows, sides, weights = residual_rows(instance, p)
-    count, columns = rows.shape
-    lower, upper = bounds(instance)
-    identity = np.eye(count)
-    result = linprog(
-        np.concatenate([np.zeros(columns), weights]),
-        A_ub=np.block([[rows, -identity], [-rows, -identity]]),
-        b_ub=np.concatenate([sides, -sides]),
-        bounds=[*zip(lower, upper, strict=True), *[(0, None)] * count],
-        method="highs-ds",
-    )
-    return result.fun
-
-
-def by_enumeration(instance, inner):
-    """The optimum over all jumps, each with its convex problem in the angles."""
-    ranges = (range(lo, hi + 1) for lo, hi in zip(instance.p_min, instance.p_max, strict=True))
-    return min(inner(instance, p) for p in itertools.product(*ranges))
 
 
 # Right optima
@@ -154,8 +90,8 @@ def test_two_pixels_with_exchanged_lines_meet_with_jump_one(name, solver):
 )
 @pytest.mark.parametrize("gauge", ["box", "strokes"])
 def test_the_milp_has_the_optimum_of_the_enumeration(seed, gauge):
-    instance = random_instance(2, 2, seed, gauge=gauge)
-    expected = by_enumeration(instance, least_deviations)
+    instance = random_instance(seed, (2, 2), 4, gauge)
+    expected = least_absolute(instance)
     assert expected > 1e-3
     solution = cf.solve(cf.formulate(instance, "milp-mccormick"), "highs")
     assert solution.status == Status.OPTIMAL_GLOBAL
@@ -168,8 +104,8 @@ def test_the_milp_has_the_optimum_of_the_enumeration(seed, gauge):
 @pytest.mark.parametrize("seed", [1, 4])
 @pytest.mark.parametrize("gauge", ["box", "strokes"])
 def test_the_exact_miqp_has_the_optimum_of_the_enumeration(seed, gauge):
-    instance = random_instance(2, 2, seed, gauge=gauge)
-    expected = by_enumeration(instance, least_squares)
+    instance = random_instance(seed, (2, 2), 4, gauge)
+    expected = least_squares(instance)
     assert expected > 1e-3
     solution = cf.solve(cf.formulate(instance, "miqp-exact"), "bonmin")
     assert solution.objective == pytest.approx(expected, abs=2e-5)
@@ -180,7 +116,7 @@ def test_the_exact_miqp_has_the_optimum_of_the_enumeration(seed, gauge):
 # The table of solvers and classes
 
 
-SMALL = random_instance(2, 2, 1, strokes=1.0)
+SMALL = random_instance(1, (2, 2), 4)
 
 
 @pytest.fixture
@@ -251,20 +187,6 @@ def test_a_missing_package_is_a_named_error(small, monkeypatch):
     with pytest.raises(MissingSolverError, match="Ipopt is not installed; pip install casadi"):
         choose_solver(formulated(small, "qp-fixed"))
     assert choose_solver(formulated(small, "milp-mccormick")).name == "highs"
-
-
-# Integers dropped or fixed
-
-
-@for_each("name", [name for name in FORMULATIONS if name != "qp-fixed"])
-def test_with_integers_fixed_ipopt_finds_the_optimum_of_the_angles(small, name):
-    start = cf.greedy_field(small)
-    solution = cf.solve(cf.with_integers_fixed(cf.formulate(small, name), start), "ipopt", start=start)
-    assert solution.field.p.tolist() == start.p.tolist()
-    if name in {"minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact"}:
-        assert solution.objective == pytest.approx(least_squares(small, start.p), abs=1e-6)
-    if name in {"miqcp-bilinear-l1", "milp-mccormick"}:
-        assert solution.objective == pytest.approx(least_deviations(small, start.p), abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["milp-mccormick", "miqp-exact", "miqp-mccormick"])
@@ -414,7 +336,7 @@ def test_what_is_solved_is_the_file(tmp_path, small):
     """Another bound in the file would show: the solvers see nothing else."""
     problem = formulated(small, "qp-fixed")
     solution = cf.solve(problem, "ipopt", folder=tmp_path)
-    stem = tmp_path / "random_1.qp-fixed"
+    stem = tmp_path / "random.qp-fixed"
     left = {path for path in tmp_path.iterdir() if "instance" not in path.name}
     assert {path.name.removeprefix(stem.name) for path in left} == {
         ".nl", ".row", ".col", ".manifest.json", ".ipopt.sol", ".ipopt.log",
@@ -429,13 +351,13 @@ def test_what_is_solved_is_the_file(tmp_path, small):
 def test_a_crashed_solver_is_said_and_no_stale_answer_taken(tmp_path, small, monkeypatch):
     problem = formulated(small, "qp-fixed")
     cf.solve(problem, "ipopt", folder=tmp_path)
-    answer = tmp_path / "random_1.qp-fixed.ipopt.sol"
+    answer = tmp_path / "random.qp-fixed.ipopt.sol"
     assert answer.exists()
     broken = tmp_path / "broken"
     broken.mkdir()
     (broken / "casadi.py").write_text("raise ImportError('libgfortran is gone')")
     monkeypatch.setenv("PYTHONPATH", str(broken))
-    with pytest.raises(SolverError, match=r"random_1\.qp-fixed\.nl: Ipopt: ImportError: libgfortran is gone"):
+    with pytest.raises(SolverError, match=r"random\.qp-fixed\.nl: Ipopt: ImportError: libgfortran is gone"):
         cf.solve(problem, "ipopt", folder=tmp_path)
     assert not answer.exists()
 
