@@ -1,4 +1,4 @@
-"""Tiny odd instances: masks in parts, parts without strokes, one pixel, extreme weights, both gauges."""
+"""Odd instances: masks in parts, parts without strokes, one pixel, extreme weights, both gauges."""
 
 import numpy as np
 from crossfield.models.instance.instance import MOST_WEIGHT, Instance
@@ -9,10 +9,11 @@ SHAPES = [(1, 1), (1, 2), (2, 1), (1, 4), (2, 2), (2, 2), (2, 2), (2, 3), (3, 2)
 WEIGHTS = [0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.05, 1.0, 20.0, 1e3, 1e4, 1e5, MOST_WEIGHT]
 
 
-def odd_instance(seed):
-    """A tiny instance; every kind of oddity appears in each block of some dozens of seeds."""
+def odd_instance(seed, shape=None):
+    """An instance, tiny unless it has a shape; every oddity appears in each block of some dozens of seeds."""
     rng = np.random.default_rng(seed)
-    mask = rng.random(SHAPES[rng.integers(len(SHAPES))]) < rng.choice([0.6, 1.0])
+    tiny = SHAPES[rng.integers(len(SHAPES))]
+    mask = rng.random(tiny if shape is None else shape) < rng.choice([0.6, 1.0])
     mask[rng.integers(mask.shape[0]), rng.integers(mask.shape[1])] = True
     if rng.random() < 0.3:  # a part without strokes
         part = np.ones(tuple(rng.integers(1, 3, 2)), bool)

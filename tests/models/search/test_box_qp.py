@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import make_field
 from crossfield.export.solving.local import solve
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.problem import formulate
@@ -13,6 +14,7 @@ from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.search.reproducible_angles import reproducible_field
 from crossfield.models.sketch.samples import sample, samples
 from crossfield.models.smooth.polyvector import power_field
+from exhaustive import random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -20,24 +22,6 @@ from loops import for_each
 pytestmark = pytest.mark.numeric
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def random_instance(seed, shape=None, gauge="box", skew_coefficient=1e-3):
-    rng = np.random.default_rng(seed)
-    mask = rng.random(rng.integers(1, 8, 2)) < 0.8 if shape is None else np.ones(shape, bool)
-    mask[0, 0] = True
-    at = np.argwhere(mask)
-    at = at[np.sort(rng.permutation(len(at))[: 1 + rng.integers(max(1, len(at) // 2))])]
-    theta, w = rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at))
-    return Instance("random", mask, at, theta, w, skew_coefficient=skew_coefficient, gauge=gauge)
-
-
-def random_field(instance, seed):
-    """Angles and jumps anywhere in their bounds: most angles want to leave them."""
-    rng = np.random.default_rng(seed)
-    alpha = rng.uniform(instance.alpha_lower, instance.alpha_upper)
-    beta = rng.uniform(-QUARTER, QUARTER, len(alpha))
-    return CrossField(instance, alpha, beta, rng.integers(instance.p_min, instance.p_max + 1))
 
 
 def gradient(field):
@@ -79,8 +63,9 @@ def assert_optimal(field):
 )
 @settings(deadline=None, max_examples=200)
 def test_random_jumps_are_fitted_to_the_optimum(seed, gauge, skew_coefficient, stroke_coefficient):
-    instance = random_instance(seed, gauge=gauge, skew_coefficient=skew_coefficient)
-    field = random_field(replace(instance, stroke_coefficient=stroke_coefficient), seed)
+    instance = random_instance(seed, strokes=20, gauge=gauge)
+    weights = {"skew_coefficient": skew_coefficient, "stroke_coefficient": stroke_coefficient}
+    field = make_field(replace(instance, **weights), seed)
     best = fit_in_box(field)
     assert_optimal(best)
     assert (best.p == field.p).all()
@@ -89,8 +74,8 @@ def test_random_jumps_are_fitted_to_the_optimum(seed, gauge, skew_coefficient, s
 
 @pytest.mark.parametrize("gauge", ["strokes", "box"])
 def test_thousands_of_active_bounds(gauge):
-    instance = random_instance(3, (80, 100), gauge, 1e-6)
-    assert assert_optimal(fit_in_box(random_field(instance, 0))) > 1000
+    instance = random_instance(3, (80, 100), 4000, gauge)
+    assert assert_optimal(fit_in_box(make_field(instance, 0))) > 1000
 
 
 def test_contact_along_the_strokes_of_a_drawing():
@@ -111,7 +96,7 @@ def test_same_optimum_as_ipopt_on_the_file(name, size):
         instance,
         (instance.alpha_lower + instance.alpha_upper) / 2,
         np.zeros(instance.grid.size),
-        random_field(instance, size).p,
+        make_field(instance, size).p,
     )
     problem = formulate(instance, "qp-fixed", p=centre.p)
     best, other = fit_in_box(centre), solve(problem, "ipopt", start=centre).field
@@ -144,7 +129,7 @@ def test_angles_stay_where_the_energy_does_not_say():
 
 
 def test_the_optimum_comes_back_as_it_is():
-    best = fit_in_box(random_field(random_instance(7, (12, 12)), 7))
+    best = fit_in_box(make_field(random_instance(7, (12, 12), 70, "box"), 7))
     again = fit_in_box(best)
     assert again.alpha.tobytes() == best.alpha.tobytes()
     assert again.beta.tobytes() == best.beta.tobytes()
@@ -153,8 +138,8 @@ def test_the_optimum_comes_back_as_it_is():
 @for_each("gauge", ["strokes", "box"])
 @for_each("seed", range(6))
 def test_pinned_angles_depend_on_the_jumps_alone(seed, gauge):
-    instance = random_instance(seed, (4, 5), gauge, 1e-6)
-    field, other = (random_field(instance, number) for number in (seed, seed + 100))
+    instance = random_instance(seed, (4, 5), 10, gauge)
+    field, other = (make_field(instance, number) for number in (seed, seed + 100))
     found, same = (
         reproducible_field(field),
         reproducible_field(CrossField(instance, other.alpha, other.beta, field.p)),
@@ -172,9 +157,11 @@ def test_pinned_angles_depend_on_the_jumps_alone(seed, gauge):
 @for_each("skew_coefficient", [0, 1e-6])
 def test_pinned_angles_are_optimal_where_the_energy_does_not_say_all(skew_coefficient, stroke_coefficient):
     instance = replace(
-        random_instance(7, (5, 5)), skew_coefficient=skew_coefficient, stroke_coefficient=stroke_coefficient
+        random_instance(7, (5, 5), 12, "box"),
+        skew_coefficient=skew_coefficient,
+        stroke_coefficient=stroke_coefficient,
     )
-    assert_optimal(reproducible_field(random_field(instance, 7)))
+    assert_optimal(reproducible_field(make_field(instance, 7)))
 
 
 def test_pinned_angles_of_a_part_without_strokes_stay():

@@ -8,7 +8,6 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import GAUGES
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.box_qp import minimise_in_box, stroke_bounds
 from crossfield.models.search.energy import energy_at
@@ -19,12 +18,12 @@ from crossfield.models.search.starts import first_field
 from crossfield.models.search.walk import Perturbations, explore
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from odd_instances import odd_instance
 from threadpoolctl import threadpool_limits
 
 pytestmark = pytest.mark.numeric
 
 SEEDS = st.integers(0, 2**32 - 1)
-WEIGHTS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -32,28 +31,6 @@ def one_thread():
     """Small systems: on a busy machine threads would wait for each other."""
     with threadpool_limits(1):
         yield
-
-
-def odd_instance(seed):
-    """Any size up to 12 x 12, holes, parts without strokes, parallel or random strokes,
-    weights of any magnitude.
-    """
-    rng = np.random.default_rng(seed)
-    mask = rng.random(rng.integers(1, 13, 2)) < rng.choice([0.5, 0.8, 1.0])
-    mask[rng.integers(mask.shape[0]), rng.integers(mask.shape[1])] = True
-    at = np.argwhere(mask)
-    at = at[np.sort(rng.permutation(len(at))[: max(1, round(len(at) * rng.choice([0.05, 0.2, 0.6])))])]
-    spread = rng.choice([0.0, 0.3, np.pi])
-    return cf.Instance(
-        "odd",
-        mask,
-        at,
-        rng.uniform(0, np.pi) + spread * rng.random(len(at)),
-        10.0 ** rng.uniform(rng.choice([-12, -3, 0]), 0, len(at)),
-        stroke_coefficient=float(rng.choice(WEIGHTS)),
-        skew_coefficient=float(rng.choice(WEIGHTS)),
-        gauge=str(rng.choice(GAUGES)),
-    )
 
 
 def definition(instance, x, p):
@@ -112,7 +89,7 @@ def explored(instance, seed, perturbations):
 @given(seed=SEEDS)
 @settings(deadline=None, max_examples=25)
 def test_energies_on_odd_instances_are_those_of_their_definition(seed):
-    instance = odd_instance(seed)
+    instance = odd_instance(seed, np.random.default_rng(seed).integers(1, 13, 2))
     walked(instance, seed, perturbations=3, steps=4)
     explored(instance, seed, perturbations=2)
 
