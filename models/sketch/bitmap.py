@@ -22,7 +22,6 @@ from ..input_limits import MAX_PIXELS, MAX_SIDE
 from ..instance.grid import Bools, Floats
 from .colour import REDDISH, ink_of, redness
 from .cover import Box, Cover, Covers, Frame, block_means
-from .tiff import unpack_tiff
 
 Ink = NDArray[np.float32]
 
@@ -165,8 +164,6 @@ def _open_image(data: bytes) -> Any:
         try:
             image = Image.open(io.BytesIO(data), formats=FORMATS)
             _check_size(*image.size)
-            if any(tile[0] == "libtiff" for tile in image.tile):
-                image = Image.open(io.BytesIO(unpack_tiff(data)), formats=["TIFF"])
             image.load()
             ImageOps.exif_transpose(image, in_place=True)
         except InputError:
