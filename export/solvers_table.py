@@ -127,7 +127,6 @@ PROGRAMS: Final = {
         Program(
             "glpk", "GLPK", ("lp", "mps"), ("mod",), "glpsol", "apt install glpk-utils", 1e-14, adds=r"~r_\d+"
         ),
-        Program("asl", "AMPL Solver Library", (), ("nl",), "gjh_asl_json", "apt install gjh-asl-json"),
         Program("casadi", "CasADi", (), ("nl",), "casadi", "pip install casadi"),
         Program(
             "gams", "GAMS", (), ("gms",), "gamspy_base", "pip install gamspy_base gamspy_baron",

@@ -96,15 +96,14 @@ def positions_of(have: list[str], wanted: list[str]) -> Ints:
 class Behaviour:
     """Columns and rows of a model, and the values of objective (k,) and rows (k, rows) at k points.
 
-    integer is None if the program does not report it; then discrete counts these columns. Values that are not
-    reported are NaN. rounding: relative accuracy of reported bounds; may_lack: whether columns in no term
-    are left out.
+    Values that are not reported are NaN. rounding: relative accuracy of reported bounds; may_lack: whether
+    columns in no term are left out.
     """
 
     columns: list[str]
     lower: Floats
     upper: Floats
-    integer: Bools | None
+    integer: Bools
     rows: list[str]
     row_lower: Floats
     row_upper: Floats
@@ -112,7 +111,6 @@ class Behaviour:
     activities: Floats
     rounding: float = 0.0
     may_lack: bool = False
-    discrete: int | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -126,18 +126,18 @@ def write_in_full(solution: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
-def run_program(name: str, *arguments: str, folder: Path | None = None) -> str:
+def run_program(name: str, *arguments: str) -> str:
     """Run an executable and return its output. Raises RefusedError if it ends with an error.
 
     When the parent requests a stop, the program receives SIGINT.
     """
-    done = run_command([shutil.which(name) or name, *arguments], folder)
+    done = run_command([shutil.which(name) or name, *arguments])
     if done.returncode:
         raise RefusedError(f"{name} ends with code {done.returncode}: {done.stdout.strip()[-300:]}")
     return done.stdout
 
 
-def run_command(command: list[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+def run_command(command: list[str]) -> subprocess.CompletedProcess[str]:
     """Run a command, print its output, and return how it ended; standard error goes to the same text."""
     with (
         subprocess.Popen(
@@ -147,7 +147,6 @@ def run_command(command: list[str], folder: Path | None = None) -> subprocess.Co
             stderr=subprocess.STDOUT,
             encoding="utf-8",
             errors="replace",
-            cwd=folder,
         ) as process,
         on_stop(lambda: process.send_signal(signal.SIGINT)),
     ):

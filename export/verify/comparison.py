@@ -142,10 +142,8 @@ def behaviour_difference(reported: Behaviour, problem: Problem, points: Points) 
         positions_of(reported.columns, wanted),
         positions_of(reported.rows, rows),
     )
-    if reported.integer is not None and (reported.integer[c] != problem.integer[at]).any():
+    if (reported.integer[c] != problem.integer[at]).any():
         return "other columns are integer"
-    if reported.discrete is not None and reported.discrete != problem.integer.sum():
-        return f"{reported.discrete} discrete columns instead of {problem.integer.sum()}"
     form = CanonicalForm(problem)
     bounds = [
         ("lower", reported.lower[c], problem.lower[at]),

@@ -5,14 +5,15 @@ each giving what it read to be compared with a Problem.
 from __future__ import annotations
 
 import importlib.util
+import json
 import shutil
+import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from cases import names_of, points_of
-from crossfield.export.programs import asl as asl_program
 from crossfield.export.programs import highs as highs_program
 from crossfield.export.programs import scip as scip_program
 from crossfield.export.programs.casadi import read_nl
@@ -63,6 +64,7 @@ def browser() -> str | None:
 
 
 OTHERS = {
+    "asl": (shutil.which("gjh_asl_json"), "AMPL Solver Library", "apt install gjh-asl-json"),
     "baron": (importlib.util.find_spec("gamspy_baron"), "BARON", "pip install gamspy_baron"),
     "pyqplib": (importlib.util.find_spec("pyqplib"), "pyqplib", "pip install pyqplib"),
     "toulbar2": (importlib.util.find_spec("pytoulbar2"), "toulbar2", "pip install pytoulbar2"),
@@ -94,7 +96,8 @@ def by_asl(path: Path) -> tuple[dict[str, Any], float, Floats, Floats, Floats]:
 
     Statistics, objective, gradient, rows, Jacobian (rows, columns).
     """
-    answer = asl_program.report_at_start(path)
+    subprocess.run(["gjh_asl_json", path.stem], cwd=path.parent, check=True, capture_output=True)
+    answer = json.loads(path.with_suffix(".json").read_text("utf-8"))
     statistics, values = answer["problem statistics"], answer["initial evaluations"]
     columns, rows = statistics["total no. of variables"], statistics["total no. of constraints"]
     goal = values["objective function"]["0"]
