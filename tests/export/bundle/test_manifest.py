@@ -93,9 +93,6 @@ def test_the_instance_is_that_of_the_last_export(tmp_path):
         assert read_instance(tmp_path / "tiny.instance.json").sha256 == instance.sha256
 
 
-# determinism
-
-
 # what is refused
 
 

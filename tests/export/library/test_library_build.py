@@ -324,9 +324,6 @@ def test_the_tangent_bound_never_exceeds_the_optimum(built):
     assert tangent_bound(formulate(problem.instance, "miqp-exact"), np.zeros(1)) is None
 
 
-# Random instances
-
-
 # The same bytes, however it is made
 
 

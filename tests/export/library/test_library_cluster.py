@@ -10,6 +10,7 @@ from clusters import cluster
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
 from crossfield.export.library.plan.spec import read_spec
+from libraries import content
 
 SPEC = """format = "crossfield-library-spec"
 version = 1
@@ -40,10 +41,6 @@ from crossfield.export.library.plan.spec import read_spec
 spec, folder, address = sys.argv[1:4]
 build(read_spec(spec), folder, scheduler=address, progress=lambda line: print(line, flush=True))
 """
-
-
-def content(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.mark.slow

@@ -49,10 +49,6 @@ def built(tmp_path_factory):
     return build(read_spec(written(folder, SMALL)), folder / "library")
 
 
-def content(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
 # The specification
 
 
