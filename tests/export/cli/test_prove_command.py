@@ -50,7 +50,7 @@ def test_field_certificate_and_report_agree(folder):
     ]
 
 
-def test_a_proof_in_the_1_norm_is_of_the_optimum_of_the_milp(tmp_path, capsys):
+def test_a_proof_in_the_1_norm_is_checked_with_its_norm(tmp_path, capsys):
     instance = write_instance(tmp_path, 4, 0.2)
     given = ["prove", instance, "--norm", "1", "--time-limit", "100", "--json"]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
@@ -60,11 +60,6 @@ def test_a_proof_in_the_1_norm_is_of_the_optimum_of_the_milp(tmp_path, capsys):
     field = read_field(of(tmp_path, "field.npz"))
     assert (report["norm"], report["status"]) == (1, "optimal")
     assert report["energy"] == pytest.approx(field.energy(1).total, abs=1e-12)
-    solved = ["solve", instance, "-f", "milp-mccormick", "--time-limit", "100", "--json"]
-    assert invoke([*solved, "-o", str(tmp_path / "milp")]) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert answer["status"] == "optimal-global"
-    assert answer["objective_recomputed"] == pytest.approx(report["energy"], rel=1e-6)
 
 
 def test_certificates_are_checked(folder, capsys, tmp_path):
@@ -86,13 +81,3 @@ def test_certificates_are_checked(folder, capsys, tmp_path):
     printed = capsys.readouterr().err
     assert "wrong.npz: is refused as a certificate: energy is claimed as" in printed
     assert printed.count("\n") == 1
-
-
-def test_tightened_files_of_a_proof(folder, tmp_path):
-    folder, _ = folder
-    instance = write_instance(tmp_path, 8, 0.3)
-    command = ["export", instance, "-o", str(tmp_path), "-f", "miqp-exact", "-F", "lp", "-q"]
-    assert invoke([*command, "--tightened", str(of(folder, "certificate.npz"))]) == 0
-    (manifest,) = tmp_path.glob("*.manifest.json")
-    windows = json.loads(manifest.read_text())["windows"]
-    assert windows["p_min"] == windows["p_max"]

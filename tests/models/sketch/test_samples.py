@@ -9,7 +9,6 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.sketch.samples import SAMPLES, sample, sample_svg, samples
 from crossfield.models.sketch.surfaces import SURFACES
-from crossfield.models.sketch.svg import read_svg
 from crossfield.models.smooth.polyvector import power_field
 from loops import for_each
 from scipy import ndimage
@@ -25,19 +24,6 @@ def test_the_table_lists_every_drawing_and_every_surface():
     }
     assert set(SKETCHES) == drawings
     assert set(ANALYTIC) == set(SURFACES)
-
-
-@pytest.mark.parametrize("name", SKETCHES)
-def test_the_colours_are_those_of_the_description(name):
-    curves = read_svg(sample_svg(name).encode())
-    mixed = "red" in SAMPLES[name].description
-    assert curves.red.any() == mixed
-    assert not curves.red.all()
-    assert curves.page is not None
-    x, y, width, height = curves.page
-    corners = curves.points.reshape(-1, 2)
-    assert (corners >= (x, y)).all()
-    assert (corners <= (x + width, y + height)).all()
 
 
 @pytest.mark.parametrize("size", [8, 24, *(pytest.param(size, marks=pytest.mark.slow) for size in (48, 96))])
