@@ -66,12 +66,6 @@ class Cover:
         single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
         return np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
 
-    def __add__(self, second: Cover) -> Cover:
-        """The cover by both kinds of strokes."""
-        sums = [cover.amount[..., None] * cover.direction for cover in (self, second)]
-        amount = self.amount + second.amount
-        return Cover(amount, sum(sums) / np.where(amount > 0, amount, 1)[..., None])
-
 
 @dataclass(frozen=True, eq=False)
 class Covers:

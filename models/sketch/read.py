@@ -23,7 +23,6 @@ from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Rea
 from .bitmap import read_white_pixels
 from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
 from .doubts import (
-    describe_box,
     describe_crowding,
     describe_loose_strokes,
     describe_off_page,
@@ -187,7 +186,6 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
     warnings = _list_warnings(
         describe_open_drawing(region),
         describe_loose_strokes(walls, region, frame),
-        describe_box(walls, region, covers.lines + covers.others),
         describe_crowding(covers.filled, mask, frame),
         describe_off_page(mask, frame, drawing.page),
     )

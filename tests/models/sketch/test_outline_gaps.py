@@ -67,39 +67,6 @@ def test_an_open_wrist_that_loses_the_palm_is_warned_of():
     assert in_black(f"{HAND}H60", page=LARGE).reading.warnings == ()
 
 
-BODY = "M100 21C150 30 178 60 179 100C175 150 150 178 100 179C50 178 25 150 21 100C25 50 50 25 100 21Z"
-
-
-def test_a_construction_box_round_the_body_is_warned_of():
-    box = "M10 20H190M10 180H190M20 10V190M180 10V190"
-    for size, body in ((96, BODY), (48, "M100 50A50 50 0 1 1 99.9 50Z")):
-        paths = [(path, "black") for path in (box, body, "M60 100Q100 130 140 100")]
-        (text,) = read(drawing(paths, LARGE), size).reading.warnings
-        assert "a box of straight lines encloses another outline, and the" in text
-    image = Image.new("L", (400, 400), 255)
-    draw = ImageDraw.Draw(image)
-    draw.rectangle((40, 40, 360, 360), outline=0, width=3)
-    draw.ellipse((100, 80, 300, 330), outline=0, width=3)
-    assert "a box of straight lines" in read(png(image), 48, "a.png").reading.warnings[0]
-
-
-def test_a_construction_box_in_perspective_is_warned_of():
-    silhouette, edges = "M30 60L110 30L180 60L180 150L100 185L30 140Z", "M30 60L100 95L180 60M100 95V185"
-    body = "M105 50C150 60 160 90 150 130C130 160 80 160 60 130C40 100 60 55 105 50Z"
-    (text,) = in_black(silhouette, edges, body, page=LARGE).reading.warnings
-    assert "a box of straight lines" in text
-
-
-def test_sheets_and_plates_are_no_construction_boxes():
-    lines = "".join(f"M{20 + 20 * k} 20V180M20 {20 + 20 * k}H180" for k in range(1, 8))
-    hatching = "".join(f"M{30 + 20 * k} 30V170" for k in range(8))
-    sheet = "M20 20H180V180H20Z"
-    circles = "M100 20A80 80 0 1 1 99.9 20Z", "M100 50A50 50 0 1 1 99.9 50Z"
-    hole = sheet, "M100 70A30 30 0 1 1 99.9 70Z", "M20 100H70M130 100H180M100 20V70M100 130V180M20 20L79 79"
-    for paths in ((sheet, lines), (sheet, hatching), circles, hole):
-        assert in_black(*paths, page=LARGE).reading.warnings == ()
-
-
 def test_solid_ink_and_hatching_are_warned_of_with_their_place():
     hatching = "".join(f"M20 {20 + k / 2}H80" for k in range(60))
     (text,) = in_black("M10 10H90V90H10Z", hatching).reading.warnings
