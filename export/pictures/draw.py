@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,7 +21,6 @@ from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
 from ...models.surface.surface import Surface
-from ..shading.colours import colour_normals, matcap, shade_by_light
 from . import panels
 from .canvas import draw_sheet, set_coordinates
 from .layers import field_sheet
@@ -62,9 +60,6 @@ KINDS: Final = {
         legend=True,
     ),
     "angle": PictureKind("map of the angle between the two lines", (("", panels.draw_angle),), bar=52.0),
-    "energy": PictureKind(
-        "map of the smoothness energy of each pixel", (("", panels.draw_energy),), bar=58.0
-    ),
     "overview": PictureKind(
         "instance, crosses, streamlines and angle map in a row, with counts and energies",
         (
@@ -81,25 +76,8 @@ KINDS: Final = {
 }
 """Kinds of pictures of instances and fields by name."""
 
-_SHADED, _MATCAP, _NORMALS = (
-    partial(panels.draw_surface, colours) for colours in (shade_by_light, matcap, colour_normals)
-)
-SURFACE_KINDS: Final = {
-    "shaded": PictureKind("surface in the light of a lamp", (("", _SHADED),)),
-    "matcap": PictureKind("surface in the material of a glazed ball", (("", _MATCAP),)),
-    "normals": PictureKind("map of the normals of a surface as colours", (("", _NORMALS),)),
-    "relief": PictureKind(
-        "strokes, normal map, shaded surface and matcap in a row",
-        (
-            ("strokes", panels.draw_instance),
-            ("normal map", _NORMALS),
-            ("shaded", _SHADED),
-            ("matcap", _MATCAP),
-        ),
-        size=170.0,
-    ),
-}
-"""Kinds of pictures of surfaces by name."""
+SHADED: Final = PictureKind("surface in the light of a lamp", (("", panels.draw_surface),))
+"""The picture of a surface; `crossfield shade` writes others."""
 
 Subject = CrossField | Instance | Surface
 
@@ -137,9 +115,8 @@ def draw(
     path
         The file to write; its suffix, .png, .svg or .pdf, decides the format.
     kind
-        A name in KINDS, for a Surface in SURFACE_KINDS; an Instance has only `instance`. The default is
-        `shaded` for a Surface, `instance` for an Instance, `layers` for a field as SVG or with an underlay,
-        and `field` otherwise.
+        A name in KINDS; an Instance has only `instance`, and a Surface one picture without a name. By default
+        `layers` for a field as SVG or with an underlay, and `field` otherwise.
     underlay
         The drawing (SVG, bitmap, .scap) or sample from which the instance was read. Its strokes become the
         bottom of `layers`; nothing else of the file is copied.
@@ -164,12 +141,17 @@ def draw(
         raise InputError(
             f"a picture cannot be written as {path.suffix!r}; use one of {', '.join(SUFFIXES)}", file=path
         )
-    kind = kind or _default_kind(what, suffix, underlaid=underlay is not None)
-    chosen = _find_kind(kind, what)
-    if kind == LAYERS and isinstance(what, CrossField):
-        return write_bytes(path, _draw_layers(what, suffix, underlay))
-    if underlay is not None:
-        raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}, or leave it out")
+    if isinstance(what, Surface):
+        if kind is not None or underlay is not None:
+            raise InputError("a surface has one picture, on no drawing; leave kind and underlay out")
+        chosen = SHADED
+    else:
+        kind = kind or _default_kind(what, suffix, underlaid=underlay is not None)
+        chosen = _find_kind(kind, what)
+        if kind == LAYERS and isinstance(what, CrossField):
+            return write_bytes(path, _draw_layers(what, suffix, underlay))
+        if underlay is not None:
+            raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}")
     with fixed_settings():
         return write_bytes(path, _save_figure(_draw_panels(what, chosen), suffix))
 
@@ -189,15 +171,13 @@ def preview(what: CrossField | Instance | Surface) -> bytes:
         A PNG.
 
     """
-    kind = _find_kind(_default_kind(what, ".png", underlaid=False), what)
+    kind = SHADED if isinstance(what, Surface) else KINDS[_default_kind(what, ".png", underlaid=False)]
     with fixed_settings():
         return _save_figure(_draw_panels(what, kind), ".png", dots=_PREVIEW_DOTS)
 
 
-def _default_kind(what: Subject, suffix: str, *, underlaid: bool) -> str:
+def _default_kind(what: CrossField | Instance, suffix: str, *, underlaid: bool) -> str:
     """The default kind of picture."""
-    if isinstance(what, Surface):
-        return "shaded"
     if isinstance(what, Instance):
         return "instance"
     return LAYERS if suffix == ".svg" or underlaid else "field"
@@ -231,19 +211,15 @@ def _save_figure(figure: Any, suffix: str, *, dots: int = _DOTS) -> bytes:
 
 
 def _find_kind(kind: str, what: Subject) -> PictureKind:
-    table, other_table = (SURFACE_KINDS, KINDS) if isinstance(what, Surface) else (KINDS, SURFACE_KINDS)
-    if kind in other_table and isinstance(what, Surface):
-        raise InputError(f"pictures of kind {kind} show a field; choose one of {', '.join(table)}")
-    if kind in other_table:
-        raise InputError(f"pictures of kind {kind} show a surface, which `crossfield shade` makes of a field")
-    if kind not in table:
-        raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(table)}")
-    if table[kind].needs_field and isinstance(what, Instance):
+    """The kind of that name. Raises InputError for an unknown one, and for one that needs a field."""
+    if kind not in KINDS:
+        raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(KINDS)}")
+    if KINDS[kind].needs_field and isinstance(what, Instance):
         raise InputError(
             f"{what.name} is an instance without a field, which kind {kind} needs; solve it first, "
             "or use kind instance"
         )
-    return table[kind]
+    return KINDS[kind]
 
 
 def _draw_panels(what: Subject, kind: PictureKind) -> Any:

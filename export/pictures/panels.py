@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -12,7 +11,8 @@ from ...models.field.field import CrossField
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
-from ..shading.raster import Raster, raster
+from ..shading.colours import shade_by_light
+from ..shading.raster import raster
 from .canvas import draw_smooth_image, paint
 from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, GridFrame
 
@@ -94,22 +94,6 @@ def draw_angle(axes: Any, picture: PanelContent) -> None:
     _draw_colour_bar(axes, image, picture, "angle between the lines", ticks=[0, 30, 60, 90], format="%d°")
 
 
-def draw_energy(axes: Any, picture: PanelContent) -> None:
-    """The smoothness energy of each pixel, on a square-root scale."""
-    from matplotlib.colors import PowerNorm
-
-    field = picture.crosses
-    energy = field.pixel_energy
-    top = float(energy.max()) if energy.max() > 1e-12 else 1.0
-    image = _draw_image(
-        axes, picture, field.image(energy), norm=PowerNorm(0.5, vmin=0.0, vmax=top), cmap="Reds"
-    )
-    _draw_border(axes, picture)
-    _draw_singularities(axes, picture)
-    ticks = [share**2 * top for share in (0, 0.25, 0.5, 0.75, 1)]
-    _draw_colour_bar(axes, image, picture, "smoothness energy in rad²", ticks=ticks, format="%.2g")
-
-
 def legend_keys(picture: PanelContent) -> list[Any]:
     """Keys of the marks in a picture of a field."""
     from matplotlib.lines import Line2D
@@ -163,9 +147,9 @@ def _draw_colour_bar(axes: Any, image: Any, picture: PanelContent, label: str, *
     inset.tick_params(labelsize=6.5, length=2, width=0.5)
 
 
-def draw_surface(colours: Callable[[Raster], Floats], axes: Any, picture: PanelContent) -> None:
-    """The surface in colours of its raster, smooth at any size."""
+def draw_surface(axes: Any, picture: PanelContent) -> None:
+    """The surface in the light of a lamp, smooth at any size."""
     assert picture.surface is not None
     scale = max(1, round(_DOTS_PER_POINT * picture.unit))
-    image = colours(raster(picture.instance, picture.surface.normals, scale))
+    image = shade_by_light(raster(picture.instance, picture.surface.normals, scale))
     draw_smooth_image(axes, image, picture.extent)

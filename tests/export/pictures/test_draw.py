@@ -54,7 +54,7 @@ def place(found, picture):
 @pytest.mark.slow
 @for_each(
     "kind, suffix",
-    [("field", ".svg"), ("energy", ".pdf"), ("overview", ".svg"), *((kind, ".png") for kind in KINDS)],
+    [("field", ".svg"), ("angle", ".pdf"), ("overview", ".svg"), *((kind, ".png") for kind in KINDS)],
 )
 def test_every_kind_and_suffix_is_written_the_same_twice(tmp_path, kind, suffix):
     field = singular(5)
@@ -99,7 +99,6 @@ def test_the_mask_is_white_and_the_rest_grey(tmp_path):
         ("field", 0.25, marks.POSITIVE),
         pytest.param("crosses", -0.25, marks.NEGATIVE, marks=pytest.mark.slow),
         ("angle", -0.25, marks.NEGATIVE),
-        pytest.param("energy", 0.25, marks.POSITIVE, marks=pytest.mark.slow),
     ],
 )
 def test_singularities_are_dots_in_their_place(tmp_path, kind, index, colour):
