@@ -7,8 +7,6 @@ direction changes little from one to the next.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -32,9 +30,7 @@ HOLD: Final = 0.25  # factor of the stroke weights; from 0.3 on, 3 degrees of no
 _LEAST_HARMONIC: Final = 0.01  # smallest deviation from clean strokes
 _SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size
 _ROUNDS: Final = 20  # 2 to 6 are usual
-_PAST: Final = 5  # rounds whose steps are combined with the present one
 _RESIDUAL: Final = 0.1  # relative, of systems that are not factored
-_DEPENDENT: Final = 1e-8  # relative singular value below which past rounds count as linearly dependent
 _STEPS: Final = 5  # of conjugate gradients; where they do not suffice, a system is factored
 _FALL: Final = 1e-4  # least share of the energy that a round has to remove before another one
 
@@ -59,11 +55,9 @@ def bend_field(
 
     Each round fixes the unit vectors and minimises over the angles: one sparse system. The system of the
     first round is factored. Its factors precondition conjugate gradients in later rounds, until a round needs
-    more than five steps; its system is then factored. Anderson acceleration combines a step with those of up
-    to 5 rounds before it (Walker, Ni: SIAM Journal on Numerical Analysis 49, 2011), unless this increases the
-    energy. Rounds end when the energy hardly decreases, and after 20 rounds at the latest; a round that
-    increases it is discarded. Labels are then moved into the windows of the instance, as by
-    `CrossField.from_lines`. Deterministic unless `stop` ends it.
+    more than five steps; its system is then factored. Rounds end when the energy hardly decreases, and after
+    20 rounds at the latest; a round that increases it is discarded. Labels are then moved into the windows of
+    the instance, as by `CrossField.from_lines`. Deterministic unless `stop` ends it.
 
     Parameters
     ----------
@@ -118,30 +112,6 @@ def tremble(field: CrossField) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Round:
-    """A round: the angles at its begin, half the slope there, and minus the step to the least energy."""
-
-    x: Floats
-    slope: Floats
-    step: Floats
-
-    def accelerate(self, past: Collection[_Round]) -> Floats:
-        """The angles after this round, by Anderson acceleration with rounds before it.
-
-        The combination of rounds that has the smallest slope, measured by the energy of its step.
-        """
-        if not past:
-            return self.x - self.step
-        x, slope, step = (
-            np.array([getattr(earlier, part) for earlier in past]) - getattr(self, part)
-            for part in ("x", "slope", "step")
-        )
-        share = np.linalg.lstsq(step @ slope.T, -(step @ self.slope), rcond=_DEPENDENT)[0]
-        accelerated: Floats = self.x + share @ x - (self.step + share @ step)
-        return accelerated
-
-
-@dataclass(frozen=True, eq=False)
 class _Bend:
     """The energy of line angles x = (u, v), shape (2n,), as squares: bend, and linear ones (rows x - goal).
 
@@ -175,18 +145,11 @@ class _Bend:
     def least(self, x: Floats, solver: SimilarSystems, over: Over) -> Floats:
         """Angles of low energy, in rounds that begin at x."""
         energy, slope, along = self.at(x)
-        past: deque[_Round] = deque(maxlen=_PAST)
         for _ in range(_ROUNDS):
-            present = _Round(x, slope, self._step(along, slope, solver))
-            moved = present.accelerate(past)
+            moved = x - self._step(along, slope, solver)
             there = self.at(moved)
-            if past and there[0] >= energy:
-                past.clear()
-                moved = present.accelerate(past)
-                there = self.at(moved)
             fallen = energy - there[0]
             if fallen > 0:
-                past.append(present)
                 x, (energy, slope, along) = moved, there
             if fallen <= _FALL * energy or over():
                 break
