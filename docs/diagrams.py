@@ -152,7 +152,7 @@ def singular(figure: Figure) -> None:
         row, column = np.indices((2, 2)).reshape(2, -1)
         at = np.arctan2(0.5 - row, column - 0.5)
         alpha = (0.35 + turn * at) % HALF
-        instance = Instance(
+        instance = Instance.on_pixels(
             "block", np.ones((2, 2), bool), np.array([[0, 0]]), np.array([0.0]), np.ones(1), gauge="box"
         )
         p = best_jumps(instance, alpha, np.zeros(4))

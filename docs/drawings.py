@@ -125,7 +125,7 @@ def tiny_instances() -> Iterator[Instance]:
         rng = np.random.default_rng(seed)
         pixels = np.argwhere(rng.random((5, 5)) < 0.5)
         theta = rng.uniform(0, np.pi, len(pixels))
-        yield Instance(f"random_{seed}", np.ones((5, 5), bool), pixels, theta, np.ones(len(pixels)))
+        yield Instance.on_pixels(f"random_{seed}", np.ones((5, 5), bool), pixels, theta, np.ones(len(pixels)))
 
 
 def optimum(

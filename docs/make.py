@@ -104,7 +104,7 @@ def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes"
     random = np.random.default_rng(seed)
     mask = np.ones((height, width), dtype=bool)
     pixels = np.argwhere(random.random(mask.shape) < 0.4)
-    return Instance(
+    return Instance.on_pixels(
         f"random_{seed}",
         mask,
         pixels,
@@ -171,7 +171,7 @@ def write_errata() -> None:
                     " / ".join(solution.message.split(": ")[1].split()[0] for solution in both),
                 ]
             )
-    single = Instance(
+    single = Instance.on_pixels(
         "single", np.ones((1, 1), bool), np.array([[0, 0]]), np.array([2 * np.pi / 3]), np.ones(1)
     )
     angles = []

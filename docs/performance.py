@@ -58,7 +58,7 @@ def square(size: int) -> Instance:
     pixels = np.argwhere((7 * row + 3 * column) % 5 == 0)
     theta = (2 * np.arctan2(pixels[:, 0] + 0.5, pixels[:, 1] + 0.5) + 1e-3 * pixels[:, 0]) % np.pi
     w = 0.1 + 0.9 * ((13 * pixels[:, 0] + 7 * pixels[:, 1]) % 101) / 101
-    return Instance("square", np.ones((size, size), dtype=bool), pixels, theta, w)
+    return Instance.on_pixels("square", np.ones((size, size), dtype=bool), pixels, theta, w)
 
 
 def problem_of(instance: Instance, name: str) -> Problem:

@@ -9,7 +9,8 @@ import matplotlib as mpl
 import numpy as np
 from crossfield.export.pictures.draw import fixed_settings
 from crossfield.models.instance.angles import HALF
-from crossfield.models.instance.grid import Bools, Floats, Grid
+from crossfield.models.instance.domain import Bools, Floats
+from crossfield.models.instance.grid import Grid
 from crossfield.models.proof.lattice import block_starts, checkerboard_offsets
 from crossfield.models.proof.record import LevelRecord, Proof
 from diagrams import STYLE, U, V

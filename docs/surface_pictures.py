@@ -18,7 +18,7 @@ from crossfield.export.pictures.underlay import read_underlay
 from crossfield.export.shading.colours import colour_normals, matcap, shade_by_light, to_eight_bit
 from crossfield.export.shading.raster import raster
 from crossfield.export.surfaces.files import draw_strokes, lay_over
-from crossfield.models.instance.grid import Floats
+from crossfield.models.instance.domain import Floats
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.surface import Surface
 from matplotlib.figure import Figure

@@ -44,7 +44,7 @@ def instance_of(gauge: Gauge) -> Instance:
     rng = np.random.default_rng(SEED)
     mask = np.ones(SHAPE, dtype=bool)
     pixels = np.argwhere(mask)[np.sort(rng.permutation(mask.size)[:STROKES])]
-    return Instance(
+    return Instance.on_pixels(
         "small",
         mask,
         pixels,

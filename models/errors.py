@@ -76,6 +76,14 @@ class InstanceError(CrossfieldError):
     """An instance or an instance file that breaks the rules of its format."""
 
 
+class MeshError(InstanceError):
+    """A mesh that is no oriented manifold of triangles."""
+
+
+class DomainError(InstanceError):
+    """A command for pixels with an instance on a mesh, or the reverse."""
+
+
 class NoStrokeError(InputError, InstanceError):
     """A sketch without pixels or strokes: its mask misses them, or the grid is too coarse."""
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.grid import Floats, Ints
+from crossfield.models.instance.domain import Floats, Ints
 from crossfield.models.instance.instance import Instance
 
 SHORTEST: Final = 3  # fewest stroke pixels of a curve that is hidden
@@ -33,8 +33,8 @@ class HiddenCurve:
         shown = np.ones(len(self.instance.theta), dtype=bool)
         shown[self.stroke] = False
         instance = self.instance
-        pixels, theta, w = instance.stroke_pixels[shown], instance.theta[shown], instance.w[shown]
-        return replace(instance, stroke_pixels=pixels, theta=theta, w=w)
+        index, theta, w = instance.stroke_index[shown], instance.theta[shown], instance.w[shown]
+        return replace(instance, stroke_index=index, theta=theta, w=w)
 
     def deviation(self, field: CrossField) -> float:
         """The mean angle, in [0, pi/2] radians, from the curve to the nearer line of a field on its grid."""

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from crossfield.models.errors import InputError, naming
 from crossfield.models.instance.angles import arctangent, line_difference
-from crossfield.models.instance.grid import Ints
+from crossfield.models.instance.domain import Ints
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.cover import LEAST_WEIGHT, Frame, Indices, curve_pixels
 from crossfield.models.sketch.curves import Curves

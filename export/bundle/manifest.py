@@ -13,8 +13,8 @@ from ...models.arguments import check_arguments
 from ...models.errors import CrossfieldError, FormulationError, InstanceError
 from ...models.formulations.problem import Problem, formulate, with_products_lifted, with_windows
 from ...models.formulations.windows import Windows
+from ...models.instance.domain import Ints
 from ...models.instance.file import read_document, read_instance, write_instance
-from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
 from ..formats.registry import Written, program_version
@@ -88,7 +88,7 @@ class Manifest:
     def _jumps(self, instance: Instance) -> Ints | None:
         if self.document["jumps"] is None:
             return None
-        jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
+        jumps = np.zeros(len(instance.domain.first), dtype=np.int32)
         listed = np.array(self.document["jumps"], dtype=np.int64).reshape(-1, 2)
         if (listed[:, 0] >= len(jumps)).any():
             raise InstanceError(
@@ -169,7 +169,7 @@ def file_stem(problem: Problem) -> str:
 
 def instance_file(instance: Instance) -> str:
     """The name of the instance's file beside a manifest."""
-    return f"{instance.name}.instance.{'npz' if instance.grid.size > LARGE else 'json'}"
+    return f"{instance.name}.instance.{'npz' if instance.domain.size > LARGE else 'json'}"
 
 
 def narrow_windows(problem: Problem, windows: Windows | None) -> Problem:
@@ -209,9 +209,9 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
             "binary": sum(block.count for block in form.blocks("binary")),
             "integer": sum(block.count for block in form.blocks("integer")),
             "rows": problem.n_rows,
-            "pixels": instance.grid.size,
-            "pairs": len(instance.grid.first),
-            "stroke_pixels": len(instance.theta),
+            f"{instance.domain.kind}s": instance.domain.size,
+            "pairs": len(instance.domain.first),
+            f"stroke_{instance.domain.kind}s": len(instance.theta),
         },
         "columns": _column_blocks(problem),
         "rows": [

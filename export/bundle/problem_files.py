@@ -22,7 +22,7 @@ from ...models.formulations.catalogue import FORMULATIONS, declaration_of, decla
 from ...models.formulations.declaration import Declaration, Formulation, Options
 from ...models.formulations.problem import Problem, formulate
 from ...models.formulations.windows import Windows
-from ...models.instance.grid import Ints
+from ...models.instance.domain import Ints
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Progress, silent
 from ...models.storage import make_folder
@@ -153,7 +153,7 @@ def write_all(
     _check_formats(
         formats,
         dialects or {},
-        [declare(declaration.name, **chosen(declaration)) for declaration in declarations],
+        [declare(declaration.name, instance, **chosen(declaration)) for declaration in declarations],
     )
     folder, manifests = make_folder(folder), []
     for declaration in declarations:
@@ -166,7 +166,9 @@ def write_all(
             _write_problem_files(problem, folder, formats, start, dialects or {}, compress=compress)
         )
         del problem
-        if instance.grid.size > LARGE:  # a problem is in a cycle with its families, and the collector counts
+        if (
+            instance.domain.size > LARGE
+        ):  # a problem is in a cycle with its families, and the collector counts
             gc.collect()  # objects, not their bytes
     return manifests
 

@@ -26,7 +26,7 @@ import numpy as np
 from ...models.errors import InputError, UnsupportedByFormatError, UnsupportedBySolverError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ..formats.registry import FORMATS, problem_in_format
 from ..solvers_table import SOLVERS, suitability
 from ..writing.canonical import CanonicalForm

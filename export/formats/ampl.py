@@ -20,6 +20,7 @@ ends with comments that print an answer with our names, as a readable solution f
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -28,11 +29,11 @@ from numpy.typing import NDArray
 
 from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.families import Block, PlacedFamily
-from ...models.formulations.names import name_length
+from ...models.formulations.names import number_width
 from ...models.formulations.problem import Problem
-from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet, Variable, pixel_of
-from ...models.instance.grid import Ints
+from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet, Variable, point_of
 from ...models.instance.instance import Instance
+from ...models.instance.mesh import Mesh
 from ...templates import stream
 from ..writing.canonical import CanonicalForm
 from ..writing.expressions import InfixLanguage, wrap_lines
@@ -51,19 +52,34 @@ from ..writing.records import (
 WIDTH: Final = 110
 """Approximate length of lines."""
 
-SECOND: Final = "r - north[h], c + east[h]"
-"""The pixel j of the pair (r,c,h)."""
 
-DOMAINS: Final[dict[IndexSet, str]] = {
-    "pixels": "{(r,c) in I}",
-    "strokes": "{(r,c) in S_c}",
-    "pairs": "{(r,c,h) in E}",
-}
-_INDEX: Final[dict[IndexSet, str]] = {
-    "pixels": "r,c",
-    "strokes": "r,c",
-    "pairs": "r,c,h",
-}
+@dataclass(frozen=True)
+class _Indices:
+    """Indices of a model: by index set its domain and its index, and the points i and j of a pair."""
+
+    domains: dict[IndexSet, str]
+    index: dict[IndexSet, str]
+    first: str
+    second: str
+
+
+_OF_PIXELS: Final = _Indices(
+    {"pixels": "{(r,c) in I}", "strokes": "{(r,c) in S_c}", "pairs": "{(r,c,h) in E}"},
+    {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,h"},
+    "r,c",
+    "r - north[h], c + east[h]",
+)
+_OF_FACES: Final = _Indices(
+    {"pixels": "{i in I}", "strokes": "{i in S_c}", "pairs": "{e in E}"},
+    {"pixels": "i", "strokes": "i", "pairs": "e"},
+    "first[e]",
+    "second[e]",
+)
+
+
+def _indices(instance: Instance) -> _Indices:
+    return _OF_FACES if isinstance(instance.domain, Mesh) else _OF_PIXELS
+
 
 SENSES: Final = {">=": b" >= ", "<=": b" <= ", "==": b" = "}
 
@@ -76,16 +92,22 @@ def generate(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
     """
     problem = form.problem
     _check_problem(problem)
+    instance, indices = problem.instance, _indices(problem.instance)
     context = {
         "header": header,
-        "sets": ["I", "S_c"] + ["E"] * bool(len(problem.instance.grid.first)),
-        "gauge": problem.instance.gauge,
-        "second": SECOND,
+        "sets": ["I", "S_c"] + ["E"] * bool(len(instance.domain.first)),
+        "mesh": isinstance(instance.domain, Mesh),
+        "weights": instance.pair_weights is not None,
+        "orthogonal": instance.orthogonal,
+        "gauge": instance.gauge,
+        "indices": indices,
+        "point": "i" if indices is _OF_FACES else "(r,c)",
+        "turn": " + kappa[e]" if indices is _OF_FACES else "",
         "windows": problem.windows is not None,
         "jumps": problem.jumps is not None and len(problem.jumps) > 0,
         "variables": [
-            _variable_text(problem.variable(block.name), block)
-            | {"label": _label(problem.instance, block), "index": _INDEX[block.over]}
+            _variable_text(problem.variable(block.name), block, indices)
+            | {"label": _label(instance, block), "index": indices.index[block.over]}
             for block in problem.blocks.values()
             if block.count
         ],
@@ -101,13 +123,15 @@ def generate_data(problem: Problem, header: list[str]) -> Iterator[bytes]:
     for line in header:
         yield f"# {line}\n".encode()
     yield b"data;\nset I :=\n"
-    rows, columns = _pixel_coordinates(instance, "pixels")
-    yield from render([b"(", Decimals(rows), b",", Decimals(columns), b")\n"], len(rows))
+    yield from _points(instance)
     yield b";\nparam: S_c: theta w :=\n"
     yield from _element_lines(instance, "strokes", [words(instance.target), b" ", words(instance.w)])
-    weights = {"w_strokes": instance.stroke_coefficient, "w_beta": instance.skew_coefficient}
+    weights = {"w_strokes": instance.stroke_coefficient}
+    if not instance.orthogonal:
+        weights["w_beta"] = instance.skew_coefficient
     lines = "\n".join(f"param {name} := {number_text(value)};" for name, value in weights.items())
     yield b";\n" + lines.encode() + b"\n"
+    yield from _pairs_of_faces(instance)
     if problem.jumps is not None and len(problem.jumps):
         at = np.nonzero(problem.jumps)[0]
         yield b"param p :=\n"
@@ -127,17 +151,41 @@ def _windows(problem: Problem) -> Iterator[bytes]:
         yield b";\n"
 
 
-def _pixel_coordinates(instance: Instance, over: IndexSet) -> tuple[Ints, Ints]:
-    """Row and column of the pixel of each element."""
-    at = pixel_of(instance, over)
-    return instance.grid.rows[at], instance.grid.columns[at]
+def _points(instance: Instance) -> Iterator[bytes]:
+    """The members of the set I."""
+    places = instance.domain.places(np.arange(instance.domain.size, dtype=np.int32))
+    if places.ndim == 1:
+        yield from render([Decimals(places), b"\n"], len(places))
+    else:
+        rows, columns = places.T
+        yield from render([b"(", Decimals(rows), b",", Decimals(columns), b")\n"], len(rows))
+
+
+def _pairs_of_faces(instance: Instance) -> Iterator[bytes]:
+    """The pairs of a mesh, by number: both faces, kappa, and weights if there are any."""
+    domain = instance.domain
+    if not isinstance(domain, Mesh) or not len(domain.first):
+        return
+    weights = instance.pair_weights
+    yield b"param: E: first second kappa%b :=\n" % (b"" if weights is None else b" omega")
+    parts: list[Piece] = [Decimals(domain.first), b" ", Decimals(domain.second), b" ", words(domain.kappa)]
+    if weights is not None:
+        check_coefficients(weights, f"pair_weights of {instance.name}")
+        parts += [b" ", words(weights)]
+    yield from _element_lines(instance, "pairs", parts)
+    yield b";\n"
 
 
 def _element_lines(
     instance: Instance, over: IndexSet, values: Pieces, at: NDArray[Any] | None = None
 ) -> Iterator[bytes]:
     """One element per line, its index and values: `1 2 u 0.3`; only the elements `at`, if given."""
-    rows, columns = _pixel_coordinates(instance, over)
+    if isinstance(instance.domain, Mesh):
+        numbers = np.arange(len(instance.domain.first)) if over == "pairs" else point_of(instance, over)
+        numbers = numbers if at is None else numbers[at]
+        yield from render([Decimals(numbers), b" ", *values, b"\n"], len(numbers))
+        return
+    rows, columns = instance.grid.places(point_of(instance, over)).T
     sides = instance.grid.upward.view(np.uint8)
     if at is not None:
         rows, columns, sides = rows[at], columns[at], sides[at]
@@ -145,8 +193,8 @@ def _element_lines(
     yield from render([Decimals(rows), b" ", Decimals(columns), *side, b" ", *values, b"\n"], len(rows))
 
 
-def _variable_text(variable: Variable, block: Block) -> dict[str, str]:
-    language = _AmplExpressions(block.over)
+def _variable_text(variable: Variable, block: Block, indices: _Indices) -> dict[str, str]:
+    language = _AmplExpressions(block.over, indices)
     attributes = ["integer"] * block.integer
     attributes += [
         f"{sign} {language.bound(end)}"
@@ -155,7 +203,7 @@ def _variable_text(variable: Variable, block: Block) -> dict[str, str]:
     ]
     return {
         "name": block.name,
-        "domain": DOMAINS[block.over],
+        "domain": indices.domains[block.over],
         "attributes": " " * bool(attributes) + ", ".join(attributes),
         "meaning": variable.meaning,
     }
@@ -163,44 +211,53 @@ def _variable_text(variable: Variable, block: Block) -> dict[str, str]:
 
 def _label(instance: Instance, block: Block) -> str:
     """Print format of a block's names: `alpha_%02d_%02d`."""
-    digits = name_length(instance, "", "pixels") // 2 - 1
-    return f"{block.name}_%0{digits}d_%0{digits}d" + "_%s" * (block.over == "pairs")
+    number = f"_%0{number_width(instance, block.over)}d"
+    if isinstance(instance.domain, Mesh):
+        return block.name + number
+    return block.name + 2 * number + "_%s" * (block.over == "pairs")
 
 
 def _family_text(family: PlacedFamily) -> dict[str, str]:
     """A family as the template prints it: its tag, its place in the paper, its set, and its text."""
-    declared = family.family
-    words = _AmplExpressions(declared.over)
+    declared, indices = family.family, _indices(family.instance)
+    words = _AmplExpressions(declared.over, indices)
     if declared.is_row:
         left, right = (words.expression(side) for side in (declared.expression.lhs, declared.expression.rhs))
         pieces = [*left, SENSES[declared.sense], *right]
     else:
         pieces = wrap_lines(words.summands(declared.expression), WIDTH, b"  ")
     paper = f"section {declared.paper}" if declared.paper[0].isdigit() else declared.paper
-    return {"tag": declared.tag, "paper": paper, "text": _literal_text(pieces), "domain": _domain(family)}
+    return {
+        "tag": declared.tag,
+        "paper": paper,
+        "text": _literal_text(pieces),
+        "domain": _domain(family, indices),
+    }
 
 
-def _domain(family: PlacedFamily) -> str:
+def _domain(family: PlacedFamily, indices: _Indices) -> str:
     """The set of a family, with a condition for rows that are needed only for one parity of a bound."""
     over, only = family.family.over, family.family.only
     if only is None:
-        return DOMAINS[over]
-    return f"{DOMAINS[over][:-1]}: abs({only[0]}[{_INDEX[over]}]) mod 2 = {only[1]}}}"
+        return indices.domains[over]
+    return f"{indices.domains[over][:-1]}: abs({only[0]}[{indices.index[over]}]) mod 2 = {only[1]}}}"
 
 
 class _AmplExpressions(InfixLanguage):
     """The language of AMPL over an index set: names with indices, constants in mathematical notation."""
 
-    def __init__(self, over: IndexSet) -> None:
-        """Store the index set."""
+    def __init__(self, over: IndexSet, indices: _Indices) -> None:
+        """Store the index set and the indices of the model."""
         self._over = over
+        self._indices = indices
 
     def symbol(self, symbol: sp.Symbol) -> Piece:
         """A symbol's name and index; scalars have none."""
         if symbol in SCALARS:
             return str(symbol.name).encode()
         name, kind = SLOTS[self._over][symbol]
-        index = {"second": SECOND, "first": _INDEX["pixels"]}.get(kind, _INDEX[self._over])
+        ends = {"first": self._indices.first, "second": self._indices.second}
+        index = ends.get(kind, self._indices.index[self._over])
         return f"{name}[{index}]".encode()
 
     def is_data(self, expression: sp.Expr) -> bool:
@@ -231,8 +288,9 @@ def _narrowed_bounds(problem: Problem) -> dict[IndexSet, tuple[str, ...]]:
     """Names of the data that are bounds where a proof has narrowed them, by index set; otherwise empty."""
     if problem.windows is None:
         return {}
-    names: dict[IndexSet, tuple[str, ...]] = {"pixels": ("alpha_lo", "alpha_up", "beta_lo", "beta_up")}
-    has_jumps = problem.jumps is None and len(problem.instance.grid.first) > 0
+    skew = () if problem.instance.orthogonal else ("beta_lo", "beta_up")
+    names: dict[IndexSet, tuple[str, ...]] = {"pixels": ("alpha_lo", "alpha_up", *skew)}
+    has_jumps = problem.jumps is None and len(problem.instance.domain.first) > 0
     return names | ({"pairs": ("p_min", "p_max")} if has_jumps else {})
 
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ..writing.canonical import CanonicalForm, ColumnKind, coefficient
 from ..writing.expressions import InfixLanguage, wrap_lines
 from ..writing.names import Names

@@ -32,7 +32,7 @@ import sympy as sp
 
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ...templates import stream
 from ..writing.canonical import CanonicalForm
 from ..writing.expressions import InfixLanguage, is_free_of_columns, wrap_lines

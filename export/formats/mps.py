@@ -25,7 +25,9 @@ import numpy as np
 from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SLOTS
-from ...models.instance.grid import Grid, Ints
+from ...models.instance.domain import Ints
+from ...models.instance.instance import Instance
+from ...models.instance.mesh import Mesh
 from ..writing.canonical import BlockBounds, CanonicalForm, coefficient
 from ..writing.names import Names, problem_name
 from ..writing.records import (
@@ -108,9 +110,7 @@ def _entries(
 def _incident_rows(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | None, Monomial]]:
     """Rows of a family that contain a column of the term's block: (rank, row of each column or -1, term).
 
-    None where row and column have the same number. Pairs are numbered by their first pixel, the upper before
-    the right one, so the rows of a pixel are those of its pairs to the left, upwards, to the right and
-    downwards, in this order.
+    None where row and column have the same number.
     """
     instance, kind = family.instance, SLOTS[family.family.over][term.symbols[0]][1]
     if kind == "itself":
@@ -122,9 +122,9 @@ def _incident_rows(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints
         return [(0, row, term)]
     assert family.covers_index_set  # families on a part of the pairs have terms of only those pairs
     if kind == "stroke":
-        return [(0, _inverse_index(instance.stroke_index, instance.grid.size), term)]
-    left, upper, right, lower = _pairs_of_pixels(instance.grid)
-    return [(1, upper, term), (2, right, term)] if kind == "first" else [(0, left, term), (3, lower, term)]
+        return [(0, _inverse_index(instance.stroke_index, instance.domain.size), term)]
+    of_points = _pairs_of_faces if isinstance(instance.domain, Mesh) else _pairs_of_pixels
+    return [(rank, row, term) for rank, end, row in of_points(instance) if end == kind]
 
 
 def _inverse_index(index: Ints, count: int) -> Ints:
@@ -134,12 +134,36 @@ def _inverse_index(index: Ints, count: int) -> Ints:
     return place
 
 
-def _pairs_of_pixels(grid: Grid) -> tuple[Ints, Ints, Ints, Ints]:
-    """Number of the pair of each pixel with its left, upper, right and lower neighbour; -1: none."""
+def _pairs_of_pixels(instance: Instance) -> list[tuple[int, str, Ints]]:
+    """(rank, end, pair of each pixel or -1): its pairs in ascending order, and which end it is.
+
+    Pairs are numbered by their first pixel, the upper before the right one, so the pairs of a pixel are those
+    to the left, upwards, to the right and downwards, in this order.
+    """
+    grid = instance.grid
     upper, right = grid.pair_number
     left, lower = np.full_like(right, -1), np.full_like(upper, -1)
     left[:, 1:], lower[:-1] = right[:, :-1], upper[1:]
-    return left[grid.mask], upper[grid.mask], right[grid.mask], lower[grid.mask]
+    ends = (("second", left), ("first", upper), ("first", right), ("second", lower))
+    return [(rank, end, table[grid.mask]) for rank, (end, table) in enumerate(ends)]
+
+
+def _pairs_of_faces(instance: Instance) -> list[tuple[int, str, Ints]]:
+    """(rank, end, pair of each face or -1): its pairs in ascending order, and which end it is."""
+    domain = instance.domain
+    point, pair = np.concatenate([domain.first, domain.second]), np.arange(len(domain.first), dtype=np.int32)
+    pair = np.concatenate([pair, pair])
+    order = np.lexsort((pair, point))
+    point, pair, is_first = point[order], pair[order], order < len(domain.first)
+    rank = np.arange(len(point)) - np.searchsorted(point, point)
+    tables = []
+    for place in range(int(rank.max(initial=-1)) + 1):
+        for end, here in (("first", is_first), ("second", ~is_first)):
+            row = np.full(domain.size, -1, dtype=np.int32)
+            chosen = (rank == place) & here
+            row[point[chosen]] = pair[chosen]
+            tables.append((place, end, row))
+    return tables
 
 
 def _integrality_runs(problem: Problem) -> list[tuple[bool, list[Block]]]:

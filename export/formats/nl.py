@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.names import name_length
-from ...models.instance.grid import Floats, Ints
+from ...models.instance.domain import Floats, Ints
 from ..writing.canonical import BOUND_KINDS, CanonicalForm, coefficient
 from ..writing.expressions import Operator, PrefixLanguage
 from ..writing.names import OBJECTIVE

@@ -30,7 +30,7 @@ import sympy as sp
 
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Floats, Ints
+from ...models.instance.domain import Floats, Ints
 from ..writing.canonical import CanonicalForm, coefficient
 from ..writing.expressions import Operator, PrefixLanguage
 from ..writing.names import OBJECTIVE, Names

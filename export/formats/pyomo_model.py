@@ -21,9 +21,10 @@ from ...models.arguments import check_arguments
 from ...models.field.field import CrossField
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.problem import Problem
-from ...models.formulations.symbols import IndexSet, pixel_of
-from ...models.instance.grid import Floats
+from ...models.formulations.symbols import IndexSet, count_elements, point_of
+from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
+from ...models.instance.mesh import Mesh
 from ..writing.canonical import CanonicalForm
 
 ElementIndex = tuple[Any, ...]
@@ -79,9 +80,16 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
 
 
 def element_indices(instance: Instance, over: IndexSet) -> list[ElementIndex]:
-    """Positions of an index set's elements: (row, column), for a pair of its first pixel, and its side."""
+    """Positions of an index set's elements: (row, column), for a pair of its first pixel, and its side.
+
+    On a mesh they are numbers of faces or of pairs.
+    """
+    if isinstance(instance.domain, Mesh):
+        points = over != "pairs"
+        numbers = point_of(instance, over) if points else np.arange(count_elements(instance, over))
+        return list(zip(numbers.tolist(), strict=True))
     grid = instance.grid
-    at = pixel_of(instance, over)
+    at = point_of(instance, over)
     coordinates = [grid.rows[at].tolist(), grid.columns[at].tolist()]
     if over == "pairs":
         coordinates.append(np.where(grid.upward, "u", "r").tolist())
@@ -103,7 +111,12 @@ def _variables(block: Block, index: list[ElementIndex], domain: Any, point: Floa
     )
     bounds = dict(zip(index, zip(*ends, strict=True), strict=True))
     values = {} if point is None else dict(zip(index, point[block.slice].tolist(), strict=True))
-    return pyo.Var(index, domain=domain, bounds=lambda _, *place: bounds[place], initialize=values)
+    return pyo.Var(
+        index,
+        domain=domain,
+        bounds=lambda _, *place: bounds[place],
+        initialize=None if point is None else lambda _, *place: values[place],
+    )
 
 
 def _constraints(family: PlacedFamily, columns: list[Any]) -> pyo.Constraint:

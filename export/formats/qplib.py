@@ -34,7 +34,7 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.formulations.families import PlacedFamily
-from ...models.instance.grid import Floats, Ints
+from ...models.instance.domain import Floats, Ints
 from ..writing.canonical import CanonicalForm, coefficient
 from ..writing.curvature import probtype
 from ..writing.records import Decimals, Piece, number_text, render, words

@@ -20,7 +20,7 @@ from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.families import ANY_DEGREE
 from ...models.formulations.problem import Problem, with_products_lifted
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ..writing.canonical import CanonicalForm
 from ..writing.sink import is_packed, pending_file
 

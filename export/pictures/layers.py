@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ...models.field.field import CrossField
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.cover import Box
 from ...models.sketch.curves import lines_as_cubics

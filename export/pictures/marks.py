@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from ...models.field.field import CrossField
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.domain import Bools, Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.cover import Box
 from .streamlines import Streamline, align_labels, streamlines

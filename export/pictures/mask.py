@@ -9,7 +9,7 @@ import numpy as np
 from ...models.arguments import check_arguments
 from ...models.errors import InputError
 from ...models.input_limits import MAX_PIXELS, MAX_SIDE
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.domain import Bools, Floats
 from ...models.instance.instance import Instance
 from ...models.storage import replacing
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.field.field import CrossField
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
 from ..shading.colours import shade_by_light

@@ -21,7 +21,7 @@ from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.field.jumps import step_labels
 from ...models.instance.angles import double_angle
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.domain import Bools, Floats
 
 Positions = NDArray[np.complex128]
 Labels = NDArray[np.int64]

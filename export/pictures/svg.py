@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from .marks import Area, Dots, Layer, Lines, Mark, Sheet
 from .underlay import Underlay, ink_colours, size_in_units
 

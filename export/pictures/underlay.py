@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ...models.errors import InputError, naming
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.domain import Bools, Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.bitmap import Bitmap
 from ...models.sketch.cover import Box, Frame, curve_pixels

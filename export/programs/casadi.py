@@ -19,7 +19,7 @@ import numpy as np
 with warnings.catch_warnings(action="ignore"):  # its import warns on newer Pythons
     import casadi as ca
 
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.domain import Bools, Floats
 from ...models.processes.child_program import is_stopped, on_stop
 from ..solutions.readers.ampl import write_ampl_sol
 from ..statuses import CASADI

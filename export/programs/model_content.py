@@ -13,7 +13,7 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from ...models.instance.grid import Bools, Floats, Ints
+from ...models.instance.domain import Bools, Floats, Ints
 from ..writing.terms import Terms, merged_terms
 
 _INFINITY: Final = 1e20

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...models.arguments import check_fields
 from ...models.errors import InputError
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from .raster import Raster, choose_scale, raster
 

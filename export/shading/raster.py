@@ -14,7 +14,7 @@ import numpy as np
 
 from ...models.errors import InputError
 from ...models.input_limits import MAX_PIXELS
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.domain import Bools, Floats
 from ...models.instance.instance import Instance
 
 SIDE: Final = 1000  # pixels, about, of a picture's longer side unless a scale is given

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from ...models.errors import SolutionError
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ..writing.canonical import CanonicalForm
 from .readers.text import NamedValues, RawSolution, unknown_names
 

@@ -19,7 +19,7 @@ from ...models.arguments import check_arguments
 from ...models.errors import SolutionError, UnsupportedByFormatError, naming
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, with_products_lifted
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ...models.previews import table_of
 from ..formats.registry import FORMATS, problem_in_format
 from ..statuses import Status, is_gap_closed

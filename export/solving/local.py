@@ -28,7 +28,7 @@ from ...models.errors import (
 )
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ...models.processes.child import Child, KilledError
 from ...models.processes.child_program import WorkerError
 from ...models.processes.deadline import Deadline, Stop, stop_function

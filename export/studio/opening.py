@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ...models.errors import InputError
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.domain import Bools, Floats
 from ...models.sketch.bitmap import Bitmap
 from ...models.sketch.cover import Box, block_means
 from ...models.sketch.curves import Curves, flatten, run_numbers

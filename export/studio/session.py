@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
-from ...models.instance.grid import Bools, Floats, Ints
+from ...models.instance.domain import Bools, Floats, Ints
 from ...models.instance.instance import SKEW_WEIGHT, Instance
 from ...models.processes.child_program import is_stopped
 from ...models.sketch.cover import LEAST_WEIGHT, Frame, curve_pixels, fit_frame

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...models.arguments import check_arguments
 from ...models.field.rawfield import vertices_of
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import make_folder, write_bytes
 from ...models.surface.surface import Surface

@@ -10,7 +10,7 @@ import numpy as np
 from ...models.formulations.arrays import row_terms
 from ...models.formulations.names import column_names, row_names
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.domain import Bools, Floats
 from ..programs.model_content import Algebra, Behaviour, Points, positions_of
 from ..writing.canonical import CanonicalForm
 from ..writing.terms import merged_terms

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...models.formulations.families import Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 
 _CHOSEN: Final = frozenset({"alpha", "beta", "p", "p1", "p2"})
 """Blocks of columns that determine the field of a point."""

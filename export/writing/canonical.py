@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...models.formulations.families import Block, Coefficient, Monomial, row_sides
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Bools, Floats, Ints
+from ...models.instance.domain import Bools, Floats, Ints
 from .names import Names
 from .nl_order import NlOrder
 from .records import TaggedWords, Texts, check_coefficients, texts_of_bytes
@@ -170,11 +170,11 @@ def _glpk_column_order(problem: Problem) -> Ints:
     for the skew all pixels. `glpsol -m x.mod -d x.dat --wglp` names the columns that it numbers.
     """
     instance = problem.instance
-    grid = instance.grid
-    named = np.concatenate([np.stack([grid.second, grid.first], axis=1).ravel(), instance.stroke_index])
+    domain = instance.domain
+    named = np.concatenate([np.stack([domain.second, domain.first], axis=1).ravel(), instance.stroke_index])
     orders = {
         "alpha": _first_occurrences(named),
-        "beta": _first_occurrences(np.concatenate([named, np.arange(grid.size)])),
+        "beta": _first_occurrences(np.concatenate([named, np.arange(domain.size)])),
     }
     return np.concatenate(
         [

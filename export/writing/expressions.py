@@ -16,7 +16,7 @@ import sympy as sp
 
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.symbols import SCALARS, VARIABLES
-from ...models.instance.grid import Floats
+from ...models.instance.domain import Floats
 from .records import Piece, Pieces
 
 

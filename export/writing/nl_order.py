@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Bools, Ints
+from ...models.instance.domain import Bools, Ints
 from .names import OBJECTIVE, Names
 from .records import render
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.names import Bytes, digits
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.domain import Bools, Floats
 
 Cells = NDArray[Any]
 """Words of equal length, one item each."""

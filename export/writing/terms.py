@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...models.instance.grid import Floats, Ints
+from ...models.instance.domain import Floats, Ints
 
 
 class Terms(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import check_fields, float_array
 from ..errors import InputError, InstanceError
 from ..instance.angles import HALF, MOST_ANGLE, QUARTER, line_difference
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance, whole_numbers
 from ..instance.terms import parity_sign
 from ..previews import Pictured
@@ -74,14 +74,36 @@ class Shape:
 
 @dataclass(frozen=True)
 class Singularities:
-    """Quads of 2 x 2 pixels around which the crosses turn.
+    """Rings around which the crosses turn.
 
-    row, column: of the upper left pixel, (k,). index: turns of the cross on a counter-clockwise walk, (k,).
+    instance: on whose domain. ring: number of each, (k,). index: turns of the cross on a counter-clockwise
+    walk, (k,), multiples of 1/4; on a closed mesh they add up to the Euler characteristic.
     """
 
-    row: Ints
-    column: Ints
+    instance: Instance
+    ring: Ints
     index: Floats
+
+    @property
+    def row(self) -> Ints:
+        """Row of the upper left of the four pixels of each ring of a grid, (k,)."""
+        return self.instance.grid.rows[self._corner] - 1
+
+    @property
+    def column(self) -> Ints:
+        """Column of the upper left of the four pixels of each ring of a grid, (k,)."""
+        return self.instance.grid.columns[self._corner]
+
+    @property
+    def vertex(self) -> Ints:
+        """Vertex inside each ring of a mesh, (k,)."""
+        return self.instance.mesh.ring_vertices[self.ring]
+
+    @property
+    def _corner(self) -> Ints:
+        """The lower left pixel of each ring of a grid, where its first pair begins."""
+        grid = self.instance.grid
+        return np.asarray(grid.first[grid.quads[self.ring, 0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +119,7 @@ class CrossField(Pictured):
     instance
         The instance.
     alpha, beta
-        Direction and skew of each cross, shape (n,), in the order of `instance.grid`.
+        Direction and skew of each cross, shape (n,), in the order of `instance.domain`.
     p
         Jump of each pair, integers of shape (m,).
 
@@ -116,21 +138,25 @@ class CrossField(Pictured):
     def __post_init__(self) -> None:
         """Store read-only copies, and check shapes and values."""
         check_fields(self, InstanceError)
-        grid = self.instance.grid
+        domain = self.instance.domain
         values_by_name: dict[str, np.ndarray[Any, Any]] = {
             "alpha": float_array(self.alpha, "alpha", InstanceError),
             "beta": float_array(self.beta, "beta", InstanceError),
             "p": whole_numbers(self.p, "p"),
         }
         for (name, value), size in zip(
-            values_by_name.items(), (grid.size, grid.size, len(grid.first)), strict=True
+            values_by_name.items(), (domain.size, domain.size, len(domain.first)), strict=True
         ):
             if value.shape != (size,):
                 raise InstanceError(
-                    f"{name} has shape {value.shape}, but the grid of {self.instance.name} needs ({size},)"
+                    f"{name} has shape {value.shape}, but {self.instance.name} needs ({size},)"
                 )
             if not np.isfinite(value).all():
                 raise InstanceError(f"{name} holds a value that is not finite")
+            if name == "beta" and self.instance.orthogonal and value.any():
+                raise InstanceError(
+                    f"beta is not 0 everywhere, but crosses on {self.instance.name} are orthogonal"
+                )
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
@@ -146,14 +172,14 @@ class CrossField(Pictured):
         label is the one in the window of the instance's gauge. Under `strokes` its u is the line nearer to
         the stroke. Under `box` it may be the other line, whose distance the energy then counts
         (docs/mathematics.md, 4). Crosses stay as they are; both lines may coincide, where
-        abs(beta) = pi/4.
+        abs(beta) = pi/4. Where crosses are orthogonal, beta becomes 0.
 
         Parameters
         ----------
         instance
             The instance.
         u_angle, v_angle
-            Angles of the two lines, shape (n,), the pixels in the order of `instance.grid`. Radians
+            Angles of the two lines, shape (n,), the points in the order of `instance.domain`. Radians
             counter-clockwise from +x, with y up.
 
         Returns
@@ -173,6 +199,8 @@ class CrossField(Pictured):
         steps = _steps_into_windows(instance, alpha, beta, inside=True)
         alpha = np.clip(alpha + HALF * steps, instance.alpha_lower, instance.alpha_upper)
         beta = np.clip(parity_sign(steps) * beta, -QUARTER, QUARTER)
+        if instance.orthogonal:
+            beta = np.zeros_like(beta)
         return cls(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
     def check_instance(self, instance: Instance) -> None:
@@ -205,7 +233,7 @@ class CrossField(Pictured):
 
     @property
     def residual_a(self) -> Floats:
-        """A = alpha_i - alpha_j + pi/2 p of each pair, shape (m,)."""
+        """A = alpha_i - alpha_j + kappa + pi/2 p of each pair, shape (m,)."""
         return self.instance.pair_terms.residual_a(self.alpha, self.p)
 
     @property
@@ -227,11 +255,14 @@ class CrossField(Pictured):
         norm.
         """
         check_norm(norm)
-        instance = self.instance
+        instance, weighted = self.instance, self.instance.pair_terms.weighted
         of_pairs = np.square if norm == 2 else np.abs
         size = np.abs if norm == 1 else np.square
         return Energy(
-            smooth=2 * float(np.sum(of_pairs(self.residual_a)) + np.sum(of_pairs(self.residual_b))),
+            smooth=2
+            * float(
+                np.sum(weighted(of_pairs(self.residual_a))) + np.sum(weighted(of_pairs(self.residual_b)))
+            ),
             strokes=instance.stroke_coefficient * float(np.sum(instance.w * size(self.residual_r))),
             beta=instance.skew_coefficient * float(np.sum(size(self.beta))),
         )
@@ -239,20 +270,19 @@ class CrossField(Pictured):
     @cached_property
     def pixel_energy(self) -> Floats:
         """Smooth 2-norm energy per pixel, each pair shared by its two pixels; shape (n,)."""
-        grid = self.instance.grid
-        share = self.residual_a**2 + self.residual_b**2
-        ends, halves = np.concatenate([grid.first, grid.second]), np.concatenate([share, share])
-        return np.bincount(ends, halves, grid.size).astype(np.float64)
+        domain = self.instance.domain
+        share = self.instance.pair_terms.weighted(self.residual_a**2 + self.residual_b**2)
+        ends, halves = np.concatenate([domain.first, domain.second]), np.concatenate([share, share])
+        return np.bincount(ends, halves, domain.size).astype(np.float64)
 
     @cached_property
     def singularities(self) -> Singularities:
-        """Quads of 2 x 2 pixels whose index, -(sum of p on a counter-clockwise walk)/4, is not zero."""
-        grid = self.instance.grid
-        bottom, side, top, left = grid.quads.T
-        turn = self.p[bottom] + self.p[side] - self.p[top] - self.p[left]
-        at = np.nonzero(turn)[0]
-        corner = grid.first[bottom[at]]
-        return Singularities(grid.rows[corner] - 1, grid.columns[corner], -turn[at] / 4)
+        """Rings whose index, (defect - sum of kappa + pi/2 p along the ring) / 2 pi, is not zero."""
+        rings = self.instance.domain.rings
+        turn = rings.defect - rings.sums(self.instance.pair_terms.offset(self.p))
+        quarters = np.round(turn / HALF)
+        at = np.nonzero(quarters)[0]
+        return Singularities(self.instance, at.astype(np.int32), quarters[at] / 4)
 
     @cached_property
     def degenerate(self) -> Bools:
@@ -322,7 +352,7 @@ class CrossField(Pictured):
             For the same angles as `from_lines`.
 
         """
-        size = self.instance.grid.size
+        size = self.instance.domain.size
         u, v = (
             _check_angles(self.instance, np.full(size, line) if np.size(line) == 1 else line, name)
             for name, line in (("u_angle", u_angle), ("v_angle", v_angle))
@@ -341,7 +371,7 @@ class CrossField(Pictured):
 
         Raises InputError for another shape.
         """
-        size = self.instance.grid.size
+        size = self.instance.domain.size
         if np.ndim(values) and np.shape(values) != (size,):
             raise InputError(f"values has shape {np.shape(values)}; give one value for each of {size} pixels")
         picture = np.full(self.instance.mask.shape, fill)
@@ -355,7 +385,7 @@ def field_in_windows(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -
     Each pair gets its best jump; without clipping the energy does not rise.
     """
     alpha, beta, p = step_labels(
-        instance.grid, alpha, beta, p, _steps_into_windows(instance, alpha, beta, inside=False)
+        instance.domain, alpha, beta, p, _steps_into_windows(instance, alpha, beta, inside=False)
     )
     clipped = CrossField(
         instance,
@@ -392,7 +422,7 @@ def _steps_into_windows(instance: Instance, alpha: Floats, beta: Floats, *, insi
 def _check_angles(instance: Instance, values: Any, name: str) -> Floats:
     """The angles (n,). Raises InputError."""
     angles = float_array(values, name)
-    size = instance.grid.size
+    size = instance.domain.size
     if angles.shape != (size,):
         raise InputError(
             f"{name} has shape {angles.shape}, but {instance.name} has {size} pixels; give an angle for each"

@@ -18,6 +18,7 @@ from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
 from ..errors import InputError, InstanceError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.angles import MOST_ANGLE
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.file import (
     are_places,
     check_schema,
@@ -31,7 +32,7 @@ from ..instance.file import (
     parse_head,
     parse_json,
 )
-from ..instance.grid import Bools, Floats, Grid, Ints
+from ..instance.grid import Grid
 from ..instance.instance import Instance
 from ..storage import read_bytes, write_bytes
 from .field import CrossField

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.terms import PairTerms
 from .field import CrossField
 from .jumps import free_jumps
@@ -30,21 +30,23 @@ def fuse_fields(one: CrossField, other: CrossField) -> CrossField:
     Both fields are on the same instance. Jumps are not limited to a range. Returns `one` if no cut finds a
     choice that is lower by 1e-6 of 1 + energy. Deterministic.
     """
-    grid, energy = one.instance.grid, one.energy().total
+    domain, energy = one.instance.domain, one.energy().total
     far = one.cross_error(other.u_angle, other.v_angle) > _APART
     if not far.any():
         return one
     fields = (one, other)
-    pairs = np.nonzero(far[grid.first] | far[grid.second])[0].astype(np.int32)
+    pairs = np.nonzero(far[domain.first] | far[domain.second])[0].astype(np.int32)
     terms = one.instance.pair_terms.select(pairs)
     same, mixed, mixed_too, exchanged = (
         _least_pair_costs(terms, first, second) for first in fields for second in fields
     )
-    inside = far[grid.first[pairs]] & far[grid.second[pairs]]
+    inside = far[domain.first[pairs]] & far[domain.second[pairs]]
     price = _pixel_costs(other) - _pixel_costs(one)
-    price += np.bincount(grid.first[pairs], mixed_too - same, grid.size)
-    price += np.bincount(grid.second[pairs], np.where(inside, exchanged - mixed_too, mixed - same), grid.size)
-    links = np.stack([grid.first[pairs[inside]], grid.second[pairs[inside]]])
+    price += np.bincount(domain.first[pairs], mixed_too - same, domain.size)
+    price += np.bincount(
+        domain.second[pairs], np.where(inside, exchanged - mixed_too, mixed - same), domain.size
+    )
+    links = np.stack([domain.first[pairs[inside]], domain.second[pairs[inside]]])
     excess = (mixed + mixed_too - same - exchanged)[inside]
     unit = (1 + energy) / _UNITS
     taken = _find_least_cut(far, np.rint(price / unit), links, np.rint(np.maximum(excess, 0) / unit))
@@ -57,7 +59,7 @@ def _pixel_costs(field: CrossField) -> Floats:
     """Contribution of each pixel to the energy without its neighbours, shape (n,)."""
     terms, instance = field.instance.stroke_terms, field.instance
     residual = terms.residuals(field.alpha, field.beta)
-    strokes = terms.at_pixels(terms.weight * residual * residual, instance.grid.size)
+    strokes = terms.at_points(terms.weight * residual * residual, instance.domain.size)
     skew: Floats = instance.skew_coefficient * field.beta * field.beta
     return strokes + skew
 

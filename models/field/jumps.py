@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..instance.angles import HALF, QUARTER, wrap
-from ..instance.grid import Floats, Grid, Ints
+from ..instance.domain import Domain, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import PairTerms, parity_sign
 
@@ -51,7 +51,9 @@ def _find_best_jumps(
     return candidates[at], cost[at]
 
 
-def step_labels(grid: Grid, alpha: Floats, beta: Floats, p: Ints, steps: Ints) -> tuple[Floats, Floats, Ints]:
+def step_labels(
+    domain: Domain, alpha: Floats, beta: Floats, p: Ints, steps: Ints
+) -> tuple[Floats, Floats, Ints]:
     """Angles (n,) and jumps (m,) of the crosses after `steps` (n,) of labels; residuals only change sign."""
-    jumps = p - steps[grid.first] + steps[grid.second]
+    jumps = p - steps[domain.first] + steps[domain.second]
     return alpha + HALF * steps, parity_sign(steps) * beta, jumps

@@ -19,7 +19,8 @@ import numpy as np
 from ..errors import InstanceError, shortened
 from ..input_limits import MAX_NUMBER
 from ..instance.angles import arctangent, double_angle, line_difference, line_of
-from ..instance.grid import Bools, Floats, Grid, Ints
+from ..instance.domain import Bools, Floats, Ints
+from ..instance.grid import Grid
 from ..instance.instance import Instance
 from .field import CrossField
 

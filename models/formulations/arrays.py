@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import SolverError, UnsupportedBySolverError
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from .families import ANY_DEGREE, PlacedFamily, merge_terms, row_sides
 from .names import Bytes
 

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any, Final
 
 import sympy as sp
 
 from ..field.field import Norm
+from ..instance.instance import Instance
 from .declaration import (
     FORMULATIONS,
     S_C,
@@ -31,14 +33,17 @@ from .declaration import (
 )
 from .symbols import (
     B_LIFTED,
+    OF_SKEW,
     A,
     B,
     R,
     beta,
     beta_i,
     beta_j,
+    constants_of,
     d,
     gamma,
+    omega,
     p,
     p1,
     p2,
@@ -63,9 +68,9 @@ AT_JUMPS: Final = "the 2-norm energy at given jumps"
 BY_HULL: Final = "z = p1 beta_i at every point with binary p1, by the four facets of its hull"
 BY_ROWS: Final = "the products p1 beta_i stand in the rows"
 
-PARITY: Final = 2 * ((A.subs(p1 + 2 * p2, p)) ** 2 + (sp.cos(pi * p) * beta_i - beta_j) ** 2)
+PARITY: Final = omega * (2 * ((A.subs(p1 + 2 * p2, p)) ** 2 + (sp.cos(pi * p) * beta_i - beta_j) ** 2))
 """The smoothness of a pair with one integer jump, (1)-(4)."""
-QUARTIC: Final = 2 * (A**2 + B**2)
+QUARTIC: Final = omega * (2 * (A**2 + B**2))
 """The smoothness of a pair, (8)."""
 CUBIC: Final = sp.expand(sp.expand(QUARTIC).subs(p1**2, p1))
 """(8) expanded, with p1^2 = p1: (9)."""
@@ -121,7 +126,7 @@ def minlp_cubic() -> Families:
 )  # fmt: skip
 def miqcp_bilinear(stroke_norm: int = 2, beta_norm: int = 2) -> Families:
     """1-norm smoothness with bilinear rows."""
-    yield term("smooth", E, 2 * s + 2 * t)
+    yield term("smooth", E, omega * (2 * s + 2 * t))
     yield row(14, E, s >= A)
     yield row(15, E, s >= -A)
     yield row(16, E, t >= B)
@@ -146,7 +151,7 @@ def miqcp_bilinear_l1(stroke_norm: int = 1, beta_norm: int = 1) -> Families:
 )  # fmt: skip
 def miqp_mccormick(facet: Facet = "hull", stroke_norm: int = 2, beta_norm: int = 2) -> Families:
     """1-norm smoothness, products replaced by their facets."""
-    yield term("smooth", E, 2 * s + 2 * t)
+    yield term("smooth", E, omega * (2 * s + 2 * t))
     yield row(14, E, s >= A)
     yield row(15, E, s >= -A)
     yield row(16, E, t >= B_LIFTED)
@@ -183,7 +188,7 @@ def qp_fixed() -> Families:
 )  # fmt: skip
 def miqp_exact() -> Families:
     """2-norm with z = p1 beta by its hull: exactly (8), and convex."""
-    yield term("smooth", E, 2 * (d**2 + u**2))
+    yield term("smooth", E, omega * (2 * (d**2 + u**2)))
     yield row("cd", E, sp.Eq(d, A), "residual of (8)")
     yield row("cu", E, sp.Eq(u, B_LIFTED), "residual of (8), lifted")
     yield from facets_of_z("hull")
@@ -230,13 +235,31 @@ def facets_of_z(facet: Facet) -> Families:
     yield row(29, E, z >= beta_i + pi / 4 * p1 - pi / 4)
 
 
-def declare(name: str, **chosen: Any) -> Formulation:
+def declare(name: str, on: Instance | None = None, **chosen: Any) -> Formulation:
     """The formulation of a name, full or short, with options: facet, stroke_norm, beta_norm, relax.
 
-    An option that is None keeps its default. Raises FormulationError for an unknown name, option or value.
+    on: the instance whose domain it is written for, None for the pixels of a sketch. An option that is None
+    keeps its default. Raises FormulationError for an unknown name, option or value.
     """
     options = {key: value for key, value in chosen.items() if value is not None}
-    return declaration_of(name).with_options(options)
+    return _with_constants(declaration_of(name).with_options(options), tuple(constants_of(on).items()))
+
+
+@cache
+def _with_constants(formulation: Formulation, constants: tuple[tuple[sp.Symbol, int], ...]) -> Formulation:
+    """The formulation with numbers for symbols, without the terms and rows that vanish."""
+    numbers = dict(constants)
+    vanishing = set(OF_SKEW) & numbers.keys()
+    families = [
+        replace(family, expression=family.expression.subs(numbers))
+        for family in (*formulation.objective, *formulation.rows)
+        if not (family.is_row and vanishing & family.expression.free_symbols)
+    ]
+    return replace(
+        formulation,
+        objective=tuple(family for family in families if not family.is_row and family.expression != 0),
+        rows=tuple(family for family in families if family.is_row),
+    )
 
 
 def norm_of(formulation: Formulation) -> Norm | None:

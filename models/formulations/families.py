@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from .declaration import Family
 from .symbols import SCALARS, SLOTS, IndexSet, index_map, numpy_function

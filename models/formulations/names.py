@@ -1,10 +1,10 @@
-"""Names of columns and rows: `alpha_012_034`, `p1_012_034_u`, `c14_012_034_r`.
+"""Names of columns and rows: `alpha_012_034`, `p1_012_034_u`, `c14_012_034_r`; on a mesh `alpha_0123`.
 
 A name consists of the block or row tag, and of the row and the column of the pixel (of a pair: of its first
-pixel). A pair adds `u` for the upper or `r` for the right neighbour. Numbers are zero-padded to the grid's
-width. Names have at most 15 characters and no leading e, i or n, and they are unique without regard to case
-(docs/format-rules.md, W6). So a solver's log can be read, and every solution file maps back without the
-model.
+pixel). A pair adds `u` for the upper or `r` for the right neighbour. On a mesh, the number of the face or of
+the pair follows the tag. Numbers are zero-padded to the width of the largest. Names have at most 15
+characters and no leading e, i or n, and they are unique without regard to case (docs/format-rules.md, W6). So
+a solver's log can be read, and every solution file maps back without the model.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.instance import Instance
-from .symbols import IndexSet, pixel_of
+from ..instance.mesh import Mesh
+from .symbols import IndexSet, count_elements, point_of
 
 if TYPE_CHECKING:
     from .families import Block, PlacedFamily
@@ -42,21 +43,33 @@ def digits(values: NDArray[Any], width: int) -> Bytes:
 
 
 def element_names(instance: Instance, tag: str, over: IndexSet) -> Bytes:
-    """Names `tag_row_column[_u|_r]` of all elements of an index set, shape (count, width), no padding."""
-    grid, at = instance.grid, pixel_of(instance, over)
-    labels = digits(np.arange(max(grid.height, grid.width)), _digits(instance))
+    """Names of all elements of an index set, shape (count, width), no padding."""
+    place = _numbered if isinstance(instance.domain, Mesh) else _row_and_column
+    parts: dict[str, Any] = {"tag": np.bytes_(f"{tag}_")} | place(instance, over)
+    names = np.empty(count_elements(instance, over), [(name, part.dtype) for name, part in parts.items()])
+    for name, part in parts.items():
+        names[name] = part
+    return names.view(np.uint8).reshape(len(names), names.itemsize)
+
+
+def _row_and_column(instance: Instance, over: IndexSet) -> dict[str, Any]:
+    """The parts `row_column[_u|_r]` of names on a grid."""
+    grid, at = instance.grid, point_of(instance, over)
+    labels = digits(np.arange(grid.side), number_width(instance, over))
     parts: dict[str, Any] = {
-        "tag": np.bytes_(f"{tag}_"),
         "row": _items(labels)[grid.rows[at]],
         "between": np.bytes_("_"),
         "column": _items(labels)[grid.columns[at]],
     }
     if over == "pairs":
         parts["side"] = np.array([b"_r", b"_u"])[grid.upward.astype(np.intp)]
-    names = np.empty(len(at), [(name, part.dtype) for name, part in parts.items()])
-    for name, part in parts.items():
-        names[name] = part
-    return names.view(np.uint8).reshape(len(at), names.itemsize)
+    return parts
+
+
+def _numbered(instance: Instance, over: IndexSet) -> dict[str, Any]:
+    """The number of the face or pair in names on a mesh."""
+    at = np.arange(len(instance.domain.first)) if over == "pairs" else point_of(instance, over)
+    return {"number": _items(digits(at, number_width(instance, over)))}
 
 
 def _items(texts: Bytes) -> NDArray[np.void]:
@@ -66,12 +79,18 @@ def _items(texts: Bytes) -> NDArray[np.void]:
 
 def name_length(instance: Instance, tag: str, over: IndexSet) -> int:
     """Length of each of these names."""
-    return len(tag) + 2 * (1 + _digits(instance)) + (2 if over == "pairs" else 0)
+    width = number_width(instance, over)
+    if isinstance(instance.domain, Mesh):
+        return len(tag) + 1 + width
+    return len(tag) + 2 * (1 + width) + (2 if over == "pairs" else 0)
 
 
-def _digits(instance: Instance) -> int:
-    """Digits of a row or column number: as many as the largest has, at least two."""
-    return max(2, len(str(max(instance.grid.height, instance.grid.width) - 1)))
+def number_width(instance: Instance, over: IndexSet) -> int:
+    """Digits of a number in a name: as many as the largest has, at least two."""
+    domain = instance.domain
+    if isinstance(domain, Mesh):
+        return max(2, len(str((len(domain.first) if over == "pairs" else domain.size) - 1)))
+    return max(2, len(str(domain.side - 1)))
 
 
 def stack_names(matrices: list[Bytes]) -> Bytes:

@@ -20,13 +20,22 @@ from ..arguments import check_arguments, check_kind, float_array
 from ..errors import FormulationError, InputError
 from ..field.field import CrossField
 from ..instance.angles import QUARTER
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance, whole_numbers
 from ..previews import table_of
 from .catalogue import declare, lift_products, norm_of
 from .declaration import Family, Formulation
 from .families import ANY_DEGREE, Block, PlacedFamily, merge_terms
-from .symbols import NARROWED, SLOTS, VARIABLES, Variable, count_elements, index_map, numpy_function
+from .symbols import (
+    NARROWED,
+    SLOTS,
+    VARIABLES,
+    Variable,
+    constants_of,
+    count_elements,
+    index_map,
+    numpy_function,
+)
 from .windows import Windows
 
 if TYPE_CHECKING:
@@ -140,14 +149,19 @@ class Problem:
             "w": self.instance.w,
             "alpha_lo": self.instance.alpha_lower,
             "alpha_up": self.instance.alpha_upper,
-            "beta_lo": np.full(self.instance.grid.size, -QUARTER),
-            "beta_up": np.full(self.instance.grid.size, QUARTER),
+            "beta_lo": np.full(self.instance.domain.size, -QUARTER),
+            "beta_up": np.full(self.instance.domain.size, QUARTER),
             "p_min": self.instance.p_min,
             "p_max": self.instance.p_max,
+            "kappa": self._of_pairs(self.instance.domain.kappa, 0.0),
+            "omega": self._of_pairs(self.instance.pair_weights, 1.0),
         }
         if self.jumps is not None:
             data |= {"p1": self.jumps & 1, "p2": self.jumps >> 1}
         return data if self.windows is None else data | self.windows.data
+
+    def _of_pairs(self, values: Floats | None, default: float) -> Floats:
+        return np.full(count_elements(self.instance, "pairs"), default) if values is None else values
 
     def variable(self, name: str) -> Variable:
         """The declaration of a block of columns, with bounds in `data`."""
@@ -365,9 +379,9 @@ class Problem:
         else:
             halves = np.round(point[self.blocks["p2"].slice])
             jumps = whole_numbers(np.round(point[self.blocks["p1"].slice] + 2 * halves), "p")
-        return CrossField(
-            self.instance, point[self.blocks["alpha"].slice], point[self.blocks["beta"].slice], jumps
-        )
+        alpha = point[self.blocks["alpha"].slice]
+        beta = np.zeros(len(alpha)) if self.instance.orthogonal else point[self.blocks["beta"].slice]
+        return CrossField(self.instance, alpha, beta, jumps)
 
     def _check_point(self, point: Floats) -> Floats:
         values = float_array(point, "point")
@@ -410,11 +424,11 @@ def _at_field(problem: Problem, name: str, quantities: dict[str, Any]) -> Floats
     if name in quantities:
         return np.asarray(quantities[name], dtype=np.float64)
     variable = VARIABLES[name]
-    sources = problem.data | quantities
-    symbols = sorted(variable.value.free_symbols, key=str)
+    sources, value = problem.data | quantities, variable.value.subs(constants_of(problem.instance))
+    symbols = sorted(value.free_symbols, key=str)
     slots = (SLOTS[variable.over][symbol] for symbol in symbols)
     arguments = (sources[quantity][index_map(problem.instance, kind)] for quantity, kind in slots)
-    return np.asarray(numpy_function(symbols, variable.value)(*arguments), dtype=np.float64)
+    return np.asarray(numpy_function(symbols, value)(*arguments), dtype=np.float64)
 
 
 def stamp_of(sha256: str) -> str:
@@ -449,7 +463,7 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
         For an unknown name, option or value.
 
     """
-    return Problem(instance, declare(name, **options), p)
+    return Problem(instance, declare(name, instance, **options), p)
 
 
 @check_arguments

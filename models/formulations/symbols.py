@@ -16,7 +16,7 @@ from typing import Any, Final, Literal
 import numpy as np
 import sympy as sp
 
-from ..instance.grid import Ints
+from ..instance.domain import Ints
 from ..instance.instance import Instance
 
 IndexSet = Literal["pixels", "strokes", "pairs"]
@@ -34,11 +34,11 @@ p_min, p_max, theta, w = (_symbol(name) for name in ("p_min", "p_max", "theta", 
 alpha_lo, alpha_up, beta_lo, beta_up = (
     _symbol(name) for name in ("alpha_lo", "alpha_up", "beta_lo", "beta_up")
 )
-w_strokes, w_beta = (_symbol(name) for name in ("w_strokes", "w_beta"))
+w_strokes, w_beta, kappa, omega = (_symbol(name) for name in ("w_strokes", "w_beta", "kappa", "omega"))
 pi: Final = sp.pi
 
-A: Final = alpha_i - alpha_j + pi / 2 * (p1 + 2 * p2)
-"""Change of direction across a pair, (8)."""
+A: Final = alpha_i - alpha_j + kappa + pi / 2 * (p1 + 2 * p2)
+"""Change of direction across a pair, (8); kappa turns the frame of the first point into the second's."""
 B: Final = (1 - 2 * p1) * beta_i - beta_j
 """Change of skew across a pair, bilinear, (8)."""
 B_LIFTED: Final = beta_i - 2 * z - beta_j
@@ -112,16 +112,24 @@ SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, IndexMap]]]] = {
         alpha_j: ("alpha", "second"),
         beta_i: ("beta", "first"),
         beta_j: ("beta", "second"),
-        **{symbol: (symbol.name, "itself") for symbol in (p, p1, p2, s, t, z, d, u, p_min, p_max)},
+        **{
+            symbol: (symbol.name, "itself")
+            for symbol in (p, p1, p2, s, t, z, d, u, p_min, p_max, kappa, omega)
+        },
     },
 }
 """For each index set: symbol -> (quantity, way to it)."""
+
+OF_SKEW: Final = (z, t, u, psi)
+"""Variables that measure beta and nothing else: rows with one of them hold where beta is 0."""
 
 SCALARS: Final = {w_strokes: "stroke_coefficient", w_beta: "skew_coefficient"}
 """Symbols with one value for the whole instance, and the instance's attribute that holds it."""
 
 LATEX: Final = {
     **{symbol: f"{symbol.name}_{{ij}}" for symbol in (p, s, t, z, d, u)},
+    kappa: r"\kappa_{ij}",
+    omega: r"\omega_{ij}",
     alpha: r"\alpha_i",
     beta: r"\beta_i",
     gamma: r"\gamma_i",
@@ -146,28 +154,44 @@ LATEX: Final = {
 def count_elements(instance: Instance, over: IndexSet) -> int:
     """Number of elements of an index set."""
     sizes = {
-        "pixels": instance.grid.size,
+        "pixels": instance.domain.size,
         "strokes": len(instance.theta),
-        "pairs": len(instance.grid.first),
+        "pairs": len(instance.domain.first),
     }
     return sizes[over]
+
+
+def constants_of(instance: Instance | None) -> dict[sp.Symbol, int]:
+    """Symbols that are numbers on this instance's domain, and these numbers.
+
+    On a grid, and without an instance, kappa is 0; without weights of pairs omega is 1. Where crosses are
+    orthogonal, beta is 0, and so are the variables that only measure it.
+    """
+    constants: dict[sp.Symbol, int] = {}
+    if instance is None or instance.domain.kappa is None:
+        constants[kappa] = 0
+    if instance is None or instance.pair_weights is None:
+        constants[omega] = 1
+    if instance is not None and instance.orthogonal:
+        constants |= dict.fromkeys((beta, beta_i, beta_j, *OF_SKEW), 0)
+    return constants
 
 
 def index_map(instance: Instance, kind: IndexMap) -> Ints | slice:
     """Index array from the elements of a family to the elements of a quantity."""
     if kind == "first":
-        return instance.grid.first
+        return instance.domain.first
     if kind == "second":
-        return instance.grid.second
+        return instance.domain.second
     return instance.stroke_index if kind == "stroke" else slice(None)
 
 
-def pixel_of(instance: Instance, over: IndexSet) -> Ints:
-    """Number of the pixel at each element of an index set (for a pair: its first pixel)."""
+def point_of(instance: Instance, over: IndexSet) -> Ints:
+    """Number of the point at each element of an index set (for a pair: its first point)."""
     if over == "pixels":
-        return np.arange(instance.grid.size, dtype=np.int32)
+        return np.arange(instance.domain.size, dtype=np.int32)
     if over == "pairs":
-        return instance.grid.first
+        return instance.domain.first
     return instance.stroke_index
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InstanceError
 from ..field.field import Norm
 from ..instance.angles import QUARTER
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance, whole_numbers
 
 _SLACK = 1e-9
@@ -39,7 +39,7 @@ class Windows:
 
     def check(self, instance: Instance) -> None:
         """Raise InstanceError unless these windows lie within the instance's windows."""
-        quarter = np.full(instance.grid.size, QUARTER)
+        quarter = np.full(instance.domain.size, QUARTER)
         for name, low, high, least, most in (
             ("alpha", self.alpha_lower, self.alpha_upper, instance.alpha_lower, instance.alpha_upper),
             ("beta", self.beta_lower, self.beta_upper, -quarter, quarter),

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from .grid import Floats
+from .domain import Floats
 
 QUARTER: Final = np.pi / 4
 HALF: Final = np.pi / 2

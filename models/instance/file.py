@@ -18,7 +18,7 @@ from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
 from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
 from ..storage import read_bytes, write_bytes
-from .grid import Floats
+from .domain import Floats
 from .instance import Instance
 
 FORMAT: Final = "crossfield-instance"
@@ -197,7 +197,7 @@ def instance_of_document(document: object) -> Instance:
     strokes = document["strokes"]
     check_counts(len(strokes), int(np.count_nonzero(mask)))
     try:
-        return Instance(
+        return Instance.on_pixels(
             mask=mask,
             stroke_pixels=np.array([stroke[:2] for stroke in strokes], dtype=np.int32).reshape(-1, 2),
             theta=np.array([stroke[2] for stroke in strokes], dtype=float),
@@ -313,7 +313,7 @@ def instance_of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
         scalars = {name: head[key] for key, name in _SCALARS.items() if key != "view"}
         x, y = arrays["origin"].astype(np.float64).tolist()
         entries: dict[str, Any] = scalars | {key: arrays[key] for key in _ARRAYS}
-        return Instance(origin=(x, y), view=head.get("view"), **entries)
+        return Instance.on_pixels(origin=(x, y), view=head.get("view"), **entries)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error
 

@@ -4,20 +4,92 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
-Floats = NDArray[np.float64]
+from ..errors import InstanceError, NoStrokeError
+from .domain import Bools, Domain, Ints, Rings
+
+REFERENCE: Final = 24  # pixels of the longer side of the grid on which weights are coefficients
+_FARTHEST: Final = 1e100  # coordinates whose squares are finite numbers
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
-    """Pixels of a mask [height, width], numbered row by row, and their ordered neighbour pairs."""
+class Grid(Domain):
+    """Pixels of a mask [height, width], numbered row by row, and their ordered neighbour pairs.
+
+    Parameters
+    ----------
+    mask
+        Pixels to solve for, bool (height, width), row 0 at the top.
+    pixel_size
+        Side of a pixel in units of the sketch, 1e-100 to 1e100.
+    origin
+        Sketch coordinates (x, y) of the top left corner of pixel [0, 0], y downwards.
+
+    """
 
     mask: Bools
+    pixel_size: float = 1.0
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    kind: ClassVar[str] = "pixel"
+    reference: ClassVar[int] = REFERENCE
+    kappa: ClassVar[None] = None
+
+    def check(self) -> None:
+        """Raise InstanceError for a mask without pixels, too large a grid, or an impossible place."""
+        if self.mask.ndim != 2 or not self.mask.any():
+            raise NoStrokeError("the mask has no pixel to solve for; draw something white in it")
+        if self.side > 9999:
+            raise InstanceError(
+                f"the grid is {self.width} x {self.height}; at most 9999 pixels per side are allowed"
+            )
+        if not 1 / _FARTHEST <= self.pixel_size <= _FARTHEST:
+            raise InstanceError(
+                f"pixel_size is {self.pixel_size}; it must be between {1 / _FARTHEST:g} and {_FARTHEST:g}"
+            )
+        if not all(abs(value) <= _FARTHEST for value in self.origin):
+            raise InstanceError(
+                f"origin is {self.origin}; it must be two numbers between {-_FARTHEST:g} and {_FARTHEST:g}"
+            )
+
+    @property
+    def side(self) -> int:
+        """Pixels of the longer side."""
+        return max(self.height, self.width)
+
+    @property
+    def summary(self) -> str:
+        """Width, height, pixels, and parts if there are more than one."""
+        parts = f" in {self.parts} separate parts" if self.parts > 1 else ""
+        return f"{self.width} x {self.height}, {self.size} pixels{parts}"
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Height, width, and numbers of pixels, pairs and parts."""
+        return {
+            "height": self.height,
+            "width": self.width,
+            "pixels": self.size,
+            "pairs": len(self.first),
+            "parts": self.parts,
+            "pixel_size": self.pixel_size,
+        }
+
+    def place(self, point: int) -> str:
+        """Row and column of a pixel."""
+        return f"pixel [{self.rows[point]}, {self.columns[point]}]"
+
+    def places(self, points: Ints) -> Ints:
+        """Row and column of each of some pixels, shape (k, 2)."""
+        return np.stack([self.rows[points], self.columns[points]], axis=1)
+
+    def content(self) -> tuple[list[int], list[float], list[NDArray[Any]]]:
+        """Height and width, pixel size and origin, and the mask."""
+        return [self.height, self.width], [self.pixel_size, *self.origin], [np.packbits(self.mask)]
 
     @property
     def height(self) -> int:
@@ -101,12 +173,8 @@ class Grid:
         return walk[(walk >= 0).all(axis=-1)]
 
     @cached_property
-    def parts(self) -> int:
-        """Number of 4-connected parts of the mask."""
-        least = np.arange(self.size)  # the first pixel known to belong to the same part, of each pixel
-        while len(between := np.nonzero(least[self.first] != least[self.second])[0]):
-            one, other = least[self.first[between]], least[self.second[between]]
-            np.minimum.at(least, np.maximum(one, other), np.minimum(one, other))
-            while (least[least] != least).any():
-                least = least[least]
-        return len(np.unique(least))
+    def rings(self) -> Rings:
+        """The ring around the common corner of the four pixels of each of `quads`."""
+        start = np.arange(0, 4 * len(self.quads) + 1, 4, dtype=np.int32)
+        sign = np.tile(np.array([1, 1, -1, -1], dtype=np.int32), len(self.quads))
+        return Rings(start, self.quads.ravel(), sign, np.zeros(len(self.quads)))

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
 from ..arguments import check_fields, check_kind, float_array
-from ..errors import CrossfieldError, InstanceError, NoStrokeError
+from ..errors import CrossfieldError, DomainError, InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import HALF, MOST_ANGLE, QUARTER, wrap
-from .grid import Bools, Floats, Grid, Ints
+from .domain import Bools, Floats, Ints
+from .grid import Grid
+from .mesh import Mesh
 from .terms import PairTerms, StrokeTerms
 
 Gauge = Literal["strokes", "box"]
@@ -23,13 +25,11 @@ GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
 _FLAT = 1e-8  # directions closer to the horizontal than this are horizontal
 _DECIMALS = 12  # of theta and w
 _FINE = 1e-3  # reliabilities up to here would lose digits that count
-_FARTHEST = 1e100  # coordinates whose squares are finite numbers
 _SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds and at the ends of ranges
 
 MOST_WEIGHT: Final = 1e6  # greatest weight of a term of the energy
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
 """Instance names that instance libraries allow: at most 32 lower-case letters, digits and `_`."""
-REFERENCE: Final = 24  # pixels of the longer side of the grid on which weights are coefficients
 STROKE_WEIGHT: Final = 20.0  # see docs/evidence.md
 SKEW_WEIGHT: Final = 1e-6
 # On a finer grid the smoothness keeps its value, strokes have more pixels, and areas the square of that.
@@ -79,50 +79,39 @@ def _check_weight(name: str, value: float) -> None:
         raise InstanceError(f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}")
 
 
-def _check_lines(at: Ints, theta: Floats, w: Floats, outside: Bools) -> None:
-    for label, wrong in (
-        ("theta is not a finite number", ~np.isfinite(theta)),
-        (f"theta is beyond {MOST_ANGLE:g} radians", ~(np.abs(theta) <= MOST_ANGLE)),
-        ("w is not in (0, 1]", ~((w > 0) & (w <= 1))),
-        ("is outside the mask", outside),
-    ):
-        if wrong.any():
-            row, column = at[int(np.argmax(wrong))]
-            raise InstanceError(f"stroke pixel [{row}, {column}]: {label} ({int(wrong.sum())} in all)")
-
-
 @dataclass(frozen=True, eq=False)
 class Instance(Pictured):
-    """A mask with stroke directions on some of its pixels, and the weights of the energy.
+    """Points with directions of strokes on some of them, and the weights of the energy.
 
     It is frozen and validated. Rounding makes instances, and so their hashes, equal on processors that differ
-    in the last digit. Rounding is idempotent. See docs/mathematics.md, 1 and 4.
+    in the last digit. Rounding is idempotent. See docs/mathematics.md, 1 and 4. `Instance.on_pixels` and
+    `Instance.on_faces` make one from positions.
 
     Parameters
     ----------
     name
         At most 32 lower-case letters, digits and underscores, a letter first.
-    mask
-        Pixels to solve for, bool (height, width), row 0 at the top.
-    stroke_pixels
-        Row and column of each stroke pixel, int (s, 2), inside the mask, sorted, each once.
+    domain
+        The pixels of a sketch or the faces of a mesh.
+    stroke_index
+        Number of each point with a stroke, int (s,), ascending, each once.
     theta
-        Stroke directions, float (s,), in radians counter-clockwise from +x with y up. Stored modulo pi,
-        rounded to 12 decimals, and as 0 within 1e-8 of the horizontal, because readers of files drop such
-        small costs.
+        Stroke directions, float (s,), in radians counter-clockwise from the x axis of the point's frame (of
+        a pixel: to the right, y up). Stored modulo pi, rounded to 12 decimals, and as 0 within 1e-8 of the
+        axis, because readers of files drop such small costs.
     w
         Reliability of each direction, float (s,), in (0, 1]; above 1e-3 rounded to 12 decimals.
     stroke_coefficient, skew_coefficient
-        Coefficients w_strokes and w_beta of the energy per pixel, 0 to 1e6. `with_weights` takes weights that
+        Coefficients w_strokes and w_beta of the energy per point, 0 to 1e6. `with_weights` takes weights that
         mean the same on every grid.
     gauge
         Window of length pi/2 that contains alpha: `strokes` (exact), or `box` as printed in (1).
+    orthogonal
+        Whether all crosses have right angles: beta is 0 and no variable.
+    pair_weights
+        Weight of the smoothness of each pair, (m,), above 0 and up to 1e6; None where all are 1.
     source
-        Origin of the sketch, one line of text.
-    pixel_size
-        Side of a pixel in units of the sketch, 1e-100 to 1e100, rounded to 12 digits.
-    origin
-        Sketch coordinates (x, y) of the top left corner of pixel [0, 0], y downwards, rounded to 12 digits.
+        Origin of the sketch or mesh, one line of text.
     view
         Viewpoint from which a drawing in space was seen, as in `read_sketch`; None without a choice.
     reading
@@ -131,42 +120,111 @@ class Instance(Pictured):
     Raises
     ------
     NoStrokeError
-        For a mask without pixels, and for no stroke pixel.
+        For a mask without pixels, and for pixels without a stroke.
+    MeshError
+        For a mesh that is no oriented manifold of triangles.
     InstanceError
         For a value that breaks a rule.
 
     """
 
     name: str
-    mask: Bools
-    stroke_pixels: Ints
+    domain: Grid | Mesh
+    stroke_index: Ints
     theta: Floats
     w: Floats
     stroke_coefficient: float = 1.0
     skew_coefficient: float = 1e-6
     gauge: Gauge = "strokes"
+    orthogonal: bool = False
+    pair_weights: Floats | None = None
     source: str = ""
-    pixel_size: float = 1.0
-    origin: tuple[float, float] = field(default=(0.0, 0.0))
     view: str | None = None
     reading: Reading | None = None
+
+    @classmethod
+    def on_pixels(
+        cls,
+        name: str,
+        mask: Any,
+        stroke_pixels: Any,
+        theta: Any,
+        w: Any,
+        *,
+        pixel_size: float = 1.0,
+        origin: tuple[float, float] = (0.0, 0.0),
+        **more: Any,
+    ) -> Instance:
+        """Return an instance on the pixels of a sketch.
+
+        Parameters
+        ----------
+        name, theta, w, more
+            As in `Instance`.
+        mask
+            Pixels to solve for, bool (height, width), row 0 at the top.
+        stroke_pixels
+            Row and column of each stroke pixel, int (s, 2), inside the mask, sorted, each once.
+        pixel_size
+            Side of a pixel in units of the sketch, 1e-100 to 1e100, rounded to 12 digits.
+        origin
+            Sketch coordinates (x, y) of the top left corner of pixel [0, 0], y downwards, rounded to 12
+            digits.
+
+        Raises
+        ------
+        InstanceError
+            As in `Instance`.
+
+        """
+        check_kind("pixel_size", pixel_size, "float", InstanceError)
+        corner = float_array(origin, "origin", InstanceError)
+        if corner.shape != (2,):
+            raise InstanceError(f"origin has shape {corner.shape}; give two numbers, x and y")
+        place = round_to_digits(corner[0]), round_to_digits(corner[1])
+        grid = Grid(_read_only(_boolean_array(mask)), round_to_digits(pixel_size), place)
+        grid.check()
+        pixels = whole_numbers(stroke_pixels, "stroke_pixels")
+        return cls(name, grid, _numbers_of_pixels(grid, pixels), theta, w, **more)
+
+    @classmethod
+    def on_faces(cls, name: str, mesh: Mesh, stroke_faces: Any, theta: Any, w: Any, **more: Any) -> Instance:
+        """Return an instance on the faces of a mesh; `orthogonal` unless `more` says otherwise.
+
+        Parameters
+        ----------
+        name, theta, w, more
+            As in `Instance`.
+        mesh
+            The mesh.
+        stroke_faces
+            Number of each face with a stroke, int (s,), ascending, each once; there may be none.
+
+        Raises
+        ------
+        InstanceError
+            As in `Instance`.
+
+        """
+        return cls(name, mesh, stroke_faces, theta, w, **({"orthogonal": True} | more))
 
     def __post_init__(self) -> None:
         """Store read-only copies in the documented types, then check every rule."""
         check_fields(self, InstanceError)
-        self._freeze("mask", _boolean_array(self.mask))
-        self._freeze("stroke_pixels", whole_numbers(self.stroke_pixels, "stroke_pixels"))
+        if not isinstance(self.domain, Grid | Mesh):
+            raise InstanceError("domain is neither a Grid nor a Mesh")
+        self._freeze("stroke_index", whole_numbers(self.stroke_index, "stroke_index"))
         for name in ("theta", "w"):
             self._freeze(name, float_array(getattr(self, name), name, InstanceError))
-        origin = float_array(self.origin, "origin", InstanceError)
-        if origin.shape != (2,):
-            raise InstanceError(f"origin has shape {origin.shape}; give two numbers, x and y")
-        object.__setattr__(self, "origin", (round_to_digits(origin[0]), round_to_digits(origin[1])))
+        if self.pair_weights is not None:
+            self._freeze("pair_weights", float_array(self.pair_weights, "pair_weights", InstanceError))
         for name in ("stroke_coefficient", "skew_coefficient"):
             object.__setattr__(self, name, float(getattr(self, name)))
-        object.__setattr__(self, "pixel_size", round_to_digits(self.pixel_size))
+        object.__setattr__(self, "orthogonal", bool(self.orthogonal))
         self._check_scalars()
+        self.domain.check()
         self._check_strokes()
+        self._check_pair_weights()
         theta = np.round(wrap(self.theta, 0.0, np.pi), _DECIMALS)
         self._freeze("theta", np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta))
         self._freeze("w", np.where(self.w > _FINE, np.round(self.w, _DECIMALS), self.w))
@@ -175,9 +233,7 @@ class Instance(Pictured):
         return f"<Instance {self.summary}>"
 
     def _freeze(self, name: str, value: Any) -> None:
-        value = value.copy()
-        value.setflags(write=False)
-        object.__setattr__(self, name, value)
+        object.__setattr__(self, name, _read_only(value.copy()))
 
     def _check_scalars(self) -> None:
         if not NAME.fullmatch(self.name):
@@ -189,53 +245,87 @@ class Instance(Pictured):
             raise InstanceError(f"there is no gauge {self.gauge!r}; choose one of {', '.join(GAUGES)}")
         for name in ("stroke_coefficient", "skew_coefficient"):
             _check_weight(name, getattr(self, name))
-        if not 1 / _FARTHEST <= self.pixel_size <= _FARTHEST:
-            raise InstanceError(
-                f"pixel_size is {self.pixel_size}; it must be between {1 / _FARTHEST:g} and {_FARTHEST:g}"
-            )
-        if not all(abs(value) <= _FARTHEST for value in self.origin):
-            raise InstanceError(
-                f"origin is {self.origin}; it must be two numbers between {-_FARTHEST:g} and {_FARTHEST:g}"
-            )
         for name, text in (("source", self.source), ("view", self.view or "")):
             if _NOT_TEXT.search(text):
                 raise InstanceError(f"{name} holds a line break or a control character; give one line")
 
     def _check_strokes(self) -> None:
-        if self.mask.ndim != 2 or not self.mask.any():
-            raise NoStrokeError("the mask has no pixel to solve for; draw something white in it")
-        if max(self.mask.shape) > 9999:
-            height, width = self.mask.shape
-            raise InstanceError(f"the grid is {width} x {height}; at most 9999 pixels per side are allowed")
-        if self.stroke_pixels.size == 0:
+        if self.stroke_index.size == 0 and isinstance(self.domain, Grid):
             raise NoStrokeError("no stroke lies inside the mask; move the mask or draw a curvature line")
-        if self.stroke_pixels.ndim != 2 or self.stroke_pixels.shape[1] != 2:
-            shape = self.stroke_pixels.shape
-            raise InstanceError(f"stroke_pixels has shape {shape}; give [row, column] for each stroke pixel")
-        count = len(self.stroke_pixels)
-        if self.theta.shape != (count,) or self.w.shape != (count,):
+        count = len(self.stroke_index)
+        if self.stroke_index.ndim != 1 or self.theta.shape != (count,) or self.w.shape != (count,):
             sizes = f"{self.theta.size} and {self.w.size}"
-            raise InstanceError(f"{count} stroke pixels need as many theta and w, but there are {sizes}")
-        row, column = self.stroke_pixels.T
-        height, width = self.mask.shape
-        on_grid = (row >= 0) & (column >= 0) & (row < height) & (column < width)
-        inside = on_grid & self.mask[np.where(on_grid, row, 0), np.where(on_grid, column, 0)]
-        _check_lines(self.stroke_pixels, self.theta, self.w, ~inside)
-        key = self.stroke_pixels[:, 0].astype(np.int64) * self.mask.shape[1] + self.stroke_pixels[:, 1]
-        if (np.diff(key) <= 0).any():
-            row, column = self.stroke_pixels[int(np.argmax(np.diff(key) <= 0)) + 1]
-            raise InstanceError(f"stroke pixel [{row}, {column}] is out of order or listed twice; sort them")
+            raise InstanceError(
+                f"{count} stroke {self.domain.kind}s need as many theta and w, but there are {sizes}"
+            )
+        beyond = (self.stroke_index < 0) | (self.stroke_index >= self.domain.size)
+        if beyond.any():
+            raise InstanceError(f"there is no {self.domain.kind} {self.stroke_index[beyond][0]} for a stroke")
+        for label, wrong in (
+            ("theta is not a finite number", ~np.isfinite(self.theta)),
+            (f"theta is beyond {MOST_ANGLE:g} radians", ~(np.abs(self.theta) <= MOST_ANGLE)),
+            ("w is not in (0, 1]", ~((self.w > 0) & (self.w <= 1))),
+            ("is out of order or listed twice; sort them", np.diff(self.stroke_index, prepend=-1) <= 0),
+        ):
+            if wrong.any():
+                place = self.domain.place(int(self.stroke_index[int(np.argmax(wrong))]))
+                raise InstanceError(f"stroke {place}: {label} ({int(wrong.sum())} in all)")
 
-    @cached_property
+    def _check_pair_weights(self) -> None:
+        weights = self.pair_weights
+        if weights is None:
+            return
+        if weights.shape != self.domain.first.shape:
+            raise InstanceError(
+                f"pair_weights has shape {weights.shape}; give one for each of {len(self.domain.first)} pairs"
+            )
+        wrong = ~((weights > 0) & (weights <= MOST_WEIGHT))
+        if wrong.any():
+            raise InstanceError(
+                f"the weight of pair {int(np.argmax(wrong))} is {weights[wrong][0]}; "
+                f"it must be above 0 and at most {MOST_WEIGHT:g}"
+            )
+
+    @property
     def grid(self) -> Grid:
-        """The pixels, numbered, with their neighbour pairs."""
-        return Grid(self.mask)
+        """The pixels, numbered, with their neighbour pairs. Raises DomainError for an instance on a mesh."""
+        if isinstance(self.domain, Grid):
+            return self.domain
+        raise DomainError(
+            f"{self.name} is on the faces of a mesh, and this works on pixels only; give an instance of a "
+            "sketch (docs/architecture.md lists what takes which)"
+        )
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh. Raises DomainError for an instance on pixels."""
+        if isinstance(self.domain, Mesh):
+            return self.domain
+        raise DomainError(
+            f"{self.name} is on the pixels of a sketch, and this works on meshes only; give an instance of "
+            "a mesh (docs/architecture.md lists what takes which)"
+        )
+
+    @property
+    def mask(self) -> Bools:
+        """The pixels to solve for, shape [height, width]."""
+        return self.grid.mask
+
+    @property
+    def pixel_size(self) -> float:
+        """Side of a pixel in units of the sketch."""
+        return self.grid.pixel_size
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Sketch coordinates (x, y) of the top left corner of pixel [0, 0], y downwards."""
+        return self.grid.origin
 
     @cached_property
-    def stroke_index(self) -> Ints:
-        """Pixel number of each stroke pixel, shape (s,)."""
-        row, column = self.stroke_pixels.T
-        return np.asarray(self.grid.number[row, column])
+    def stroke_pixels(self) -> Ints:
+        """Row and column of each stroke pixel, shape (s, 2)."""
+        pixels: Ints = _read_only(self.grid.places(self.stroke_index))
+        return pixels
 
     @cached_property
     def target(self) -> Floats:
@@ -249,7 +339,7 @@ class Instance(Pictured):
     @cached_property
     def pair_terms(self) -> PairTerms:
         """The residuals of all pairs of neighbours."""
-        return PairTerms(self.grid.first, self.grid.second)
+        return PairTerms(self.domain.first, self.domain.second, self.domain.kappa, self.pair_weights)
 
     @cached_property
     def stroke_terms(self) -> StrokeTerms:
@@ -258,16 +348,16 @@ class Instance(Pictured):
 
     @cached_property
     def alpha_lower(self) -> Floats:
-        """Lower end of each pixel's window of alpha, shape (n,). The upper end is pi/2 above."""
-        lower = np.zeros(self.grid.size)
+        """Lower end of each point's window of alpha, shape (n,). The upper end is pi/2 above."""
+        lower = np.zeros(self.domain.size)
         if self.gauge == "strokes":
             lower[self.stroke_index] = self.target - QUARTER
         return lower
 
     @cached_property
     def alpha_upper(self) -> Floats:
-        """Upper end of each pixel's window of alpha, shape (n,)."""
-        upper = np.full(self.grid.size, HALF)
+        """Upper end of each point's window of alpha, shape (n,)."""
+        upper = np.full(self.domain.size, HALF)
         if self.gauge == "strokes":
             upper[self.stroke_index] = self.target + QUARTER
         return upper
@@ -317,7 +407,9 @@ class Instance(Pictured):
             if weight is not None:
                 _check_weight(f"{term}_weight", weight)
                 power = _POWERS[term]
-                changed[f"{term}_coefficient"] = weight * REFERENCE**power / max(self.mask.shape) ** power
+                changed[f"{term}_coefficient"] = (
+                    weight * self.domain.reference**power / self.domain.side**power
+                )
         return replace(self, **changed) if changed else self
 
     @property
@@ -331,8 +423,9 @@ class Instance(Pictured):
         return self._weight("skew")
 
     def _weight(self, term: str) -> float:
-        side, power = max(self.mask.shape), _POWERS[term]
-        return round_to_digits(getattr(self, f"{term}_coefficient") * side**power / REFERENCE**power)
+        side, power = self.domain.side, _POWERS[term]
+        coefficient: float = getattr(self, f"{term}_coefficient")
+        return round_to_digits(coefficient * side**power / self.domain.reference**power)
 
     def facts(self) -> dict[str, Any]:
         """Name, origin, sizes and weights, as reports list them."""
@@ -341,13 +434,8 @@ class Instance(Pictured):
             "source": self.source,
             "gauge": self.gauge,
             "sha256": self.sha256,
-            "height": self.grid.height,
-            "width": self.grid.width,
-            "pixels": self.grid.size,
-            "pairs": len(self.grid.first),
-            "stroke_pixels": len(self.theta),
-            "parts": self.grid.parts,
-            "pixel_size": self.pixel_size,
+            **self.domain.facts,
+            f"stroke_{self.domain.kind}s": len(self.theta),
             "w_strokes": self.stroke_coefficient,
             "w_beta": self.skew_coefficient,
             "stroke_weight": self.stroke_weight,
@@ -356,12 +444,10 @@ class Instance(Pictured):
 
     @property
     def summary(self) -> str:
-        """Name, grid, pixels, strokes, parts of the mask, gauge, and weights unless they are defaults."""
-        grid = self.grid
-        parts = f" in {grid.parts} separate parts" if grid.parts > 1 else ""
+        """Name, domain, strokes, gauge, right angles, and weights unless they are defaults."""
         return (
-            f"{self.name}: {grid.width} x {grid.height}, {grid.size} pixels{parts}, "
-            f"{len(self.theta)} with strokes, gauge {self.gauge}{self._other_weights}"
+            f"{self.name}: {self.domain.summary}, {len(self.theta)} with strokes, gauge {self.gauge}"
+            f"{', orthogonal' * self.orthogonal}{self._other_weights}"
         )
 
     @property
@@ -381,16 +467,37 @@ class Instance(Pictured):
         for text in (self.name, self.gauge, self.source, self.view):
             if text is not None:
                 digest.update(text.encode() + b"\0")
-        scalars = np.array(
-            [*self.mask.shape, self.stroke_coefficient, self.skew_coefficient, self.pixel_size, *self.origin],
-            dtype="<f8",
-        )
-        for array in (
-            scalars,
-            np.packbits(self.mask),
-            self.stroke_pixels.astype("<i4"),
-            self.theta.astype("<f8"),
-            self.w.astype("<f8"),
-        ):
+        size, numbers, arrays = self.domain.content()
+        scalars = np.array([*size, self.stroke_coefficient, self.skew_coefficient, *numbers], dtype="<f8")
+        strokes = self.domain.places(self.stroke_index).astype("<i4")
+        for array in (scalars, *arrays, strokes, self.theta.astype("<f8"), self.w.astype("<f8")):
             digest.update(array.tobytes())
+        if self.orthogonal:
+            digest.update(b"orthogonal\n")
+        if self.pair_weights is not None:
+            digest.update(self.pair_weights.astype("<f8").tobytes())
         return digest.hexdigest()
+
+
+def _numbers_of_pixels(grid: Grid, pixels: Ints) -> Ints:
+    """Number of each pixel [row, column], shape (s,). Raises InstanceError for one outside the mask."""
+    if pixels.size == 0:
+        return np.zeros(0, dtype=np.int32)
+    if pixels.ndim != 2 or pixels.shape[1] != 2:
+        raise InstanceError(
+            f"stroke_pixels has shape {pixels.shape}; give [row, column] for each stroke pixel"
+        )
+    row, column = pixels.T
+    on_grid = (row >= 0) & (column >= 0) & (row < grid.height) & (column < grid.width)
+    number = np.where(on_grid, grid.number[np.where(on_grid, row, 0), np.where(on_grid, column, 0)], -1)
+    if (number < 0).any():
+        row, column = pixels[int(np.argmax(number < 0))]
+        raise InstanceError(
+            f"stroke pixel [{row}, {column}]: is outside the mask ({int((number < 0).sum())} in all)"
+        )
+    return number.astype(np.int32)
+
+
+def _read_only(array: np.ndarray[Any, Any]) -> Any:
+    array.setflags(write=False)
+    return array

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .angles import HALF
-from .grid import Bools, Ints
+from .domain import Bools, Ints
 from .instance import Instance
 
 
@@ -32,11 +32,13 @@ def transposed(instance: Instance) -> Instance:
 
 def _move(instance: Instance, mask: Bools, pixels: Ints, sense: int, turn: float) -> Instance:
     """The instance with its stroke pixels moved and every theta changed to sense theta + turn."""
-    order = np.lexsort((pixels[:, 1], pixels[:, 0]))
+    grid = replace(instance.grid, mask=mask)
+    number = grid.number[pixels[:, 0], pixels[:, 1]]
+    order = np.argsort(number)
     return replace(
         instance,
-        mask=mask,
-        stroke_pixels=pixels[order],
+        domain=grid,
+        stroke_index=number[order],
         theta=sense * instance.theta[order] + turn,
         w=instance.w[order],
         reading=None,

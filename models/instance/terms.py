@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .angles import HALF
-from .grid import Floats, Ints
+from .domain import Floats, Ints
 
 _SLACK = 1e-9  # quarter turns by which rounding may move the end of a range of jumps
 
@@ -30,22 +30,30 @@ class PairTerms:
     A = alpha_i - alpha_j + offset(p) and B = (-1)^p beta_i - beta_j, shapes (m,). Jumps may have more axes
     in front: p (c, m) are c candidates for each pair.
 
-    first, second: the pixels i and j of each pair, shapes (m,).
+    first, second: the points i and j of each pair, shapes (m,). kappa: turn of a direction from the frame
+    of i to that of j in radians, (m,), None where all are 0. weight: weight of each pair's smoothness, (m,),
+    None where all are 1.
     """
 
     first: Ints
     second: Ints
+    kappa: Floats | None = None
+    weight: Floats | None = None
 
     def offset(self, p: Ints | int) -> Floats:
-        """The turn pi/2 p that a jump adds to A."""
-        return np.asarray(HALF * p)
+        """The turn kappa + pi/2 p between the two labels of a pair with jump p, which A contains."""
+        return np.asarray(HALF * p if self.kappa is None else self.kappa + HALF * p)
+
+    def weighted(self, values: Floats) -> Floats:
+        """The values (m,) of the pairs times their weights."""
+        return values if self.weight is None else self.weight * values
 
     def residual_a(self, alpha: Floats, p: Ints | int) -> Floats:
-        """A of each pair, in radians, of the angles alpha (n,) of all pixels."""
+        """A of each pair, in radians, of the angles alpha (n,) of all points."""
         return np.asarray(alpha[self.first] - alpha[self.second] + self.offset(p))
 
     def residual_b(self, beta: Floats, p: Ints) -> Floats:
-        """B of each pair, in radians, of the angles beta (n,) of all pixels."""
+        """B of each pair, in radians, of the angles beta (n,) of all points."""
         return np.asarray(parity_sign(p) * beta[self.first] - beta[self.second])
 
     def jump_below(self, alpha: Floats) -> Ints:
@@ -54,7 +62,7 @@ class PairTerms:
 
     def costs(self, alpha: Floats, beta: Floats, p: Ints, size: np.ufunc = np.square) -> Floats:
         """Smooth energy 2 (phi(A) + phi(B)) of each pair. size: phi, the square or the absolute value."""
-        return np.asarray(2 * (size(self.residual_a(alpha, p)) + size(self.residual_b(beta, p))))
+        return self.weighted(2 * (size(self.residual_a(alpha, p)) + size(self.residual_b(beta, p))))
 
     def least_costs(self, alpha: Floats, beta: Floats, size: np.ufunc = np.square) -> Floats:
         """Least smooth energy of each pair over all jumps, shape (m,)."""
@@ -62,10 +70,10 @@ class PairTerms:
         costs: Floats = self.costs(alpha, beta, jumps, size).min(axis=0)
         return costs
 
-    def degree(self, pixels: int) -> Ints:
-        """Number of pairs of each pixel, shape (pixels,)."""
+    def degree(self, points: int) -> Ints:
+        """Number of pairs of each point, shape (points,)."""
         ends = np.concatenate([self.first, self.second])
-        return np.bincount(ends, minlength=pixels).astype(np.int32)
+        return np.bincount(ends, minlength=points).astype(np.int32)
 
     def range_a(self, lower: Floats, upper: Floats, p: Ints | int) -> tuple[Floats, Floats]:
         """Least and greatest A of each pair where lower <= alpha <= upper, shapes (n,)."""
@@ -82,30 +90,33 @@ class PairTerms:
         return p_min, np.ceil(-2 * least / np.pi - _SLACK).astype(np.int32)
 
     def select(self, pairs: NDArray[Any], number: Ints | None = None) -> PairTerms:
-        """Some of the pairs, by their numbers or a mask, at pixels renumbered by `number` (n,)."""
+        """Some of the pairs, by their numbers or a mask, at points renumbered by `number` (n,)."""
         first, second = self.first[pairs], self.second[pairs]
-        return PairTerms(first, second) if number is None else PairTerms(number[first], number[second])
+        kappa, weight = (None if all_ is None else all_[pairs] for all_ in (self.kappa, self.weight))
+        if number is not None:
+            first, second = number[first], number[second]
+        return PairTerms(first, second, kappa, weight)
 
 
 @dataclass(frozen=True, eq=False)
 class StrokeTerms:
-    """One residual R = alpha + beta - goal for each stroke pixel, shapes (s,).
+    """One residual R = alpha + beta - goal for each stroke point, shapes (s,).
 
     goal: direction in the gauge's range. weight: reliability times the instance's `stroke_coefficient`.
     """
 
-    pixel: Ints
+    point: Ints
     goal: Floats
     weight: Floats
 
     def residuals(self, alpha: Floats, beta: Floats) -> Floats:
-        """R of each term in radians, shape (s,), of the angles (n,) of all pixels."""
-        return alpha[self.pixel] + beta[self.pixel] - self.goal
+        """R of each term in radians, shape (s,), of the angles (n,) of all points."""
+        return alpha[self.point] + beta[self.point] - self.goal
 
-    def at_pixels(self, values: Floats, size: int) -> Floats:
-        """Sums of the terms' values at each of `size` pixels, shape (size,)."""
-        return np.bincount(self.pixel, values, size).astype(np.float64, copy=False)
+    def at_points(self, values: Floats, size: int) -> Floats:
+        """Sums of the terms' values at each of `size` points, shape (size,)."""
+        return np.bincount(self.point, values, size).astype(np.float64, copy=False)
 
     def select(self, terms: Ints, number: Ints) -> StrokeTerms:
-        """Some of the terms, by their numbers, at pixels renumbered by `number` (n,)."""
-        return StrokeTerms(number[self.pixel[terms]], self.goal[terms], self.weight[terms])
+        """Some of the terms, by their numbers, at points renumbered by `number` (n,)."""
+        return StrokeTerms(number[self.point[terms]], self.goal[terms], self.weight[terms])

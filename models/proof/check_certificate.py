@@ -726,22 +726,22 @@ class ForwardPass:
             self.errors = []
             yield self._sums_along(spines, self._sums_along(teeth, rest)), 2 * math.fsum(self.errors)
 
-    def _sums_along(self, runs: list[tuple[list[int], list[int]]], at_pixels: list[Array]) -> list[Array]:
+    def _sums_along(self, runs: list[tuple[list[int], list[int]]], at_points: list[Array]) -> list[Array]:
         """The least sums over the pixels and pairs of each run, by the labels of each of its pixels.
 
-        at_pixels: the terms of each pixel alone.
+        at_points: the terms of each pixel alone.
         """
-        sums = list(at_pixels)
+        sums = list(at_points)
         for pixels, pairs in runs:
             costs = [PairCost(self.level, self.terms, e) for e in pairs]
             for way in (1, -1):
-                carried = at_pixels[pixels[::way][0]]
+                carried = at_points[pixels[::way][0]]
                 for e, cost, j in zip(pairs[::way], costs[::way], pixels[::way][1:]):
                     here, there = self.shares[e][::way]
                     message = cost.least_sums(carried - here, back=way < 0) - there
                     shares = greatest_size(here) + greatest_size(there)
                     self._add_error(cost.size + shares + greatest_size(carried) + greatest_size(message))
-                    sums[j], carried = sums[j] + message, at_pixels[j] + message
+                    sums[j], carried = sums[j] + message, at_points[j] + message
         return sums
 
     def _add_error(self, size: float) -> None:

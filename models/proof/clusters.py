@@ -29,7 +29,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.grid import Floats, Grid, Ints
+from ..instance.domain import Floats, Ints
+from ..instance.grid import Grid
 from ..processes.compilation import compiled
 from .lattice import Lattice, block_starts
 from .min_plus import (

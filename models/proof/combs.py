@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from ..processes.compilation import Crew, compiled
 from .passes import add_to, copy_to, fill_product, reparametrised_costs, shares_at
 from .state import State

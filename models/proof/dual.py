@@ -31,7 +31,8 @@ from numpy.typing import NDArray
 
 from ..array_archive import Arrays
 from ..field.field import CrossField
-from ..instance.grid import Bools, Floats, Grid
+from ..instance.domain import Bools, Floats
+from ..instance.grid import Grid
 from ..processes.compilation import Crew, compiled
 from ..processes.deadline import Over, never
 from ..smooth.sparse_systems import stroke_weight

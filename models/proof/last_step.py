@@ -13,7 +13,7 @@ import numpy as np
 
 from ..field.field import CrossField, Norm
 from ..instance.angles import QUARTER
-from ..instance.grid import Floats, Ints
+from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..search.absolute_fit import absolute_fit

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from ..field.field import AbsoluteNorm, CrossField, Norm
 from ..field.jumps import step_labels
 from ..instance.angles import HALF, QUARTER, wrap
-from ..instance.grid import Bools, Floats, Grid, Ints
+from ..instance.domain import Bools, Floats, Ints
+from ..instance.grid import Grid
 from ..instance.instance import Instance
 from ..smooth.sparse_systems import stroke_weight
 

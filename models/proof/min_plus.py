@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from ..processes.compilation import compiled, compiled_in_any_order
 from .state import RowEnds, State
 

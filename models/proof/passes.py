@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from ..processes.compilation import compiled
 from .min_plus import (
     RaggedMatrix,

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..instance.angles import QUARTER
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..processes.compilation import compiled
 from .lattice import Lattice, Starts, beta_range, block_starts, ranges
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps
 from ..instance.angles import QUARTER
-from ..instance.grid import Bools, Floats
+from ..instance.domain import Bools, Floats
 from ..processes.compilation import compiled
 from ..processes.deadline import Over, never
 from ..search.box_qp import FreeField

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.grid import Floats, Grid, Ints
+from ..instance.domain import Floats, Ints
+from ..instance.grid import Grid
 from .lattice import Lattice, Starts
 from .pruning import allowed_rows
 

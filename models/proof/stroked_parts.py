@@ -19,7 +19,9 @@ def stroked_parts(instance: Instance) -> Instance:
     """The instance on those parts of its mask alone that have a stroke."""
     parts = ndimage.label(instance.mask)[0]
     numbers = parts[instance.mask][instance.stroke_index]
-    return replace(instance, mask=np.isin(parts, numbers))
+    grid = replace(instance.grid, mask=np.isin(parts, numbers))
+    row, column = instance.stroke_pixels.T
+    return replace(instance, domain=grid, stroke_index=grid.number[row, column])
 
 
 def restricted(field: CrossField, part: Instance) -> CrossField:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..formulations.windows import Windows
 from ..instance.angles import HALF, QUARTER
-from ..instance.grid import Bools
+from ..instance.domain import Bools
 from ..instance.terms import parity_sign
 from .certificate import Certificate
 

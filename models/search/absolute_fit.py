@@ -26,7 +26,7 @@ from ..errors import CrossfieldError
 from ..field.field import AbsoluteNorm, CrossField, Norm
 from ..field.jumps import best_jumps
 from ..instance.angles import HALF
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
@@ -63,17 +63,19 @@ class Residuals:
         lines (s,): 0 where line u carries the stroke, None for zeros; -1 and 1 where v does, below and above
         the window of u. target (s,): the direction of each stroke at one turn, None for that of the gauge.
         """
-        n, pairs, strokes = instance.grid.size, instance.pair_terms, instance.stroke_terms
+        n, pairs, strokes = instance.domain.size, instance.pair_terms, instance.stroke_terms
         unit, m = sparse.eye_array(n, format="csr"), len(p)
         lines = np.zeros(len(strokes.goal), np.int32) if lines is None else lines
         target = strokes.goal if target is None else target
-        nothing, at = sparse.csr_array((m, n)), unit[strokes.pixel]
+        nothing, at = sparse.csr_array((m, n)), unit[strokes.point]
         a = sparse.hstack([unit[pairs.first] - unit[pairs.second], nothing])
         signed = sparse.diags_array(parity_sign(p)) @ unit[pairs.first]
         b = sparse.hstack([nothing, signed - unit[pairs.second]])
         r = sparse.hstack([at, sparse.diags_array(np.where(lines == 0, 1.0, -1.0)) @ at])
         skew = sparse.hstack([sparse.csr_array((n, n)), unit])
-        weight = np.concatenate([np.full(2 * m, 2.0), strokes.weight, np.full(n, instance.skew_coefficient)])
+        of_pair = pairs.weighted(np.full(m, 2.0))
+        skew_weight = np.full(n, instance.skew_coefficient)
+        weight = np.concatenate([of_pair, of_pair, strokes.weight, skew_weight])
         return cls(
             sparse.vstack([a, b, r, skew], format="csr"),
             np.concatenate([pairs.offset(p), np.zeros(m), -target - HALF * lines, np.zeros(n)]),

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..field.field import CrossField, field_in_windows
 from ..instance.angles import QUARTER
-from ..instance.grid import Floats, Ints
+from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.sparse_systems import PULL, one_thread
@@ -47,7 +47,7 @@ def field_at(instance: Instance, x: Floats, p: Ints) -> CrossField:
 
 def angle_bounds(instance: Instance) -> tuple[Floats, Floats]:
     """Least and greatest (alpha, beta) of a field, shapes (2n,)."""
-    quarter = np.full(instance.grid.size, QUARTER)
+    quarter = np.full(instance.domain.size, QUARTER)
     lower = np.concatenate([instance.alpha_lower, -quarter])
     return lower, np.concatenate([instance.alpha_upper, quarter])
 
@@ -55,7 +55,7 @@ def angle_bounds(instance: Instance) -> tuple[Floats, Floats]:
 def stroke_bounds(instance: Instance) -> tuple[Floats, Floats]:
     """As `angle_bounds`, with alpha bounded only at strokes."""
     lower, upper = angle_bounds(instance)
-    free = np.ones(instance.grid.size, dtype=bool)
+    free = np.ones(instance.domain.size, dtype=bool)
     free[instance.stroke_index] = False
     lower[: len(free)][free], upper[: len(free)][free] = -np.inf, np.inf
     return lower, upper

@@ -15,8 +15,8 @@ import numpy as np
 from ..field.field import CrossField
 from ..field.jumps import step_labels
 from ..instance.angles import HALF
-from ..instance.grid import Floats, Ints
-from ..instance.instance import MOST_WEIGHT, Instance
+from ..instance.domain import Floats, Ints
+from ..instance.instance import MOST_WEIGHT, Instance, round_to_digits
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, never
 from .box_qp import FreeField
@@ -40,15 +40,15 @@ def halve_resolution(instance: Instance) -> Instance | None:
     aligned = np.nonzero(np.hypot(*turn) > _ALIGNED * weight)[0]
     if not len(aligned):
         return None
+    grid = replace(instance.grid, mask=mask, pixel_size=round_to_digits(2 * instance.pixel_size))
     return replace(
         instance,
-        mask=mask,
-        stroke_pixels=np.stack(np.divmod(aligned, mask.shape[1]), axis=1),
+        domain=grid,
+        stroke_index=grid.number.ravel()[aligned],
         theta=np.arctan2(turn[1][aligned], turn[0][aligned]) / 2,
         w=weight[aligned] / 4,
         stroke_coefficient=min(4 * instance.stroke_coefficient, MOST_WEIGHT),
         skew_coefficient=min(4 * instance.skew_coefficient, MOST_WEIGHT),
-        pixel_size=2 * instance.pixel_size,
     )
 
 

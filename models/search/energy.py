@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..smooth.sparse_systems import PULL, Solve, factor_matrix, stroke_weight, symmetric_matrix
@@ -43,18 +43,19 @@ class QuadraticForm:
 
 def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> QuadraticForm:
     """The 2-norm energy as a function of the angles, over the pairs of known jump (None: all)."""
-    n, at, strokes = instance.grid.size, instance.stroke_index, instance.stroke_terms
+    n, at, strokes = instance.domain.size, instance.stroke_index, instance.stroke_terms
     pairs = instance.pair_terms
     if known is not None:
         pairs, p = pairs.select(known), p[known]
     i, j = pairs.first, pairs.second
-    degree = 2.0 * pairs.degree(n)
-    weight, turn = stroke_weight(instance), 2 * pairs.offset(p)
-    couplings = np.concatenate([np.full(len(p), -2.0), -2.0 * parity_sign(p), weight[at]])
+    of_pair = pairs.weighted(np.full(len(p), 2.0))
+    degree = np.bincount(i, of_pair, n) + np.bincount(j, of_pair, n)
+    weight, turn = stroke_weight(instance), of_pair * pairs.offset(p)
+    couplings = np.concatenate([-of_pair, -of_pair * parity_sign(p), weight[at]])
     diagonal = np.concatenate([degree + weight, degree + weight + instance.skew_coefficient])
     row, column = np.concatenate([i, i + n, at]), np.concatenate([j, j + n, at + n])
     matrix = symmetric_matrix(row, column, couplings, diagonal)
-    goal = strokes.at_pixels(strokes.weight * strokes.goal, n)
+    goal = strokes.at_points(strokes.weight * strokes.goal, n)
     pulled = np.bincount(j, turn, n) - np.bincount(i, turn, n)
     return QuadraticForm(matrix, np.concatenate([pulled + goal, goal]))
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..arguments import check_arguments
 from ..field.field import CrossField
 from ..field.jumps import free_jumps
-from ..instance.grid import Bools, Ints
+from ..instance.domain import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
 from ..smooth.sparse_systems import one_thread, solve_locally

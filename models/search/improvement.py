@@ -17,7 +17,7 @@ from ..arguments import check_arguments
 from ..field.field import CrossField
 from ..field.jumps import free_jumps, step_labels
 from ..instance.angles import HALF, QUARTER, line_difference
-from ..instance.grid import Ints
+from ..instance.domain import Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..processes.deadline import Over, Stop, never, stop_function

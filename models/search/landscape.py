@@ -34,7 +34,7 @@ from scipy.linalg.blas import dgemm
 
 from ..field.field import CrossField
 from ..instance.angles import HALF
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import PairTerms, parity_sign
 from ..smooth.sparse_systems import PULL
@@ -133,7 +133,7 @@ class PatchEnergy:
         self._terms = instance.pair_terms.select(self._pairs, number)
         alpha, beta = np.split(x, 2)
         self._alpha, self._beta = alpha[outside], beta[outside]
-        strokes = np.nonzero(free[instance.stroke_terms.pixel])[0].astype(np.int32)
+        strokes = np.nonzero(free[instance.stroke_terms.point])[0].astype(np.int32)
         self._strokes = instance.stroke_terms.select(strokes, number)
         field, terms = CrossField(instance, alpha, beta, p), instance.stroke_terms
         pair = field.residual_a**2 + field.residual_b**2

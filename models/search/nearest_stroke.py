@@ -8,7 +8,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
-from ..instance.grid import Grid, Ints
+from ..instance.domain import Ints
+from ..instance.grid import Grid
 from ..instance.instance import Instance
 
 

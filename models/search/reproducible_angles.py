@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from ..field.field import CrossField
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from ..smooth.sparse_systems import one_thread
 from .box_qp import angle_bounds, field_at, fit_in_box
 from .energy import LinearSolver, QuadraticForm, energy_at

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arguments import check_arguments, check_count
 from ..field.field import CrossField
-from ..instance.grid import Bools
+from ..instance.domain import Bools
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
 from ..processes.job_counts import check_jobs

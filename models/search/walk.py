@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over
 from ..smooth.sparse_systems import one_thread

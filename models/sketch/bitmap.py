@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, shortened
 from ..input_limits import MAX_PIXELS, MAX_SIDE
-from ..instance.grid import Bools, Floats
+from ..instance.domain import Bools, Floats
 from .colour import REDDISH, ink_of, redness
 from .cover import Box, Cover, Covers, Frame, block_means
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.grid import Bools, Floats
+from ..instance.domain import Bools, Floats
 
 PAPER: Final = 0.1  # ink below this counts as paper
 REDDISH: Final = 0.4  # least share of a stroke's ink that must be missing from green and blue alone

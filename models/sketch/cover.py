@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..input_limits import MAX_PIECES
 from ..instance.angles import vector_length
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..memory import check_memory
 
 Box = tuple[float, float, float, float]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..input_limits import MAX_SEGMENTS
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from .cover import Box, Covers, Frame, cover_by_segments
 
 _FLATNESS: Final = 0.02  # of a pixel

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.grid import Bools, Floats
+from ..instance.domain import Bools, Floats
 from .cover import Box, Frame
 from .outline import THICK
 

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from ..instance.angles import cosine, line_of, sine
-from ..instance.grid import Bools, Floats
+from ..instance.domain import Bools, Floats
 from .cover import LEAST_WEIGHT
 
 GAPS: Final = (0.03, 0.06, 0.12)  # shares of the longer side: gaps that count as closed, tried in turn

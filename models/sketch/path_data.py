@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..input_limits import MAX_CURVES, MAX_LENGTH
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from .curves import lines_as_cubics
 
 PPI: Final = 96.0  # CSS pixels per inch

@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import InputError, shortened
 from ..input_limits import LEAST_LENGTH, MAX_LINES
 from ..instance.angles import cosine, sine, transform_vectors
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from .cover import Box
 from .curves import Curves, lines_as_cubics
 from .labels import LabelMatcher

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..input_limits import MAX_DATA
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from .curves import Curves, are_straight
 from .drawing_file import detect_file_kind, suffix_of_picture
 from .svg import read_svg

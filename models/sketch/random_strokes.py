@@ -13,7 +13,7 @@ import numpy as np
 from ..arguments import check_arguments
 from ..errors import InputError, NoStrokeError
 from ..instance.angles import line_of
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from ..memory import check_memory
 from .cover import LEAST_WEIGHT, Cover, Frame
@@ -107,7 +107,7 @@ def random_instance(
     )
     if noise > 0:
         theta = theta + noise * rng.standard_normal(len(theta))
-    return Instance(
+    return Instance.on_pixels(
         name=name or f"rand_n{size:03}_s{seed}",
         mask=mask,
         stroke_pixels=pixels,

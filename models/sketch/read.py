@@ -18,7 +18,7 @@ import numpy as np
 from ..arguments import check_arguments
 from ..errors import InputError, NoStrokeError, naming, printable, shortened
 from ..instance.angles import line_of
-from ..instance.grid import Bools
+from ..instance.domain import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading
 from .bitmap import read_white_pixels
 from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
@@ -228,7 +228,7 @@ def instance_of_mask(
     stroke = mask & (weight >= LEAST_WEIGHT)
     if not stroke.any():
         raise NoStrokeError("no stroke lies inside the mask; draw a curvature line there or move the mask")
-    return Instance(
+    return Instance.on_pixels(
         name=name,
         mask=mask,
         stroke_pixels=np.argwhere(stroke).astype(np.int32),

@@ -15,7 +15,7 @@ import numpy as np
 from ..arguments import check_arguments
 from ..errors import InputError
 from ..instance.angles import arctangent, cosine, sine, transform_vectors, vector_length, wrap
-from ..instance.grid import Bools, Floats
+from ..instance.domain import Bools, Floats
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from .cover import LEAST_WEIGHT, Frame, cover_by_segments, fit_frame
 from .outline import largest_part
@@ -260,7 +260,7 @@ def analytic_instance(
     u_angle, v_angle = (wrap(arctangent(d[:, 1], d[:, 0]), 0.0, np.pi) for d in tangents)
     weight, on_u = _choose_strokes(surface, frame, mask)
     stroke = weight >= LEAST_WEIGHT
-    instance = Instance(
+    instance = Instance.on_pixels(
         name=name,
         mask=mask,
         stroke_pixels=np.argwhere(stroke).astype(np.int32),

@@ -31,7 +31,7 @@ from ..input_limits import (
     MAX_USES,
 )
 from ..instance.angles import transform_vectors
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from .colour import is_paper, is_red
 from .cover import Box
 from .curves import Curves, run_numbers

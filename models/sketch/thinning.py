@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..instance.grid import Bools
+from ..instance.domain import Bools
 
 
 def thin_shape(shape: Bools) -> Bools:

@@ -17,7 +17,7 @@ from scipy import sparse
 from ..arguments import check_arguments, check_positive
 from ..field.field import CrossField
 from ..instance.angles import HALF, QUARTER, wrap
-from ..instance.grid import Floats, Ints
+from ..instance.domain import Floats, Ints
 from ..processes.deadline import Over, Stop, stop_function
 from .sparse_systems import SimilarSystems, nested_dissection_order, one_thread
 

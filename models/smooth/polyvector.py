@@ -17,7 +17,7 @@ from ..arguments import check_arguments, check_positive
 from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps, label_of
 from ..instance.angles import HALF
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from ..instance.instance import Instance
 from .sparse_systems import factor_matrix, one_thread, smoothness, solve_locally, stroke_weight
 
@@ -82,9 +82,9 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
     root = np.exp(2j * instance.theta)
 
     def sums(values: _Complex) -> _Complex:
-        return strokes.at_pixels(values.real, size) + 1j * strokes.at_pixels(values.imag, size)
+        return strokes.at_points(values.real, size) + 1j * strokes.at_points(values.imag, size)
 
-    alike = smoothness(instance) + sparse.diags_array(strokes.at_pixels(weight, size))
+    alike = smoothness(instance) + sparse.diags_array(strokes.at_points(weight, size))
     once = sums(weight * root)
     matrix = _couple_coefficients(alike, once, instance.skew_coefficient)
     right = np.concatenate([-sums(weight * root**2), -once])
@@ -132,7 +132,7 @@ def power_field(instance: Instance) -> CrossField:
     grid = instance.grid
     strokes, theta = instance.stroke_terms, instance.theta
     goal = np.stack(
-        [strokes.at_pixels(strokes.weight * f(4 * theta), grid.size) for f in (np.cos, np.sin)], axis=-1
+        [strokes.at_points(strokes.weight * f(4 * theta), grid.size) for f in (np.cos, np.sin)], axis=-1
     )
     z = factor_matrix(smoothness(instance) + sparse.diags_array(stroke_weight(instance)))(goal)
     alpha, beta = np.arctan2(z[:, 1], z[:, 0]) / 4, np.zeros(grid.size)

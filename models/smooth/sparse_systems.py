@@ -13,7 +13,7 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg, splu
 from threadpoolctl import OpenBLASController, ThreadpoolController
 
-from ..instance.grid import Floats, Ints
+from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
 
 Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
@@ -30,7 +30,7 @@ _HELD: Final[list[Any]] = []  # the limit of BLAS, once for each context that is
 
 def stroke_weight(instance: Instance) -> Floats:
     """Weight w_strokes w of each pixel, of both strokes where two meet, 0 without a stroke; shape (n,)."""
-    return instance.stroke_terms.at_pixels(instance.stroke_terms.weight, instance.grid.size)
+    return instance.stroke_terms.at_points(instance.stroke_terms.weight, instance.grid.size)
 
 
 def smoothness(instance: Instance) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..processes.deadline import Over
 from ..smooth.sparse_systems import SimilarSystems
 from .stencils import SLOPES, Crosses, Stencils, scale_rows

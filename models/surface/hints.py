@@ -12,7 +12,7 @@ from scipy import sparse
 from ..arguments import check_fields
 from ..errors import InputError
 from ..instance.angles import HALF
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from ..instance.instance import Instance
 from .equations import Rows
 from .stencils import GridLevel

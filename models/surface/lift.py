@@ -12,7 +12,8 @@ from scipy import ndimage
 
 from ..arguments import check_arguments
 from ..field.field import CrossField
-from ..instance.grid import Floats, Grid
+from ..instance.domain import Floats
+from ..instance.grid import Grid
 from ..processes.deadline import Over, Progress, Stop, silent, stop_function
 from ..smooth.sparse_systems import one_thread
 from .equations import FORGIVEN, Equations, Weights, descend, normals_of

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..field.field import CrossField
-from ..instance.grid import Bools, Floats, Grid, Ints
+from ..instance.domain import Bools, Floats, Ints
+from ..instance.grid import Grid
 from ..smooth.polyvector import roots
 from ..smooth.sparse_systems import nested_dissection_order
 
@@ -53,12 +54,12 @@ class Stencils:
     @cached_property
     def slopes(self) -> tuple[Any, Any]:
         """The matrices (n, N) of dz/dx and of dz/dy at the centres of pixels."""
-        return self._at_pixels(*SLOPES[0]), self._at_pixels(*SLOPES[1])
+        return self._at_points(*SLOPES[0]), self._at_points(*SLOPES[1])
 
     @cached_property
     def twist(self) -> Any:
         """The matrix (n, N) of the component without slope: the difference of a pixel's two diagonals."""
-        return self._at_pixels(-1.0, 1.0, 1.0, -1.0)
+        return self._at_points(-1.0, 1.0, 1.0, -1.0)
 
     @cached_property
     def blocks(self) -> Ints:
@@ -87,7 +88,7 @@ class Stencils:
         number[self.used] = np.arange(self.count, dtype=np.int32)
         return np.stack([corner[self.grid.mask] for corner in corners_of_blocks(number)])
 
-    def _at_pixels(self, *weights: float) -> Any:
+    def _at_points(self, *weights: float) -> Any:
         return _weighted_sums(self.corners, self.count, *weights)
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..field.field import CrossField
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from ..instance.instance import Instance
 from ..previews import Pictured
 

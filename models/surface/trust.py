@@ -9,7 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from ..field.field import CrossField
-from ..instance.grid import Floats
+from ..instance.domain import Floats
 from ..smooth.sparse_systems import factor_matrix
 from .equations import Equations, Rows, Weights, changes_of_normals
 from .stencils import Crosses, GridLevel, Stencils, corners_of_blocks, scale_rows

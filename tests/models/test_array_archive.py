@@ -9,7 +9,7 @@ from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import Instance
 from crossfield.models.search.greedy import greedy_field
 
-INSTANCE = Instance("tiny", np.ones((2, 2), bool), [[0, 0], [1, 1]], [0.3, 1.2], [1.0, 0.5])
+INSTANCE = Instance.on_pixels("tiny", np.ones((2, 2), bool), [[0, 0], [1, 1]], [0.3, 1.2], [1.0, 0.5])
 KINDS = {
     "field": ("alpha", read_field, lambda path: write_field(greedy_field(INSTANCE), path)),
     "instance": ("theta", read_instance, lambda path: write_instance(INSTANCE, path)),
@@ -52,8 +52,8 @@ def test_an_array_too_many_is_named(kind):
 
 def test_numbers_of_half_precision_are_whole_or_refused_without_a_warning(recwarn):
     given = np.array([[0, 0], [1, 1]], dtype=np.float16)
-    instance = Instance("tiny", np.ones((2, 2), bool), given, [0.3, 1.2], [1.0, 0.5])
+    instance = Instance.on_pixels("tiny", np.ones((2, 2), bool), given, [0.3, 1.2], [1.0, 0.5])
     assert instance.sha256 == INSTANCE.sha256
     with pytest.raises(InstanceError, match="whole numbers of 32 bits"):
-        Instance("tiny", np.ones((2, 2), bool), given + np.float16(0.5), [0.3, 1.2], [1.0, 0.5])
+        Instance.on_pixels("tiny", np.ones((2, 2), bool), given + np.float16(0.5), [0.3, 1.2], [1.0, 0.5])
     assert not list(recwarn)

@@ -85,17 +85,17 @@ cf.CrossField(field, field.alpha, field.beta, field.p)   | instance is a CrossFi
 cf.CrossField(instance, ["a"], field.beta, field.p)      | alpha holds something other than numbers
 cf.CrossField(instance, field.alpha + 1j, field.beta, field.p) | alpha holds something other than numbers
 cf.CrossField.from_lines(instance, "a", "b")             | u_angle holds something other than numbers
-cf.Instance("a", **pixel | {"mask": [[0.5]]})            | mask holds something other than True and False
-cf.Instance("a", **pixel | {"mask": [["no"]]})           | mask holds something other than numbers
-cf.Instance("a", **pixel | {"theta": ["x"]})             | theta holds something other than numbers
-cf.Instance("a", **pixel | {"w": [1j]})                  | w holds something other than numbers
-cf.Instance("a", **pixel | {"stroke_pixels": [[0, 0.5]]}) | stroke_pixels holds something
-cf.Instance(3, **pixel)                                  | name is 3; give text
-cf.Instance("a", **pixel, stroke_coefficient="x")        | stroke_coefficient is 'x'; give a number
-cf.Instance("a", **pixel, pixel_size=True)               | pixel_size is True; give a number
-cf.Instance("a", **pixel, origin=3)                      | origin has shape ()
-cf.Instance("a", **pixel, gauge=["box"])                 | no gauge ['box']; choose one of strokes, box
-cf.Instance("a", **pixel, source=3)                      | source is 3; give text
+cf.Instance.on_pixels("a", **pixel | {"mask": [[0.5]]})  | mask holds something other than True and False
+cf.Instance.on_pixels("a", **pixel | {"mask": [["no"]]})           | mask holds something other than numbers
+cf.Instance.on_pixels("a", **pixel | {"theta": ["x"]})             | theta holds something other than numbers
+cf.Instance.on_pixels("a", **pixel | {"w": [1j]})                  | w holds something other than numbers
+cf.Instance.on_pixels("a", **pixel | {"stroke_pixels": [[0, 0.5]]}) | stroke_pixels holds something
+cf.Instance.on_pixels(3, **pixel)                                  | name is 3; give text
+cf.Instance.on_pixels("a", **pixel, stroke_coefficient="x")        | stroke_coefficient is 'x'; give a number
+cf.Instance.on_pixels("a", **pixel, pixel_size=True)               | pixel_size is True; give a number
+cf.Instance.on_pixels("a", **pixel, origin=3)                      | origin has shape ()
+cf.Instance.on_pixels("a", **pixel, gauge=["box"])       | no gauge ['box']; choose one of strokes, box
+cf.Instance.on_pixels("a", **pixel, source=3)                      | source is 3; give text
 instance.with_weights(stroke_weight="1")                 | stroke_weight is '1'; give a number
 cf.draw(field, 3)                                        | path is 3; give text or a path
 cf.entry(3)                                              | name is 3; give text

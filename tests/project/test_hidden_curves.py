@@ -106,6 +106,6 @@ def test_a_part_of_the_mask_keeps_a_stroke(study):
     mask = np.ones((5, 9), dtype=bool)
     mask[:, 4] = False  # two parts: one curve on the left, two on the right
     pixels = np.array([[row, column] for row in range(5) for column in (1, 5, 7)])
-    instance = cf.Instance("two", mask, pixels, np.full(15, np.pi / 2), np.ones(15))
+    instance = cf.Instance.on_pixels("two", mask, pixels, np.full(15, np.pi / 2), np.ones(15))
     curve = np.tile(np.array([0, 1, 2], dtype=np.int32), 5)
     assert [hidden.number for hidden in study.hidden.hidden_curves(instance, curve, 9)] == [1, 2]

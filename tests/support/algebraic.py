@@ -16,7 +16,7 @@ import numpy as np
 from cases import names_of, points_of
 from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem
-from crossfield.models.instance.grid import Floats
+from crossfield.models.instance.domain import Floats
 from lark import Lark, Token, Transformer
 from lark.exceptions import UnexpectedInput, VisitError
 

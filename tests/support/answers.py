@@ -101,12 +101,12 @@ OPTIMA = {
 def problem(name):
     """The problems behind the files: 2 x 2 pixels with three strokes, and a pair of pixels."""
     if name == "pair":
-        pair = Instance(
+        pair = Instance.on_pixels(
             "pair", np.ones((1, 2), bool), np.array([[0, 0], [0, 1]]), np.array([0.2, 1.2]),
             np.array([1.0, 0.75]), stroke_coefficient=1.5, skew_coefficient=1e-3, gauge="strokes",
         )  # fmt: skip
         return formulate(pair, "minlp-quartic")
-    tiny = Instance(
+    tiny = Instance.on_pixels(
         "tiny", np.ones((2, 2), bool), np.array([[0, 0], [0, 1], [1, 1]]), np.array([0.2, 1.6, 2.6]),
         np.array([1.0, 0.75, 0.5]), stroke_coefficient=1.5, skew_coefficient=1e-3, gauge="strokes",
     )  # fmt: skip

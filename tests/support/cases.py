@@ -10,7 +10,7 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import Problem, formulate, with_integers_fixed
 from crossfield.models.instance.angles import QUARTER
-from crossfield.models.instance.grid import Floats
+from crossfield.models.instance.domain import Floats
 from crossfield.models.instance.instance import Instance
 
 MASKS = {
@@ -75,7 +75,7 @@ def make_instance(shape: str = "hole", gauge: str = "strokes", seed: int = 1, **
     chosen[rng.integers(len(pixels))] = True
     pixels = pixels[chosen]
     theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.1, 1, len(pixels))
-    return Instance(
+    return Instance.on_pixels(
         "tiny",
         mask,
         pixels,

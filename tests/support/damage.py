@@ -10,7 +10,7 @@ MASK = np.array([[1, 1, 0, 1], [1, 1, 0, 0], [0, 1, 1, 0]], dtype=bool)
 
 def full_instance():
     """An instance in which no attribute has its default."""
-    return Instance(
+    return Instance.on_pixels(
         name="sample",
         mask=MASK,
         stroke_pixels=[[0, 0], [1, 1], [2, 2]],

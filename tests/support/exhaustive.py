@@ -20,7 +20,7 @@ def sketch(mask, theta, skew_coefficient=1e-6, gauge="strokes", w=None):
     theta = np.where(mask, theta, np.nan)
     at = np.argwhere(np.isfinite(theta))
     weight = np.ones(len(at)) if w is None else w
-    return Instance(
+    return Instance.on_pixels(
         "sketch", mask, at, theta[tuple(at.T)], weight, skew_coefficient=skew_coefficient, gauge=gauge
     )
 
@@ -31,7 +31,7 @@ def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
     mask[rng.integers(mask.shape[0]), rng.integers(mask.shape[1])] = True
     at = np.argwhere(mask)
     at = at[np.sort(rng.permutation(len(at))[: 1 + rng.integers(strokes)])]
-    return Instance(
+    return Instance.on_pixels(
         "random",
         mask,
         at,
@@ -129,7 +129,7 @@ def terms(instance, p):
     unit, none = np.eye(n), np.zeros((n, n))
     a = np.hstack([unit[grid.first] - unit[grid.second], none[grid.first]])
     b = np.hstack([none[grid.first], parity_sign(p)[:, None] * unit[grid.first] - unit[grid.second]])
-    r = np.hstack([unit[strokes.pixel], unit[strokes.pixel]])
+    r = np.hstack([unit[strokes.point], unit[strokes.point]])
     rows = np.vstack([a, b, r, np.hstack([none, unit])])
     goal = np.concatenate([-HALF * np.asarray(p), np.zeros(len(b)), strokes.goal, np.zeros(n)])
     skew = np.full(n, instance.skew_coefficient)

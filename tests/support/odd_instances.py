@@ -30,4 +30,6 @@ def odd_instance(seed, shape=None):
     w = 1 - rng.random(len(at)) if rng.random() < 0.8 else 10.0 ** -rng.uniform(0, 12, len(at))
     stroke, skew = WEIGHTS[rng.integers(len(WEIGHTS))], WEIGHTS[rng.integers(len(WEIGHTS))]
     gauge = ("strokes", "box")[seed // len(NORMS) % 2]
-    return Instance("odd", mask, at, theta, w, stroke_coefficient=stroke, skew_coefficient=skew, gauge=gauge)
+    return Instance.on_pixels(
+        "odd", mask, at, theta, w, stroke_coefficient=stroke, skew_coefficient=skew, gauge=gauge
+    )

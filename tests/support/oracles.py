@@ -23,7 +23,7 @@ from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.verify.comparison import problem_algebra, values_at
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
-from crossfield.models.instance.grid import Floats
+from crossfield.models.instance.domain import Floats
 
 __all__ = [
     "Model",

@@ -15,7 +15,7 @@ def corners_of(mask):
 def surface_of(mask, height, u=0.0, v=np.pi / 2):
     """The surface of a height function of x and y, pixels from the middle, with the same cross everywhere."""
     mask = np.asarray(mask, dtype=bool)
-    instance = Instance("shape", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1))
+    instance = Instance.on_pixels("shape", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1))
     rows, columns = mask.shape
     row, column = np.mgrid[: rows + 1, : columns + 1]
     heights = np.asarray(height(column - columns / 2, rows / 2 - row), dtype=np.float64)

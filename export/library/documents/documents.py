@@ -122,7 +122,7 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
     path = folder / document["instance"]["file"]
     instance, jumps = read_instance(path), None
     if FORMULATIONS[document["formulation"]].fixed:
-        jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
+        jumps = np.zeros(len(instance.domain.first), dtype=np.int32)
         listed = np.array(document["jumps"] or [], dtype=np.int64).reshape(-1, 2)
         if (listed[:, 0] >= len(jumps)).any():
             raise InstanceError(

@@ -9,7 +9,7 @@ import numpy as np
 
 from ....models.formulations.families import PlacedFamily
 from ....models.formulations.problem import Problem
-from ....models.instance.grid import Floats
+from ....models.instance.domain import Floats
 from ....models.instance.instance import Instance
 from ...writing.canonical import CanonicalForm
 from ...writing.curvature import objective_curvature, row_curvature
@@ -17,13 +17,13 @@ from ...writing.curvature import objective_curvature, row_curvature
 
 def instance_sizes(instance: Instance) -> dict[str, int]:
     """Return the numbers of pixels, stroke pixels and pairs."""
-    grid = instance.grid
-    return {"pixels": grid.size, "strokes": len(instance.theta), "pairs": len(grid.first)}
+    domain = instance.domain
+    return {f"{domain.kind}s": domain.size, "strokes": len(instance.theta), "pairs": len(domain.first)}
 
 
 def density(instance: Instance) -> float:
     """Return the share of the pixels that are strokes, to four decimals."""
-    return round(len(instance.theta) / instance.grid.size, 4)
+    return round(len(instance.theta) / instance.domain.size, 4)
 
 
 def problem_counts(problem: Problem) -> dict[str, int]:

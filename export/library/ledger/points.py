@@ -17,7 +17,7 @@ import numpy as np
 from ....models.field.field import CrossField, Norm
 from ....models.formulations.problem import Problem
 from ....models.instance.angles import QUARTER
-from ....models.instance.grid import Floats
+from ....models.instance.domain import Floats
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import Certificate, read_certificate
 from ...formats.registry import program_version
@@ -98,8 +98,8 @@ def complete_point(problem: Problem, field: CrossField) -> Floats:
     point = problem.point(field)
     # With the facet as printed, z is free in an interval, and takes the value there that makes t least.
     if problem.formulation.options.facet == "printed" and {"z", "t"} <= problem.blocks.keys():
-        grid, odd = field.instance.grid, (field.p & 1).astype(np.float64)
-        first, second = field.beta[grid.first], field.beta[grid.second]
+        domain, odd = field.instance.domain, (field.p & 1).astype(np.float64)
+        first, second = field.beta[domain.first], field.beta[domain.second]
         lower = np.maximum(-QUARTER, first + QUARTER * odd - QUARTER)
         upper = np.minimum(first - QUARTER * odd + QUARTER, QUARTER * odd)
         z = np.where(odd > 0, first, np.clip((first - second) / 2, lower, upper))

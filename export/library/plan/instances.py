@@ -9,7 +9,7 @@ from typing import cast
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, formulate
-from ....models.instance.grid import Ints
+from ....models.instance.domain import Ints
 from ....models.instance.instance import Gauge, Instance
 from ....models.sketch.drawing_file import parse_drawing
 from ....models.sketch.random_strokes import random_instance

@@ -41,7 +41,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ....models.errors import SolutionError
-from ....models.instance.grid import Floats
+from ....models.instance.domain import Floats
 from ....models.storage import replacing
 from ...statuses import status_of_ampl
 from ...writing.stamps import digits_of_option, stamp_option

@@ -21,7 +21,7 @@ import re
 from typing import Final
 
 from ....models.errors import SolutionError
-from ....models.instance.grid import Floats
+from ....models.instance.domain import Floats
 from ...statuses import Status, status_of_baron
 from .grammar import EntryForm
 from .text import (

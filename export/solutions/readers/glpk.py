@@ -23,7 +23,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ....models.errors import SolutionError
-from ....models.instance.grid import Floats
+from ....models.instance.domain import Floats
 from ...statuses import GLPK, Status
 from ...writing.canonical import ColumnOrder
 from .grammar import EntryForm, place_of_entry, quoted

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....models.errors import SolutionError
-from ....models.instance.grid import Floats, Ints
+from ....models.instance.domain import Floats, Ints
 from ...statuses import Status
 from .grammar import (
     HEAD,

@@ -42,7 +42,7 @@ def crossfield(capsys, tmp_path, monkeypatch):
 def instance():
     mask = np.ones((2, 3), dtype=bool)
     pixels, theta = np.array([[0, 0], [0, 2], [1, 1]]), np.array([0.3, 2.0, 1.2])
-    return cf.Instance("tiny", mask, pixels, theta, np.array([1.0, 0.7, 0.5]))
+    return cf.Instance.on_pixels("tiny", mask, pixels, theta, np.array([1.0, 0.7, 0.5]))
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def test_a_start_gives_the_jumps_of_qp_fixed(crossfield, instance, instance_file
 def test_a_search_without_a_point_removes_the_field_of_an_earlier_call(tmp_path, capsys):
     stale = tmp_path / "tiny.minlp-cubic.field.npz"
     mask = np.ones((1, 2), dtype=bool)
-    instance = cf.Instance("tiny", mask, np.array([[0, 0]]), np.array([1.0]), np.array([1.0]))
+    instance = cf.Instance.on_pixels("tiny", mask, np.array([[0, 0]]), np.array([1.0]), np.array([1.0]))
     cf.write_field(cf.greedy_field(instance), stale)
     cf.write_instance(instance, tmp_path / "tiny.json")
     broken = tmp_path / "broken"

@@ -64,7 +64,9 @@ COSTLY_SVG = {
 
 def instance():
     mask = np.ones((2, 2), dtype=bool)
-    return cf.Instance("tiny", mask, np.array([[0, 0], [1, 1]]), np.array([0.3, 1.2]), np.array([1.0, 0.5]))
+    return cf.Instance.on_pixels(
+        "tiny", mask, np.array([[0, 0], [1, 1]]), np.array([0.3, 1.2]), np.array([1.0, 0.5])
+    )
 
 
 def archive_with(name, shape, kind, length):

@@ -58,9 +58,11 @@ def test_a_weight_means_the_same_on_every_grid():
     """Each pixel cut in four, its stroke through two of them: the field's energy is the same in all terms."""
     mask = np.ones((5, 7), dtype=bool)
     rows = np.arange(5)
-    coarse = cf.Instance("coarse", mask, np.stack([rows, 3 + 0 * rows], axis=1), 0.3 + 0.1 * rows, np.ones(5))
+    coarse = cf.Instance.on_pixels(
+        "coarse", mask, np.stack([rows, 3 + 0 * rows], axis=1), 0.3 + 0.1 * rows, np.ones(5)
+    )
     fine_rows = np.arange(10)
-    fine = cf.Instance(
+    fine = cf.Instance.on_pixels(
         "fine",
         np.ones((10, 14), dtype=bool),
         np.stack([fine_rows, 6 + 0 * fine_rows], axis=1),
@@ -87,7 +89,7 @@ def test_a_weight_means_the_same_on_every_grid():
 
 def test_an_instance_of_its_own_has_the_coefficients_of_the_paper():
     mask = np.ones((2, 30), dtype=bool)
-    instance = cf.Instance("own", mask, np.array([[0, 0]]), np.zeros(1), np.ones(1))
+    instance = cf.Instance.on_pixels("own", mask, np.array([[0, 0]]), np.zeros(1), np.ones(1))
     assert (instance.stroke_coefficient, instance.skew_coefficient) == (1.0, 1e-6)
     assert "stroke weight" not in instance.summary
 

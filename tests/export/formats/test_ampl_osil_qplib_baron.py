@@ -78,13 +78,13 @@ def feasible_points(problem: Problem) -> Points:
 def tiny() -> Instance:
     """Two pixels with strokes that no field follows without loss: the window is the box's."""
     pixels = [[0, 0], [0, 1]]
-    return Instance(
+    return Instance.on_pixels(
         "small", np.ones((1, 2), bool), pixels, [2.2, 1.3], [1.0, 0.7], skew_coefficient=1e-2, gauge="box"
     )
 
 
 def pixel() -> Instance:
-    return Instance(
+    return Instance.on_pixels(
         "small", np.ones((1, 1), bool), [[0, 0]], [2.2], [0.8], skew_coefficient=1e-2, gauge="box"
     )
 
@@ -228,7 +228,8 @@ def test_glpk_reads_the_linear_ampl_model_as_the_problem(
 @pytest.mark.needs("glpk")
 def test_an_answer_of_the_ampl_model_is_read_back(tmp_path: Path):
     problem = make_problem(
-        "milp-mccormick", Instance("two", np.ones((2, 2), bool), [[0, 0], [1, 1]], [0.3, 2.0], [1, 1])
+        "milp-mccormick",
+        Instance.on_pixels("two", np.ones((2, 2), bool), [[0, 0], [1, 1]], [0.3, 2.0], [1, 1]),
     )
     text = written(problem, tmp_path / "model.mod")
     printed = (

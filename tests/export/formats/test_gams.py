@@ -90,7 +90,7 @@ def test_text_is_plain(label: str):
 
 def test_golden_file():
     """A small model that people can read; the other tests check its meaning."""
-    instance = Instance("golden", [[True, True], [True, False]], [[0, 1]], [2.5], [0.5])
+    instance = Instance.on_pixels("golden", [[True, True], [True, False]], [[0, 1]], [2.5], [0.5])
     text = b"".join(
         gams.generate(
             CanonicalForm(make_problem("minlp-quartic", instance)), ["minlp-quartic on three pixels"]

@@ -32,16 +32,16 @@ CORNER = [[True, True], [True, False]]
 
 
 def corner(gauge: str = "strokes") -> Instance:
-    return Instance("corner", CORNER, [[0, 1], [1, 0]], [2.5, 1.2], [0.5, 0.7], gauge=gauge)
+    return Instance.on_pixels("corner", CORNER, [[0, 1], [1, 0]], [2.5, 1.2], [0.5, 0.7], gauge=gauge)
 
 
 INSTANCES = {
-    "extreme": Instance(
+    "extreme": Instance.on_pixels(
         "extreme", CORNER, [[0, 0], [1, 0]], [0.0, 3.1], [1e-6, 1.0],
         stroke_coefficient=3e5, skew_coefficient=2e-7,
     ),
     "no skew": make_instance("row", skew_coefficient=0.0),
-    "no pairs": Instance("alone", [[True, False, True]], [[0, 0]], [1.2], [0.7], gauge="box"),
+    "no pairs": Instance.on_pixels("alone", [[True, False, True]], [[0, 0]], [1.2], [0.7], gauge="box"),
     "one pixel": make_instance("pixel"),
 }  # fmt: skip
 """Instances whose numbers or shapes are odd."""
@@ -107,7 +107,7 @@ def test_text_of_odd_instances(name: str, instance: Instance, tmp_path: Path):
 @for_each("count", (11, 12, 13, 14, 24, 25))
 def test_lists_of_names_that_fill_a_line(count: int, tmp_path: Path):
     """12 names of alpha and 13 of beta fill a line."""
-    instance = Instance("line", np.ones((1, count), bool), [[0, 0]], [0.3], [0.5])
+    instance = Instance.on_pixels("line", np.ones((1, count), bool), [[0, 0]], [0.3], [0.5])
     assert_text(make_problem("miqp-mccormick", instance), tmp_path)
 
 

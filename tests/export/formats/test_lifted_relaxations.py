@@ -18,7 +18,9 @@ LIFTED = ("minlp-quartic", "minlp-cubic")
 def two():
     """Two pixels whose strokes pull p1 between 0 and 1, where the hull of the product is larger than it."""
     mask, pixels = np.ones((1, 2), dtype=bool), [[0, 0], [0, 1]]
-    return cf.Instance("two", mask, pixels, [0.5, 2.2], [1.0, 1.0], skew_coefficient=1.0, gauge="box")
+    return cf.Instance.on_pixels(
+        "two", mask, pixels, [0.5, 2.2], [1.0, 1.0], skew_coefficient=1.0, gauge="box"
+    )
 
 
 @pytest.fixture(scope="module")

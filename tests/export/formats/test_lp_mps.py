@@ -95,7 +95,9 @@ def test_no_weight_at_all_is_written(suffix: str, tmp_path: Path):
 @both
 @pytest.mark.parametrize("angle", [1e-16, np.pi - 1e-15, 0.0])
 def test_an_angle_next_to_nothing_is_written(angle: float, suffix: str, tmp_path: Path):
-    instance = Instance("flat", np.ones((1, 2), bool), np.array([[0, 0]]), np.array([angle]), np.ones(1))
+    instance = Instance.on_pixels(
+        "flat", np.ones((1, 2), bool), np.array([[0, 0]]), np.array([angle]), np.ones(1)
+    )
     problem = make_problem("qp-fixed", instance)
     write(problem, tmp_path / f"model.{suffix}")
     expected = problem_algebra(problem)
@@ -125,7 +127,7 @@ def test_names_suit_every_reader(label: str):
 def test_names_on_the_largest_grid_are_15_long_at_most(name: str):
     mask = np.zeros((2, 9999), dtype=bool)
     mask[:, -2:] = True
-    instance = Instance("largest", mask, np.array([[1, 9998]]), np.array([3.0]), np.ones(1))
+    instance = Instance.on_pixels("largest", mask, np.array([[1, 9998]]), np.array([3.0]), np.ones(1))
     problem = make_problem(name, instance)
     names = names_of(column_names(problem.instance, problem.blocks))
     assert {"alpha_0000_9998", "beta_0001_9997"} < set(names)
@@ -248,7 +250,7 @@ def test_golden_files(file: str, pixels: int, tmp_path: Path):
     or SCIP read them as the problem.
     """
     mask = np.array([[True, True], [True, False]])[: pixels - 1]
-    instance = Instance("golden", mask, np.array([[0, 1]]), np.array([2.5]), np.array([0.5]))
+    instance = Instance.on_pixels("golden", mask, np.array([[0, 1]]), np.array([2.5]), np.array([0.5]))
     name, suffix = file.split(".")
     problem = make_problem(name, instance)
     text = b"".join(GENERATE[suffix](CanonicalForm(problem), ["for people to read"]))

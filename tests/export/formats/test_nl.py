@@ -177,7 +177,9 @@ def test_golden_file():
     window of the stroke leaves 0 and 1. All six are nonlinear in the objective alone, the last two whole. The
     real solver library reads it.
     """
-    instance = Instance("golden", np.ones((1, 2), bool), np.array([[0, 1]]), np.array([2.5]), np.array([0.5]))
+    instance = Instance.on_pixels(
+        "golden", np.ones((1, 2), bool), np.array([[0, 1]]), np.array([2.5]), np.array([0.5])
+    )
     problem = make_problem("minlp-cubic", instance)
     assert b"".join(nl.generate(CanonicalForm(problem))) == (GOLDEN / "minlp-cubic.nl").read_bytes()
     read = by_casadi(GOLDEN / "minlp-cubic.nl")

@@ -14,7 +14,7 @@ SCALAR = re.compile(r"np\.|\barray\(|dtype")
 
 
 def one_stroke(theta=1.0, w=1.0, **given):
-    return cf.Instance("two", np.ones((1, 2), bool), [[0, 0]], [theta], [w], **given)
+    return cf.Instance.on_pixels("two", np.ones((1, 2), bool), [[0, 0]], [theta], [w], **given)
 
 
 def refusals(instance, folder):
@@ -55,9 +55,11 @@ def test_messages_about_numbers_of_numpy_are_plain():
         lambda: one_stroke(stroke_coefficient=np.float64("nan")),
         lambda: one_stroke(theta=np.float64("inf")),
         lambda: one_stroke(w=np.float64(2.0)),
-        lambda: cf.Instance("two", mask, np.array([[0, 7]]), [one], [one]),
-        lambda: cf.Instance("two", mask, np.array([[0, 0]]), [one], [one], pixel_size=np.float64(0.0)),
-        lambda: cf.Instance("two", mask, np.array([[0, 0]]), [one, one], [one]),
+        lambda: cf.Instance.on_pixels("two", mask, np.array([[0, 7]]), [one], [one]),
+        lambda: cf.Instance.on_pixels(
+            "two", mask, np.array([[0, 0]]), [one], [one], pixel_size=np.float64(0.0)
+        ),
+        lambda: cf.Instance.on_pixels("two", mask, np.array([[0, 0]]), [one, one], [one]),
         lambda: cf.CrossField(instance, field.alpha[:1], field.beta, field.p),
         lambda: cf.CrossField(instance, field.alpha * np.nan, field.beta, field.p),
         lambda: cf.formulate(instance, "qp-fixed", p=field.p[:0]),

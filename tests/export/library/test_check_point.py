@@ -138,7 +138,7 @@ def test_integers_that_are_not_quite_whole_count_as_they_are(tmp_path):
     ],
 )
 def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_path):
-    tiny = Instance(
+    tiny = Instance.on_pixels(
         "tiny", np.ones((2, 2), bool), np.array([[0, 0], [0, 1], [1, 1]]), np.array([0.2, 1.6, 2.6]),
         np.array([1.0, 0.75, 0.5]), stroke_coefficient=1.5, skew_coefficient=1e-3, gauge="strokes"
     )  # fmt: skip

@@ -15,7 +15,9 @@ MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
 
 def instance_of(mask, row, column, theta=0.0, **more):
-    return Instance("sample", mask, np.array([[row, column]]), np.array([theta]), np.array([1.0]), **more)
+    return Instance.on_pixels(
+        "sample", mask, np.array([[row, column]]), np.array([theta]), np.array([1.0]), **more
+    )
 
 
 def singular(size, index=0.25, x0=1.2, y0=0.4):

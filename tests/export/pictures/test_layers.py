@@ -19,7 +19,7 @@ NAMES = ["strokes", "crosses", "streamlines-v", "streamlines-u", "singularities"
 def level(height=6, width=10, pixel_size=5.0, origin=(20.0, 30.0)):
     """A field of horizontal and upright lines with a stroke along its second row."""
     pixels = np.stack([np.ones(width, int), np.arange(width)], axis=1)
-    instance = Instance(
+    instance = Instance.on_pixels(
         "level", np.ones((height, width)), pixels, np.zeros(width), np.ones(width),
         pixel_size=pixel_size, origin=origin,
     )  # fmt: skip

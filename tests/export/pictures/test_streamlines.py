@@ -20,7 +20,7 @@ def field_of(mask, line, skew, stroke=0):
     x, y = column - (mask.shape[1] - 1) / 2, (mask.shape[0] - 1) / 2 - row
     angle, beta = line(x, y) + 0.0 * x, skew(x, y) + 0.0 * x
     pixel = np.array([[row[stroke], column[stroke]]])
-    instance = Instance("sample", mask, pixel, angle[[stroke]], np.array([1.0]))
+    instance = Instance.on_pixels("sample", mask, pixel, angle[[stroke]], np.array([1.0]))
     return field_in_windows(instance, angle - beta, beta, np.zeros(len(instance.grid.first), dtype=np.int32))
 
 

@@ -33,7 +33,7 @@ KEPT = {"optimal-global", "optimal-local", "infeasible", "unbounded"}
 def instance_of(**facts):
     values = {"theta": [0.2, 1.6, 2.6], "w": [1.0, 0.75, 0.5], "gauge": "strokes", **facts}
     strokes = np.array([[0, 0], [0, 1], [1, 1]])
-    return cf.Instance(
+    return cf.Instance.on_pixels(
         "two", np.ones((2, 2), bool), strokes, np.array(values["theta"]), np.array(values["w"]),
         stroke_coefficient=1.5, skew_coefficient=1e-3, gauge=values["gauge"],
     )  # fmt: skip

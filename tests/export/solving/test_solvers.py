@@ -34,7 +34,7 @@ SOLVED = {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
 
 def one_pixel(gauge, skew_coefficient):
     mask, theta = np.ones((1, 1), dtype=bool), np.array([2 * np.pi / 3])
-    return cf.Instance(
+    return cf.Instance.on_pixels(
         "pixel", mask, np.array([[0, 0]]), theta, np.ones(1), gauge=gauge, skew_coefficient=skew_coefficient
     )
 
@@ -75,7 +75,7 @@ def test_two_pixels_with_exchanged_lines_meet_with_jump_one(name, solver):
     """Strokes at b and pi/2 - b, each on line u: one cross in two labels, (0, b) and (pi/2, -b)."""
     b = 0.3
     mask, pixels = np.ones((1, 2), dtype=bool), np.array([[0, 0], [0, 1]])
-    instance = cf.Instance(
+    instance = cf.Instance.on_pixels(
         "pair", mask, pixels, np.array([b, np.pi / 2 - b]), np.ones(2), gauge="box", skew_coefficient=0
     )
     solution = cf.solve(cf.formulate(instance, name), solver)

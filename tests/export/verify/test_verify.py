@@ -59,7 +59,7 @@ def on_grid(height: int, width: int, name: str = "small", seed: int = 4) -> Inst
     rng = np.random.default_rng(seed)
     pixels = np.argwhere(np.ones((height, width), bool))[: max(1, 2 * height * width // 3)]
     theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.1, 1, len(pixels))
-    return Instance(name, np.ones((height, width), bool), pixels, theta, w, skew_coefficient=1e-3)
+    return Instance.on_pixels(name, np.ones((height, width), bool), pixels, theta, w, skew_coefficient=1e-3)
 
 
 INSTANCES: dict[str, Callable[[], Instance]] = {

@@ -170,7 +170,7 @@ def written(problem, path, **given):
 def test_blocks_leave_no_seam_in_any_format(name, suffix, dialect, tmp_path, monkeypatch):
     """Lines of pixels: families of 4 k - 1, 4 k and 4 k + 1 records; and one pixel."""
     for count in (1, 4, 5):
-        instance = Instance("line", np.ones((1, count), bool), [[0, 0]], [2.5], [0.5])
+        instance = Instance.on_pixels("line", np.ones((1, count), bool), [[0, 0]], [2.5], [0.5])
         problem, field = make_problem(name, instance), make_field(instance)
         start = field if FORMATS[suffix].has_start else None
         given = {"path": tmp_path / f"x.{suffix}", "dialect": dialect, "start": start}

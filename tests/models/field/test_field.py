@@ -28,7 +28,7 @@ def pixels(mask, theta, gauge="strokes", skew_coefficient=1e-6):
     """An instance whose pixels [row, column] in theta (a dict, degrees) are strokes of weight 1."""
     places = sorted(theta)
     angles = np.radians([theta[place] for place in places])
-    return Instance(
+    return Instance.on_pixels(
         "hand",
         np.array(mask, bool),
         places,
@@ -60,7 +60,7 @@ def test_odd_jump_changes_the_sign_of_the_first_beta():
 
 
 def test_weights_scale_the_stroke_and_the_skew_term():
-    instance = Instance(
+    instance = Instance.on_pixels(
         "hand", [[True]], [[0, 0]], [1.0], [0.5], stroke_coefficient=3.0, skew_coefficient=2.0
     )
     energy = CrossField(instance, [0.7], [0.1], []).energy()
@@ -129,9 +129,9 @@ def test_singularity_is_found_at_its_quad():
 @for_each(
     "alpha,beta,p,message",
     [
-        ([0], [0, 0], [0], "alpha has shape (1,), but the grid of hand needs (2,)"),
+        ([0], [0, 0], [0], "alpha has shape (1,), but hand needs (2,)"),
         ([0, 0], [[0, 0]], [0], "beta has shape (1, 2)"),
-        ([0, 0], [0, 0], [0, 0], "p has shape (2,), but the grid of hand needs (1,)"),
+        ([0, 0], [0, 0], [0, 0], "p has shape (2,), but hand needs (1,)"),
         ([0, np.nan], [0, 0], [0], "alpha holds a value that is not finite"),
         ([0, 0], [np.inf, 0], [0], "beta holds a value that is not finite"),
         ([0, 0], [0, 0], [0.5], "p holds something other than whole numbers"),

@@ -2,7 +2,6 @@
 
 import json
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,7 +50,7 @@ def test_field_comes_back_and_gives_the_same_bytes(field, tmp_path, suffix):
 
 
 def test_json_states_each_jump_beside_its_pixel(tmp_path):
-    instance = Instance("small", [[1, 1], [1, 0]], [[0, 0]], [1.0], [1.0])
+    instance = Instance.on_pixels("small", [[1, 1], [1, 0]], [[0, 0]], [1.0], [1.0])
     field = CrossField(instance, [0.1, 0.2, 0.3], [0, 0.5, 0], [-1, 2])
     document = json.loads(write_field(field, tmp_path / "small.json").read_text())
     assert document["pixels"] == [
@@ -116,7 +115,7 @@ def test_field_json_that_breaks_the_rules_is_named_with_its_place(field, tmp_pat
 @for_each(
     "name,array,message",
     [
-        ("alpha", np.zeros(3), "alpha has shape (3,), but the grid of sample needs (7,)"),
+        ("alpha", np.zeros(3), "alpha has shape (3,), but sample needs (7,)"),
         ("beta", np.full(7, np.nan), "beta holds a value that is not finite"),
         ("p", None, "holds no array 'p'"),
         ("instance_w", None, "its instance: holds no array 'w'"),
@@ -224,6 +223,13 @@ def test_any_field_comes_back(tmp_path, seed, suffix):
     mask = rng.random(rng.integers(1, 8, 2)) < 0.7
     mask[0, 0] = True
     at = np.argwhere(mask)
-    instance = Instance("random", mask, at, rng.uniform(-HALF, HALF, len(at)), 1 - rng.random(len(at)))
-    field = random_field(replace(instance, origin=tuple(rng.normal(size=2))), seed)
+    instance = Instance.on_pixels(
+        "random",
+        mask,
+        at,
+        rng.uniform(-HALF, HALF, len(at)),
+        1 - rng.random(len(at)),
+        origin=tuple(rng.normal(size=2)),
+    )
+    field = random_field(instance, seed)
     assert same_field(field, read_field(write_field(field, tmp_path / f"f.{suffix}")))

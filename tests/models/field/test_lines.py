@@ -71,13 +71,13 @@ def test_u_is_the_line_nearer_to_the_stroke(seed):
 
 def test_a_label_on_the_edge_of_the_box_carries_the_stroke():
     for theta in (0.0, HALF):
-        instance = Instance("edge", [[True, True]], [[0, 1]], [theta], [1.0], gauge="box")
+        instance = Instance.on_pixels("edge", [[True, True]], [[0, 1]], [theta], [1.0], gauge="box")
         field = CrossField.from_lines(instance, [0.0, 0.0], [HALF, HALF])
         assert field.energy().total == pytest.approx(0)
 
 
 def test_lines_that_are_one_make_a_cross_of_one_line():
-    instance = Instance("one", [[True, True]], [[0, 0]], [0.3], [1.0])
+    instance = Instance.on_pixels("one", [[True, True]], [[0, 0]], [0.3], [1.0])
     field = CrossField.from_lines(instance, [0.3, 1.0], [0.3 + np.pi, 1.0])
     assert field.degenerate.all()
     assert field.angle_between == pytest.approx([0, 0], abs=1e-9)
@@ -96,7 +96,7 @@ def test_lines_that_are_one_make_a_cross_of_one_line():
     ],
 )
 def test_what_is_no_angle_is_refused(u, message):
-    instance = Instance("two", [[True, True]], [[0, 0]], [0.3], [1.0])
+    instance = Instance.on_pixels("two", [[True, True]], [[0, 0]], [0.3], [1.0])
     with pytest.raises(InputError) as caught:
         CrossField.from_lines(instance, u, [0.0, 0.0])
     assert message in str(caught.value)

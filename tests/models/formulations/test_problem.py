@@ -228,7 +228,7 @@ def test_sha256_stands_for_everything_that_changes_a_file():
 def test_noise_is_left_out_and_small_weights_are_not():
     """Jumps that cancel leave no cost of 1e-16; the format decides on a weight of 1e-13."""
     mask = np.ones((1, 3), dtype=bool)
-    instance = Instance(
+    instance = Instance.on_pixels(
         "line", mask, np.array([[0, 0]]), np.array([1e-16]), np.ones(1), skew_coefficient=1e-13
     )
     problem = formulate(instance, "qp-fixed", p=[1, 1])

@@ -75,7 +75,7 @@ def test_json_needs_only_name_mask_and_strokes(tmp_path):
         (change("strokes", [[0, 0, 1, 0]]), "$.strokes[0][3]"),
         (
             change("strokes", [[0, 0, 1, 1], [0, 0, 1, 1]]),
-            "stroke pixel [0, 0] is out of order or listed twice",
+            "stroke pixel [0, 0]: is out of order or listed twice",
         ),
         (change("extra", 1), "$: Additional properties are not allowed ('extra' was unexpected)"),
         (without("name"), "'name' is a required property"),

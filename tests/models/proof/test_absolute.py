@@ -114,7 +114,7 @@ def test_the_mean_cost_of_a_rounded_cross_is_at_most_its_own(norm):
             rng.choice([-1, 0, 1, rng.uniform(-1.6, 1.6)]),
             rng.uniform(),
         )
-        instance = Instance(
+        instance = Instance.on_pixels(
             "one", np.ones((1, 1), bool), [[0, 0]], [theta], [1.0], skew_coefficient=skew_coefficient
         )
         field = cf.CrossField(instance, [rng.uniform(0, 3)], [0.0], [])
@@ -157,7 +157,7 @@ def test_any_multipliers_bound_the_energy_in_a_box(norm):
 @NORMS
 def test_a_forced_jump_is_the_best_one_everywhere_in_its_boxes(norm):
     rng = np.random.default_rng(3)
-    instance = Instance("two", np.ones((1, 2), bool), [[0, 0]], [1.0], [1.0])
+    instance = Instance.on_pixels("two", np.ones((1, 2), bool), [[0, 0]], [1.0], [1.0])
     found = 0
     for _ in range(300):
         p = rng.integers(-1, 2)

@@ -28,7 +28,7 @@ def small(seed):
     rows = MASKS[seed % len(MASKS)].split("/")
     mask = np.array([[c == "1" for c in row] for row in rows])
     at = np.argwhere(mask)[np.sort(rng.permutation(mask.sum())[: rng.integers(1, 1 + mask.sum())])]
-    return Instance(
+    return Instance.on_pixels(
         "small", mask, at, rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at)),
         skew_coefficient=float(rng.choice([0, 1e-6, 1])),
         stroke_coefficient=float(rng.choice([0.1, 1, 1000])),

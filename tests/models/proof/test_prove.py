@@ -153,7 +153,7 @@ def weighted(seed, **weights):
     mask = np.ones((3, 5), bool)
     mask[1, 1] = mask[:, 3] = False
     at = np.argwhere(mask[:, :3])[np.sort(rng.permutation(8)[:4])]
-    return Instance("holes", mask, at, rng.uniform(0, np.pi, 4), 1 - rng.random(4), **weights)
+    return Instance.on_pixels("holes", mask, at, rng.uniform(0, np.pi, 4), 1 - rng.random(4), **weights)
 
 
 @pytest.mark.slow

@@ -106,7 +106,7 @@ def test_same_optimum_as_ipopt_on_the_file(name, size):
 
 def test_pair_with_a_jump_between_two_strokes():
     # alpha stays at both strokes, since |A| = |0.3 - 0.3 - pi/2 + pi/2| = 0.
-    instance = Instance(
+    instance = Instance.on_pixels(
         "two", [[True, True]], [[0, 0], [0, 1]], [0.3, 0.3 + HALF], [1.0, 1.0], skew_coefficient=0
     )
     field = fit_in_box(CrossField(instance, [0.0, HALF], [0.5, 0.1], [1]))
@@ -117,7 +117,7 @@ def test_pair_with_a_jump_between_two_strokes():
 def test_angles_stay_where_the_energy_does_not_say():
     mask = np.ones((3, 9), bool)
     mask[:, 4] = False
-    instance = Instance("parts", mask, [[0, 0]], [0.7], [1.0], skew_coefficient=0)
+    instance = Instance.on_pixels("parts", mask, [[0, 0]], [0.7], [1.0], skew_coefficient=0)
     rng = np.random.default_rng(0)
     given = CrossField(instance, *rng.uniform(0.3, 0.5, (2, 24)), np.zeros(len(instance.p_min)))
     field = fit_in_box(given)
@@ -166,7 +166,7 @@ def test_pinned_angles_are_optimal_where_the_energy_does_not_say_all(skew_coeffi
 
 def test_pinned_angles_of_a_part_without_strokes_stay():
     mask = np.array([[True, True, False, True, True]])
-    instance = Instance("parts", mask, np.array([[0, 0]]), np.array([0.3]), np.ones(1))
+    instance = Instance.on_pixels("parts", mask, np.array([[0, 0]]), np.array([0.3]), np.ones(1))
     alpha = np.array([0.3, 0.3, 0.7, 0.7])
     field = reproducible_field(CrossField(instance, alpha, np.zeros(4), np.zeros(2, int)))
     assert field.alpha.tolist() == alpha.tolist()

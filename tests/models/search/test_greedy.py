@@ -229,7 +229,7 @@ def test_cells_do_not_leap_over_a_corner():
 
 @pytest.mark.parametrize("skew_coefficient", [0.0, 1e-6, 1e6])
 def test_the_greatest_weights_are_solved(skew_coefficient):
-    for instance in (sample("mouse", 8), Instance("one", [[True]], [[0, 0]], [2.0], [1.0])):
+    for instance in (sample("mouse", 8), Instance.on_pixels("one", [[True]], [[0, 0]], [2.0], [1.0])):
         heavy = replace(instance, stroke_coefficient=1e6, skew_coefficient=skew_coefficient)
         for field in (greedy_field(heavy), power_field(heavy), search(heavy, rounds=1).field):
             assert np.isfinite(field.energy().total)

@@ -40,7 +40,7 @@ def test_a_hard_hold_keeps_the_strokes():
 def test_one_pixel_under_the_heaviest_strokes_is_solved():
     """Its system has one equation for two unknowns, which a heavy weight must not drown the pull of."""
     for theta in np.linspace(0, 3.1, 40):
-        one = Instance(
+        one = Instance.on_pixels(
             "one", [[True]], [[0, 0]], [theta], [1.0], stroke_coefficient=1e6, skew_coefficient=0.0
         )
         for hold in HOLDS:

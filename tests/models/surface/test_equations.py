@@ -20,7 +20,7 @@ def equations(weights=WEIGHTS, extra=()):
     """Those of a constant skew cross on a mask with a hole and a tail, and heights at random."""
     mask = np.ones((4, 5), dtype=bool)
     mask[1, 1] = mask[0, 3:] = mask[3, :3] = False
-    instance = cf.Instance("bit", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1))
+    instance = cf.Instance.on_pixels("bit", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1))
     size = instance.grid.size
     field = cf.CrossField.from_lines(instance, np.full(size, 0.2), np.full(size, 1.4))
     stencils = Stencils(instance.grid)
@@ -91,7 +91,7 @@ def test_the_way_down_ends_where_the_slope_does_and_time_cuts_it_short():
 def test_a_plane_stays_a_plane_on_finer_levels():
     mask = np.ones((33, 30), dtype=bool)
     mask[:9, :13] = False
-    grid = cf.Instance("bit", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1)).grid
+    grid = cf.Instance.on_pixels("bit", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1)).grid
     cross = np.full(grid.size, 1.0 + 0j)
     levels = levels_of(GridLevel(Stencils(grid), Crosses(-cross, 0 * cross)))
     assert [level.halved for level in levels] == [1, 0]

@@ -131,7 +131,7 @@ def test_the_surface_moves_with_the_sketch(moved_instance):
 def constant(mask, u=0.3, v=1.3):
     """A field of the same skew cross everywhere."""
     mask = np.array(mask, dtype=bool)
-    instance = Instance("tiny", mask, np.argwhere(mask)[:1], np.array([u]), np.ones(1))
+    instance = Instance.on_pixels("tiny", mask, np.argwhere(mask)[:1], np.array([u]), np.ones(1))
     return cf.CrossField.from_lines(instance, np.full(mask.sum(), u), np.full(mask.sum(), v))
 
 
@@ -155,7 +155,7 @@ def test_parts_of_the_mask_are_independent():
     pictures = [field.image(line) for line in lines(field)]
     mirrored = [np.pi - picture[:, ::-1] for picture in pictures]
     twice = [np.hstack([one, gap, other])[mask] for one, other in zip(pictures, mirrored, strict=True)]
-    instance = Instance("twice", mask, np.argwhere(mask)[:1], twice[0][:1], np.ones(1))
+    instance = Instance.on_pixels("twice", mask, np.argwhere(mask)[:1], twice[0][:1], np.ones(1))
     both = cf.surface(cf.CrossField.from_lines(instance, *twice)).heights
     alone = cf.surface(field).heights
     wide = alone.shape[1]

@@ -1,0 +1,342 @@
+"""The surface of a triangle mesh as a domain: faces with frames, edges between them, rings around vertices.
+
+The x axis of a face's frame is its first edge, its z axis the normal of its counter-clockwise side. Numbers
+are equal on every processor: see angles.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MeshError
+from .angles import arctangent, wrap
+from .domain import Bools, Domain, Floats, Ints, Rings
+
+MOST_FACES: Final = 2_000_000
+_FARTHEST: Final = 1e30  # coordinates whose products are finite numbers
+_THINNEST: Final = 1e-12  # height of a face relative to its longest edge, below which it has no normal
+_DECIMALS: Final = 12  # of kappa
+_SHOWN: Final = 8  # faces that an error lists
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(Domain):
+    """Triangles with positions of their corners; neighbours share an edge.
+
+    Points of the domain are faces. A pair is an inner edge: its first face has the edge from the lower to
+    the higher vertex, its second face has it reversed. Pairs are ordered by their first face.
+
+    Parameters
+    ----------
+    vertices
+        Positions, float (v, 3).
+    faces
+        Numbers of the three vertices of each face, counter-clockwise seen from outside, int (n, 3).
+
+    """
+
+    vertices: Floats
+    faces: Ints
+
+    kind: ClassVar[str] = "face"
+    side: ClassVar[int] = 1
+    reference: ClassVar[int] = 1
+
+    def check(self) -> None:
+        """Raise MeshError, with numbers of faces, unless the mesh is an oriented manifold of triangles."""
+        self._check_arrays()
+        self._check_shapes()
+        start, end = self._edges
+        key = _edge_keys(start, end, len(self.vertices))
+        order = np.argsort(key, kind="stable")
+        twice = key[order][1:] == key[order][:-1]
+        if twice.any():
+            at = np.concatenate([order[1:][twice], order[:-1][twice]])
+            raise MeshError(
+                f"{_list_faces(at // 3)} go along the same edge in the same direction: they are turned "
+                "against their neighbours, or more than two share it; orient all faces alike and remove "
+                "inner walls"
+            )
+        fans = np.bincount(start[self._opposite < 0], minlength=len(self.vertices)) > 1
+        fans[self._fan_vertices()] = True
+        if fans.any():
+            at = np.nonzero(fans[self.faces].any(axis=1))[0]
+            raise MeshError(
+                f"{_list_faces(at)} touch others at vertex {int(np.argmax(fans))} alone; "
+                "split it, so that each vertex has one fan of faces"
+            )
+
+    def _check_arrays(self) -> None:
+        if self.vertices.ndim != 2 or self.vertices.shape[1] != 3 or self.faces.ndim != 2:
+            raise MeshError("give vertices as (v, 3) and faces as (n, 3)")
+        if not len(self.faces):
+            raise MeshError("has no face; give a triangle mesh")
+        if self.faces.shape[1] != 3:
+            raise MeshError(f"has faces of {self.faces.shape[1]} corners; triangulate it")
+        if len(self.faces) > MOST_FACES:
+            raise MeshError(f"has {len(self.faces)} faces; at most {MOST_FACES} are allowed, simplify it")
+        if not (np.abs(self.vertices) <= _FARTHEST).all():
+            raise MeshError(f"has a coordinate that is not a number up to {_FARTHEST:g}")
+        wrong = ((self.faces < 0) | (self.faces >= len(self.vertices))).any(axis=1)
+        if wrong.any():
+            raise MeshError(f"{_list_faces(np.nonzero(wrong)[0])} name a vertex that does not exist")
+
+    def _check_shapes(self) -> None:
+        edges = [self._edge_vectors(corner) for corner in range(3)]
+        longest = np.sqrt(np.maximum.reduce([_dot(edge, edge) for edge in edges]))
+        twice_area = np.sqrt(_dot(self._cross, self._cross))
+        thin = ~(twice_area > _THINNEST * longest * longest)
+        if thin.any():
+            raise MeshError(
+                f"{_list_faces(np.nonzero(thin)[0])} have no area: two corners are one, or all lie on a "
+                "line; merge close vertices and remove such faces"
+            )
+
+    @property
+    def size(self) -> int:
+        """Number of faces n."""
+        return len(self.faces)
+
+    @cached_property
+    def _edges(self) -> tuple[Ints, Ints]:
+        """First and second vertex of each directed edge, (3 n,): edge 3 f + k leaves corner k of face f."""
+        return self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+
+    @cached_property
+    def _opposite(self) -> Ints:
+        """The directed edge that is each one reversed, -1 at the boundary, (3 n,)."""
+        start, end = self._edges
+        key = _edge_keys(start, end, len(self.vertices))
+        order = np.argsort(key, kind="stable")
+        reversed_key = _edge_keys(end, start, len(self.vertices))
+        at = np.minimum(np.searchsorted(key[order], reversed_key), len(key) - 1)
+        return np.where(key[order][at] == reversed_key, order[at], -1).astype(np.int32)
+
+    @cached_property
+    def pair_edges(self) -> Ints:
+        """The directed edge of each pair that its first face has, shape (m,)."""
+        start, end = self._edges
+        return np.nonzero((self._opposite >= 0) & (start < end))[0].astype(np.int32)
+
+    @cached_property
+    def first(self) -> Ints:
+        """Face i of each pair, shape (m,)."""
+        return self.pair_edges // np.int32(3)
+
+    @cached_property
+    def second(self) -> Ints:
+        """Face j of each pair, shape (m,)."""
+        return np.asarray(self._opposite[self.pair_edges] // np.int32(3))
+
+    @property
+    def pair_vertices(self) -> Ints:
+        """Lower and higher vertex of each pair's edge, shape (m, 2)."""
+        start, end = self._edges
+        return np.stack([start[self.pair_edges], end[self.pair_edges]], axis=1)
+
+    @property
+    def boundary(self) -> Ints:
+        """The directed edges with a face on one side only, shape (b,): edge 3 f + k is in face f."""
+        return np.nonzero(self._opposite < 0)[0].astype(np.int32)
+
+    def edge_vertices(self, edges: Ints) -> Ints:
+        """First and second vertex of directed edges, shape (k, 2)."""
+        start, end = self._edges
+        return np.stack([start[edges], end[edges]], axis=1)
+
+    def _edge_vectors(self, corner: int) -> Floats:
+        """The edge that leaves a corner of each face, shape (n, 3)."""
+        corners = self.vertices[self.faces]
+        return np.asarray(corners[:, (corner + 1) % 3] - corners[:, corner])
+
+    @cached_property
+    def _cross(self) -> Floats:
+        """Normal of each face times twice its area, shape (n, 3)."""
+        one, other = self._edge_vectors(0), -self._edge_vectors(2)
+        return np.stack([one[:, a] * other[:, b] - one[:, b] * other[:, a] for a, b in _AXES], axis=1)
+
+    @cached_property
+    def normals(self) -> Floats:
+        """Unit normal of each face, shape (n, 3)."""
+        return _unit(self._cross)
+
+    @cached_property
+    def frames(self) -> Floats:
+        """Unit x and y axis of each face, shape (n, 2, 3)."""
+        x, z = _unit(self._edge_vectors(0)), self.normals
+        y = np.stack([z[:, a] * x[:, b] - z[:, b] * x[:, a] for a, b in _AXES], axis=1)
+        return np.stack([x, y], axis=1)
+
+    @cached_property
+    def centres(self) -> Floats:
+        """Mean of the corners of each face, shape (n, 3)."""
+        corners = self.vertices[self.faces]
+        return np.asarray((corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3)
+
+    def angle_in(self, faces: Ints, vectors: Floats) -> Floats:
+        """Angle of a vector (k, 3) in the frame of its face, projected to it, in (-pi, pi]; shape (k,)."""
+        frames = self.frames[faces]
+        return arctangent(_dot(frames[:, 1], vectors), _dot(frames[:, 0], vectors))
+
+    def vectors(self, faces: Ints, angles: Floats) -> Floats:
+        """Unit vectors (k, 3) of angles (k,) in the frames of their faces."""
+        frames = self.frames[faces]
+        return np.asarray(np.cos(angles)[:, None] * frames[:, 0] + np.sin(angles)[:, None] * frames[:, 1])
+
+    @cached_property
+    def kappa(self) -> Floats:
+        """Angle of the common edge in face j less that in face i, shape (m,), in (-pi, pi]."""
+        low, high = self.pair_vertices.T
+        edge = self.vertices[high] - self.vertices[low]
+        turn = self.angle_in(self.second, edge) - self.angle_in(self.first, edge)
+        rounded = np.round(wrap(turn, -np.pi, 2 * np.pi), _DECIMALS)
+        return np.where(rounded <= -np.pi, rounded + 2 * np.pi, rounded)
+
+    @cached_property
+    def dihedral(self) -> Floats:
+        """Angle between the normals of each pair of faces, in [0, pi], shape (m,)."""
+        one, other = self.normals[self.first], self.normals[self.second]
+        cross = np.stack([one[:, a] * other[:, b] - one[:, b] * other[:, a] for a, b in _AXES], axis=1)
+        return arctangent(np.sqrt(_dot(cross, cross)), _dot(one, other))
+
+    @cached_property
+    def dual_weights(self) -> Floats:
+        """Length of each pair's edge over the distances of its middle from both centres, shape (m,)."""
+        low, high = self.pair_vertices.T
+        edge = self.vertices[high] - self.vertices[low]
+        middle = (self.vertices[high] + self.vertices[low]) / 2
+        to_first, to_second = (self.centres[face] - middle for face in (self.first, self.second))
+        across = np.sqrt(_dot(to_first, to_first)) + np.sqrt(_dot(to_second, to_second))
+        return np.asarray(np.sqrt(_dot(edge, edge)) / across)
+
+    @cached_property
+    def defect(self) -> Floats:
+        """2 pi less the angles of the faces around each vertex, in radians, shape (v,)."""
+        angles = np.zeros((self.size, 3))
+        for corner in range(3):
+            one, other = self._edge_vectors(corner), -self._edge_vectors((corner + 2) % 3)
+            cross = np.stack([one[:, a] * other[:, b] - one[:, b] * other[:, a] for a, b in _AXES], axis=1)
+            angles[:, corner] = arctangent(np.sqrt(_dot(cross, cross)), _dot(one, other))
+        around = np.bincount(self.faces.ravel(), angles.ravel(), len(self.vertices))
+        return np.asarray(2 * np.pi - around)
+
+    @cached_property
+    def on_boundary(self) -> Bools:
+        """Whether each vertex lies on the boundary or in no face, shape (v,)."""
+        inner = np.zeros(len(self.vertices), dtype=bool)
+        inner[self.faces.ravel()] = True
+        start, end = self._edges
+        inner[start[self.boundary]] = inner[end[self.boundary]] = False
+        return ~inner
+
+    @cached_property
+    def ring_vertices(self) -> Ints:
+        """The vertex of each ring, ascending, shape (r,)."""
+        return np.nonzero(~self.on_boundary)[0].astype(np.int32)
+
+    @cached_property
+    def _walks(self) -> tuple[Ints, Ints]:
+        """Directed edges that rings cross, in order, and the ring of each."""
+        start, _ = self._edges
+        first = np.full(len(self.vertices), -1, dtype=np.int32)
+        first[start[::-1]] = np.arange(len(start) - 1, -1, -1, dtype=np.int32)
+        ring = np.arange(len(self.ring_vertices), dtype=np.int32)
+        begin = first[self.ring_vertices]
+        at, rings, crossed = begin, [ring], []
+        while len(ring):
+            incoming = at - at % 3 + (at + 2) % 3  # the edge that returns to the vertex
+            crossed.append(incoming)
+            at = self._opposite[incoming]
+            open_ = at != begin[ring]
+            ring, at = ring[open_], at[open_]
+            rings.append(ring)
+        order = np.argsort(np.concatenate(rings[:-1] or [ring]), kind="stable")
+        return np.concatenate(crossed or [at])[order], np.concatenate(rings[:-1] or [ring])[order]
+
+    def _fan_vertices(self) -> Ints:
+        """Inner vertices whose faces are more than one ring."""
+        number = np.bincount(self.faces.ravel(), minlength=len(self.vertices))[self.ring_vertices]
+        split = np.bincount(self._walks[1], minlength=len(number)) != number
+        return np.asarray(self.ring_vertices[split])
+
+    @cached_property
+    def rings(self) -> Rings:
+        """The ring around each vertex of `ring_vertices`."""
+        crossed, ring = self._walks
+        pair_of = np.full(3 * self.size, -1, dtype=np.int32)
+        pair_of[self.pair_edges] = np.arange(len(self.pair_edges), dtype=np.int32)
+        forward = pair_of[crossed] >= 0
+        pair = np.where(forward, pair_of[crossed], pair_of[self._opposite[crossed]])
+        start = np.searchsorted(ring, np.arange(len(self.ring_vertices) + 1)).astype(np.int32)
+        sign = np.where(forward, 1, -1).astype(np.int32)
+        return Rings(start, pair.astype(np.int32), sign, self.defect[self.ring_vertices])
+
+    @property
+    def euler_characteristic(self) -> int:
+        """Vertices in use less edges plus faces."""
+        vertices = len(np.unique(self.faces))
+        return vertices - len(self.pair_edges) - len(self.boundary) + self.size
+
+    @property
+    def summary(self) -> str:
+        """Faces, vertices, Euler characteristic, and parts if there are more than one."""
+        parts = f" in {self.parts} separate parts" if self.parts > 1 else ""
+        return (
+            f"{self.size} faces{parts}, {len(self.vertices)} vertices, "
+            f"Euler characteristic {self.euler_characteristic}"
+        )
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Numbers of faces, vertices, pairs, boundary edges and parts, and the Euler characteristic."""
+        return {
+            "faces": self.size,
+            "vertices": len(self.vertices),
+            "pairs": len(self.pair_edges),
+            "boundary_edges": len(self.boundary),
+            "euler_characteristic": self.euler_characteristic,
+            "parts": self.parts,
+        }
+
+    def place(self, point: int) -> str:
+        """Number of a face."""
+        return f"face {point}"
+
+    def places(self, points: Ints) -> Ints:
+        """Numbers of faces, shape (k,)."""
+        return points
+
+    def content(self) -> tuple[list[int], list[float], list[NDArray[Any]]]:
+        """Numbers of vertices and faces, and both arrays."""
+        arrays = [self.vertices.astype("<f8"), self.faces.astype("<i4")]
+        return [len(self.vertices), self.size], [], arrays
+
+
+_AXES: Final = ((1, 2), (2, 0), (0, 1))
+"""The two other axes, for each component of a cross product."""
+
+
+def _dot(one: Floats, other: Floats) -> Floats:
+    """Scalar products of vectors (k, 3), summed from left to right, shape (k,)."""
+    return np.asarray(one[:, 0] * other[:, 0] + one[:, 1] * other[:, 1] + one[:, 2] * other[:, 2])
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.sqrt(_dot(vectors, vectors))[:, None])
+
+
+def _edge_keys(start: Ints, end: Ints, vertices: int) -> NDArray[np.int64]:
+    return start.astype(np.int64) * vertices + end
+
+
+def _list_faces(numbers: NDArray[Any]) -> str:
+    """Numbers of faces for an error, the first ones of many."""
+    unique = np.unique(numbers)
+    text = ", ".join(map(str, unique[:_SHOWN].tolist()))
+    more = f" and {len(unique) - _SHOWN} more" if len(unique) > _SHOWN else ""
+    return f"face{'s' * (len(unique) > 1)} {text}{more}"
