@@ -90,9 +90,6 @@ VARIABLES: Final = {
 }  # fmt: skip
 """Every variable of every formulation, in the order of columns."""
 
-COLUMNS: Final = {variable.name: variable.over for variable in VARIABLES.values()}
-"""The index set of every variable, also for programs without SymPy."""
-
 NARROWED: Final = VARIABLES | {"beta": replace(VARIABLES["beta"], lower=beta_lo, upper=beta_up)}
 """`VARIABLES` for windows that a proof has narrowed, so that bounds of beta are data too."""
 

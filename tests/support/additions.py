@@ -45,7 +45,6 @@ def additions():
     tables = (
         (symbols.VARIABLES, {"v": VARIABLE}),
         (symbols.NARROWED, {"v": VARIABLE}),
-        (symbols.COLUMNS, {"v": "pairs"}),
         (symbols.SLOTS["pairs"], {v: ("v", "itself")}),
         (symbols.LATEX, {v: "v_{ij}"}),
         (registry.FORMATS, {"toy": FORMAT}),

@@ -10,11 +10,11 @@ import gzip
 import os
 import tempfile
 import zlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from ....models.errors import CrossfieldError, InputError
 from ....models.processes.deadline import Progress, silent
@@ -156,22 +156,17 @@ def _read_unpacked(path: Path) -> bytes:
 
 
 def _find_wrong_points(folder: Path, library: Library, named: Collection[str], jobs: int) -> list[Defect]:
-    """Best known points that are not feasible; damaged files are not checked."""
+    """Best known points that are not feasible in their .mps; damaged files are not checked."""
     defects: list[Defect] = []
     with open_executor(jobs, None) as chosen:
         tasks = Tasks(chosen, tasks_ahead(jobs, None))
         for sidecar in library.entries:
-            point, models = sidecar["best"]["point"], _checked_models(sidecar)
+            point = sidecar["best"]["point"]
+            models = [file["name"] for file in sidecar["files"] if file["format"] == "mps"]
             intact = [model for model in models if not {point, model} & set(named)]
             tasks.add(_check_point, (folder, point, intact), defects.extend)
         tasks.run()
     return defects
-
-
-def _checked_models(sidecar: Mapping[str, Any]) -> list[str]:
-    """The files against which a point is checked: the .mps, and the instance unless jumps are data."""
-    models = [file["name"] for file in sidecar["files"] if file["format"] == "mps"]
-    return [*models, sidecar["instance"]["file"]] if sidecar["jumps"] is None else models
 
 
 def _check_point(task: tuple[Path, str, list[str]]) -> list[Defect]:

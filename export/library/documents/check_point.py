@@ -2,20 +2,18 @@
 
 One file, Python 3.9 or newer, nothing to install, no solver.
 
-MODEL   a .mps or .mps.gz of the library, or the .instance.json that its formulations share
+MODEL   a .mps or .mps.gz of the library
 POINT   a solution file of HiGHS, SCIP, CBC, Gurobi, Xpress (.slx), MIPLIB or GAMS (our CSV), or a list of
         names and values in lines. A column that is left out is 0, or what it is fixed to.
 
 Both files may be packed with gzip, bzip2 or xz.
 
-With an MPS file, the objective and the violations of bounds, rows and integrality are exact: the numbers are
-the decimals in the files, and no sum or product is rounded. With an instance, the energies of the cross field
-are computed from their definition: the numbers are the doubles nearest to the decimals of the instance, and
-pi has 60 digits.
+The objective and the violations of bounds, rows and integrality are exact: the numbers are the decimals in
+the files, and no sum or product is rounded.
 
 Exit code 0: feasible within the tolerance; 1: not feasible, or the file claims another objective; 2: wrong
-usage or a file that cannot be used. A claimed objective is compared with that of an MPS file, within 1e-5 of
-its size, or of 1: solvers round theirs to about 1e-6.
+usage or a file that cannot be used. A claimed objective must agree within 1e-5 of its size, or of 1: solvers
+round theirs to about 1e-6.
 """
 
 from __future__ import annotations
@@ -24,9 +22,7 @@ import argparse
 import bz2
 import decimal
 import gzip
-import json
 import lzma
-import math
 import re
 import sys
 import zlib
@@ -36,12 +32,10 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import IO, Any, NoReturn, Optional, TypeVar
 
-from ....models.formulations.symbols import COLUMNS
 from ...solutions.readers.grammar import HEAD, LineError, Scan, plain_numbers, plain_text, spellings
 from ...solutions.readers.layouts import LAYOUTS
 
-PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
-ZERO, HALF, ONE, TWO = Decimal(0), Decimal("0.5"), Decimal(1), Decimal(2)
+ZERO, HALF, ONE = Decimal(0), Decimal("0.5"), Decimal(1)
 EXACT = decimal.Context(prec=20_000, traps=[decimal.Inexact, decimal.InvalidOperation, decimal.Overflow])
 """Arithmetic that raises an error rather than round; sums of products take some 3,000 digits."""
 
@@ -49,12 +43,8 @@ INFINITE = Decimal("1e20")  # bounds from here on are none, as in all solvers
 
 LONGEST_LINE = 1 << 20
 MOST_BYTES = 1 << 30  # of a file, unpacked: a small .gz that holds more is a trap
-MOST_BYTES_OF_JSON = 1 << 27
 MOST_BYTES_OF_POINT = 1 << 28
 LONGEST_NUMBER = 100
-MOST_WEIGHT = 1e6  # of a term of the energy
-MOST_ANGLE = 1e6
-LEAST_WEIGHT = 5e-324  # of a stroke, which must be above 0
 GREATEST_EXPONENT = 400
 
 BOUNDS = {
@@ -87,7 +77,6 @@ Entry = tuple[int, Decimal]
 Product = tuple[int, int, Decimal]
 Matrix = dict[tuple[int, int], Decimal]
 Excess = tuple[Decimal, str]
-Jump = tuple[Decimal, Decimal]
 Interval = tuple[Optional[Decimal], Optional[Decimal]]
 Content = TypeVar("Content")
 
@@ -160,8 +149,8 @@ class Model:
 class PointReport:
     """Result of the check of a point.
 
-    Objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind, and
-    whether the file's own point has the objective that it claims, if it claims one that can be compared.
+    Objective, lines of the report, the worst violation of each kind, and whether the point has the objective
+    that its file claims, if it claims one.
     """
 
     objective: Decimal
@@ -519,212 +508,6 @@ def _worst(violations: Iterable[Excess]) -> Excess:
     return max(violations, key=lambda violation: violation[0], default=(ZERO, ""))
 
 
-# ------------------------------------------------------------------------------------- instance against point
-
-
-Stroke = tuple[float, Decimal]
-
-
-class Pixel:
-    """A pixel inside the mask: its place in names, window of alpha, and stroke (theta, weight), if any."""
-
-    def __init__(self, place: str, gauge: str, stroke: Stroke | None) -> None:
-        self.place = place
-        self.stroke: tuple[Decimal, Decimal] | None = None
-        self.low = 0.0
-        self.window: tuple[Decimal, Decimal] = (ZERO, PI / 2)
-        if stroke is None:
-            return
-        theta = stroke[0] % math.pi
-        theta = theta if 1e-8 <= theta < math.pi else 0.0  # as the program itself has it
-        if gauge == "box":
-            theta = -math.pi / 4 + (theta + math.pi / 4) % math.pi
-        else:
-            self.low = theta - math.pi / 4
-            self.window = (Decimal(theta) - PI / 4, Decimal(theta) + PI / 4)
-        self.stroke = (Decimal(theta), stroke[1])
-
-
-@dataclass
-class SketchInstance:
-    """An instance: pixels, pairs (place, first, second), and the weights of the energy."""
-
-    pixels: list[Pixel]
-    pairs: list[tuple[str, int, int]]
-    w_strokes: Decimal
-    w_beta: Decimal
-
-    def jumps(self, first: int, second: int) -> tuple[int, int]:
-        """The least and the greatest useful jump of a pair of pixels."""
-        difference = self.pixels[first].low - self.pixels[second].low
-        high, low = difference + math.pi / 2, difference - math.pi / 2
-        return math.floor(-2 * high / math.pi + 1e-9), math.ceil(-2 * low / math.pi - 1e-9)
-
-
-def read_instance(path: str) -> SketchInstance:
-    """The instance in a JSON file."""
-    text, size = [], 0
-    for _, line in lines_of(path):
-        text.append(line)
-        size += len(line)
-        _require(size <= MOST_BYTES_OF_JSON, "is unreasonably long for an instance")
-    try:
-        document = json.loads("".join(text), parse_constant=_no_constant, object_pairs_hook=_once)
-        known = (document["format"], _real(document["version"], 0, 9)) == ("crossfield-instance", 1)
-        _require(known, "is JSON, but no instance of crossfield, version 1")
-        _require(
-            "crossings" not in document,
-            "holds crossings, which this version does not know; read the sketch again",
-        )
-        return _instance(document)
-    except (ValueError, RecursionError, KeyError, TypeError, IndexError, OverflowError, ArithmeticError):
-        raise BadInputError("is no instance of crossfield, or damaged") from None
-
-
-def _no_constant(text: str) -> NoReturn:
-    raise ValueError(text)
-
-
-def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """A JSON object, each of whose keys is there once: programs differ on which one counts."""
-    values = dict(pairs)
-    if len(values) < len(pairs):
-        raise ValueError("a key is there twice")
-    return values
-
-
-def _real(value: object, least: float, most: float) -> float:
-    """A number of a document, which must be in a range."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
-        raise ValueError(value)
-    return float(value)
-
-
-def _instance(document: dict[str, object]) -> SketchInstance:
-    mask, strokes = document["mask"], document["strokes"]
-    gauge = document.get("gauge", "strokes")
-    if not (isinstance(mask, list) and isinstance(strokes, list)) or gauge not in ("strokes", "box"):
-        raise ValueError(gauge)
-    width = max(2, len(str(max(len(mask), *(len(row) for row in mask)) - 1)))
-    held = _held(strokes)
-    inside = [(r, c) for r, row in enumerate(mask) for c, pixel in enumerate(row) if pixel == "#"]
-    at = {place: number for number, place in enumerate(inside)}
-    if any(place not in at for place in held):
-        raise ValueError("strokes")
-    pixels = [Pixel(f"{r:0{width}}_{c:0{width}}", str(gauge), held.get((r, c))) for r, c in inside]
-    pairs = [
-        (f"{pixels[i].place}_{way}", i, at[other])
-        for (r, c), i in at.items()
-        for way, other in (("u", (r - 1, c)), ("r", (r, c + 1)))
-        if other in at
-    ]
-    weights = [
-        Decimal(_real(document.get(*item), 0, MOST_WEIGHT)) for item in (("w_strokes", 1.0), ("w_beta", 1e-6))
-    ]
-    return SketchInstance(pixels, pairs, *weights)
-
-
-def _held(strokes: Any) -> dict[tuple[int, int], Stroke]:
-    """Direction and weight of each stroke by row and column, each place once."""
-    held = {
-        (r, c): (_real(theta, -MOST_ANGLE, MOST_ANGLE), Decimal(_real(w, LEAST_WEIGHT, 1)))
-        for r, c, theta, w in strokes
-    }
-    if len(held) < len(strokes):
-        raise ValueError("strokes")
-    return held
-
-
-class Field:
-    """The cross field of a point: angles, and the jump of each pair as p, or as p1 and p2."""
-
-    def __init__(self, instance: SketchInstance, point: NamedPoint) -> None:
-        self.instance = instance
-        get = point.values.get
-        self.alpha = [get(f"alpha_{pixel.place}", ZERO) for pixel in instance.pixels]
-        self.beta = [get(f"beta_{pixel.place}", ZERO) for pixel in instance.pixels]
-        names = [place for place, _, _ in instance.pairs]
-        self.whole = any(name.startswith("p_") for name in point.values)
-        self.p1 = [get(f"p1_{name}", ZERO) for name in names]
-        self.p2 = [get(f"p2_{name}", ZERO) for name in names]
-        self.p = [get(f"p_{name}", ZERO) for name in names]
-        if not self.whole:
-            self.p = [odd + TWO * even for odd, even in zip(self.p1, self.p2)]
-
-    def jump(self, pair: int) -> Jump:
-        """Jump of a pair and its factor (-1)^p; a p1 that is not whole counts as it is."""
-        p = self.p[pair]
-        if not self.whole:
-            return p, ONE - TWO * self.p1[pair]
-        return p, ONE if _nearest(p) % 2 == 0 else -ONE
-
-    def energy(self, norm: int) -> Decimal:
-        """The energy with squares (2) or absolute values (1):
-        2 sum (A, B) + w_strokes sum w R + w_beta sum beta.
-        """
-
-        def size(value: Decimal) -> Decimal:
-            return abs(value) if norm == 1 else value * value
-
-        smooth = strokes = skew = ZERO
-        for pair, (_, i, j) in enumerate(self.instance.pairs):
-            p, factor = self.jump(pair)
-            smooth += size(self.alpha[i] - self.alpha[j] + PI / 2 * p)
-            smooth += size(factor * self.beta[i] - self.beta[j])
-        for alpha, beta, pixel in zip(self.alpha, self.beta, self.instance.pixels):
-            skew += size(beta)
-            if pixel.stroke is not None:
-                strokes += pixel.stroke[1] * size(alpha + beta - pixel.stroke[0])
-        return TWO * smooth + self.instance.w_strokes * strokes + self.instance.w_beta * skew
-
-    def violations(self) -> dict[str, Excess]:
-        """Windows of alpha, bounds of beta, ranges of jumps, integrality."""
-        quarter = (-PI / 4, PI / 4)
-        bounds = []
-        for alpha, beta, pixel in zip(self.alpha, self.beta, self.instance.pixels):
-            bounds.append((_outside(alpha, pixel.window), f"alpha_{pixel.place}"))
-            bounds.append((_outside(beta, quarter), f"beta_{pixel.place}"))
-        integers = []
-        for (name, i, j), p, odd, even in zip(self.instance.pairs, self.p, self.p1, self.p2):
-            low, high = self.instance.jumps(i, j)
-            bounds.append((_outside(p, (Decimal(low), Decimal(high))), f"the jump of {name}"))
-            bounds.append((_outside(odd, (ZERO, ONE)), f"p1_{name}"))
-            whole = (p,) if self.whole else (odd, even)
-            integers.append((max(abs(v - _nearest(v)) for v in whole), f"the jump of {name}"))
-        return {"bounds": _worst(bounds), "integers": _worst(integers)}
-
-
-def check_instance(instance: SketchInstance, point: NamedPoint) -> PointReport:
-    """Check the cross field of a point on an instance."""
-    places = {
-        "pixels": {pixel.place for pixel in instance.pixels},
-        "strokes": {pixel.place for pixel in instance.pixels if pixel.stroke is not None},
-        "pairs": {name for name, _, _ in instance.pairs},
-    }
-    foreign = [name for name in point.values if not _is_of(name, places) and not ADDED.fullmatch(name)]
-    _refuse_foreign(foreign, len(point.values))
-    tags = {name.split("_", 1)[0] for name in point.values}
-    _require("p" not in tags or not tags & {"p1", "p2"}, "holds jumps both as p and as p1 and p2")
-    field = Field(instance, point)
-    strokes = sum(pixel.stroke is not None for pixel in instance.pixels)
-    energy = field.energy(2)
-    lines = [
-        ("instance", f"{len(instance.pixels)} pixels ({strokes} with strokes), {len(instance.pairs)} pairs"),
-        ("2-norm", _shown(energy)),
-        ("1-norm", _shown(field.energy(1))),
-        ("pi", "60 digits; all else exact for the doubles of the instance"),
-    ]
-    if not tags & {"p", "p1", "p2"}:
-        lines.append(("jumps", "none in the point: taken as 0; of qp-fixed they are data, see its .mps"))
-    return PointReport(energy, lines, field.violations())
-
-
-def _is_of(name: str, places: dict[str, set[str]]) -> bool:
-    """Whether a column of a formulation on the instance has this name."""
-    symbol, _, place = name.partition("_")
-    return symbol in COLUMNS and place in places[COLUMNS[symbol]]
-
-
 # ----------------------------------------------------------------------------------------------------- report
 
 
@@ -739,11 +522,9 @@ def _brief(value: Decimal) -> str:
 
 
 def check(model: str, point: str) -> PointReport:
-    """Check the point in a file against the model or the instance in another one."""
+    """Check the point in a file against the model in another one."""
     with decimal.localcontext(EXACT):
         values = _of_file(point, read_point)
-        if _of_file(model, _is_json):
-            return _of_file(model, lambda path: check_instance(read_instance(path), values))
         return _of_file(model, lambda path: check_model(MpsReader().read(lines_of(path)), values))
 
 
@@ -753,10 +534,6 @@ def _of_file(path: str, read: Callable[[str], Content]) -> Content:
         return read(path)
     except BadInputError as error:
         raise BadInputError(f"{path}: {error}") from None
-
-
-def _is_json(path: str) -> bool:
-    return next((line for _, line in lines_of(path) if line.strip()), "").lstrip().startswith("{")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -789,7 +566,7 @@ def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = _Parser(
         "check_point.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("model", metavar="MODEL", help=".mps, .mps.gz or .instance.json")
+    parser.add_argument("model", metavar="MODEL", help=".mps or .mps.gz")
     parser.add_argument("point", metavar="POINT", help="a solution file, or names and values; may be .gz")
     parser.add_argument("--tolerance", default="1e-8", help="greatest violation of a feasible point (1e-8)")
     options = parser.parse_args(arguments)

@@ -4,20 +4,11 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
-from pprint import pformat
-from typing import Final
-
-_ROOT: Final = Path(__file__).parents[3]
-_WIDTH: Final = 110
 
 
 def standalone_program(path: Path) -> bytes:
-    """The text of a module in which relative imports are replaced by what they import.
-
-    An import from `models/` becomes the values that it names, any other the whole module.
-    """
+    """The text of a module in which relative imports are replaced by the modules that they import."""
     return "".join(_lines(path, set())).encode()
 
 
@@ -35,9 +26,7 @@ def _lines(path: Path, included: set[Path]) -> Iterator[str]:
         if module or (inner and (docstring or _is_future(node))):
             yield from lines[at : node.lineno - 1]
             at = node.end_lineno or node.lineno
-        if module and module.is_relative_to(_ROOT / "models"):
-            yield from _values(node, module)
-        elif module and module not in included:
+        if module and module not in included:
             yield from _lines(module, included)
     yield from lines[at:]
 
@@ -47,16 +36,6 @@ def _module_of(node: ast.stmt, path: Path) -> Path | None:
     if not isinstance(node, ast.ImportFrom) or not node.level:
         return None
     return path.parents[node.level - 1].joinpath(*(node.module or "").split(".")).with_suffix(".py")
-
-
-def _values(node: ast.stmt, path: Path) -> Iterator[str]:
-    """Assignments of the values that an import names."""
-    assert isinstance(node, ast.ImportFrom)
-    package = __name__.removesuffix(".export.library.documents.standalone")
-    module = import_module(".".join([package, *path.relative_to(_ROOT).with_suffix("").parts]))
-    for alias in node.names:
-        value = pformat(getattr(module, alias.name), width=_WIDTH, sort_dicts=False)
-        yield f"{alias.name} = {value}\n"
 
 
 def _is_future(node: ast.stmt) -> bool:
