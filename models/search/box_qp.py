@@ -47,7 +47,7 @@ def field_at(instance: Instance, x: Floats, p: Ints) -> CrossField:
 
 def angle_bounds(instance: Instance) -> tuple[Floats, Floats]:
     """Least and greatest (alpha, beta) of a field, shapes (2n,)."""
-    quarter = np.full(instance.domain.size, QUARTER)
+    quarter = np.full(instance.domain.size, 0.0 if instance.orthogonal else QUARTER)
     lower = np.concatenate([instance.alpha_lower, -quarter])
     return lower, np.concatenate([instance.alpha_upper, quarter])
 

@@ -30,7 +30,7 @@ _HELD: Final[list[Any]] = []  # the limit of BLAS, once for each context that is
 
 def stroke_weight(instance: Instance) -> Floats:
     """Weight w_strokes w of each pixel, of both strokes where two meet, 0 without a stroke; shape (n,)."""
-    return instance.stroke_terms.at_points(instance.stroke_terms.weight, instance.grid.size)
+    return instance.stroke_terms.at_points(instance.stroke_terms.weight, instance.domain.size)
 
 
 def smoothness(instance: Instance) -> Any:
@@ -49,13 +49,13 @@ def symmetric_matrix(row: Ints, column: Ints, beside: Floats, diagonal: Floats) 
     return sparse.csr_array((values, place), shape=(len(diagonal), len(diagonal)))
 
 
-def factor_matrix(matrix: Any, order: Ints | None = None) -> Solve:
-    """The solver of a positive semidefinite Hermitian system H, made definite as H + 1e-9.
+def factor_matrix(matrix: Any, order: Ints | None = None, *, pull: float = PULL) -> Solve:
+    """The solver of a positive semidefinite Hermitian system H, made definite as H + pull.
 
     order: of elimination, which keeps the factors sparse, as from `nested_dissection_order`. None finds one
     by minimum degree, which is better for systems where only neighbours meet.
     """
-    pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
+    pulled = (matrix + pull * sparse.eye_array(matrix.shape[0])).tocsc()
     with one_thread():
         # A definite matrix needs no pivots, so the ordering keeps the factors sparse. In the sparse factors
         # by minimum degree, dense blocks of several columns would mostly hold zeros.

@@ -1,0 +1,201 @@
+"""The energy of orthogonal crosses as a function of their jumps, and its change by one jump.
+
+Every pair and every stroke is a row with the residual r = M alpha + c + pi/2 z and an integer z: the jump of
+a pair, or the quarter turns between a stroke and the label of its cross. M is the incidence matrix of a graph
+whose edges are the rows. Strokes lead to one further vertex, the ground, whose angle is 0.
+
+At the best angles the energy is sum omega r^2. A step of z_k by 1 or -1 then changes it by
+omega_k (pi^2/4 (1 - omega_k R_k) + pi r_k) or the same with -pi r_k, where R_k is the effective resistance
+between the ends of row k.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from ..field.field import CrossField, field_in_windows
+from ..field.jumps import step_labels
+from ..instance.angles import HALF
+from ..instance.domain import Floats, Ints
+from ..instance.instance import Instance
+from ..processes.deadline import Over, never
+from ..smooth.sparse_systems import Solve, factor_matrix
+
+MOST_DENSE: Final = 6000
+"""Points up to which the inverse of the matrix is kept: 288 MB."""
+LOWER: Final = 1e-9
+"""Fall of the energy that counts: less may be rounding."""
+_MOST_STEPS: Final = 100_000  # of a descent; a tenth of the rows are usual
+
+
+@dataclass(frozen=True, eq=False)
+class OrthogonalEnergy:
+    """The energy of crosses with beta = 0, given their integers z (r,): those of the pairs, then of strokes.
+
+    size: number of points n. first, second: the ends of each row, (r,); n is the ground. offset: c in
+    radians, (r,). weight: omega, at least 0, (r,).
+    """
+
+    size: int
+    first: Ints
+    second: Ints
+    offset: Floats
+    weight: Floats
+
+    @classmethod
+    def of(cls, instance: Instance) -> OrthogonalEnergy:
+        """Return the energy of an instance as if all its crosses were orthogonal."""
+        pairs, strokes, n = instance.pair_terms, instance.stroke_terms, instance.domain.size
+        m, s = len(pairs.first), len(strokes.point)
+        return cls(
+            n,
+            np.concatenate([pairs.first, strokes.point]),
+            np.concatenate([pairs.second, np.full(s, n, dtype=np.int32)]),
+            np.concatenate([np.broadcast_to(pairs.offset(0), m), -strokes.goal]),
+            np.concatenate([pairs.weighted(np.full(m, 2.0)), strokes.weight]),
+        )
+
+    @cached_property
+    def rows(self) -> Any:
+        """The matrix M, sparse (r, n)."""
+        count = len(self.first)
+        values, row = np.repeat([1.0, -1.0], count), np.tile(np.arange(count), 2)
+        ends = np.concatenate([self.first, self.second])
+        return sparse.csr_array((values, (row, ends)), shape=(count, self.size + 1))[:, : self.size]
+
+    @cached_property
+    def part(self) -> Ints:
+        """Number of the connected part of each point and, at last, of the ground, (n + 1,)."""
+        used = self.weight > 0
+        links = sparse.coo_array(
+            (np.ones(used.sum()), (self.first[used], self.second[used])), shape=(self.size + 1,) * 2
+        )
+        number: Ints = connected_components(links.tocsr(), directed=False)[1]
+        return number
+
+    @cached_property
+    def pins(self) -> Ints:
+        """First point of each part that no row of weight ties to the ground: its angle is 0."""
+        numbers, points = np.unique(self.part[:-1], return_index=True)
+        pins: Ints = points[numbers != self.part[-1]].astype(np.int32)
+        return pins
+
+    def matrix_of(self, weight: Floats) -> Any:
+        """The matrix M' diag(weight) M, sparse (n, n); definite if its rows join what these rows join."""
+        pinned = np.zeros(self.size)
+        pinned[self.pins] = 1.0
+        return self.rows.T @ sparse.diags_array(weight) @ self.rows + sparse.diags_array(pinned)
+
+    @cached_property
+    def solve_system(self) -> Solve:
+        """The solution of systems with the matrix M' diag(omega) M, by its factors."""
+        return factor_matrix(self.matrix_of(self.weight), pull=0.0)
+
+    def fit_angles(self, z: Ints) -> Floats:
+        """The angles of least energy for integers z, (n,)."""
+        return np.asarray(-self.solve_system(self.rows.T @ (self.weight * (self.offset + HALF * z))))
+
+    def residuals(self, alpha: Floats, z: Ints) -> Floats:
+        """The residual of each row in radians, (r,)."""
+        return self.differences(alpha) + self.offset + HALF * z
+
+    def differences(self, alpha: Floats) -> Floats:
+        """M alpha, (r,)."""
+        grounded = np.append(alpha, 0.0)
+        return np.asarray(grounded[self.first] - grounded[self.second])
+
+    def total(self, residual: Floats) -> float:
+        """The sum of omega r^2."""
+        return float(self.weight @ (residual * residual))
+
+    def nearest(self, alpha: Floats) -> Ints:
+        """The integers of least energy at given angles, (r,); of two equal ones the lower."""
+        turns = np.round(-(self.differences(alpha) + self.offset) / HALF, 9)  # rounding must not decide ties
+        return np.ceil(turns - 0.5).astype(np.int32)
+
+    @cached_property
+    def _inverse(self) -> Floats:
+        """The inverse of the matrix with a row and a column of zeros for the ground."""
+        n = self.size
+        inverse = np.zeros((n + 1, n + 1))
+        inverse[:n, :n] = self.solve_system(np.eye(n))
+        return inverse
+
+    @property
+    def inverse(self) -> Floats:
+        """The inverse G of the matrix M' diag(omega) M, dense (n, n)."""
+        return self._inverse[:-1, :-1]
+
+    @cached_property
+    def resistance(self) -> Floats:
+        """The effective resistance m_k G m_k' between the ends of each row, (r,)."""
+        diagonal = np.diagonal(self._inverse)
+        between = self._inverse[self.first, self.second]
+        return np.asarray(diagonal[self.first] + diagonal[self.second] - 2 * between)
+
+    @cached_property
+    def stiffness(self) -> Floats:
+        """Energy of a quarter turn forced upon each row alone, over (pi/2)^2: omega (1 - omega R) >= 0."""
+        return np.maximum(self.weight * (1 - self.weight * self.resistance), 0.0)
+
+    def gains(self, residual: Floats) -> tuple[Floats, Floats]:
+        """Change of the energy when each integer grows by 1, and when it falls by 1, each (r,).
+
+        residual: that of the best angles for the present integers; angles follow in each case.
+        """
+        even, odd = HALF * HALF * self.stiffness, 2 * HALF * self.weight * residual
+        return even + odd, even - odd
+
+    def step_residuals(self, residual: Floats, row: int, step: int) -> Floats:
+        """The residuals of the best angles after a step of one integer, from those before it, (r,)."""
+        column = self._inverse[self.first[row]] - self._inverse[self.second[row]]
+        force = HALF * step * self.weight[row]
+        changed: Floats = residual - force * (column[self.first] - column[self.second])
+        changed[row] += HALF * step
+        return changed
+
+    def descend(self, z: Ints, over: Over = never) -> tuple[Ints, Floats]:
+        """Change single integers, the one of greatest gain first, until none lowers the energy.
+
+        Returns the integers and the residuals at their best angles. Needs the inverse.
+        """
+        return self.descend_from(z, self.residuals(self.fit_angles(z), z), over)
+
+    def descend_from(self, z: Ints, residual: Floats, over: Over = never) -> tuple[Ints, Floats]:
+        """As `descend`, from known residuals."""
+        z = z.copy()
+        even, odd = HALF * HALF * self.stiffness, 2 * HALF * self.weight
+        for _ in range(_MOST_STEPS):
+            change = even - odd * np.abs(residual)
+            row = int(np.argmin(change))
+            if change[row] > -LOWER or over():
+                break
+            step = -1 if residual[row] > 0 else 1
+            z[row] += step
+            residual = self.step_residuals(residual, row, step)
+        return z, residual
+
+
+def integers_of(field: CrossField) -> Ints:
+    """The integers z of a field: its jumps, and 0 for strokes, whose label they determine."""
+    return np.append(field.p, np.zeros(len(field.instance.theta), dtype=np.int32))
+
+
+def field_of(instance: Instance, z: Ints, energy: OrthogonalEnergy) -> CrossField:
+    """The field of integers z, (r,), with their best angles, within the windows of the instance.
+
+    Windows change jumps and angles where a stroke deviates from its cross by more than pi/4, and under the
+    gauge `box`. Otherwise the field has least energy for its jumps.
+    """
+    pairs = len(instance.domain.first)
+    steps = np.zeros(instance.domain.size, dtype=np.int32)
+    steps[instance.stroke_index] = z[pairs:]
+    beta = np.zeros(instance.domain.size)
+    alpha, _, p = step_labels(instance.domain, energy.fit_angles(z), beta, z[:pairs], steps)
+    return field_in_windows(instance, alpha, beta, p)
