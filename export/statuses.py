@@ -304,6 +304,29 @@ def status_of_baron(banner: str, *, has_table: bool, unbounded: bool) -> Status:
     return Status.LIMIT_WITHOUT_POINT if BARON_STOPPED.search(banner) else Status.ERROR
 
 
+PULP: Final = {
+    1: (Status.OPTIMAL_GLOBAL, "optimal"),
+    2: (Status.FEASIBLE, "feasible"),
+    0: (Status.NO_POINT, "no solution found"),
+    -1: (Status.INFEASIBLE, "infeasible"),
+    -2: (Status.UNBOUNDED, "unbounded"),
+}
+"""PuLP's codes of a solution (LpSolution), and their words."""
+
+PYOMO: Final = {
+    "optimal": Status.OPTIMAL_LOCAL,
+    "globallyOptimal": Status.OPTIMAL_GLOBAL,
+    "locallyOptimal": Status.OPTIMAL_LOCAL,
+    "feasible": Status.FEASIBLE,
+    "maxTimeLimit": Status.LIMIT_WITH_POINT,
+    "maxIterations": Status.LIMIT_WITH_POINT,
+    "infeasible": Status.INFEASIBLE,
+    "infeasibleOrUnbounded": Status.INFEASIBLE,  # our objectives are bounded below
+    "unbounded": Status.UNBOUNDED,
+}
+"""Pyomo's termination conditions, also of plain documents: of any solver, so `optimal` counts as local."""
+
+
 WORDS: Final = (
     (r"infeasible|inconsistent", Status.INFEASIBLE),
     (r"unbounded", Status.UNBOUNDED),

@@ -215,6 +215,7 @@ def read_command(
     output: options.Output,
     *,
     tolerance: options.Tolerance = 1e-5,
+    pick: options.Pick = None,
     printing: options.PrintOptions,
 ) -> None:
     """Read a solver's solution file back as a cross field, and check it.
@@ -230,7 +231,7 @@ def read_command(
     with show_progress(quiet=printing.quiet) as show:
         show("reading the solution")
         problem, held = read_described_problem(manifest)
-        answer = read_solution(solution, problem, held=held, tolerance=tolerance)
+        answer = read_solution(solution, problem, held=held, tolerance=tolerance, solution=pick)
         if answer.point is None:
             words = answer.caveat and f"; claims {answer.caveat}"
             raise InputError(

@@ -65,7 +65,7 @@ PANELS: Final = {
     "Formulation": "formulation facet stroke-norm beta-norm relax norm tightened",
     "Method and solver": "method solver start program solve search",
     "Entries": "rung",
-    "Files": "format nl-form gzip manifest check on underlay",
+    "Files": "format nl-form gzip manifest solution check on underlay",
     "Picture and surface": "kind scale light flip hint port no-browser",
     "Limits and processes": "time-limit gap threads jobs tolerance up-to scheduler",
     FACTS: "",

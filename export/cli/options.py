@@ -231,6 +231,16 @@ Tolerance = Annotated[
         " objective.",
     ),
 ]
+Pick = Annotated[
+    int | None,
+    typer.Option(
+        "--solution",
+        min=1,
+        metavar="K",
+        help="Number of the solution in a file with several; by default the one with the least objective, or"
+        " the first.",
+    ),
+]
 SolveSeconds = Annotated[
     float | None,
     typer.Option(

@@ -92,6 +92,8 @@ class Solution:
         Largest violation of a feasible point, in units of a column.
     nodes
         Number of nodes of the search tree, if reported.
+    digits
+        How the program writes all digits, if its layout rounds values.
 
     """
 
@@ -111,6 +113,7 @@ class Solution:
     start_returned: bool | None = None
     tolerance: float = TOLERANCE
     nodes: int | None = None
+    digits: str = ""
 
     def __repr__(self) -> str:
         numbers = {"objective": self.objective, "bound": self.bound, "gap": self.gap}
@@ -252,9 +255,8 @@ class Solution:
             )
         only_infeasible = self.contradictions and self.contradictions == self._infeasibilities
         if only_infeasible and self.violation is not None and self.violation.worst <= ROUNDED:
-            return (
-                f"if the file has few digits, --tolerance {ROUNDED:g} accepts its point, without its claims"
-            )
+            few = f"its values are rounded ({self.digits});" if self.digits else "if the file has few digits,"
+            return f"{few} --tolerance {ROUNDED:g} accepts its point, without its claims"
         return ""
 
     @property
@@ -342,6 +344,7 @@ def read_solution(
     held: Mapping[str, Problem] | None = None,
     tolerance: float = TOLERANCE,
     identified: bool = False,
+    solution: int | None = None,
 ) -> Solution:
     """Read a solver's answer to a problem; the kind of file is detected from its content.
 
@@ -363,6 +366,9 @@ def read_solution(
         objectives. Claims of a point that violates more than 1e-5 are not kept.
     identified
         Whether the caller knows that the file answers this problem, even if it does not state it.
+    solution
+        Number of a solution, from 1, in a file that holds several. By default the best: that of least stated
+        objective, or the first if not every one states its objective.
 
     Returns
     -------
@@ -377,7 +383,7 @@ def read_solution(
         If it is damaged, or states or fits another problem.
 
     """
-    raw = read_raw(path)
+    raw = read_raw(path, solution)
     with naming(path):
         known = is_identified(raw.stamps, problem.stamp) or identified
         if not raw.has_point:
@@ -416,6 +422,7 @@ def _solution(raw: RawSolution, problem: Problem, point: Floats | None, **facts:
         reported=raw.objective,
         claimed_bound=raw.bound,
         order="" if raw.names is not None else raw.order,
+        digits=raw.rounded,
         **facts,
     )
 

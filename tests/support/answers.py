@@ -15,6 +15,7 @@ WITH_POINT = {"optimal-global", "optimal-local", "feasible", "limit-with-point"}
 
 G, C, S, B, K, X = "gurobi-13.0.3", "cplex-22.2.0.1", "scip-10.0", "cbc-2.10.8", "glpk-5.0", "xpress-9.9.1"
 A, R = "gams-54.6.1", "baron-26.5.27"
+L, Y, Q = "lp_solve-5.5.2.5", "symphony-5.6.17", "qsopt_ex-2.5.10.3"
 GLOBAL, LOCAL, FEASIBLE, INFEASIBLE = "optimal-global", "optimal-local", "feasible", "infeasible"
 LIMIT, NOTHING, UNBOUNDED, ERROR = "limit-with-point", "limit-without-point", "unbounded", "error"
 SILENT = "no-point"
@@ -50,7 +51,9 @@ FILES = {
     f"{S}_milp_solution_limit.sol": ("scip", LIMIT),
     f"{S}_other_infinite.sol": ("scip", FEASIBLE),
     f"{B}_milp_optimal.sol": ("cbc", GLOBAL),
+    f"{B}_milp_optimal_all.sol": ("cbc", GLOBAL),
     f"{B}_milp_infeasible.sol": ("cbc", INFEASIBLE),
+    f"{B}_milp_infeasible_all.sol": ("cbc", INFEASIBLE),
     f"{B}_milp_solution_limit.sol": ("cbc", LIMIT),
     f"{B}_milp_time_without_point.sol": ("cbc", NOTHING),
     f"{K}_milp_optimal_lp.sol": ("glpk", GLOBAL),
@@ -78,15 +81,55 @@ FILES = {
     f"{R}_qp_infeasible_res.lst": ("baron-res", INFEASIBLE),
     f"{R}_other_unbounded_res.lst": ("baron-res", UNBOUNDED),
     f"{R}_other_iterations_without_point_res.lst": ("baron-res", NOTHING),
+    f"{G}_milp_optimal.attr": ("gurobi-attr", FEASIBLE),
+    f"{X}_milp_optimal.asc": ("xpress-asc", FEASIBLE),
+    "mip-2.0.0_milp_optimal.sol": ("python-mip", FEASIBLE),
     "copt-8.0.7_milp_optimal.sol": ("gurobi", FEASIBLE),
-    "cuopt-by-layout_milp_optimal.sol": ("gurobi", GLOBAL),
+    "cuopt-by-layout_milp_optimal.sol": ("cuopt", GLOBAL),
+    "cuopt-by-layout_milp_infeasible.sol": ("cuopt", INFEASIBLE),
+    f"{L}_milp_optimal.txt": ("lp_solve", FEASIBLE),
+    f"{L}_milp_infeasible.txt": ("lp_solve", INFEASIBLE),
+    f"{Y}_milp_optimal.txt": ("symphony", GLOBAL),
+    f"{Y}_milp_infeasible.txt": ("symphony", INFEASIBLE),
+    f"{Y}_milp_time_without_point.txt": ("symphony", NOTHING),
+    f"{Q}_milp_optimal_fixed.sol": ("qsopt_ex", GLOBAL),
+    f"{Q}_milp_relaxed.sol": ("qsopt_ex", GLOBAL),
+    f"{Q}_milp_infeasible.sol": ("qsopt_ex", INFEASIBLE),
+    "mosek-by-layout_milp_optimal.int": ("mosek", GLOBAL),
+    "gams-by-layout_milp_optimal.lst": ("gams-listing", GLOBAL),
+    "gams-by-layout_milp_display.txt": ("gams-display", FEASIBLE),
+    "ampl-by-layout_milp_display.txt": ("ampl-display", FEASIBLE),
+    "cplex-by-layout_milp_display.txt": ("cplex-display", GLOBAL),
+    "pulp-3.3.2_milp_optimal.json": ("json", GLOBAL),
+    "pulp-3.3.2_milp_infeasible.json": ("json", INFEASIBLE),
+    "pulp-3.3.2_milp_optimal_prints.txt": ("pairs", FEASIBLE),
+    "pyomo-6.10.1_milp_optimal.json": ("json", LOCAL),
+    "pyomo-6.10.1_milp_optimal.yml": ("pyomo", LOCAL),
+    "pyomo-6.10.1_milp_infeasible.yml": ("pyomo", INFEASIBLE),
+    "python-3.11.7_milp_optimal.json": ("json", FEASIBLE),
+    "python-3.11.7_milp_optimal_nested.json": ("json", LOCAL),
+    "python-3.11.7_milp_optimal_colon.txt": ("pairs", FEASIBLE),
+    "pandas-3.1.1_milp_optimal.csv": ("pairs", FEASIBLE),
+    "pandas-3.1.1_milp_optimal_quoted.csv": ("pairs", FEASIBLE),
+    "pandas-3.1.1_milp_optimal_semicolon.csv": ("pairs-semicolon", FEASIBLE),
     "miplib-by-layout_milp_optimal.sol": ("miplib", FEASIBLE),
     "miplib-by-layout_milp_infeasible.sol": ("miplib", INFEASIBLE),
+    # Answers in other text: logs, prints and mails.
+    "highs-1.15.1_milp_optimal_log.txt": ("highs", GLOBAL),
+    f"{S}_milp_optimal_log.txt": ("scip", FEASIBLE),
+    f"{B}_milp_optimal_log.txt": ("cbc", GLOBAL),
+    f"{K}_milp_optimal_log.txt": ("glpk", GLOBAL),
+    "neos-by-layout_milp_optimal_scip.txt": ("scip", FEASIBLE),
+    "neos-by-layout_milp_optimal_ampl.txt": ("ampl-display", FEASIBLE),
+    "mail-by-layout_milp_list.txt": ("list-in-text", FEASIBLE),
 }
 """Every file of the folder: its reader and what it claims."""
 
 RELAXATIONS = {"milp_time_without_point", "milp_relaxed"}
 """Files that hold the point of a relaxation, as the solver writes it."""
+
+ROUNDED = {f"{L}_milp_optimal", "gams-by-layout_milp_optimal", "cplex-by-layout_milp_display"}
+"""Files whose program rounds values to so few digits that their points are feasible to 1e-4 only."""
 
 OPTIMA = {
     "milp": 0.5565360828459345,

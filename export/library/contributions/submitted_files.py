@@ -15,7 +15,7 @@ from ....models.field import file as fields
 from ....models.input_limits import MAX_HEAD
 from ....models.proof import check_certificate
 from ....models.storage import read_bytes
-from ...solutions.readers.registry import head_of, reader_for
+from ...solutions.readers.registry import head_of, recognising_readers
 
 FileKind = Literal["solution", "field", "certificate", ""]
 """FileKind of a file; empty if unknown."""
@@ -66,7 +66,7 @@ def kind_of(path: Path) -> FileKind:
     head = head_of(data)
     if head.lstrip().startswith(b"{"):
         return "field" if _is_field(data) else ""
-    return "solution" if reader_for(head) else ""
+    return "solution" if recognising_readers(head) else ""
 
 
 def _is_certificate(data: bytes) -> bool:

@@ -3,8 +3,9 @@
 One file, Python 3.9 or newer, nothing to install, no solver.
 
 MODEL   a .mps or .mps.gz of the library
-POINT   a solution file of HiGHS, SCIP, CBC, Gurobi, Xpress (.slx), MIPLIB or GAMS (our CSV), or a list of
-        names and values in lines. A column that is left out is 0, or what it is fixed to.
+POINT   a solution file of HiGHS, SCIP, CBC, Gurobi, Xpress (.slx), MIPLIB, GAMS (our CSV) or another program
+        with names and values in lines, or a list of them. A column that is left out is 0, or what it is
+        fixed to.
 
 Both files may be packed with gzip, bzip2 or xz.
 
@@ -33,7 +34,7 @@ from decimal import Decimal
 from typing import IO, Any, NoReturn, Optional, TypeVar
 
 from ...solutions.readers.grammar import HEAD, LineError, Scan, plain_numbers, plain_text, spellings
-from ...solutions.readers.layouts import LAYOUTS
+from ...solutions.readers.listings import TEXT_LAYOUTS
 
 ZERO, HALF, ONE = Decimal(0), Decimal("0.5"), Decimal(1)
 EXACT = decimal.Context(prec=20_000, traps=[decimal.Inexact, decimal.InvalidOperation, decimal.Overflow])
@@ -419,20 +420,20 @@ def read_point(path: str) -> NamedPoint:
     _require(data.strip(), "holds no point: it is empty")
     try:
         text = plain_text(bytes(data))
-        layout = next((layout for layout in LAYOUTS if layout.recognises(text[:HEAD])), None)
+        layout = next((layout for layout in TEXT_LAYOUTS if layout.recognises(text[:HEAD])), None)
         _require(
             layout,
             "is not a solution file of a known kind; give one of a solver, or lines of names and values",
         )
         assert layout is not None
-        scan = Scan(text, layout)
+        scan = Scan(next(layout.answers(text)), layout)
         entries = [pair for names, values in scan.read() for pair in zip(names, values)]
     except LineError as error:
         raise BadInputError(str(error)) from None
     _require(scan.has_point, "the file holds no point")
     point = NamedPoint(claimed=_value(scan.claims["objective"]) if "objective" in scan.claims else None)
     point.stamps = stamps_in(text[:HEAD].decode("utf-8", "replace"))
-    for name, value in entries:
+    for name, value in entries[scan.first :]:
         point.stamps |= stamps_in(name.decode("utf-8", "replace"))
         _keep(point, name.decode("utf-8", "replace"), _value(value))
     return point

@@ -1,4 +1,4 @@
-"""Solution files of CPLEX, XML: one solution, or a pool, whose first one is read: the incumbent.
+"""Solution files of CPLEX, XML: one solution, or a pool, which begins with the incumbent.
 
     <CPLEXSolution version="1.2">          a pool has <CPLEXSolutions> around several of these
      <header objectiveValue="-14.4" writeLevel="1"
@@ -28,7 +28,15 @@ from defusedxml.ElementTree import DefusedXMLParser
 from ....models.errors import SolutionError
 from ...statuses import CPLEX, CPLEX_STOPPED, Status
 from .grammar import float_of, is_number
-from .text import RawSolution, Reader, named_values, one_line, solution_without_point, starts_with
+from .text import (
+    RawSolution,
+    Reader,
+    named_values,
+    one_line,
+    solution_pool,
+    solution_without_point,
+    starts_with,
+)
 
 _OMITS_ZEROS: Final = "3"
 _INTEGERS_ONLY: Final = {"2", "4"}
@@ -37,12 +45,12 @@ _POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED}
 
 
 def parse(data: bytes) -> RawSolution:
-    """Read a file.
+    """Read a file, with all solutions of a pool.
 
     Raises SolutionError, with the line, for XML that is damaged or has entities, and for values that are not
     numbers.
     """
-    return _solution(_parse_xml(data)[0])
+    return solution_pool([_solution(entry) for entry in _parse_xml(data)])
 
 
 def _solution(entry: _SolutionEntry) -> RawSolution:

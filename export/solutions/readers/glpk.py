@@ -27,10 +27,12 @@ from ....models.instance.domain import Floats
 from ...statuses import GLPK, Status
 from ...writing.canonical import ColumnOrder
 from .grammar import EntryForm, place_of_entry, quoted
-from .text import Cursor, RawSolution, Reader, line_error, read_entries, solution_without_point, starts_with
+from .text import Cursor, RawSolution, Reader, line_error, read_entries, solution_without_point
 
 _SUMMARY = re.compile(rb"s (mip|bas|ipt) (\d{1,12}) (\d{1,12}) (.+) (\S+)")
 _END: Final = b"e o f"
+_BEGIN = re.compile(rb"^[ \t]*(?:c Problem:|s (?:mip|bas|ipt) )", re.MULTILINE)
+_LAST = re.compile(rb"^[ \t]*e o f[ \t]*$", re.MULTILINE)
 _GOAL_OF_MOD: Final = b"energy ="
 _FORMS: Final = {
     b"mip": EntryForm("j index value"),
@@ -52,6 +54,7 @@ class _Summary(NamedTuple):
 
 def parse(data: bytes) -> RawSolution:
     """Read a file. Raises SolutionError for counts that do not fit and for a cut file."""
+    data = _without_other_text(data)
     cursor = Cursor(data)
     comments = _comments(cursor)
     order = _order(comments)
@@ -65,6 +68,13 @@ def parse(data: bytes) -> RawSolution:
     return RawSolution(
         summary.status, message, summary.objective, None, values, rows=summary.rows, order=order
     )
+
+
+def _without_other_text(data: bytes) -> bytes:
+    """The answer in a text, in its lines: empty lines replace the text before it."""
+    begin, end = _BEGIN.search(data), _LAST.search(data)
+    start = begin.start() if begin else 0
+    return b"\n" * data.count(b"\n", 0, start) + data[start : end.end() if end else len(data)]
 
 
 def _comments(cursor: Cursor) -> dict[bytes, bytes]:
@@ -113,6 +123,4 @@ def _columns(data: bytes, start: int, summary: _Summary) -> Floats:
     return columns.values
 
 
-READER: Final = Reader(
-    "glpk", "GLPK, glpsol -w", starts_with(rb"\s*(?:c Problem:|s (?:mip|bas|ipt) )"), parse
-)
+READER: Final = Reader("glpk", "GLPK, glpsol -w", lambda head: _BEGIN.search(head) is not None, parse)

@@ -12,10 +12,12 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import compress, count
 from math import isclose
+from operator import le
 
 TOKEN_LIMIT = 63
 """Longest name or number, in bytes. Names of crossfield have at most 15, numbers at most 24."""
@@ -25,9 +27,6 @@ HEAD = 1 << 16
 
 PIECE = 1 << 20  # bytes processed at once: their words take some ten times as much
 BLANK = rb"[ \t\f\v]"
-COMMENT = b"#"
-REMARKS = rb"(?:%b*(?:%b[^\n]*)?\n)*" % (BLANK, COMMENT)
-"""Blank lines and comments at the start of a text."""
 NUMBER = (
     rb"[-+]?(?:(?:\d{1,63}(?:\.\d{0,63})?|\.\d{1,63})(?:[eEdD][-+]?\d{1,63})?"
     rb"|(?i:inf(?:inity)?)|1\.#(?i:inf)0{0,63})"
@@ -129,6 +128,7 @@ class EntryForm:
         line = rb"%b*(?!(?i:%b))%b%b*\n" % (BLANK, reserved, between.join(tokens), BLANK)
         self.line = re.compile(line)
         self.run = re.compile(rb"(?:%b|%b*\n)*" % (line, BLANK))
+        self.anywhere = re.compile(rb"^" + line, re.MULTILINE)
         self.spaces = bytes.maketrans(separator, b" " * len(separator)) if separator else None
 
     @property
@@ -177,15 +177,16 @@ class EntryForm:
 class TextLayout:
     """The look of a kind of text. Patterns are regular expressions of bytes that ignore case.
 
-    signature: pattern of the start of the first line that is no comment. forms: words of an entry
-    (`EntryForm`); the first that fits the first entry is that of the whole text. claims: patterns of whole
-    lines, with groups objective, bound, status and others that the reader knows; `none` states that there is
-    no point. begin: pattern of the line before the entries, with groups `count` (negative: without zeros) and
-    `sparse`; empty if they start at once. end: pattern of the line after them. needs: groups, `begin` or
-    `end`, without which a text is cut off, and what is missing then. pointless: pattern of a status whose
-    values are no point. refusals: patterns of lines that no answer has, and what the text is. omits_zeros:
-    whether columns at 0 are left out; None: if there is no 0 in the text. rewrites: a literal, and pattern
-    and replacement of the places that have it.
+    signature: pattern of the start of the first line of an answer, or of a line in it if `heads` is false. A
+    group `answer` begins with the only answer. forms: words of an entry (`EntryForm`); the first that fits
+    the first entry is that of the whole text. claims: patterns of whole lines, with groups objective, bound,
+    status and others that the reader knows; `none` states that there is no point. begin: pattern of the line
+    before the entries, with groups `count` (negative: without zeros) and `sparse`; empty if they start at
+    once. end: pattern of the line after them. needs: groups, `begin` or `end`, without which a text is cut
+    off, and what is missing then. pointless: pattern of a status whose values are no point. refusals:
+    patterns of lines that no answer has, and what the text is. omits_zeros: whether columns at 0 are left
+    out; None: if there is no 0 in the text. rewrites: a literal, and pattern and replacement of the places
+    that have it. digits: how the program writes all digits, if it rounds them here.
     """
 
     name: str
@@ -194,6 +195,7 @@ class TextLayout:
     forms: tuple[str, ...] = ("name value",)
     separator: bytes = b""
     reserved: bytes = RESERVED
+    comment: bytes = b"#"
     claims: tuple[bytes, ...] = ()
     begin: bytes = b""
     end: bytes = b""
@@ -201,16 +203,40 @@ class TextLayout:
     pointless: bytes = b""
     refusals: tuple[tuple[bytes, str], ...] = ()
     omits_zeros: bool | None = False
-    rewrites: tuple[tuple[bytes, bytes, bytes], ...] = ()
+    rewrites: tuple[tuple[bytes, bytes, bytes | Callable[[re.Match[bytes]], bytes]], ...] = ()
+    heads: bool = True
+    digits: str = ""
 
     def recognises(self, head: bytes) -> bool:
         """Whether a text with this start has the layout."""
-        return _compile_patterns(self)["head"].match(head) is not None
+        return next(self._heads(head), None) is not None
+
+    def _heads(self, text: bytes) -> Iterator[tuple[int, re.Match[bytes]]]:
+        """The places of the signature, and its matches. A pattern that begins with a line end is faster."""
+        first = _compile_patterns(self)["first head"].match(text)
+        if first:
+            yield 0, first
+        for match in _compile_patterns(self)["later head"].finditer(text, first.end() if first else 0):
+            yield match.start() + 1, match
+
+    def answers(self, data: bytes) -> Iterator[bytes]:
+        """The answers in a text, each in its lines: empty lines replace the text before it."""
+        starts: list[int] = []
+        for at, match in self._heads(data) if self.heads else ():
+            if "answer" in match.groupdict():
+                starts = [match.start("answer")]
+                break
+            # A line like the first one may stand among the claims of an answer, before its entries.
+            if not starts or any(form.anywhere.search(data, starts[-1], at) for form in _forms(self)):
+                starts.append(at)
+        starts = starts or [0]
+        for start, stop in zip(starts, [*starts[1:], len(data)]):
+            yield b"\n" * data.count(b"\n", 0, start) + data[start:stop] if start else data[:stop]
 
 
 @cache
 def _compile_patterns(layout: TextLayout) -> dict[str, re.Pattern[bytes]]:
-    """The patterns of a layout, compiled: head, begin, end, and claims and refusals by number."""
+    """The patterns of a layout, compiled: signature, begin, end, and claims and refusals by number."""
     lines = {"begin": layout.begin, "end": layout.end}
     lines.update({f"refusal {at}": pattern for at, (pattern, _) in enumerate(layout.refusals)})
     lines.update({f"claim {at}": claim for at, claim in enumerate((*layout.claims, *CLAIMS))})
@@ -219,8 +245,10 @@ def _compile_patterns(layout: TextLayout) -> dict[str, re.Pattern[bytes]]:
         for key, line in lines.items()
         if line
     }
-    head = re.compile(rb"%b%b*(?:%b)" % (REMARKS, BLANK, layout.signature), re.IGNORECASE)
-    return {**whole_lines, "head": head}
+    head = rb"%b*(?:%b)" % (BLANK, layout.signature)
+    heads = {"first head": head, "later head": rb"\n" + head}
+    flags = re.IGNORECASE | re.MULTILINE
+    return {**whole_lines, **{key: re.compile(pattern, flags) for key, pattern in heads.items()}}
 
 
 @cache
@@ -231,8 +259,9 @@ def _forms(layout: TextLayout) -> tuple[EntryForm, ...]:
 class Scan:
     """The entries of a text in a layout, and its claims, which are complete once the entries are read.
 
-    claims: texts by group. entries: number of entries. sparse: whether the text states that it omits zeros.
-    cut: name of the last entry, if its value ends the text without the end of a line, and so may be cut off.
+    claims: texts by group. entries: number of entries. first: number of the first entry that counts, if the
+    numbering of lines starts again there. sparse: whether the text states that it omits zeros. cut: name of
+    the last entry, if its value ends the text without the end of a line, and so may be cut off.
     """
 
     def __init__(self, data: bytes, layout: TextLayout) -> None:
@@ -247,7 +276,8 @@ class Scan:
         self.data = data if data.endswith(b"\n") else data + b"\n"
         self.claims: dict[str, bytes] = {}
         self.places: dict[str, int] = {}
-        self.entries = 0
+        self.entries = self.first = self.last_index = 0
+        self.restarts = 0
         self.sparse = self.ended = False
         self.begun = not layout.begin
         self.cut = b""
@@ -259,13 +289,13 @@ class Scan:
             if inside and self._chooses_form(at):
                 for stop, words in self.form.read(self.data, at):
                     if words:
-                        yield self._entries(words, stop)
+                        yield self._entries(words, at, stop)
                     at = stop
                 if at == len(self.data):
                     break
             end = self.data.index(b"\n", at)
             if inside and (entry := self._entry_before_comment(at, end)):
-                yield self._entries(self.form.split(entry), at)
+                yield self._entries(self.form.split(entry), at, at)
                 at = end + 1
                 continue
             at, inside = self._odd_line(at, end, inside)
@@ -279,8 +309,17 @@ class Scan:
             self.form, self.chosen = form or self.form, form is not None
         return self.chosen
 
-    def _entries(self, words: list[bytes], end: int) -> tuple[list[bytes], list[bytes]]:
+    def _entries(self, words: list[bytes], start: int, end: int) -> tuple[list[bytes], list[bytes]]:
         names, values = self.form.column(words, "name"), self.form.column(words, "value")
+        index = list(map(int, self.form.column(words, "index")))
+        if index:
+            again = list(compress(count(), map(le, index, [self.last_index - (not self.entries), *index])))
+            self.restarts += len(again)
+            if self.restarts > 1:
+                place = place_of_entry(self.data, start, again[-1])
+                raise error_at(self.data, place, "the numbers start again for the second time")
+            self.first = self.entries + again[0] if again else self.first
+            self.last_index = index[-1]
         self.entries += len(names)
         if self.unended and end == len(self.data) and self.form.ends_with_value:
             self.cut = names[-1]
@@ -288,7 +327,7 @@ class Scan:
 
     def _entry_before_comment(self, at: int, end: int) -> bytes:
         """The entry on a line that ends in a comment, or nothing."""
-        mark = self.data.find(b" " + COMMENT, at, end)
+        mark = self.data.find(b" " + self.layout.comment, at, end) if self.layout.comment else -1
         entry = self.data[at:mark] + b"\n" if mark > at else b""
         return entry if self.form.line.match(entry) else b""
 
@@ -297,7 +336,7 @@ class Scan:
         data, patterns = self.data, self.patterns
         line = data[at:end].strip()
         for key, pattern in patterns.items() if line else ():
-            match = None if key == "head" else pattern.match(data, at)
+            match = None if key.endswith("head") else pattern.match(data, at)
             if match is None or key == ("begin" if self.begun else "end"):
                 continue
             if key.startswith("refusal"):
@@ -308,11 +347,18 @@ class Scan:
                 return len(data), False
             self.begun = self.begun or key == "begin"
             return data.index(b"\n", match.end()) + 1, self.begun
-        if not line or not inside or line.startswith(COMMENT):
+        if not line or not inside or (self.layout.comment and line.startswith(self.layout.comment)):
             return end + 1, inside
+        if self._is_other_text(at):
+            return len(data), False
         if self.unended and end + 1 == len(data):
             raise error_at(data, at, "the file is cut off in the middle of this line")
         raise error_at(data, at, self.form.fault(data[at:end]))
+
+    def _is_other_text(self, at: int) -> bool:
+        """Whether the text from a line on is no part of the answer: after an empty line, without entries."""
+        before = self.data[self.data.rfind(b"\n", 0, max(at - 1, 0)) + 1 : at]
+        return self.entries > 0 and not before.strip() and not self.form.anywhere.search(self.data, at)
 
     def _keep(self, match: re.Match[bytes]) -> None:
         """Keep what a line states."""

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from .grammar import NUMBER, RESERVED, TextLayout
 
-_OUR_NAME = rb"[a-z]\w*_\d{2,4}_\d{2,4}(?:_[ru])?\b"
-_FEW_LINES = rb"(?:[^\n]*\n){0,9}?[ \t]*"
+OUR_NAME = rb"[a-z]\w*_\d{2,4}_\d{2,4}(?:_[ru])?\b"
+FEW_LINES = rb"(?:[^\n]*\n){0,9}?"
 
 HIGHS = TextLayout(
     "highs",
@@ -80,7 +80,7 @@ XPRESS = TextLayout(
 )
 """As Xpress 9.9.1 writes it:
 
-    NAME          mip                          NAME .. ENDATA for each solution; the first is read
+    NAME          mip                          NAME .. ENDATA for each solution
       C x                       10
     ENDATA                                     only ENDATA: there was no solution
 
@@ -105,9 +105,10 @@ CBC = TextLayout(
     **    3 y                    200                       0      ** before values out of their bounds
 
 Values have 8 significant digits, so violations up to about 1e-7 of a value's size are due to the file.
-`printingOptions all` or `rows` adds the rows: such a file is refused. Some versions and options omit columns
-at 0; a file with a value of 0 does not. A file of an infeasible problem looks the same, and a file of a
-search without result holds the relaxation, (no integer solution - continuous used): both hold no point."""
+`printingOptions all` or `rows` puts the rows before the columns. Their numbers then start again, and names
+before that must not be columns. Some versions and options omit columns at 0; a file with a value of 0 does
+not. A file of an infeasible problem looks the same, and a file of a search without result holds the
+relaxation, (no integer solution - continuous used): both hold no point."""
 
 GAMS = TextLayout(
     "gams-csv",
@@ -141,6 +142,7 @@ MIPLIB = TextLayout(
     "miplib",
     "MIPLIB .sol",
     signature=rb"=(?:obj|infeas)=",
+    heads=False,
     needs=(("objective", "objective"),),
     omits_zeros=True,
 )
@@ -152,11 +154,11 @@ LIST = TextLayout(
     "gurobi",
     "Gurobi .sol, or any list of names and values",
     signature=(
-        rb"# ?(?:Solution for model|Objective value|MIP start)\b"
-        rb"|%b%b[ \t]+\S+[ \t]*(?:\n|\Z)"
-        rb"|(?![#=]|[\d.+\-]*[\0- ])[^\0- ]+[ \t]+%b[ \t]*(?:\n|\Z)"
+        rb"\A(?:[ \t]*(?:#[^\n]*)?\n)*(?:[ \t]*# ?(?:Solution for model|Objective value|MIP start)\b"
+        rb"|%b[ \t]*%b[ \t]+\S+[ \t]*(?:\n|\Z)"
+        rb"|%b[ \t]*(?![#=]|[\d.+\-]*[\0- ])[^\0- ]+[ \t]+%b[ \t]*(?:\n|\Z))"
     )
-    % (_FEW_LINES, _OUR_NAME, NUMBER),
+    % (FEW_LINES, OUR_NAME, FEW_LINES, NUMBER),
     refusals=(
         (
             rb"# ?MIP (?:start|hints)\b.*",

@@ -19,12 +19,13 @@ import numpy as np
 from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
-from ...statuses import HIGHS, Status, status_of_cbc, status_of_gams, status_of_scip, status_of_words
+from ...statuses import HIGHS, PYOMO, Status, status_of_cbc, status_of_gams, status_of_scip, status_of_words
 from ...writing.stamps import digits_in_columns, digits_in_text
-from . import ampl, baron, cplex, glpk, gurobi
+from . import ampl, baron, cplex, documents, glpk
 from .grammar import HEAD, Scan, error_at, plain_text
-from .layouts import LAYOUTS
-from .text import Claim, RawSolution, Reader, reader_of, refuse_faults
+from .listings import TEXT_LAYOUTS
+from .siblings import log_of, sibling_of
+from .text import Claim, RawSolution, Reader, choose_solution, reader_of, refuse_faults
 
 _NEAR_ONE: Final = 1e-5
 _SMALLER: Final = "let the solver write it without columns at 0"
@@ -56,61 +57,75 @@ def _claim_by(table: Callable[[str], Status]) -> Claim:
 _CLAIMS: Final[dict[str, Claim]] = {
     "highs": _claim_of_highs,
     "gams-csv": _claim_of_gams,
+    "gams-listing": _claim_of_gams,
     "scip": _claim_by(status_of_scip),
     "cbc": _claim_by(status_of_cbc),
+    "pyomo": _claim_by(lambda words: PYOMO.get(words, Status.FEASIBLE)),
 }
 """Functions that return the claim of a text, by layout; the others state a status in words at most."""
 
-*_LISTS, _PLAIN = (
-    reader_of(layout, _CLAIMS.get(layout.name, _claim_by(status_of_words))) for layout in LAYOUTS
+_LISTS: Final = tuple(
+    reader_of(layout, _CLAIMS.get(layout.name, _claim_by(status_of_words))) for layout in TEXT_LAYOUTS
 )
+PLAIN: Final = _LISTS[-4:]
+"""Readers of lists without a mark of their program, for files that no other reader recognises."""
 
 READERS: Final[tuple[Reader, ...]] = (
     ampl.BINARY,
-    gurobi.READER,
+    *documents.READERS,
     cplex.READER,
     glpk.READER,
     baron.READER,
-    *_LISTS,
+    *_LISTS[: -len(PLAIN)],
     ampl.TEXT,
-    _PLAIN,
+    *PLAIN,
 )
-"""The table of readers: the first that recognises a file reads it. A plain list has no mark, and is last."""
+"""The table of readers. Plain lists are the last."""
 
 
-def read_raw(path: str | Path) -> RawSolution:
+def read_raw(path: str | Path, solution: int | None = None) -> RawSolution:
     """Read a solution file; its content determines its kind, and gzip, bzip2 and xz are unpacked.
 
-    Raises InputError when the file cannot be opened or has more than MAX_SOLUTION bytes, SolutionError when
-    it is empty, malformed or of an unknown kind.
+    solution: number of the solution in a file with several, by default the best. Raises InputError when the
+    file cannot be opened or has more than MAX_SOLUTION bytes, SolutionError when it is empty, malformed or of
+    an unknown kind.
     """
     data = read_bytes(path, MAX_SOLUTION, _SMALLER)
     with naming(path):
-        return parse_raw(_unpack(data))
+        return parse_raw(_unpack(data), solution)
 
 
-def parse_raw(data: bytes) -> RawSolution:
+def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
     """Read the content of a solution file. Raises SolutionError."""
     if not data or data.isspace():
         raise SolutionError("the file is empty; the solver's log should give the reason")
     binary = ampl.BINARY.recognises(data[:HEAD])
     with refuse_faults():
         text = data if binary else plain_text(data)
-    head = text[:HEAD]
-    reader = reader_for(head)
-    if reader is None:
+    head, readers = text[:HEAD], recognising_readers(text)
+    if not readers:
         known = "; ".join(reader.description for reader in READERS)
-        raise SolutionError(
-            "this is not a solution file of a known kind, but may be a model, a start, a report or a log; "
-            f"give one of these: {known}"
-        )
-    raw = reader.parse(text)
-    return replace(raw, reader=reader.name, stamps=raw.stamps | _stated_stamps(head, raw))
+        unknown = f"this is not a solution file of a known kind; give one of these: {known}"
+        raise SolutionError(sibling_of(head) or log_of(head) or unknown)
+    if len(readers) > 1:
+        kinds = " and ".join(reader.description for reader in readers)
+        raise SolutionError(f"the text holds answers of several kinds: {kinds}; leave one of them in it")
+    raw = choose_solution(readers[0].parse(text), solution)
+    return replace(raw, reader=readers[0].name, stamps=raw.stamps | _stated_stamps(head, raw))
 
 
-def reader_for(head: bytes) -> Reader | None:
-    """The reader of a file with these first bytes, as `plain_text` returns them; None for an unknown kind."""
-    return next((reader for reader in READERS if reader.recognises(head)), None)
+def recognising_readers(text: bytes) -> list[Reader]:
+    """The readers that recognise a text, as `plain_text` returns it; an answer may stand in other text."""
+    head = text[:HEAD]
+    if sibling_of(head):
+        return []
+    marked = [reader for reader in READERS if reader not in PLAIN and reader.recognises(head)]
+    if marked:
+        return marked
+    plain = [] if log_of(head) else [reader for reader in PLAIN if reader.recognises(head)]
+    if plain or len(text) <= HEAD:
+        return plain[:1]
+    return [reader for reader in _LISTS if reader not in PLAIN and reader.recognises(text)]
 
 
 def _stated_stamps(head: bytes, raw: RawSolution) -> frozenset[str]:

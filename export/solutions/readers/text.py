@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import repeat
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -62,8 +62,12 @@ class RawSolution:
     names: byte strings (k,), or None when the format is positional. values: float (k,), in the order of the
     file; infinities may occur, NaN may not. omits_zeros: whether a column that is not listed is 0. rows:
     number of constraints in the file, or None if it does not state them. order: the order of the values
-    without names. bound: the solver's dual bound, or None. stamps: digits of the problem's stamp, or the
-    first of them, wherever the solver repeated it. reader: name of the reader of the file.
+    without names. bound: the solver's dual bound, or None. row_names: names (k,) that the file lists as names
+    of rows, whose values are left out.
+    stamps: digits of the problem's stamp, or the first of them, wherever the solver repeated it. reader: name
+    of the reader of the file.
+    rounded: how the program writes all digits, if it rounded them, or empty. pool: all solutions of a file
+    that holds several, in its order.
     """
 
     status: Status
@@ -75,13 +79,41 @@ class RawSolution:
     rows: int | None = None
     order: ColumnOrder = "nl"
     bound: float | None = None
+    row_names: Bytes | None = None
     stamps: frozenset[str] = frozenset()
     reader: str = ""
+    rounded: str = ""
+    pool: tuple[RawSolution, ...] = ()
 
     @property
     def has_point(self) -> bool:
         """Whether the file holds a point; a file without values is the point 0 if zeros are omitted."""
         return self.values.size > 0 or self.omits_zeros
+
+
+def solution_pool(solutions: Sequence[RawSolution]) -> RawSolution:
+    """The content of a file with one or more solutions; by default the first of them."""
+    first, *further = solutions
+    return replace(first, pool=(first, *further)) if further else first
+
+
+def choose_solution(raw: RawSolution, number: int | None = None) -> RawSolution:
+    """The solution of a pool with a number from 1, by default the best; its message states which it is.
+
+    The best is that of least objective if each states one, else the first. Raises SolutionError for a
+    number that the file does not have.
+    """
+    pool = raw.pool or (raw,)
+    if number is None:
+        objectives = [np.inf if solution.objective is None else solution.objective for solution in pool]
+        number = 1 + (int(np.argmin(objectives)) if np.isfinite(objectives).all() else 0)
+    if not 1 <= number <= len(pool):
+        raise SolutionError(f"there is no solution {number} in it; choose one of 1 to {len(pool)}")
+    if len(pool) == 1:
+        return raw
+    chosen = pool[number - 1]
+    place = f"solution {number} of {len(pool)}"
+    return replace(chosen, message=f"{chosen.message}; {place}" if chosen.message else place)
 
 
 def solution_without_point(status: Status, message: bytes | str, *, rows: int | None = None) -> RawSolution:
@@ -124,7 +156,7 @@ def reader_of(layout: TextLayout, claim: Claim) -> Reader:
 
 def _parse_layout(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
     with refuse_faults():
-        return _parse_answer(data, layout, claim)
+        return solution_pool([_parse_answer(answer, layout, claim) for answer in layout.answers(data)])
 
 
 def _parse_answer(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
@@ -135,17 +167,19 @@ def _parse_answer(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
         return _without_point(scan, status, words)
     names = np.concatenate([names for names, _ in pieces] or [np.empty(0, "S1")])
     values = np.concatenate([values for _, values in pieces] or [np.empty(0)])
-    zeros = scan.layout.omits_zeros
+    zeros, first = scan.layout.omits_zeros, scan.first
     rows, bound = scan.claims.get("rows", b""), _number(scan, "bound")
     return RawSolution(
         status,
         one_line("; ".join(filter(None, (words, _note(scan)))).encode()),
         _number(scan, "objective"),
-        names,
-        values,
-        omits_zeros=scan.sparse or (not (values == 0).any() if zeros is None else zeros),
+        names[first:],
+        values[first:],
+        omits_zeros=scan.sparse or (not (values[first:] == 0).any() if zeros is None else zeros),
         rows=int(rows) if re.fullmatch(rb"\d{1,12}", rows) else None,
         bound=bound if bound is not None and np.isfinite(bound) else None,
+        row_names=names[:first] if first else None,
+        rounded=layout.digits,
     )
 
 
@@ -222,9 +256,11 @@ def values_by_name(names: Bytes, raw: RawSolution) -> NamedValues:
     the file that are not among `names` may be in another case, in quotes, or have the prefix of a transformed
     problem. Others are counted as unknown, except for the columns that programs add.
 
-    Raises SolutionError when the file has no point or no names, or gives one name two values.
+    Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of
+    `names` as the name of a row.
     """
     listed = _listed_names(raw)
+    _check_rows(names, raw)
     if np.array_equal(listed, names):
         return NamedValues(raw.values.copy(), 0, 0)
     index = _places(names, listed)
@@ -274,6 +310,18 @@ def _check_point(raw: RawSolution) -> None:
         words = f"{raw.status}: {raw.message}" if raw.message else str(raw.status)
         raise SolutionError(
             f"there is no point in it ({words}); give the solver more time or a problem that has a solution"
+        )
+
+
+def _check_rows(names: Bytes, raw: RawSolution) -> None:
+    if raw.row_names is None:
+        return
+    misplaced = raw.row_names[np.isin(raw.row_names, names)]
+    if len(misplaced):
+        name = misplaced[0].decode(errors="replace")
+        raise SolutionError(
+            f"the column {name} stands before the numbers start again, where rows should; "
+            "a line is repeated or out of order; let the solver write the file again"
         )
 
 

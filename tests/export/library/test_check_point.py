@@ -111,6 +111,7 @@ def test_integers_that_are_not_quite_whole_count_as_they_are(tmp_path):
         "scip-10.0_milp_zeros_without_status.sol",
         "miplib-by-layout_milp_optimal.sol",
         "cbc-2.10.8_milp_optimal.sol",
+        "cbc-2.10.8_milp_optimal_all.sol",
     ],
 )
 def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_path):
@@ -131,7 +132,7 @@ def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_pat
     [
         "highs-1.15.1_infeasible_style0.sol",
         "highs-1.15.1_time_without_point_style0.sol",
-        "tiny/cbc-2.10.8_milp_infeasible.sol",
+        "tiny/cbc-2.10.8_milp_infeasible_all.sol",
         "tiny/cbc-2.10.8_milp_time_without_point.sol",
     ],
 )

@@ -30,7 +30,7 @@ from crossfield.models.formulations.names import column_names
 from crossfield.models.proof.certificate import write_certificate
 from forging import change
 from libraries import OPEN, content, library_of
-from places import SOLUTIONS
+from places import DATA, SOLUTIONS
 from submitting import submit_one
 
 STEM, OTHER = "cf_rand_n004_s6", "cf_rand_n004_s7"
@@ -187,6 +187,7 @@ def test_a_folder_is_submitted_without_the_files_of_other_kinds(lib, sent):
 def test_kinds_are_recognised_by_content(sent, lib, tmp_path):
     files = [path for path in SOLUTIONS.iterdir() if path.is_file() and path.suffix == ".sol"]
     assert {kind_of(path) for path in files} == {"solution"}
+    assert {kind_of(path) for path in (DATA / "logs").glob("*.log")} <= {"", "solution"}
     for name, kind in (("s6.npz", "certificate"), (f"{STEM}_exact.field.npz", "field")):
         shutil.copy(sent / name, tmp_path / "anything")
         assert kind_of(tmp_path / "anything") == kind

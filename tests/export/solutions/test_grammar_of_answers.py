@@ -24,10 +24,19 @@ BASES = {
     "scip": "scip-10.0_milp_optimal.sol",
     "miplib": "miplib-by-layout_milp_optimal.sol",
     "cbc": "cbc-2.10.8_milp_optimal.sol",
+    "cbc with rows": "cbc-2.10.8_milp_optimal_all.sol",
     "xpress": "xpress-9.9.1_milp_optimal.slx",
     "gams": "gams-54.6.1_cplex_milp_optimal.csv",
 }
 """Answers of real programs to one problem, in every layout of lines that both read."""
+
+SIGNS = {
+    "name = value": rb"\1 = \2",
+    "name: value": rb"\1: \2",
+    "name,value": rb"\1,\2",
+    "name;value": rb"\1;\2",
+}
+"""The same in lists with a sign between name and value."""
 
 STYLES = {"highs raw": 0, "highs sparse": 4}
 """HiGHS's styles of the same, which it writes here."""
@@ -38,6 +47,8 @@ def answer(base):
     """The answer of a real program, in its layout."""
     if base in BASES:
         return (TINY / BASES[base]).read_bytes()
+    if base in SIGNS:
+        return re.sub(rb"(?m)^([a-zA-Z]\S*) (\S+)$", SIGNS[base], answer("list"))
     with TemporaryDirectory() as folder:
         write(problem("milp"), Path(folder) / "m.mps")
         solver = highspy.Highs()
@@ -129,7 +140,7 @@ def judged(tmp_path_factory):
 
 
 @for_each("change", ODD)
-@for_each("base", [*BASES, *STYLES])
+@for_each("base", [*BASES, *SIGNS, *STYLES])
 def test_odd_files_are_read_alike(base, change, judged):
     ours, theirs = judged(ODD[change](answer(base)))
     assert ours == pytest.approx(0.556536082845935, abs=1e-6)
@@ -137,7 +148,7 @@ def test_odd_files_are_read_alike(base, change, judged):
 
 
 @for_each("change", FAULTY)
-@for_each("base", [*BASES, *STYLES])
+@for_each("base", [*BASES, *SIGNS, *STYLES])
 def test_faulty_files_are_refused_or_contradicted_alike(base, change, judged):
     ours, theirs = judged(FAULTY[change](answer(base)))
     assert ours in {None, ""}
@@ -153,8 +164,7 @@ def test_faulty_files_are_refused_or_contradicted_alike(base, change, judged):
         ("# the objective value is 99", None),
     ])  # fmt: skip
 def test_objectives_in_comments_and_later_lines_are_claims(text, objective):
-    x, y = "x_00_00 1", "y_00_00 2"
-    for lines in ([text, x, y], [x, y, text], [x, text, y]):
+    for lines in ([text, "x 1", "y 2"], ["x 1", "y 2", text], ["x 1", text, "y 2"]):
         raw = parse_raw("\n".join(lines).encode() + b"\n")
         assert (raw.objective, raw.values.tolist()) == (objective, [1, 2])
 
@@ -168,7 +178,7 @@ def test_statuses_in_comments_are_claims(words, status):
     for mark in ("# Status: ", "# Solution status = ", "# status "):
         raw = parse_raw(f"{mark}{words}\n# Objective value: 3\nx 1\n".encode())
         assert (raw.status, raw.message) == (status, words)
-        assert raw.objective == 3
+        assert raw.objective == 3 or not raw.has_point  # cuOpt's values of an infeasible problem are none
 
 
 def test_two_objectives_in_one_file_are_refused_unless_they_agree():

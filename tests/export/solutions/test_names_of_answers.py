@@ -64,21 +64,32 @@ def test_two_spellings_of_a_name_are_refused_if_their_values_differ(tmp_path):
         read_solution(path, MILP)
 
 
-MISFITS = {
+CAUSES = {
     "other instance": (
         entries_of("milp-mccormick", LARGER),
-        r"86 of 148 columns .* 84 of its 146 names are unknown \(first 'alpha_01_04'\); give the manifest",
+        r"86 of 148 columns .* 84 of its 146 names are unknown \(first 'alpha_01_04'\).* another instance",
     ),
-    "other formulation": (entries_of("minlp-parity"), r"\(first 'p_00_01_r'\); give the manifest"),
+    "other formulation": (
+        entries_of("minlp-parity"),
+        r"\(first 'p_00_01_r'\); it is probably of minlp-parity",
+    ),
+    "fewer blocks": (entries_of("minlp-quartic"), "probably of minlp-quartic or minlp-cubic"),
     "cut off": (
         ENTRIES[:-5],
-        r"5 of 148 columns .* missing \(psi_02_02 is the first\); .* write all columns",
+        r"5 of 148 columns .* missing \(psi_02_02 is the first\); the file may be cut off",
     ),
-    "zeros left out": ([(name, value) for name, value in ENTRIES if value], "let it write all columns"),
-    "renamed": (
+    "cut off in a block": (ENTRIES[:60], "88 of 148 columns .* the file may be cut off"),
+    "zeros left out": (
+        [(name, value) for name, value in ENTRIES if value],
+        "left out columns at 0, which this layout lists; .* `=obj= VALUE`",
+    ),
+    "lines missing": ([*ENTRIES[:7], *ENTRIES[9:]], "2 of 148 columns .* lines are missing in it"),
+    "renamed x1": (
         [(f"x{at}", value) for at, (_, value) in enumerate(ENTRIES)],
-        r"148 of its 148 names are unknown \(first 'x0'\); .* under their names",
+        r"148 of its 148 names are unknown \(first 'x0'\); the program renamed the columns",
     ),
+    "renamed C0001": ([(f"C{at:07d}", 1.0) for at in range(148)], "the program renamed the columns"),
+    "other model": ([("foo", 1.0), ("bar", 2.0)], r"\(first 'foo'\); it is of another formulation or model"),
     "infinite": (
         [(ENTRIES[0][0], float("inf")), *ENTRIES[1:]],
         "alpha_00_01 has the value inf, .* not finite",
@@ -87,9 +98,9 @@ MISFITS = {
 }
 
 
-@for_each("name", MISFITS)
-def test_names_that_do_not_fit_are_shown_with_the_remedy(name, tmp_path):
-    entries, message = MISFITS[name]
+@for_each("name", CAUSES)
+def test_names_that_do_not_fit_are_shown_with_the_likely_cause(name, tmp_path):
+    entries, message = CAUSES[name]
     (tmp_path / "x.sol").write_text(listed(entries))
     with pytest.raises(SolutionError, match=message):
         read_solution(tmp_path / "x.sol", MILP)

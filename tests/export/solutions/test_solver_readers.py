@@ -19,6 +19,7 @@ from answers import (
     NOTHING,
     OPTIMA,
     RELAXATIONS,
+    ROUNDED,
     SILENT,
     TINY,
     UNBOUNDED,
@@ -33,7 +34,8 @@ from answers import (
     problem_of,
 )
 from crossfield.export.solutions.readers.grammar import HEAD
-from crossfield.export.solutions.readers.registry import READERS, parse_raw, read_raw
+from crossfield.export.solutions.readers.registry import parse_raw, read_raw, recognising_readers
+from crossfield.export.solutions.readers.siblings import sibling_of
 from crossfield.export.solutions.readers.text import values_by_name, values_in_order
 from crossfield.export.solutions.solution import read_solution
 from crossfield.models.errors import SolutionError
@@ -73,16 +75,17 @@ def test_reader_status_and_point(path):
 
 @for_each("path", [*GOOD, *BAD, *(path for path in HERE.rglob("*.sol") if TINY not in path.parents)])
 def test_no_file_is_claimed_by_two_readers(path):
-    """The last reader, of plain lists, takes what no other does."""
-    head = path.read_bytes()[:HEAD]
-    assert sum(reader.recognises(head) for reader in READERS[:-1]) <= 1
+    text = path.read_bytes()
+    assert len(recognising_readers(text)) == (
+        0 if path.stem in {"empty", "junk"} or sibling_of(text[:HEAD]) else 1
+    )
 
 
 @for_each("path", [path for path in GOOD if FILES[path.name][1] in WITH_POINT and problem_of(path)])
 def test_the_point_is_the_one_that_the_solver_had(path):
     status, name = FILES[path.name][1], problem_of(path)
     solution = read_solution(path, problem(name), identified=True)
-    assert (solution.unknown, solution.claimed) == (0, status)
+    assert (solution.unknown, solution.claimed) == (path.stem.endswith("_prints"), status)  # Total, of PuLP
     if solution.reported is not None:
         assert solution.objective == pytest.approx(solution.reported, abs=1e-6)
     worst = solution.violation.worst
@@ -91,10 +94,11 @@ def test_the_point_is_the_one_that_the_solver_had(path):
         assert solution.status == "unknown"
         return
     assert solution.status == status
-    assert worst < 1e-6
-    assert solution.objective > OPTIMA[name] - 2e-6
+    digits = 1e-4 if path.stem in ROUNDED else 1e-6
+    assert worst < digits
+    assert solution.objective > OPTIMA[name] - 2 * digits
     if "optimal" in path.name or "pool" in path.name:
-        assert solution.objective == pytest.approx(OPTIMA[name], abs=2e-6)
+        assert solution.objective == pytest.approx(OPTIMA[name], abs=2 * digits)
 
 
 # what is particular about each
@@ -150,9 +154,10 @@ def test_the_incumbent_of_a_pool_is_read():
     assert values.values.tolist() == [first.get(name.decode(), 0) for name in names_of("milp")]
     assert values.unknown == 0
     raw = read_raw(TINY / f"{C}_milp_pool.sol")
-    assert raw.message == "populate solution limit exceeded; incumbent"
+    assert raw.message == "populate solution limit exceeded; incumbent; solution 1 of 3"
     assert (raw.values == read_raw(TINY / f"{C}_milp_optimal.sol").values).all()
     raw = read_raw(TINY / "xpress-by-layout_milp_two_solutions.slx")
+    assert raw.message == "solution 1 of 2"
     assert (raw.values == read_raw(TINY / f"{X}_milp_optimal.slx").values).all()
 
 
@@ -187,10 +192,12 @@ def test_words_of_scip(words, status, without_point):
     assert (raw.status, raw.has_point) == (without_point, False)
 
 
-def test_cbc_marks_values_out_of_their_bounds():
-    plain = read_raw(TINY / f"{B}_milp_optimal.sol")
-    marked = re.sub(rb"\n(?= +\d+ (?:alpha|p1))", rb"\n**", text(f"{B}_milp_optimal.sol"))
-    assert marked.count(b"\n**") == 8
+def test_cbc_with_rows_and_marks_gives_the_same_columns():
+    plain, with_rows = (read_raw(TINY / f"{B}_milp_optimal{end}.sol") for end in ("", "_all"))
+    assert plain.names.tolist() == with_rows.names.tolist() == names_of("milp").tolist()
+    assert plain.values.tolist() == with_rows.values.tolist()
+    marked = re.sub(rb"\n(?= +\d+ (?:alpha|p1|c14))", rb"\n**", text(f"{B}_milp_optimal_all.sol"))
+    assert marked.count(b"\n**") == 12
     assert parse_raw(marked).values.tolist() == plain.values.tolist()
 
 
