@@ -28,15 +28,15 @@ def test_what_numpy_writes_is_read(kind):
     good = path.read_bytes()
     for save in (np.savez, np.savez_compressed):
         path.write_bytes(of_numpy(good, save))
-        found = read(path)
-        assert getattr(found, "instance", found).sha256 == INSTANCE.sha256
+        content = read(path)
+        assert getattr(content, "instance", content).sha256 == INSTANCE.sha256
 
 
 def test_forged_archives_are_refused(kind, subtests):
     name, read, path = kind
     good = path.read_bytes()
-    for what, forge in forged(name).items():
-        with subtests.test(what):
+    for forgery, forge in forged(name).items():
+        with subtests.test(forgery):
             path.write_bytes(forge(good))
             with pytest.raises(InstanceError, match=r"it\.npz: ") as refusal:
                 read(path)
@@ -51,9 +51,9 @@ def test_an_array_too_many_is_named(kind):
 
 
 def test_numbers_of_half_precision_are_whole_or_refused_without_a_warning(recwarn):
-    given = np.array([[0, 0], [1, 1]], dtype=np.float16)
-    instance = Instance.on_pixels("tiny", np.ones((2, 2), bool), given, [0.3, 1.2], [1.0, 0.5])
+    pixels = np.array([[0, 0], [1, 1]], dtype=np.float16)
+    instance = Instance.on_pixels("tiny", np.ones((2, 2), bool), pixels, [0.3, 1.2], [1.0, 0.5])
     assert instance.sha256 == INSTANCE.sha256
     with pytest.raises(InstanceError, match="whole numbers of 32 bits"):
-        Instance.on_pixels("tiny", np.ones((2, 2), bool), given + np.float16(0.5), [0.3, 1.2], [1.0, 0.5])
+        Instance.on_pixels("tiny", np.ones((2, 2), bool), pixels + np.float16(0.5), [0.3, 1.2], [1.0, 0.5])
     assert not list(recwarn)

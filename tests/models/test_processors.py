@@ -22,13 +22,13 @@ print(json.dumps({name: cf.sample(name, 10).sha256 for name in names}))
 
 
 def hashes_on(processor):
-    found = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", HASHES],
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1"} | processor,
         stdout=subprocess.PIPE,
         check=True,
     )
-    return json.loads(found.stdout)
+    return json.loads(done.stdout)
 
 
 def test_samples_are_the_same_on_every_processor():

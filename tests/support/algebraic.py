@@ -174,20 +174,20 @@ def difference(model: Model, problem: Problem, start: Floats | None = None) -> s
     """The first difference between a model and a problem; empty if there is none."""
     columns = names_of(column_names(problem.instance, problem.blocks))
     rows = names_of(row_names(problem.rows)) if problem.rows else []
-    for what, found, expected in (("column", model.columns, columns), ("row", model.rows, rows)):
-        for name in sorted(set(found) ^ set(expected)):
-            return f"a {what} {name} too {'many' if name in found else 'few'}"
-    found = [model.columns[name] for name in columns]
-    levels = [] if start is None else [("start", [column.level for column in found], start)]
-    for what, mine, expected in [
-        ("whole", [column.kind != "continuous" for column in found], problem.integer),
-        ("lower", [column.lower for column in found], problem.lower),
-        ("upper", [column.upper for column in found], problem.upper),
+    for kind, names, expected in (("column", model.columns, columns), ("row", model.rows, rows)):
+        for name in sorted(set(names) ^ set(expected)):
+            return f"a {kind} {name} too {'many' if name in names else 'few'}"
+    read = [model.columns[name] for name in columns]
+    levels = [] if start is None else [("start", [column.level for column in read], start)]
+    for kind, mine, expected in [
+        ("whole", [column.kind != "continuous" for column in read], problem.integer),
+        ("lower", [column.lower for column in read], problem.lower),
+        ("upper", [column.upper for column in read], problem.upper),
         *levels,
     ]:
         for name, value, right in zip(columns, mine, expected.tolist(), strict=True):
             if value != right:
-                return f"{what} of {name} is {value} instead of {right}"
+                return f"{kind} of {name} is {value} instead of {right}"
     points = points_of(problem, 4)
     values = dict(zip(columns, points.T, strict=True))
     objective = [problem.objective_value(point) for point in points]
@@ -213,7 +213,7 @@ def _row_difference(model: Model, problem: Problem, points: Floats, values: Valu
     return ""
 
 
-def _value_difference(what: str, found: Any, expected: Any) -> str:
-    found, expected = np.broadcast_to(found, np.shape(expected)), np.asarray(expected)
-    wrong = ~(np.abs(found - expected) <= ACCURACY * np.abs(expected).max())
-    return f"{what} is {found[wrong][0]!r} instead of {expected[wrong][0]!r}" if wrong.any() else ""
+def _value_difference(place: str, values: Any, expected: Any) -> str:
+    values, expected = np.broadcast_to(values, np.shape(expected)), np.asarray(expected)
+    wrong = ~(np.abs(values - expected) <= ACCURACY * np.abs(expected).max())
+    return f"{place} is {values[wrong][0]!r} instead of {expected[wrong][0]!r}" if wrong.any() else ""

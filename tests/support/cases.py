@@ -54,8 +54,8 @@ _VARIANTS: list[tuple[str, dict[str, Any]]] = [
 ]
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
-    " ".join([name, *(f"{key}={value}" for key, value in given.items())]): (name, given)
-    for name, given in [
+    " ".join([name, *(f"{key}={value}" for key, value in changes.items())]): (name, changes)
+    for name, changes in [
         *((name, {"gauge": gauge}) for name in FORMULATIONS for gauge in ("strokes", "box")),
         *_VARIANTS,
     ]
@@ -66,7 +66,7 @@ LOW_DEGREE = [label for label, (name, _) in CASES.items() if name != "minlp-pari
 """The cases that LP and MPS can hold."""
 
 
-def make_instance(shape: str = "hole", gauge: str = "strokes", seed: int = 1, **given: Any) -> Instance:
+def make_instance(shape: str = "hole", gauge: str = "strokes", seed: int = 1, **weights: Any) -> Instance:
     """A random instance on a mask by name, some 40 % of its pixels with a stroke."""
     rng = np.random.default_rng(seed)
     mask = np.array([[pixel == "#" for pixel in row] for row in MASKS[shape]])
@@ -81,7 +81,7 @@ def make_instance(shape: str = "hole", gauge: str = "strokes", seed: int = 1, **
         pixels,
         theta,
         w,
-        **{"stroke_coefficient": 1.5, "skew_coefficient": 1e-3, "gauge": gauge} | given,
+        **{"stroke_coefficient": 1.5, "skew_coefficient": 1e-3, "gauge": gauge} | weights,
     )
 
 
@@ -101,11 +101,11 @@ def make_problem(name: str, instance: Instance, **options: Any) -> Problem:
 @cache
 def problem_of(label: str) -> Problem:
     """The problem of a case; it is the same object every time, so that its arrays are made once."""
-    name, given = CASES[label]
-    given = dict(given)
-    pinned = given.pop("pinned", False)
-    instance = make_instance(**{key: given.pop(key) for key in ("shape", "gauge") if key in given})
-    problem = make_problem(name, instance, **given)
+    name, options = CASES[label]
+    options = dict(options)
+    pinned = options.pop("pinned", False)
+    instance = make_instance(**{key: options.pop(key) for key in ("shape", "gauge") if key in options})
+    problem = make_problem(name, instance, **options)
     return with_integers_fixed(problem, make_field(instance)) if pinned else problem
 
 

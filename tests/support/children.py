@@ -36,14 +36,14 @@ def running() -> dict[int, tuple[int, int]]:
     """The parent and the group of every process that runs;
     those that have ended and were not waited for are left out.
     """
-    found = {}
+    processes = {}
     require_proc()
     for path in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):  # it has ended meanwhile
             state, parent, group, *_ = path.read_text("utf-8", "replace").rpartition(")")[2].split()
             if state not in "ZX":
-                found[int(path.parent.name)] = (int(parent), int(group))
-    return found
+                processes[int(path.parent.name)] = (int(parent), int(group))
+    return processes
 
 
 def require_proc() -> None:
@@ -55,20 +55,20 @@ def require_proc() -> None:
 def command_lines() -> dict[int, bytes]:
     """The command line of every process; nothing between its words but a zero byte."""
     require_proc()
-    found = {}
+    lines = {}
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         with suppress(OSError):  # it has ended meanwhile
-            found[int(path.parent.name)] = path.read_bytes()
-    return found
+            lines[int(path.parent.name)] = path.read_bytes()
+    return lines
 
 
 def descendants(ancestor: int) -> set[int]:
     """The processes that run and that a process, or one of these, has started."""
     parents = {pid: parent for pid, (parent, _) in running().items()}
-    found = {ancestor}
-    while more := {pid for pid, parent in parents.items() if parent in found} - found:
-        found |= more
-    return found - {ancestor}
+    family = {ancestor}
+    while more := {pid for pid, parent in parents.items() if parent in family} - family:
+        family |= more
+    return family - {ancestor}
 
 
 def all_end(processes: set[int], seconds: float = 60.0) -> bool:

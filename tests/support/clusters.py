@@ -34,9 +34,9 @@ def cluster(
     """Address of a scheduler on this machine, and its workers; all are killed in the end."""
     arguments = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
     words = r"Scheduler at: +(tcp://127\.0\.0\.1:\d+)"
-    scheduler, found = started(arguments, folder / "scheduler.log", words, environment)
+    scheduler, match = started(arguments, folder / "scheduler.log", words, environment)
     processes = [scheduler]
-    address = found.group(1)
+    address = match.group(1)
     try:
         for number in range(1, workers + 1):
             arguments = [

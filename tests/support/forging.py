@@ -4,10 +4,10 @@ import hashlib
 import json
 
 
-def change(path, **given):
+def change(path, **changes):
     """Change keys of a JSON document; keys of parts of it are written a__b."""
     document = json.loads(path.read_text())
-    for key, value in given.items():
+    for key, value in changes.items():
         *parts, last = key.split("__")
         part = document
         for name in parts:

@@ -21,13 +21,13 @@ def layers_of(path):
 
 def lines_in(group):
     """Points (k, 2) of each line of a group: the ends of all pieces."""
-    found = []
+    lines = []
     for path in group.iter(f"{SVG}path"):
         for line in path.get("d").split("M")[1:]:
             start, letter, moves = re.split("([lc])", line)
             steps = numbers(moves).reshape(-1, 1 if letter == "l" else 3, 2)[:, -1]
-            found.append(np.cumsum(np.concatenate([[numbers(start)], steps]), axis=0))
-    return found
+            lines.append(np.cumsum(np.concatenate([[numbers(start)], steps]), axis=0))
+    return lines
 
 
 def numbers(text):

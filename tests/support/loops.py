@@ -31,17 +31,17 @@ def for_each(names: str, cases: Iterable[Any]) -> Callable[[Test], Test]:
 
 
 def _looped(test: Test, cases: list[dict[str, Any]]) -> Test:
-    given = inspect.signature(test).parameters
+    parameters = inspect.signature(test).parameters
 
     @functools.wraps(test)
     def run(subtests: pytest.Subtests, **fixtures: Any) -> None:
         for number, case in enumerate(cases):
             label = " ".join(f"{name}={str(value)[:60]}" for name, value in case.items())
             with subtests.test(f"case {number}: {label}"):
-                own = {"tmp_path": _folder(fixtures["tmp_path"], number)} if "tmp_path" in given else {}
+                own = {"tmp_path": _folder(fixtures["tmp_path"], number)} if "tmp_path" in parameters else {}
                 test(**fixtures | own | case)
 
-    fixtures = [parameter for name, parameter in given.items() if name not in cases[0]]
+    fixtures = [parameter for name, parameter in parameters.items() if name not in cases[0]]
     subtests = inspect.Parameter("subtests", inspect.Parameter.POSITIONAL_OR_KEYWORD)
     run.looped = test, cases
     run.__signature__ = inspect.Signature([subtests, *fixtures])

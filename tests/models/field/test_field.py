@@ -39,7 +39,7 @@ def pixels(mask, theta, gauge="strokes", skew_coefficient=1e-6):
     )
 
 
-def test_energy_of_two_pixels_by_hand():
+def test_the_energy_of_two_pixels_is_that_by_hand():
     instance = pixels([[1, 1]], {(0, 0): 0})
     field = CrossField(instance, [0.1, 0.4], [0.2, -0.1], [0])
     # A = -0.3, B = 0.3, R = 0.1 + 0.2 - 0.
@@ -77,7 +77,7 @@ def test_two_labels_of_one_cross_differ_by_the_jump_one(b):
         assert field.with_best_jumps().p.tolist() == [1]
 
 
-def test_lines_and_the_angle_between_them():
+def test_skew_turns_both_lines_towards_each_other():
     alpha, beta = np.radians([30, 30, 30]), np.radians([0, 10, -20])
     field = CrossField(pixels([[1, 1, 1]], {(0, 0): 0}), alpha, beta, [0, 0])
     assert np.degrees(np.arctan2(field.u[:, 1], field.u[:, 0])) == pytest.approx([30, 40, 10])
@@ -105,14 +105,18 @@ def test_cross_error_takes_the_better_assignment():
 
 
 @pytest.mark.parametrize("index", [0.25, -0.25])
-def test_quarter_singularity_of_four_pixels(index):
+def test_four_pixels_may_have_a_quarter_singularity(index):
     # The middle of the quad is the origin; the crosses turn by index * 360 degrees on the way round.
     way_round = np.radians([135, 45, 225, 315])
     alpha = np.mod(index * way_round, HALF)
     instance = pixels([[1, 1], [1, 1]], {(0, 0): np.degrees(alpha[0])}, gauge="box")
     field = CrossField(instance, alpha, np.zeros(4), [0, 0, 0, 0]).with_best_jumps()
-    found = field.singularities
-    assert (found.row.tolist(), found.column.tolist(), found.index.tolist()) == ([0], [0], [index])
+    singularities = field.singularities
+    assert (singularities.row.tolist(), singularities.column.tolist(), singularities.index.tolist()) == (
+        [0],
+        [0],
+        [index],
+    )
     assert np.abs(field.residual_a) == pytest.approx([np.pi / 8] * 4)
 
 
@@ -122,8 +126,12 @@ def test_singularity_is_found_at_its_quad():
     alpha = np.mod(-way_round / 4, HALF)
     instance = pixels(np.ones((5, 6)), {(0, 0): 0}, gauge="box")
     field = CrossField(instance, alpha, np.zeros(30), np.zeros(len(instance.grid.first))).with_best_jumps()
-    found = field.singularities
-    assert (found.row.tolist(), found.column.tolist(), found.index.tolist()) == ([2], [1], [-0.25])
+    singularities = field.singularities
+    assert (singularities.row.tolist(), singularities.column.tolist(), singularities.index.tolist()) == (
+        [2],
+        [1],
+        [-0.25],
+    )
 
 
 @for_each(

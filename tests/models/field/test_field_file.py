@@ -184,8 +184,14 @@ def test_singularities_are_the_vertices_round_which_the_crosses_turn(tmp_path, n
     _, vertices, _ = read_rawfield(write_field(field, tmp_path / "field.rawfield"))
     head, *rows = (tmp_path / "field.sings").read_text().splitlines()
     vertex, index = np.array([row.split() for row in rows], dtype=int).reshape(-1, 2).T
-    found, (x, y), size = field.singularities, field.instance.origin, field.instance.pixel_size
-    places = np.column_stack([x + size * (found.column + 1), -(y + size * (found.row + 1)), 4 * found.index])
+    singularities, (x, y), size = field.singularities, field.instance.origin, field.instance.pixel_size
+    places = np.column_stack(
+        [
+            x + size * (singularities.column + 1),
+            -(y + size * (singularities.row + 1)),
+            4 * singularities.index,
+        ]
+    )
     assert head == f"4 {len(rows)}"
     stated = np.column_stack([vertices[vertex, :2], index])
     assert sorted(map(tuple, stated.round(6).tolist())) == sorted(map(tuple, places.round(6).tolist()))

@@ -58,9 +58,9 @@ def test_it_is_the_best_choice_of_all_where_a_cut_can_say_it():
         least = min(
             mixed(one, other, choice).energy().total for choice in product([False, True], repeat=pixels)
         )
-        found = fuse_fields(one, other).energy().total
-        assert found <= one.energy().total
-        assert found == pytest.approx(least, rel=1e-5)
+        energy = fuse_fields(one, other).energy().total
+        assert energy <= one.energy().total
+        assert energy == pytest.approx(least, rel=1e-5)
 
 
 def test_fields_of_two_strategies_made_one_are_below_both_and_the_same_each_time():
@@ -68,11 +68,11 @@ def test_fields_of_two_strategies_made_one_are_below_both_and_the_same_each_time
     for name in ("mouse", "saddle", "cylinder_bend"):
         instance = sample(name, 40)
         one, other = greedy_field(instance), fit_in_box(polyvector_field(instance, hold=0.1))
-        found, again = fuse_fields(one, other), fuse_fields(one, other)
-        assert found.energy().total <= one.energy().total
-        assert found.p.tobytes() == again.p.tobytes()
-        assert found.alpha.tobytes() == again.alpha.tobytes()
-        lower += found.energy().total < min(one.energy().total, other.energy().total) - 1e-3
+        fusion, again = fuse_fields(one, other), fuse_fields(one, other)
+        assert fusion.energy().total <= one.energy().total
+        assert fusion.p.tobytes() == again.p.tobytes()
+        assert fusion.alpha.tobytes() == again.alpha.tobytes()
+        lower += fusion.energy().total < min(one.energy().total, other.energy().total) - 1e-3
     assert lower
 
 

@@ -29,11 +29,11 @@ def matrix_of(lp):
     return sparse.csc_array(tuple(map(np.array, parts)), shape=(lp.num_row_, lp.num_col_)).tocsr()
 
 
-def hessian_of(found, columns):
-    if not found.dim_:
+def hessian_of(triangle, columns):
+    if not triangle.dim_:
         return sparse.csr_array((columns, columns))
-    parts = tuple(map(np.array, (found.value_, found.index_, found.start_)))
-    half = sparse.csc_array(parts, shape=(found.dim_, found.dim_))
+    parts = tuple(map(np.array, (triangle.value_, triangle.index_, triangle.start_)))
+    half = sparse.csc_array(parts, shape=(triangle.dim_, triangle.dim_))
     full = half + half.T - sparse.diags_array(half.diagonal())
     return full.tocsr()[:columns, :columns]
 

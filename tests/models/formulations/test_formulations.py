@@ -145,7 +145,7 @@ def test_objectives_are_the_energies_of_the_field(shape, gauge):
         )
 
 
-def test_two_pixels_by_hand():
+def test_two_labels_of_one_cross_cost_nothing_at_the_jump_one():
     """(0, b) and (pi/2, -b) are two labels of one cross: p = +1 takes the first to the second."""
     instance = Instance.on_pixels(
         "two", np.ones((1, 2), bool), np.array([[0, 0]]), np.array([0.3]), np.ones(1)

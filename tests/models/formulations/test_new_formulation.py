@@ -44,9 +44,9 @@ def instance():
     return cf.sample("skew", 4)
 
 
-def test_it_is_listed(toy, instance):
+def test_a_new_formulation_is_listed(toy, instance):
     problem = cf.formulate(instance, "toy")
-    (listed,) = (each for each in tables()["formulations"][1] if each["name"] == "toy")
+    (listed,) = (row for row in tables()["formulations"][1] if row["name"] == "toy")
     assert (listed["class"], listed["summary"]) == ("MILP", "directions alone")
     assert (problem.problem_class, problem.convex, toy.option_names) == (
         "MILP",
@@ -58,7 +58,7 @@ def test_it_is_listed(toy, instance):
 
 
 @pytest.mark.parametrize("solver", ["highs", "twin"])
-def test_it_is_written_solved_and_read(toy, instance, solver, tmp_path):
+def test_a_new_formulation_is_written_solved_and_read(toy, instance, solver, tmp_path):
     problem, field = cf.formulate(instance, "toy"), cf.greedy_field(instance)
     (manifest,) = write_all(instance, tmp_path, formulations=["toy"], formats=tuple(FORMATS), start=field)
     assert {file["format"] for file in manifest.document["files"]} == set(FORMATS)
@@ -73,7 +73,7 @@ def test_it_is_written_solved_and_read(toy, instance, solver, tmp_path):
 
 
 @pytest.mark.slow
-def test_it_is_verified(toy, instance, tmp_path):
+def test_a_new_formulation_is_verified(toy, instance, tmp_path):
     write_all(instance, tmp_path, formulations=["toy"], formats=tuple(FORMATS))
     checked = verify(tmp_path, seconds=10, programs=["highs", "casadi"])
     assert checked.is_ok
@@ -82,7 +82,7 @@ def test_it_is_verified(toy, instance, tmp_path):
 
 
 @pytest.mark.slow
-def test_it_is_in_a_library(toy, tmp_path):
+def test_a_new_formulation_is_in_a_library(toy, tmp_path):
     library = library_of(tmp_path, LIBRARY)
     assert library.document["entries"] == [ENTRY]
     sidecar = library.entry(ENTRY)

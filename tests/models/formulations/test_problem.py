@@ -91,13 +91,13 @@ def test_p1_and_p2_reach_every_useful_jump_and_no_other(shape, gauge):
 def test_a_field_is_a_feasible_point_and_comes_back(label):
     problem = problem_of(label)
     field = make_field(problem.instance)  # also the one whose jumps are data or fixed
-    for each in (problem, problem_in_format(problem, FORMATS["lp"]) if label in LOW_DEGREE else problem):
-        point = each.point(field)
-        assert each.violation(point).worst < 1e-12
-        back = each.field(point)
+    for form in (problem, problem_in_format(problem, FORMATS["lp"]) if label in LOW_DEGREE else problem):
+        point = form.point(field)
+        assert form.violation(point).worst < 1e-12
+        back = form.field(point)
         for name in ("alpha", "beta", "p"):
             np.testing.assert_array_equal(getattr(back, name), getattr(field, name))
-        assert each.objective_value(point) == pytest.approx(
+        assert form.objective_value(point) == pytest.approx(
             problem.objective_value(problem.point(field)), rel=1e-12
         )
 
@@ -123,7 +123,7 @@ def test_lifted_problems_are_exact(name):
     )
 
 
-def test_convex_means_convex():
+def test_convex_problems_have_positive_semidefinite_hessians():
     """The Hessian of a quadratic objective is positive semidefinite where the problem says so,
     and only there.
     """

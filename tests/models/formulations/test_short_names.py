@@ -26,9 +26,9 @@ def test_both_names_of_every_formulation_mean_the_same():
     for name, declared in FORMULATIONS.items():
         assert declaration_of(name) is declaration_of(declared.short) is declared
         assert declare(declared.short).name == name
-        given = jumps_as_data(instance, declared.short, None)
-        assert cf.formulate(instance, declared.short, p=given).name == name
-        assert (given is None) == (not declared.fixed)
+        jumps = jumps_as_data(instance, declared.short, None)
+        assert cf.formulate(instance, declared.short, p=jumps).name == name
+        assert (jumps is None) == (not declared.fixed)
 
 
 def test_a_word_that_is_near_a_name_is_told_that_name():

@@ -14,7 +14,7 @@ def pairs(grid):
     return list(zip(grid.first.tolist(), grid.second.tolist(), grid.upward.tolist(), strict=True))
 
 
-def test_two_by_two():
+def test_a_grid_of_two_by_two_is_numbered_as_by_hand():
     grid = Grid(np.ones((2, 2), bool))
     assert (grid.height, grid.width, grid.size, grid.parts) == (2, 2, 4, 1)
     assert grid.number.tolist() == [[0, 1], [2, 3]]

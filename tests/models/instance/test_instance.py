@@ -116,7 +116,7 @@ def test_theta_is_taken_modulo_pi():
     assert (tiny.theta < np.pi).all()
 
 
-def test_windows_of_the_gauges():
+def test_windows_lie_round_strokes_or_are_the_box():
     degrees = np.radians([30.0, 150.0])
     strokes = Instance.on_pixels(**(GOOD | {"theta": degrees}))
     assert strokes.stroke_index.tolist() == [1, 3]
@@ -168,7 +168,7 @@ def test_four_turns_two_mirrors_two_transpositions_change_nothing(instance):
     assert same(mirrored(transposed(turned(instance))))
 
 
-def test_turned_by_hand():
+def test_a_turned_instance_is_that_by_hand():
     instance = Instance.on_pixels(**GOOD)
     moved = turned(instance)
     assert moved.mask.tolist() == [[True, False], [True, True], [True, True]]
@@ -177,7 +177,7 @@ def test_turned_by_hand():
     assert moved.w.tolist() == [1.0, 0.25]
 
 
-def test_mirrored_and_transposed_by_hand():
+def test_mirrored_and_transposed_instances_are_those_by_hand():
     instance = Instance.on_pixels("one", np.ones((1, 3), bool), [[0, 0]], [np.radians(30)], [1.0])
     left_right, diagonal = mirrored(instance), transposed(instance)
     assert left_right.stroke_pixels.tolist() == [[0, 2]]
@@ -232,13 +232,13 @@ def test_rounding_changes_nothing_twice(seed):
     theta = rng.choice([1.0, 1e-9, 1e5, np.pi / 4, np.pi]) * rng.integers(-9, 10, 2) + rng.choice(
         [0, 1e-12], 2
     ) * rng.random(2)
-    given = GOOD | {
+    facts = GOOD | {
         "theta": theta,
         "w": 10 ** rng.uniform(-15, 0, 2),
         "origin": tuple(rng.normal(size=2) * 1e9),
     }
     for gauge in GAUGES:
-        once = Instance.on_pixels(**given, gauge=gauge)
+        once = Instance.on_pixels(**facts, gauge=gauge)
         assert replace(once).sha256 == once.sha256
         assert ((once.theta == 0) | ((once.theta >= 1e-8) & (once.theta <= np.pi - 1e-8))).all()
         assert ((once.target == 0) | (np.abs(once.target) >= 1e-8)).all()

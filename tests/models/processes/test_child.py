@@ -32,15 +32,15 @@ class Clock:
 
 @pytest.fixture
 def child():
-    with Child() as found:
-        yield found
+    with Child() as process:
+        yield process
 
 
 @pytest.mark.parametrize("waits,answer", [(work.until_stopped, "stopped"), (work.hooked, ["hook"])])
 def test_work_is_asked_to_stop_at_its_deadline(child, tmp_path, waits, answer):
     begun = tmp_path / "begun"
-    found = child.call(waits, begun, deadline=Deadline.after(1e-3, Clock(begun, 0.01)))
-    assert found == (answer, False)
+    answered = child.call(waits, begun, deadline=Deadline.after(1e-3, Clock(begun, 0.01)))
+    assert answered == (answer, False)
     assert child.call(abs, -3) == (3, False)
 
 

@@ -158,7 +158,7 @@ def test_any_multipliers_bound_the_energy_in_a_box(norm):
 def test_a_forced_jump_is_the_best_one_everywhere_in_its_boxes(norm):
     rng = np.random.default_rng(3)
     instance = Instance.on_pixels("two", np.ones((1, 2), bool), [[0, 0]], [1.0], [1.0])
-    found = 0
+    forced = 0
     for _ in range(300):
         p = rng.integers(-1, 2)
         middle = np.array([[0.5, 0.5 + HALF * p], rng.uniform(-0.7, 0.7, 2)]) + rng.normal(0, 0.2, (2, 2))
@@ -166,9 +166,9 @@ def test_a_forced_jump_is_the_best_one_everywhere_in_its_boxes(norm):
         boxes = np.stack([low[0], high[0], low[1], high[1]], axis=1)
         if not has_forced_jump(energy_terms(instance, norm), np.array([p]), boxes)[0]:
             continue
-        found += 1
+        forced += 1
         alpha, beta = rng.uniform(low[..., None], high[..., None], (2, 2, 200))
         jumps = np.arange(p - 4, p + 5)[:, None]
         costs = np.abs(alpha[0] - alpha[1] + HALF * jumps) + np.abs((-1.0) ** jumps * beta[0] - beta[1])
         assert (costs[4] <= costs.min(axis=0) + 1e-12).all()
-    assert found > 30
+    assert forced > 30

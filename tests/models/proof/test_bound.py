@@ -116,18 +116,18 @@ def test_no_update_of_clusters_lowers_the_bound():
 def test_threads_change_no_bit():
     instance = cf.sample("bottle", 24)
     lattice = Lattice.whole(first_field(instance), 16)
-    found = []
+    states = []
     for count in (1, 2, 3):
         with crew(count) as hands:
             dual = Dual(lattice, hands)
             dual.ascend(2)
             dual.add_clusters(5, first_field(instance))
             state = dual.state
-            found.append(
+            states.append(
                 (dual.ascend(2), dual.bound(), state.shares_first.tobytes(), state.clusters.tables.tobytes())
             )
     assert lattice.start[-1] > 30_000  # so that they were used
-    assert found[0] == found[1] == found[2]
+    assert states[0] == states[1] == states[2]
 
 
 def holds(lattice, cross):

@@ -66,13 +66,13 @@ def refusal(arrays):
 
 def test_what_was_written_is_read_back_and_holds(written):
     path, _ = written(1)
-    found, proof = read_certificate(path), proven(1)
-    assert found.field.instance.sha256 == proof.field.instance.sha256
+    certificate, proof = read_certificate(path), proven(1)
+    assert certificate.field.instance.sha256 == proof.field.instance.sha256
     for name in ("alpha", "beta", "p"):
-        np.testing.assert_array_equal(getattr(found.field, name), getattr(proof.field, name))
-    assert found.status == found.proven.status == "optimal"
-    assert found.bound <= found.proven.bound <= found.energy
-    assert found.energy == pytest.approx(proof.energy, abs=1e-12)
+        np.testing.assert_array_equal(getattr(certificate.field, name), getattr(proof.field, name))
+    assert certificate.status == certificate.proven.status == "optimal"
+    assert certificate.bound <= certificate.proven.bound <= certificate.energy
+    assert certificate.energy == pytest.approx(proof.energy, abs=1e-12)
 
 
 def test_the_same_proof_gives_the_same_bytes(tmp_path):
@@ -205,7 +205,7 @@ def test_levels_that_do_not_follow_are_not_written(written, tmp_path):
     assert path.read_bytes() == b"kept"
 
 
-def test_unreadable_and_unsafe_files(tmp_path, written):
+def test_unreadable_and_unsafe_files_are_refused(tmp_path, written):
     path = tmp_path / "it.npz"
     _, arrays = written(1)
     pickled = tmp_path / "pickled.npz"
@@ -230,8 +230,8 @@ def test_what_numpy_writes_is_a_certificate_too(written, tmp_path):
 def test_a_forged_archive_is_refused_or_has_the_arrays_that_numpy_loads(written, tmp_path, capsys, subtests):
     path, arrays = written(1)
     other, accepted = tmp_path / "other.npz", set()
-    for what, forge in forged("alpha").items():
-        with subtests.test(what):
+    for forgery, forge in forged("alpha").items():
+        with subtests.test(forgery):
             other.write_bytes(forge(path.read_bytes()))
             try:
                 unpacked = check_certificate.read_arrays(str(other))
@@ -242,7 +242,7 @@ def test_a_forged_archive_is_refused_or_has_the_arrays_that_numpy_loads(written,
                 with pytest.raises(InputError, match=r"other\.npz: is not a certificate: "):
                     read_certificate(other)
                 continue
-            accepted.add(what)
+            accepted.add(forgery)
             with np.load(other, allow_pickle=False) as loaded:
                 assert set(loaded) == set(unpacked) == set(arrays)
                 for name in loaded:

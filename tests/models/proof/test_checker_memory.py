@@ -40,12 +40,12 @@ def checked(path, limit=0):
 @pytest.fixture(scope="module")
 def arrays(tmp_path_factory):
     """The arrays of a certificate of two pixels and one level, by whether there is a pair."""
-    folder, found = tmp_path_factory.mktemp("certificates"), {}
+    folder, by_pair = tmp_path_factory.mktemp("certificates"), {}
     for pair in (False, True):
         instance = random_instance(0, (1, 2), 2) if pair else sketch(np.ones((1, 1), bool), np.ones((1, 1)))
         write_certificate(prove_round(optimum(instance), levels=1), folder / "it.npz")
-        found[pair] = check_certificate.read_arrays(str(folder / "it.npz"))
-    return found
+        by_pair[pair] = check_certificate.read_arrays(str(folder / "it.npz"))
+    return by_pair
 
 
 def with_labels(arrays, alphas, betas):

@@ -177,7 +177,7 @@ def other_forms(array):
     if kind.kind == "f":
         for value in (np.nan, np.inf, -np.inf):
             forms[str(value)] = np.where(np.arange(array.size) == array.size - 1, value, array)
-    return {what: form for what, form in forms.items() if array.size or what in {"one more", "another type"}}
+    return {name: form for name, form in forms.items() if array.size or name in {"one more", "another type"}}
 
 
 def assert_refused(path):
@@ -192,8 +192,8 @@ def test_every_array_in_another_form_is_refused(honest, tmp_path, subtests):
     path, other = honest("tables"), tmp_path / "other.npz"
     members, arrays = members_of(path.read_bytes()), check_certificate.read_arrays(str(path))
     for name, array in arrays.items():
-        for what, form in other_forms(array).items() if not name.startswith(("level_0", "level_1")) else ():
-            with subtests.test(name=name, what=what):
+        for kind, form in other_forms(array).items() if not name.startswith(("level_0", "level_1")) else ():
+            with subtests.test(name=name, what=kind):
                 changed = members | {f"{name}.npy": npy(form)}
                 other.write_bytes(packed([*changed.items()], zipfile.ZIP_STORED))
                 assert_refused(other)
@@ -204,8 +204,8 @@ def test_every_array_twice_renamed_or_left_out_is_refused(honest, tmp_path, subt
     members = members_of(data)
     for member in members:
         files = forged(member.removesuffix(".npy"))
-        left_out = packed([each for each in members.items() if each[0] != member])
-        for what in ("a member twice", "a name in other case", "another ending", "left out"):
-            with subtests.test(member=member, what=what):
-                other.write_bytes(left_out if what == "left out" else files[what](data))
+        left_out = packed([entry for entry in members.items() if entry[0] != member])
+        for forgery in ("a member twice", "a name in other case", "another ending", "left out"):
+            with subtests.test(member=member, what=forgery):
+                other.write_bytes(left_out if forgery == "left out" else files[forgery](data))
                 assert_refused(other)

@@ -93,18 +93,18 @@ def test_computed_costs_of_the_four_labels_round_a_cross_average_to_no_more_than
             for x, f in ((row, lattice.alpha_first), (column, lattice.beta_first))
         ]
         k, m = row.astype(int), column.astype(int)
-        found = 0
+        average = 0
         for a in (0, 1):
             for b in (0, 1):
                 weight = np.abs(1 - a - (row - k)) * np.abs(1 - b - (column - m))
-                found = found + weight * cost[lattice.start[:-1] + (k + a) * lattice.beta_count + m + b]
+                average = average + weight * cost[lattice.start[:-1] + (k + a) * lattice.beta_count + m + b]
         exact = misfit(instance, lattice.alpha + at[0], lattice.beta + at[1])
-        assert (found <= exact + 1e-12).all(), (seed, h)
+        assert (average <= exact + 1e-12).all(), (seed, h)
 
 
 @pytest.mark.slow
 def test_a_forced_jump_is_best_and_the_tilted_quadratic_below_the_energy_all_over_the_boxes():
-    seen = np.zeros(2, int)
+    cases = np.zeros(2, int)
     for seed in range(150):
         rng = np.random.default_rng(seed)
         instance = random_instance(seed, shape=(2, 3))
@@ -142,5 +142,5 @@ def test_a_forced_jump_is_best_and_the_tilted_quadratic_below_the_energy_all_ove
                 assert least <= energy + 1e-12, seed
                 at = instance.stroke_index
                 ends = np.abs([low[0][at] - step.theta[at], high[0][at] - step.theta[at]])
-                seen += [1, ends.max() > QUARTER]
-    assert (seen > 50).all(), seen
+                cases += [1, ends.max() > QUARTER]
+    assert (cases > 50).all(), cases

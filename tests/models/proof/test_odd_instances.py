@@ -31,7 +31,7 @@ def assert_round_trip(seed, folder):
     written = cf.write_certificate(proof, path)
     claim = check_certificate.check_arrays(check_certificate.read_arrays(str(path)))
     read = cf.read_certificate(path, on=instance.with_gauge("strokes"))
-    claims = [(each.status, each.bound, each.gap, each.forced) for each in (proof, written, read)]
+    claims = [(record.status, record.bound, record.gap, record.forced) for record in (proof, written, read)]
     assert claims[0] == claims[1] == claims[2]
     assert claim.status == proof.status
     assert proof.bound <= claim.bound

@@ -58,8 +58,8 @@ def least_by_toulbar2(unary, pairs):
         least += float(cost.min())
         whole = np.ceil((cost - cost.min()) * 1e6).astype(int)
         problem.AddFunction([f"x{i}" for i in pixels], whole.ravel().tolist())
-    _, found, _ = problem.Solve()
-    return least + found / 1e6
+    _, millionths, _ = problem.Solve()
+    return least + millionths / 1e6
 
 
 @pytest.mark.needs("toulbar2")

@@ -30,11 +30,11 @@ def dense_tables(state, pair, lattice):
     """The tables of a pair at all labels of its pixels."""
     i, j = state.first[pair], state.second[pair]
     rows, columns = (np.arange(lattice.count[end]) // lattice.beta_count[end] for end in (i, j))
-    found, clusters = np.zeros((len(rows), len(columns))), state.clusters
+    tables, clusters = np.zeros((len(rows), len(columns))), state.clusters
     for number in clusters.of_pair[pair][clusters.of_pair[pair] >= 0]:
         table = clusters.tables[clusters.start[number] : clusters.start[number + 1]]
-        found += table.reshape(lattice.alpha_count[i], -1)[np.ix_(rows, columns)]
-    return found
+        tables += table.reshape(lattice.alpha_count[i], -1)[np.ix_(rows, columns)]
+    return tables
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -77,19 +77,19 @@ def test_products_over_beta_are_the_least_over_all_labels(power, seed):
     rng = np.random.default_rng(seed)
     h, sign = float(rng.uniform(0.001, 0.4)), float(rng.choice([-1, 1]))
     mine, other = (float(rng.normal()), h), (sign * float(rng.normal()), sign * h)
-    given = rng.choice([0.1, 10.0]) * rng.normal(size=(7, rng.integers(2, 40)))
-    given[rng.random(given.shape) < rng.choice([0.0, 0.5])] = np.inf
-    given[3] = np.inf
-    begin, end = rng.integers(0, given.shape[1], (2, 7))
-    used = (np.arange(given.shape[1]) >= begin[:, None]) & (np.arange(given.shape[1]) < end[:, None])
-    given[~used] = np.nan
+    costs = rng.choice([0.1, 10.0]) * rng.normal(size=(7, rng.integers(2, 40)))
+    costs[rng.random(costs.shape) < rng.choice([0.0, 0.5])] = np.inf
+    costs[3] = np.inf
+    begin, end = rng.integers(0, costs.shape[1], (2, 7))
+    used = (np.arange(costs.shape[1]) >= begin[:, None]) & (np.arange(costs.shape[1]) < end[:, None])
+    costs[~used] = np.nan
     out = np.full((7, rng.integers(2, 40)), np.inf)
-    fill_product_over_beta(RaggedMatrix(given, (begin, np.maximum(begin, end))), mine, other, power, out)
-    given[~used] = np.inf
+    fill_product_over_beta(RaggedMatrix(costs, (begin, np.maximum(begin, end))), mine, other, power, out)
+    costs[~used] = np.inf
     x, y = (
-        first + step * np.arange(n) for (first, step), n in ((mine, out.shape[1]), (other, given.shape[1]))
+        first + step * np.arange(n) for (first, step), n in ((mine, out.shape[1]), (other, costs.shape[1]))
     )
     cost = 2 * np.abs(x - y[:, None]) ** power
-    np.testing.assert_allclose(out, (given[:, :, None] + cost).min(axis=1), rtol=1e-12, atol=1e-12)
-    counts = (out.shape[1], given.shape[1])
+    np.testing.assert_allclose(out, (costs[:, :, None] + cost).min(axis=1), rtol=1e-12, atol=1e-12)
+    counts = (out.shape[1], costs.shape[1])
     assert least_beta_cost(mine, other, counts, power) <= cost.min() * (1 + 1e-12) + 1e-15

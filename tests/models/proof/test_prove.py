@@ -33,7 +33,7 @@ def test_small_instances_are_proven_at_the_least_energy_over_all_jumps():
 
 
 def test_fields_with_a_vortex_are_proven_at_the_least_energy_over_all_jumps(tmp_path):
-    seen = 0
+    vortices = 0
     for seed in range(60):
         theta = np.random.default_rng(seed).uniform(0, np.pi, (2, 3))
         instance = replace(sketch(np.ones((2, 3), bool), theta, 1.0), stroke_coefficient=30.0)
@@ -43,8 +43,8 @@ def test_fields_with_a_vortex_are_proven_at_the_least_energy_over_all_jumps(tmp_
         certificate = cf.write_certificate(proof, tmp_path / "it.npz")
         assert certificate.status == "optimal", seed
         assert certificate.bound <= exact(instance) + 1e-9
-        seen += len(proof.field.singularities.index)
-    assert seen
+        vortices += len(proof.field.singularities.index)
+    assert vortices
 
 
 @pytest.mark.slow
@@ -57,7 +57,7 @@ def test_clusters_close_a_gap_that_finer_lattices_leave(tmp_path):
     assert cf.write_certificate(proof, tmp_path / "it.npz").status == "optimal"
 
 
-def test_one_pixel_and_one_row():
+def test_one_pixel_and_one_row_are_proven():
     for mask, theta in (([[True]], [[2.0]]), ([[True] * 5], [[0.3, np.nan, 1.2, np.nan, 2.9]])):
         proof = cf.prove(sketch(np.array(mask), np.array(theta)), jobs=1)
         assert proof.status == "optimal"
@@ -75,8 +75,8 @@ def test_the_proof_in_the_gauge_box_is_that_of_the_gauge_strokes():
 def test_turned_and_mirrored_sketches_have_the_same_proven_optimum():
     instance = random_instance(8, shape=(4, 3))
     proofs = [
-        cf.prove(each, jobs=1)
-        for each in (instance, turned(instance), mirrored(instance), transposed(instance))
+        cf.prove(moved, jobs=1)
+        for moved in (instance, turned(instance), mirrored(instance), transposed(instance))
     ]
     assert {proof.status for proof in proofs} == {"optimal"}
     np.testing.assert_allclose([proof.energy for proof in proofs], proofs[0].energy, atol=1e-8)

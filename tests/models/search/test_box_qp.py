@@ -73,12 +73,12 @@ def test_random_jumps_are_fitted_to_the_optimum(seed, gauge, skew_coefficient, s
 
 
 @pytest.mark.parametrize("gauge", ["strokes", "box"])
-def test_thousands_of_active_bounds(gauge):
+def test_thousands_of_active_bounds_are_found(gauge):
     instance = random_instance(3, (80, 100), 4000, gauge)
     assert assert_optimal(fit_in_box(make_field(instance, 0))) > 1000
 
 
-def test_contact_along_the_strokes_of_a_drawing():
+def test_contact_along_the_strokes_of_a_drawing_is_found():
     # Where strokes lean on the box for long stretches the right bounds are found slowly, from the ends.
     assert assert_optimal(fit_in_box(power_field(sample("mouse", 96, gauge="box")))) > 200
 
@@ -104,7 +104,7 @@ def test_same_optimum_as_ipopt_on_the_file(name, size):
     assert best.energy().total == pytest.approx(other.energy().total, rel=1e-8)
 
 
-def test_pair_with_a_jump_between_two_strokes():
+def test_a_jump_between_two_strokes_costs_nothing():
     # alpha stays at both strokes, since |A| = |0.3 - 0.3 - pi/2 + pi/2| = 0.
     instance = Instance.on_pixels(
         "two", [[True, True]], [[0, 0], [0, 1]], [0.3, 0.3 + HALF], [1.0, 1.0], skew_coefficient=0
@@ -119,10 +119,10 @@ def test_angles_stay_where_the_energy_does_not_say():
     mask[:, 4] = False
     instance = Instance.on_pixels("parts", mask, [[0, 0]], [0.7], [1.0], skew_coefficient=0)
     rng = np.random.default_rng(0)
-    given = CrossField(instance, *rng.uniform(0.3, 0.5, (2, 24)), np.zeros(len(instance.p_min)))
-    field = fit_in_box(given)
+    start = CrossField(instance, *rng.uniform(0.3, 0.5, (2, 24)), np.zeros(len(instance.p_min)))
+    field = fit_in_box(start)
     apart = instance.grid.columns > 4
-    for before, after in ((given.alpha, field.alpha), (given.beta, field.beta)):
+    for before, after in ((start.alpha, field.alpha), (start.beta, field.beta)):
         # The nearest constant is the mean.
         assert after[apart] == pytest.approx(np.full(12, before[apart].mean()), abs=1e-6)
     assert field.energy().total == pytest.approx(0, abs=1e-18)
@@ -140,17 +140,17 @@ def test_the_optimum_comes_back_as_it_is():
 def test_pinned_angles_depend_on_the_jumps_alone(seed, gauge):
     instance = random_instance(seed, (4, 5), 10, gauge)
     field, other = (make_field(instance, number) for number in (seed, seed + 100))
-    found, same = (
+    pinned, same = (
         reproducible_field(field),
         reproducible_field(CrossField(instance, other.alpha, other.beta, field.p)),
     )
-    assert found.alpha.tobytes() == same.alpha.tobytes()
-    assert found.beta.tobytes() == same.beta.tobytes()
-    assert_optimal(found)
-    assert found.energy().total <= fit_in_box(field).energy().total * (1 + 1e-12)
-    again = reproducible_field(found)
-    assert again.alpha.tobytes() == found.alpha.tobytes()
-    assert again.beta.tobytes() == found.beta.tobytes()
+    assert pinned.alpha.tobytes() == same.alpha.tobytes()
+    assert pinned.beta.tobytes() == same.beta.tobytes()
+    assert_optimal(pinned)
+    assert pinned.energy().total <= fit_in_box(field).energy().total * (1 + 1e-12)
+    again = reproducible_field(pinned)
+    assert again.alpha.tobytes() == pinned.alpha.tobytes()
+    assert again.beta.tobytes() == pinned.beta.tobytes()
 
 
 @for_each("stroke_coefficient", [0, 1])

@@ -77,7 +77,7 @@ def test_two_families_give_a_constant_skewed_field(first, between, skew_coeffici
 
 @pytest.mark.parametrize("index", [0.25, -0.25])
 @pytest.mark.parametrize("solve", [greedy_field, first_field, power_field])
-def test_frame_of_strokes_round_one_singularity(solve, index):
+def test_a_frame_of_strokes_has_one_singularity(solve, index):
     rows, columns = np.mgrid[0:10, 0:12]
     theta = index * np.arctan2(-(rows - 4.5), columns - 5.5)
     theta[2:-2, 2:-2] = np.nan

@@ -128,10 +128,10 @@ def test_search_finds_the_optimum_over_all_jumps(seed):
 def test_search_is_never_above_what_it_starts_from(name):
     instance = cf.sample(name, 10)
     start = cf.power_field(instance)
-    found = cf.search(instance, rounds=1, start=start).field
+    result = cf.search(instance, rounds=1, start=start).field
     for other in (greedy_field(instance), first_field(instance), start):
-        assert found.energy().total <= other.energy().total + 1e-9
-    assert_feasible(found)
+        assert result.energy().total <= other.energy().total + 1e-9
+    assert_feasible(result)
 
 
 def test_a_start_on_another_instance_is_refused():
@@ -143,8 +143,8 @@ def test_a_start_on_another_instance_is_refused():
 
 def test_a_small_grid_is_searched_from_several_starts():
     """From the lowest start alone, three rounds lead to an energy of 6.914."""
-    found = cf.search(cf.random_instance(9, size=12), rounds=3, jobs=1).field
-    assert found.energy().total < 6.82
+    field = cf.search(cf.random_instance(9, size=12), rounds=3, jobs=1).field
+    assert field.energy().total < 6.82
 
 
 @pytest.mark.parametrize("gauge", ["strokes", pytest.param("box", marks=pytest.mark.slow)])
@@ -158,11 +158,11 @@ def test_same_seed_gives_the_same_bits_in_one_process_and_in_two(gauge):
 @pytest.mark.slow
 def test_a_large_grid_is_searched_from_coarse_to_fine_by_patches():
     instance = cf.sample("mouse", 40)
-    seen = []
-    result = cf.search(instance, rounds=2, progress=seen.append)
+    messages = []
+    result = cf.search(instance, rounds=2, progress=messages.append)
     assert result.field.energy().total < first_field(instance).energy().total
     assert (result.rounds, result.ended) == (2, "rounds")
-    assert [line.split(" after ")[1] for line in seen] == ["1 rounds", "2 rounds"]
+    assert [line.split(" after ")[1] for line in messages] == ["1 rounds", "2 rounds"]
 
 
 @pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
@@ -273,6 +273,6 @@ def test_parts_without_strokes_and_free_skews_do_no_harm(skew_coefficient):
     mask[:, 5] = False
     theta = np.full(mask.shape, np.nan)
     theta[:, 1], theta[2, 2:5], theta[4, 3] = 0.3, 1.2, 2.5
-    found = cf.search(sketch(mask, theta, skew_coefficient=skew_coefficient), rounds=4).field
-    assert found.energy().total <= first_field(found.instance).energy().total + 1e-9
-    assert found.image(found.pixel_energy)[:, 6:] == pytest.approx(np.zeros((6, 5)), abs=1e-12)
+    field = cf.search(sketch(mask, theta, skew_coefficient=skew_coefficient), rounds=4).field
+    assert field.energy().total <= first_field(field.instance).energy().total + 1e-9
+    assert field.image(field.pixel_energy)[:, 6:] == pytest.approx(np.zeros((6, 5)), abs=1e-12)

@@ -23,8 +23,8 @@ def test_every_patch_faces_the_viewer_and_its_lines_stay_apart(name):
     )
     normal = np.cross(*surface.tangents(s, t))
     assert np.abs((np.sign(normal[:, 2])).sum()) == len(s)  # one sign: the projection does not fold
-    made = analytic(name, 48)
-    assert np.degrees(line_difference(made.u_angle, made.v_angle).min()) > 30
+    patch = analytic(name, 48)
+    assert np.degrees(line_difference(patch.u_angle, patch.v_angle).min()) > 30
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -75,11 +75,11 @@ def test_names_and_sizes_that_do_not_exist_are_refused():
 @pytest.mark.parametrize("name", NAMES)
 def test_lines_are_curvature_lines_the_normals_belong_to_them_and_the_heights_to_both(name):
     """Tangents at right angles, and normals that turn along each line as the line goes: dN is along dp."""
-    made, surface = analytic(name, 20), SURFACES[name]
+    patch, surface = analytic(name, 20), SURFACES[name]
     s, t, _ = _find_parameters(surface, _frame_patch(surface, 20))
     tangents, h = surface.tangents(s, t), 1e-5
     assert np.abs((tangents[0] * tangents[1]).sum(axis=1)).max() < 1e-9
-    for tangent, ds, dt, angle in zip(tangents, (h, 0), (0, h), (made.u_angle, made.v_angle), strict=True):
+    for tangent, ds, dt, angle in zip(tangents, (h, 0), (0, h), (patch.u_angle, patch.v_angle), strict=True):
         change = (surface.point(s + ds, t + dt) - surface.point(s - ds, t - dt)) / (2 * h)
         np.testing.assert_allclose(tangent, change, atol=1e-7)
         assert line_difference(np.arctan2(tangent[:, 1], tangent[:, 0]), angle).max() < 1e-12
@@ -88,12 +88,12 @@ def test_lines_are_curvature_lines_the_normals_belong_to_them_and_the_heights_to
         across = np.cross(*surface.tangents(s, t))
         return across / (np.linalg.norm(across, axis=1) * np.sign(across[:, 2]))[:, None]
 
-    np.testing.assert_allclose(made.normals, normal(s, t), atol=1e-12)
+    np.testing.assert_allclose(patch.normals, normal(s, t), atol=1e-12)
     for tangent, ds, dt in zip(tangents, (h, 0), (0, h), strict=True):
         turn = (normal(s + ds, t + dt) - normal(s - ds, t - dt)) / (2 * h)
         assert np.linalg.norm(np.cross(turn, tangent), axis=1).max() < 1e-8
-    grid = made.instance.grid
-    rise = made.heights[grid.second] - made.heights[grid.first]
-    slopes = -made.normals[:, :2] / made.normals[:, 2:]
+    grid = patch.instance.grid
+    rise = patch.heights[grid.second] - patch.heights[grid.first]
+    slopes = -patch.normals[:, :2] / patch.normals[:, 2:]
     expected = (slopes[grid.first] + slopes[grid.second])[np.arange(len(rise)), grid.upward.astype(int)] / 2
     assert np.median(np.abs(rise - expected)) < 0.02

@@ -59,7 +59,7 @@ def test_a_view_is_a_projection_at_right_angles_with_up_above(azimuth, elevation
     assert towards[1] == pytest.approx(np.sin(np.radians(elevation)), abs=1e-9)
 
 
-def test_named_views():
+def test_named_views_have_their_axes():
     names = {
         "front": ([1, 0, 0], [0, -1, 0]),
         "side": ([0, 0, -1], [0, -1, 0]),

@@ -13,7 +13,7 @@ from crossfield.models.sketch.samples import sample_svg, samples
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-SKETCHES = [each.name for each in samples() if each.kind == "sketch"]
+SKETCHES = [known.name for known in samples() if known.kind == "sketch"]
 OPEN = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">'
     '<path d="M84 30H10V70H90V30M50 30V70" fill="none" stroke="black"/></svg>'
@@ -58,14 +58,14 @@ def assert_same_up_to_the_border(first, second):
 @pytest.mark.parametrize("size", [16, 24, 48])
 def test_a_mask_given_back_unchanged_solves_the_same_up_to_the_border(size, tmp_path):
     for path in drawings(tmp_path):
-        found = cf.read_sketch(path, size=size)
-        mask = cf.write_mask(found, tmp_path / "mask.png")
+        first = cf.read_sketch(path, size=size)
+        mask = cf.write_mask(first, tmp_path / "mask.png")
         again = cf.read_sketch(path, size=size, mask=mask)
         assert max(again.mask.shape) == size
-        assert_same_up_to_the_border(found, again)
+        assert_same_up_to_the_border(first, again)
         # White is all that is solved: both have the same area, that on the page.
         white = (np.asarray(Image.open(mask)) > 127).sum()
-        for instance in (found, again):
+        for instance in (first, again):
             assert instance.mask.sum() * instance.pixel_size**2 == pytest.approx(white, rel=0.06)
 
 

@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw
 from scipy import ndimage
 from small_drawings import png, read, svg
 
-SKETCHES = [each.name for each in samples() if each.kind == "sketch"]
+SKETCHES = [known.name for known in samples() if known.kind == "sketch"]
 
 
 def drawing(paths, page="0 0 100 100"):

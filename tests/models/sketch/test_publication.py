@@ -12,7 +12,7 @@ from loops import for_each
 from PIL import Image
 from small_drawings import png, read
 
-DRAWN = [name for name, each in SAMPLES.items() if each.kind == "sketch"]
+DRAWN = [name for name, known in SAMPLES.items() if known.kind == "sketch"]
 TURNED = b"""<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm">
 <g transform="rotate(7) scale(1.1 0.9)"><path d="M10 10h70v40q-9 9 -35 3T10 50z m5 5l9 9c1 2 3 4 5 6l7 0"/>
 <path stroke="red" fill="none" d="M20 20A30 20 10 0 1 70 30"/><circle cx="40" cy="30" r="9" stroke="red"/>
@@ -29,7 +29,7 @@ def test_a_drawing_is_the_same_when_it_is_drawn_again(name):
     assert first.red.tolist() == second.red.tolist()
     assert np.array_equal(first.points[:, [0, 3]], second.points[:, [0, 3]])
     assert np.allclose(first.points, second.points, rtol=1e-9, atol=0)
-    instances = [read(each) for each in (data, again)]
+    instances = [read(content) for content in (data, again)]
     assert instances[0].sha256 == instances[1].sha256
     assert re.fullmatch(
         r'<svg xmlns="http://www.w3.org/2000/svg"( viewBox="[^"]+")? fill="none" stroke="#000" '
@@ -56,10 +56,10 @@ BLANK = Image.new("L", (3, 3), 255)
     ],
 )
 def test_the_suffix_of_a_published_file_follows_from_its_content(data, suffix, expected):
-    content, found = publishable_sketch(data, suffix)
-    assert found == expected
-    assert publishable_sketch(content, suffix) == (content, found)
-    assert (content == data) == (found != ".svg")
+    content, published = publishable_sketch(data, suffix)
+    assert published == expected
+    assert publishable_sketch(content, suffix) == (content, published)
+    assert (content == data) == (published != ".svg")
 
 
 def test_a_drawing_that_would_be_too_large_to_read_again_is_refused(monkeypatch):

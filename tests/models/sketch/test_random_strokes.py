@@ -25,9 +25,9 @@ def test_the_library_that_ships_has_the_instances_of_the_generator():
 
 @for_each("strokes", STROKES)
 def test_seed_and_options_decide_alone(strokes):
-    made = [cf.random_instance(seed, size=9, strokes=strokes) for seed in (5, 5, 6)]
-    assert made[0].sha256 == made[1].sha256 != made[2].sha256
-    assert made[0].name == "rand_n009_s5"
+    instances = [cf.random_instance(seed, size=9, strokes=strokes) for seed in (5, 5, 6)]
+    assert instances[0].sha256 == instances[1].sha256 != instances[2].sha256
+    assert instances[0].name == "rand_n009_s5"
 
 
 def test_the_digits_of_curves_do_not_change():
@@ -64,12 +64,14 @@ def neighbours_that_differ(instance):
 
 
 def test_only_lines_and_curves_have_directions_that_continue():
-    found = {each: neighbours_that_differ(cf.random_instance(1, size=30, strokes=each)) for each in STROKES}
-    assert found["straight"] < 0.1 < found["curved"] < 10 < found["pixels"]
+    angles = {kind: neighbours_that_differ(cf.random_instance(1, size=30, strokes=kind)) for kind in STROKES}
+    assert angles["straight"] < 0.1 < angles["curved"] < 10 < angles["pixels"]
 
 
 def test_noise_turns_directions_by_its_standard_deviation():
-    calm, noisy = (cf.random_instance(4, size=60, strokes="curved", noise=each) for each in (0.0, 0.05))
+    calm, noisy = (
+        cf.random_instance(4, size=60, strokes="curved", noise=deviation) for deviation in (0.0, 0.05)
+    )
     assert (calm.stroke_pixels == noisy.stroke_pixels).all()
     turned = line_difference(calm.theta, noisy.theta)
     assert 0.045 < np.sqrt((turned**2).mean()) < 0.055

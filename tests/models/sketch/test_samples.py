@@ -13,8 +13,8 @@ from crossfield.models.smooth.polyvector import power_field
 from loops import for_each
 from scipy import ndimage
 
-SKETCHES = [each.name for each in samples() if each.kind == "sketch"]
-ANALYTIC = [each.name for each in samples() if each.kind == "analytic"]
+SKETCHES = [known.name for known in samples() if known.kind == "sketch"]
+ANALYTIC = [known.name for known in samples() if known.kind == "analytic"]
 
 
 def test_the_table_lists_every_drawing_and_every_surface():
@@ -75,12 +75,12 @@ def test_the_skewed_sheet_has_a_constant_answer_without_energy(size):
 @pytest.mark.parametrize("size", [32, 48, 64])
 def test_the_rounded_cube_has_a_singularity_of_a_quarter_at_its_corner(size):
     instance = sample("singular", size)
-    found, (height, width) = power_field(instance).singularities, instance.mask.shape
-    down, across = found.row / height, found.column / width
+    singularities, (height, width) = power_field(instance).singularities, instance.mask.shape
+    down, across = singularities.row / height, singularities.column / width
     corner = (down > 0.3) & (down < 0.62) & (across > 0.35) & (across < 0.72)
-    assert found.index[corner].sum() == 0.25
+    assert singularities.index[corner].sum() == 0.25
     beside = (down > 0.6) & (down < 0.75) & (across > 0.2) & (across < 0.4)
-    assert found.index[beside].sum() == 0
+    assert singularities.index[beside].sum() == 0
 
 
 def test_the_ring_keeps_its_hole_and_the_bend_no_end_cap():

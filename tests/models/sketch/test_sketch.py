@@ -420,7 +420,7 @@ def test_red_is_red_in_every_notation_of_css(colour):
         '<path d="M20 50H80M50 20V80" fill="none" style="stroke:{}"/>',
         TWO_COLOURS.partition("<path")[0],
     )
-    red, other = (read(svg(outline + line.format(each))) for each in ("red", colour))
+    red, other = (read(svg(outline + line.format(notation))) for notation in ("red", colour))
     assert_same(red, other)
     assert red.theta.tolist() == other.theta.tolist()
 

@@ -232,7 +232,7 @@ def test_commands_read_what_python_reads(tmp_path, capsys):
     expected = cf.read_sketch(file, size=20, curvature=["class=flow"], silhouette="outer")
     assert cf.read_instance(instance).sha256 == expected.sha256
     for wrong in (options, ["--view", "top"]):
-        for what, reason in ((instance, "has its own curvature lines"), ("ring", "leave --curvature and")):
-            assert invoke(["instance", what, *wrong, "-o", str(tmp_path / "b.json")]) == 1
+        for source, reason in ((instance, "has its own curvature lines"), ("ring", "leave --curvature and")):
+            assert invoke(["instance", source, *wrong, "-o", str(tmp_path / "b.json")]) == 1
             assert reason in capsys.readouterr().err
     assert not (tmp_path / "b.json").exists()

@@ -37,10 +37,10 @@ CLEAN = picture(DRAWING).ink
 
 def assert_nearly_the_strokes(pixels):
     """All but a hundredth of the dark pixels are found, and next to nothing a pixel beside the strokes."""
-    found = picture(pixels).ink > 0.5
+    ink = picture(pixels).ink > 0.5
     dark, near = CLEAN > 0.9, ndimage.binary_dilation(CLEAN > 0.3)
-    assert (dark & ~found).sum() <= 0.01 * dark.sum()
-    assert (found & ~near).sum() <= 0.01 * dark.sum()
+    assert (dark & ~ink).sum() <= 0.01 * dark.sum()
+    assert (ink & ~near).sum() <= 0.01 * dark.sum()
 
 
 @settings(max_examples=6, deadline=None)

@@ -23,16 +23,16 @@ def noisy(instance, degrees, seed):
 
 def neighbours(field):
     """By pixel and side: differences (du, dv) of the lines of a pixel, to the right or upwards."""
-    grid, found = field.instance.grid, {}
+    grid, differences = field.instance.grid, {}
     for i, j, p, upward in zip(grid.first, grid.second, field.p, grid.upward, strict=True):
         sides, sign = ("up", "down") if upward else ("right", "left"), 1 - 2 * (p & 1)
         of_j = field.alpha[j] - HALF * p, sign * field.beta[j]  # in the labels of i
         of_i = field.alpha[i] + HALF * p, sign * field.beta[i]  # in the labels of j
         a, b = of_j[0] - field.alpha[i], of_j[1] - field.beta[i]
-        found[i, sides[0]] = a + b, a - b
+        differences[i, sides[0]] = a + b, a - b
         a, b = field.alpha[j] - of_i[0], field.beta[j] - of_i[1]
-        found[j, sides[1]] = a + b, a - b
-    return found
+        differences[j, sides[1]] = a + b, a - b
+    return differences
 
 
 def bend_energy(field, hold=HOLD):
@@ -112,8 +112,8 @@ def test_the_field_is_near_the_true_curvature_lines(surface, tmp_path):
     name, clean, rough = surface
     true = cf.analytic(name, 48)
     for degrees, most in ((0, clean), (3, rough)):
-        (found,) = METHODS["bend"].find(Request(noisy(true.instance, degrees, seed=1), tmp_path))
-        assert np.degrees(found.field.cross_error(true.u_angle, true.v_angle).mean()) <= most
+        (candidate,) = METHODS["bend"].find(Request(noisy(true.instance, degrees, seed=1), tmp_path))
+        assert np.degrees(candidate.field.cross_error(true.u_angle, true.v_angle).mean()) <= most
 
 
 def test_fields_are_as_smooth_as_the_strokes_tremble():
@@ -122,12 +122,12 @@ def test_fields_are_as_smooth_as_the_strokes_tremble():
     for degrees, harmonic, other in ((0, 0.01, HARMONIC), (8, HARMONIC, 0.01)):
         start = polyvector_field(noisy(clean, degrees, seed=1), hold=max(HOLDS))
         field = bend_field(start)
-        near, far = (bend_field(start, harmonic=each).alpha for each in (harmonic, other))
+        near, far = (bend_field(start, harmonic=weight).alpha for weight in (harmonic, other))
         assert np.abs(field.alpha - near).max() < 1e-4
         assert np.abs(field.alpha - far).max() > 1e-3
     starts = [polyvector_field(noisy(clean, 3, seed), hold=max(HOLDS)) for seed in range(4)]
-    found = [tremble(bend_field(start, harmonic=HARMONIC)) for start in starts]
-    assert np.mean(found) == pytest.approx(TREMBLE, rel=0.15)
+    trembles = [tremble(bend_field(start, harmonic=HARMONIC)) for start in starts]
+    assert np.mean(trembles) == pytest.approx(TREMBLE, rel=0.15)
 
 
 def test_rounds_end_when_the_time_is_over():

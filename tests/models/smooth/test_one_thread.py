@@ -12,7 +12,7 @@ MANY = 2
 
 
 def numbers() -> set[int]:
-    return {each["num_threads"] for each in ThreadpoolController().select(user_api="blas").info()}
+    return {library["num_threads"] for library in ThreadpoolController().select(user_api="blas").info()}
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def many():
 def test_overlapping_threads_restore_the_setting(many):
     """The first one leaves while the second one is inside."""
     first_in, second_in, first_out = (threading.Event() for _ in range(3))
-    found = []
+    inside = []
 
     def first() -> None:
         with one_thread():
@@ -43,12 +43,12 @@ def test_overlapping_threads_restore_the_setting(many):
         with one_thread():
             second_in.set()
             assert first_out.wait(60)
-            found.append(numbers())
+            inside.append(numbers())
 
     threads = [threading.Thread(target=work) for work in (first, second)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert found == [{1}]
+    assert inside == [{1}]
     assert numbers() == {MANY}

@@ -29,6 +29,8 @@ def test_an_order_does_not_change_the_solution():
     squares = sparse.csr_array(np.where(near, rng.standard_normal(near.shape), 0.0))
     matrix = (squares.T @ squares + sparse.eye_array(len(row))).tocsr()
     right = rng.standard_normal(len(row))
-    found = [factor_matrix(matrix, order)(right) for order in (None, nested_dissection_order(row, column, 4))]
-    assert found[0] == pytest.approx(found[1], abs=1e-9)
-    assert matrix @ found[1] == pytest.approx(right, abs=1e-6)
+    solutions = [
+        factor_matrix(matrix, order)(right) for order in (None, nested_dissection_order(row, column, 4))
+    ]
+    assert solutions[0] == pytest.approx(solutions[1], abs=1e-9)
+    assert matrix @ solutions[1] == pytest.approx(right, abs=1e-6)

@@ -24,8 +24,8 @@ def equations(weights=WEIGHTS, extra=()):
     size = instance.grid.size
     field = cf.CrossField.from_lines(instance, np.full(size, 0.2), np.full(size, 1.4))
     stencils = Stencils(instance.grid)
-    found = Equations(stencils, Crosses.of(field), weights, extra)
-    return found, np.random.default_rng(1).normal(size=stencils.count)
+    system = Equations(stencils, Crosses.of(field), weights, extra)
+    return system, np.random.default_rng(1).normal(size=stencils.count)
 
 
 def by_pixels(mask, z, weights):
@@ -45,8 +45,8 @@ def by_pixels(mask, z, weights):
             if there in normal:
                 total += weights.even * n * np.sum((here - normal[there]) ** 2)
         block = [(r, c), (r, c + 1), (r + 1, c), (r + 1, c + 1)]
-        if all(each in slope for each in block):
-            a, b, d, e = (slope[each] for each in block)
+        if all(corner in slope for corner in block):
+            a, b, d, e = (slope[corner] for corner in block)
             by_x, by_y = (b + e - a - d) / 2, (a + b - d - e) / 2
             for line, other in ((u, v), (v, u)):
                 total += CONJUGACY * n / 2 * np.dot(line, other[0] * by_x + other[1] * by_y) ** 2
@@ -54,19 +54,21 @@ def by_pixels(mask, z, weights):
 
 
 def test_the_energy_is_as_written():
-    found, z = equations()
-    picture = np.full(found.stencils.used.shape, np.nan)
-    picture[found.stencils.used] = z
-    assert found.energy(z) == pytest.approx(by_pixels(found.stencils.grid.mask, picture, WEIGHTS), rel=1e-12)
+    system, z = equations()
+    picture = np.full(system.stencils.used.shape, np.nan)
+    picture[system.stencils.used] = z
+    assert system.energy(z) == pytest.approx(
+        by_pixels(system.stencils.grid.mask, picture, WEIGHTS), rel=1e-12
+    )
 
 
 @for_each("forgiven", [0.1, np.inf])
 def test_the_slope_is_that_of_the_energy_and_the_curvature_is_never_negative(forgiven):
     goal = Rows(sparse.csr_array(np.ones((1, 25))), np.ones(1))
-    found, z = equations(Weights(1e-3, 1e-2, forgiven), [goal])
-    slope, curvature = found.model(z)
+    system, z = equations(Weights(1e-3, 1e-2, forgiven), [goal])
+    slope, curvature = system.model(z)
     steps = 1e-6 * np.eye(len(z))
-    differences = [(found.energy(z + step) - found.energy(z - step)) / 2e-6 for step in steps]
+    differences = [(system.energy(z + step) - system.energy(z - step)) / 2e-6 for step in steps]
     assert 2 * slope == pytest.approx(np.array(differences), abs=1e-6)
     dense = curvature.toarray()
     assert dense == pytest.approx(dense.T)
@@ -74,16 +76,16 @@ def test_the_slope_is_that_of_the_energy_and_the_curvature_is_never_negative(for
 
 
 def test_the_way_down_ends_where_the_slope_does_and_time_cuts_it_short():
-    found, z = equations()
+    system, z = equations()
     energies = []
     for most in (0, 1, 3, 1000):
         left = iter(range(most))
-        energy, low = descend(found, z, lambda left=left: next(left, None) is None)
-        assert energy == found.energy(low)
+        energy, low = descend(system, z, lambda left=left: next(left, None) is None)
+        assert energy == system.energy(low)
         energies.append(energy)
-    assert energies[0] == found.energy(z)
+    assert energies[0] == system.energy(z)
     assert energies == sorted(energies, reverse=True)
-    again, _ = descend(found, low, never)
+    again, _ = descend(system, low, never)
     assert again == pytest.approx(energies[-1], rel=1e-2)
     assert again <= energies[-1]
 

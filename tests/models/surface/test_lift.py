@@ -34,7 +34,7 @@ def apart(first, second):
 
 def error(surface, true):
     """Mean angle to the true normals, on the side of the truth."""
-    return min(apart(each.normals, true.normals).mean() for each in (surface, surface.flipped()))
+    return min(apart(side.normals, true.normals).mean() for side in (surface, surface.flipped()))
 
 
 def middle(true, slant=None):
@@ -64,7 +64,7 @@ def test_a_hint_chooses_among_surfaces_of_the_same_crosses(name, size):
     loose, settled = cf.surface(field), cf.surface(field, [middle(true)])
     assert apart(settled.normals, true.normals).mean() < (1 if size == 48 else 2)
     assert loose.firmness < 0.01 < settled.firmness
-    assert [len(each.freedom) for each in (loose, settled)] == [2, 0]
+    assert [len(lifted.freedom) for lifted in (loose, settled)] == [2, 0]
 
 
 def test_what_has_no_such_family_says_so():
@@ -78,13 +78,13 @@ def test_a_hint_and_flip_choose_the_side():
     true, field = exact("spheroid", 12)
     hint = middle(true)
     other = replace(hint, tilt=hint.tilt + np.pi)
-    found, turned = cf.surface(field), cf.surface(field, flip=True)
-    assert turned.heights == pytest.approx(-found.heights, nan_ok=True)
-    assert turned.normals == pytest.approx(found.flipped().normals)
-    flipped = [cf.surface(field, [each], flip=True) for each in (hint, other)]
-    assert [(apart(each.normals, true.normals).mean() < 20) for each in flipped] == [True, False]
+    plain, turned = cf.surface(field), cf.surface(field, flip=True)
+    assert turned.heights == pytest.approx(-plain.heights, nan_ok=True)
+    assert turned.normals == pytest.approx(plain.flipped().normals)
+    flipped = [cf.surface(field, [one], flip=True) for one in (hint, other)]
+    assert [(apart(one.normals, true.normals).mean() < 20) for one in flipped] == [True, False]
     straight = cf.surface(field, [replace(hint, slant=0.05)], flip=True)
-    assert straight.normals[:, :2].ravel() @ found.normals[:, :2].ravel() < 0  # no side follows
+    assert straight.normals[:, :2].ravel() @ plain.normals[:, :2].ravel() < 0  # no side follows
 
 
 @for_each(
