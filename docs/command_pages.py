@@ -37,7 +37,11 @@ def _command(title: str, command: Any) -> Iterator[str]:
     yield from (f"## {title}", "", _text(command.help or ""), "")
     yield from ("```sh", EXAMPLES[title.partition(" ")[2]], "```", "")
     for head, kind in (("Argument", "argument"), ("Option", "option")):
-        records = [each.get_help_record(context) for each in command.params if each.param_type_name == kind]
+        records = [
+            parameter.get_help_record(context)
+            for parameter in command.params
+            if parameter.param_type_name == kind
+        ]
         if records:
             yield from (f"| {head} | Meaning |", "| --- | --- |")
             yield from (f"| `{_cell(name)}` | {_cell(_text(text))} |" for name, text in records)
@@ -51,7 +55,7 @@ def _cell(text: str) -> str:
 def _text(text: str) -> str:
     """A help text with names from the tables."""
     paragraphs = fill_names(text).split("\n\n")
-    return "\n\n".join(" ".join(each.split()) for each in paragraphs)
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
 def setup(app: Sphinx) -> None:

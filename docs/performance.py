@@ -186,14 +186,14 @@ def here(*task: Any) -> Row | None:
 # The page
 
 
-def seconds(row: Row | None, what: str = "seconds") -> str:
+def seconds(row: Row | None, column: str = "seconds") -> str:
     """Seconds with three significant digits."""
-    return "" if row is None else f"{row[what]:.3g}" if row[what] < 100 else f"{row[what]:.0f}"
+    return "" if row is None else f"{row[column]:.3g}" if row[column] < 100 else f"{row[column]:.0f}"
 
 
-def ratio(row: Row, ours: Row, what: str) -> str:
+def ratio(row: Row, ours: Row, column: str) -> str:
     """A ratio with significant digits."""
-    value = row[what] / ours[what] if ours[what] else 0.0
+    value = row[column] / ours[column] if ours[column] else 0.0
     return f"{value:.1f}" if value < 10 else f"{value:.0f}"
 
 

@@ -65,8 +65,8 @@ def draw_maps(proof: Proof, boxes: Floats, path: Path) -> None:
     with fixed_settings(STYLE):
         figure = Figure(figsize=(11.5, 2.75 * rows + 0.2), layout="constrained")
         axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
-        for place, (each, title) in zip(axes, zip(values, titles, strict=True), strict=False):
-            shown = _map(place, proof.field.instance.grid, each, norm)
+        for place, (array, title) in zip(axes, zip(values, titles, strict=True), strict=False):
+            shown = _map(place, proof.field.instance.grid, array, norm)
             place.set_title(title, fontsize=10)
         for place in axes[len(values) :]:
             place.set_axis_off()

@@ -123,5 +123,5 @@ def solver_rows(name: str, size: int, seconds: float, proof_seconds: float) -> I
             "tightened": solve_file(narrow, solver, seconds),
             "here": prove_here(instance, 1 if formulation == "milp-mccormick" else 2, seconds),
         }
-        row |= {what: asdict(answer) | {"proven": answer.proven} for what, answer in answers.items()}
+        row |= {kind: asdict(answer) | {"proven": answer.proven} for kind, answer in answers.items()}
         yield row

@@ -340,9 +340,9 @@ def solvers_table(rows: dict[str, Facts]) -> str:
     return markdown(columns, cells)
 
 
-def solver_cells(row: Facts, what: str) -> list[str]:
+def solver_cells(row: Facts, kind: str) -> list[str]:
     """Cells of a solver: the best point, the bound and the seconds."""
-    answer = row[what]
+    answer = row[kind]
     best, bound = (
         "none" if answer[name] is None else f"{round(answer[name], 5) + 0.0:.5f}"
         for name in ("objective", "bound")

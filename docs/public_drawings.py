@@ -59,7 +59,7 @@ def name_of(path: Path) -> str:
     """The name of the copy: layers of BendFields get the name of their sketch, and masks the usual ending."""
     if path.parent.name != "input_layers":
         return f"{path.parent.name}_{path.name}" if path.suffix == ".png" else path.name
-    sketch = path.relative_to(next(each for each in path.parents if each.name == "Sketches")).parts[0]
+    sketch = path.relative_to(next(parent for parent in path.parents if parent.name == "Sketches")).parts[0]
     words = path.stem.split("_")
     layer = next(word for word in words if word not in {"input", "mask"})
     return f"{sketch}_{layer}{'_mask' if 'mask' in words else ''}.png"
@@ -77,8 +77,8 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Collect drawings of public repositories.")
     parser.add_argument("clones", type=Path, help="folder of the clones")
     parser.add_argument("folder", type=Path, help="folder of the drawings")
-    given = parser.parse_args()
-    for each in COLLECTIONS.values():
-        if not (folder := clone_of(given.clones, each)).is_dir():
-            parser.error(f"there is no {folder}: clone {each.repository} from GitHub into it")
-    collect(given.clones, given.folder)
+    arguments = parser.parse_args()
+    for listed in COLLECTIONS.values():
+        if not (folder := clone_of(arguments.clones, listed)).is_dir():
+            parser.error(f"there is no {folder}: clone {listed.repository} from GitHub into it")
+    collect(arguments.clones, arguments.folder)

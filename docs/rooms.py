@@ -68,7 +68,7 @@ def table(root: Path) -> list[list[str]]:
         [
             f"`{folder}/`",
             first_line(root, folder),
-            ", ".join(f"`{each}`" for each in used_folders(root, folder)) or "-",
+            ", ".join(f"`{used}`" for used in used_folders(root, folder)) or "-",
         ]
         for folder in ORDER
     ]
@@ -158,8 +158,8 @@ def bars(root: Path) -> list[str]:
 
 def bar(root: Path, folder: str, y: int, height: int) -> str:
     """A folder over the whole width."""
-    what = f'<tspan class="what" dx="14">{escape(first_line(root, folder))}</tspan>'
-    text = f'<text x="{LEFT + 14}" y="{y + 30}"><tspan class="name">{folder}</tspan>{what}</text>'
+    words = f'<tspan class="what" dx="14">{escape(first_line(root, folder))}</tspan>'
+    text = f'<text x="{LEFT + 14}" y="{y + 30}"><tspan class="name">{folder}</tspan>{words}</text>'
     return panel(folder, LEFT, y, WHOLE, height) + text
 
 
@@ -193,8 +193,8 @@ def box(root: Path, folder: str) -> str:
         f'<tspan x="{x + 12}" dy="17">{escape(line)}</tspan>' for line in wrap(first_line(root, folder), 25)
     ]
     name = f'<text class="name" x="{x + 12}" y="{y + 24}">{folder}</text>'
-    what = f'<text class="what" x="{x + 12}" y="{y + 27}">{"".join(lines)}</text>'
-    return panel(folder, x, y, WIDE, HIGH) + name + what
+    words = f'<text class="what" x="{x + 12}" y="{y + 27}">{"".join(lines)}</text>'
+    return panel(folder, x, y, WIDE, HIGH) + name + words
 
 
 def arrow(begin: str, end: str, above: str, below: str) -> str:

@@ -30,7 +30,7 @@ def write_shot(page: Any, name: str, *selectors: str) -> None:
     for selector in selectors:
         page.find_element("css selector", selector).click()
     ready = "return document.documentElement.dataset.state === 'ready'"
-    WebDriverWait(page, PATIENCE).until(lambda each: each.execute_script(ready))
+    WebDriverWait(page, PATIENCE).until(lambda shown: shown.execute_script(ready))
     page.execute_script("document.querySelector('#times').textContent = ''")  # it differs from run to run
     page.execute_async_script("requestAnimationFrame(() => setTimeout(arguments[0], 300))")
     with Image.open(io.BytesIO(page.get_screenshot_as_png())) as image:

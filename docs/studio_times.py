@@ -27,7 +27,7 @@ READY: Final = "return document.documentElement.dataset.state === 'ready'"
 def wait_until_ready(page: Any) -> None:
     """Wait until all answers to the last edit have arrived."""
     page.execute_async_script("setTimeout(arguments[0], 300)")
-    WebDriverWait(page, PATIENCE).until(lambda each: each.execute_script(READY))
+    WebDriverWait(page, PATIENCE).until(lambda shown: shown.execute_script(READY))
 
 
 def draw_stroke(page: Any, number: int) -> dict[str, float]:
@@ -44,7 +44,7 @@ def draw_stroke(page: Any, number: int) -> dict[str, float]:
 
 def main() -> None:
     """Print a row for each sample and size: the middle one of several strokes."""
-    print(f"| sample | size | {' | '.join(f'{each}, s' for each in PARTS.values())} |")
+    print(f"| sample | size | {' | '.join(f'{title}, s' for title in PARTS.values())} |")
     print("| --- | ---: | ---: | ---: | ---: |")
     for sample in SAMPLES:
         with page_of(sample) as page:
@@ -52,8 +52,8 @@ def main() -> None:
                 page.execute_script(RESIZE, size)
                 wait_until_ready(page)
                 strokes = [draw_stroke(page, number) for number in range(REPEATED)]
-                cells = [[each[part] for each in strokes if part in each] for part in PARTS]
-                texts = [f"{statistics.median(each):.2f}" if each else "" for each in cells]
+                cells = [[times[part] for times in strokes if part in times] for part in PARTS]
+                texts = [f"{statistics.median(seconds):.2f}" if seconds else "" for seconds in cells]
                 print(f"| `{sample}` | {size} | {' | '.join(texts)} |", flush=True)
 
 

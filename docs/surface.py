@@ -60,7 +60,7 @@ def angles(first: Any, second: Any) -> Any:
 
 def normal_error(surface: cf.Surface, normals: Any) -> Any:
     """Angles to the true normals in degrees, on the side nearer to the truth."""
-    both = [angles(each.normals, normals) for each in (surface, surface.flipped())]
+    both = [angles(side.normals, normals) for side in (surface, surface.flipped())]
     return min(both, key=np.mean)
 
 
@@ -69,7 +69,7 @@ def middle_hint(true: Any) -> cf.Hint:
     pixels = np.argwhere(true.instance.mask)
     at = int(np.argmin(((pixels - pixels.mean(axis=0)) ** 2).sum(axis=1)))
     x, y, z = true.normals[at]
-    row, column = (int(each) for each in pixels[at])
+    row, column = (int(place) for place in pixels[at])
     return cf.Hint(row, column, float(np.arccos(z)), float(np.arctan2(y, x)))
 
 
@@ -142,12 +142,12 @@ def sides(name: str, size: int) -> Rows:
     step = 1e-6
     rows = []
     for tilt, side in VIEWS:
-        seen = rotation_by(tilt, 15) @ np.diag([1, 1, side])
+        rotation = rotation_by(tilt, 15) @ np.diag([1, 1, side])
         patch = CurvaturePatch(
             position,
             lambda s, t: (position(s + step, t) - position(s - step, t)) / (2 * step),
             lambda s, t: (position(s, t + step) - position(s, t - step)) / (2 * step),
-            s_range, t_range, seen, share=0.2,
+            s_range, t_range, rotation, share=0.2,
         )  # fmt: skip
         true = analytic_instance(patch, "patch", size)
         estimate = cf.surface(cf.CrossField.from_lines(true.instance, true.u_angle, true.v_angle))
@@ -158,9 +158,9 @@ def sides(name: str, size: int) -> Rows:
     return rows
 
 
-def trust(name: str, what: str, size: int) -> Rows:
+def trust(name: str, drawing: str, size: int) -> Rows:
     """Doubts about the surface over the bend field of a sample or drawing."""
-    instance = cf.sample(what, size) if what in SAMPLES else cf.read_sketch(what, size=size)
+    instance = cf.sample(drawing, size) if drawing in SAMPLES else cf.read_sketch(drawing, size=size)
     field = field_by("bend", instance)
     estimate = cf.surface(field)
     off = right_angle_deviation(field, estimate.heights)
@@ -202,7 +202,7 @@ def tasks(part: str, folder: Path | None) -> Iterator[tuple[Any, ...]]:
         own = [(name, name) for name, entry in SAMPLES.items() if entry.kind == "sketch"]
         files = (path for path in sorted(folder.iterdir()) if path.suffix in SUFFIXES) if folder else ()
         others = [(path.name, str(path)) for path in files if not path.stem.endswith("_mask")]
-        yield from ((name, what, 48) for name, what in [*own, *others])
+        yield from ((name, drawing, 48) for name, drawing in [*own, *others])
     else:
         yield from ((name, size) for name in SURFACES for size in SIZES)
 
@@ -251,7 +251,9 @@ def by_noise(rows: Rows, clean: Rows) -> str:
         without = [row for row in clean if (row["surface"], row["size"], row["way"]) == (name, size, "bend")]
         own = [row for row in rows if (row["surface"], row["size"]) == (name, size)]
         table.append([f"`{name}`", str(size), *(f"{row['mean']:.1f}" for row in [*without, *own])])
-    return markdown(("surface", "size", "exact strokes", *(f"{each:g} degrees" for each in NOISE)), table)
+    return markdown(
+        ("surface", "size", "exact strokes", *(f"{degrees:g} degrees" for degrees in NOISE)), table
+    )
 
 
 def by_drawing(rows: Rows) -> str:

@@ -138,7 +138,7 @@ def same_problem(main: Run) -> str:
 
 def short_summary(main: Run, runs: list[Run]) -> str:
     """Numbers of files that were read as intended or not, and of formulations with a proven optimum."""
-    verdicts = [f.verdict for each in runs for f in each.result.checks if f.step == "read"]
+    verdicts = [f.verdict for run in runs for f in run.result.checks if f.step == "read"]
     proven = [name for name in FORMULATIONS if main.proven(name)]
     counts = [len(main.proven(name)) for name in proven]
     return (
@@ -153,11 +153,11 @@ def short_summary(main: Run, runs: list[Run]) -> str:
 def errata(runs: list[Run]) -> str:
     """The misprints as numbers: optimum, and the energy of its field."""
     rows = []
-    for each in runs:
+    for run in runs:
         for name in VARIANTS:
-            (objective, energy), *more = each.proven(name)
+            (objective, energy), *more = run.proven(name)
             numbers = (f"{objective:.6f}", f"{energy:.6f}", str(1 + len(more)))
-            rows.append([f"`{name}`", each.gauge, each.facet, *numbers])
+            rows.append([f"`{name}`", run.gauge, run.facet, *numbers])
     return markdown(
         ("formulation", "gauge", "facet", "optimum", "energy of its field", "proofs"), sorted(rows)
     )
@@ -167,7 +167,7 @@ def readings(runs: list[Run]) -> str:
     """Number of files that each program read, by result."""
     rows = []
     for name, entry in PROGRAMS.items():
-        checks = [f for each in runs for f in each.result.checks if f.program == name and f.step == "read"]
+        checks = [f for run in runs for f in run.result.checks if f.program == name and f.step == "read"]
         verdicts = [f.verdict for f in checks]
         counts = [verdicts.count(verdict) for verdict in (Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED)]
         counts.append(verdicts.count(Verdict.DIFFERS) + verdicts.count(Verdict.FAILED))
@@ -186,7 +186,7 @@ def update_record(runs: list[Run]) -> dict[str, dict[str, Any]]:
     main = runs[0]
     for name, entry in PROGRAMS.items():
         if entry.free and name in main.result.versions:
-            checks = [check for each in runs for check in each.result.checks if check.program == name]
+            checks = [check for run in runs for check in run.result.checks if check.program == name]
             read = [check.verdict for check in checks if check.step == "read"]
             record[name] = {
                 "version": main.result.versions[name],
@@ -293,7 +293,7 @@ def main() -> None:
         ),
     ]
     (DOCS / "validation.md").write_text("\n\n".join(parts) + "\n")
-    bad = [check for each in runs for check in each.result.failed_checks]
+    bad = [check for run in runs for check in run.result.failed_checks]
     print(
         f"{time.perf_counter() - begin:.0f} s, {len(bad)} checks with something wrong",
         *bad,

@@ -46,7 +46,7 @@ def mean_by_drawing(rows: Iterable[Row], value: Callable[[Row], float]) -> Summa
     of: dict[str, list[float]] = defaultdict(list)
     for row in rows:
         of[row["instance"]].append(value(row))
-    return summary(np.array([np.mean(each) for each in of.values()]))
+    return summary(np.array([np.mean(errors) for errors in of.values()]))
 
 
 @dataclass(frozen=True)
@@ -158,4 +158,4 @@ def correlation(gaps: list[tuple[Row, float]]) -> Summary | None:
         gap, error = np.array(points).T
         if len(set(gap)) > 2 and len(set(error)) > 2:
             of[case[0]].append(float(spearmanr(gap, error).statistic))
-    return summary(np.array([np.mean(each) for each in of.values()]))
+    return summary(np.array([np.mean(values) for values in of.values()]))

@@ -53,7 +53,7 @@ def over_drawings(rows: list[Row]) -> str:
     of: dict[str, list[float]] = {}
     for row in rows:
         of.setdefault(row["name"], []).append(row["value"])
-    mean_of_drawings = summary(np.array([np.mean(each) for each in of.values()]))
+    mean_of_drawings = summary(np.array([np.mean(values) for values in of.values()]))
     if mean_of_drawings is None:
         return "-"
     return f"{mean_of_drawings.mean:.1f}" + (
@@ -175,7 +175,7 @@ def missed_sentence() -> str:
         for method in values("method", **facts)
         for size in values("size", **facts)
     }
-    (method, size), most = max(shares.items(), key=lambda each: each[1])
+    (method, size), most = max(shares.items(), key=lambda entry: entry[1])
     worst = max(rows_with(**facts), key=lambda row: row["value"])
     return (
         f"Under the default weights, every method misses at most {most:.1%} of the stroke pixels by more "

@@ -57,7 +57,7 @@ class Stage:
 
 def stages(plan: Plan, folder: Path | None) -> Iterator[Stage]:
     """The whole plan: small sizes before large ones, parts in turn."""
-    practice, quality = (dict(enumerate(each)) for each in (plan.practice, plan.quality))
+    practice, quality = (dict(enumerate(runs)) for runs in (plan.practice, plan.quality))
     for number in range(max(len(practice), len(quality))):
         if number in practice:
             yield Stage(f"practice {practice[number]}", tuple(practice_runs(plan, practice[number], folder)))
@@ -86,7 +86,7 @@ def quality_runs(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
         for share in SHARES if "hidden" in case else ():
             for seed in SEEDS:
                 yield _default("quality", name, size, f"{PERTURBED} {share}", **case, seed=seed)
-        for limit in dict.fromkeys(min(each, plan.quality_limit) for each in SEARCHES):
+        for limit in dict.fromkeys(min(seconds, plan.quality_limit) for seconds in SEARCHES):
             yield _default("quality", name, size, "search", **case, limit=limit)
         for norm in (2, 1):
             yield _default("quality", name, size, PROOF, **case, norm=norm, limit=plan.quality_limit)
@@ -96,8 +96,8 @@ def weight_runs(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
     """Greedy and best fields under other weights."""
     for name, case in _instances(plan, size, folder):
         for strokes, skew in (
-            *((each, SKEW_WEIGHT) for each in WEIGHTS),
-            *((STROKE_WEIGHT, each) for each in SKEWS),
+            *((weight, SKEW_WEIGHT) for weight in WEIGHTS),
+            *((STROKE_WEIGHT, weight) for weight in SKEWS),
         ):
             for way, limit in (("greedy", 0.0), (PROOF, plan.quality_limit)):
                 changed = {"w_strokes": strokes, "w_beta": skew, "limit": limit}

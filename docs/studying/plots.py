@@ -67,7 +67,9 @@ def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
             for name, (x, y) in kinds.items():
                 look = {"color": looks[name]["color"], "marker": looks[name]["marker"]}
                 axis.scatter(np.maximum(x, _ZERO), y, s=16, alpha=0.6, linewidths=0, label=name, **look)
-            x, y = (np.concatenate([np.array(each[i]) for each in kinds.values()] or [[]]) for i in (0, 1))
+            x, y = (
+                np.concatenate([np.array(points[i]) for points in kinds.values()] or [[]]) for i in (0, 1)
+            )
             centre, middle = medians(x / 100, y)
             axis.plot(
                 np.maximum(100 * np.array(centre), _ZERO),

@@ -182,14 +182,16 @@ def draw(rows_of: RowsByPart, pictures: Path) -> None:
     panels: dict[str, dict[str, plots.Line]] = {}
     for surfaces, title in ((False, "hidden curves of drawings"), (True, "surfaces with a known answer")):
         panels[title] = {}
-        for kind in dict.fromkeys(kind_of(each[0]) for each in fields):
-            mine = [each for each in fields if kind_of(each[0]) == kind and is_surface(each[0]) == surfaces]
+        for kind in dict.fromkeys(kind_of(entry[0]) for entry in fields):
+            mine = [
+                entry for entry in fields if kind_of(entry[0]) == kind and is_surface(entry[0]) == surfaces
+            ]
             panels[title][kind] = ([100 * gap for _, gap, _ in mine], [more for _, _, more in mine])
     plots.error_by_gap(pictures / "evidence_quality.svg", panels)
     lines = {name: weight_lines(rows_of["quality"], name) for name in ("w_strokes", "w_beta")}
     titles = {"w_strokes": "weight of the strokes", "w_beta": "weight of the skew"}
     plots.error_by_weight(
-        pictures / "evidence_weights.svg", {titles[name]: each for name, each in lines.items()}
+        pictures / "evidence_weights.svg", {titles[name]: entry for name, entry in lines.items()}
     )
 
 

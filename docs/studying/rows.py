@@ -26,7 +26,7 @@ class Keyed:
     @property
     def key(self) -> tuple[str, ...]:
         """Its values as text."""
-        return tuple(text(getattr(self, each.name)) for each in fields(self))  # type: ignore[arg-type]
+        return tuple(text(getattr(self, part.name)) for part in fields(self))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

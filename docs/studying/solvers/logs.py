@@ -143,9 +143,9 @@ def progress(solver: str, text: str) -> Iterator[Step]:
                 yield time, _number(row[1]), _number(row[2])
         return
     bound = best = None
-    for objective, possible, found, time in _COIN.findall(text):
+    for objective, possible, incumbent, time in _COIN.findall(text):
         bound = _within(possible) if possible else bound
-        best = _within(found or objective) or best
+        best = _within(incumbent or objective) or best
         yield float(time), bound, best
 
 

@@ -28,7 +28,7 @@ from .statistics import (
 Kind = tuple[str, str, str]
 """Formulation, solver and start."""
 KINDS: Final[tuple[Kind, ...]] = (
-    *((each, PROVE, "cold") for each in PROBLEMS),
+    *((formulation, PROVE, "cold") for formulation in PROBLEMS),
     *((*pair, start) for start in STARTS for pair in PAIRS),
 )
 MISSING: Final = "-"
@@ -132,7 +132,7 @@ def known_values(rows: Iterable[Row]) -> dict[tuple[str, str], tuple[float, floa
             best[problem(row)] = min(best[problem(row)], row["objective"])
         if row["solver"] == PROVE and row["bound"] is not None:
             bound[problem(row)] = max(bound[problem(row)], row["bound"])
-    return {each: (best[each], bound[each]) for each in best}
+    return {known: (best[known], bound[known]) for known in best}
 
 
 def instances_table(rows: list[Row], plan: Plan) -> Table:
@@ -142,14 +142,14 @@ def instances_table(rows: list[Row], plan: Plan) -> Table:
     for names in plan.instances.values():
         for name in names:
             instance = make_instance(name)
-            problems = [cf.formulate(instance, each) for each in PROBLEMS]
-            integers = {int(each.integer.sum()) for each in problems}
+            problems = [cf.formulate(instance, formulation) for formulation in PROBLEMS]
+            integers = {int(problem.integer.sum()) for problem in problems}
             line = [name, str(len(instance.grid.first)), str(len(instance.theta)), *map(str, integers)]
-            line += [str(each.n_columns) for each in problems]
-            cells.append(line + [_energy(proofs.get((name, each))) for each in PROBLEMS])
+            line += [str(problem.n_columns) for problem in problems]
+            cells.append(line + [_energy(proofs.get((name, formulation))) for formulation in PROBLEMS])
     return (
-        "instance", "pairs", "stroke pixels", "integers", *(f"columns of `{each}`" for each in PROBLEMS),
-        "energy, 1-norm", "energy, 2-norm",
+        "instance", "pairs", "stroke pixels", "integers",
+        *(f"columns of `{formulation}`" for formulation in PROBLEMS), "energy, 1-norm", "energy, 2-norm",
     ), cells  # fmt: skip
 
 
@@ -173,17 +173,17 @@ def turned_table(rows: list[Row], plan: Plan) -> Table:
             )
             if mine and row["instance"] in plan.turned:
                 of[row["instance"]].append(row)
-        whole = [sorted(each, key=lambda row: row["turns"]) for each in of.values() if len(each) == 3]
+        whole = [sorted(turned, key=lambda row: row["turns"]) for turned in of.values() if len(turned) == 3]
         if not whole:
             continue
-        times = np.array([seconds(each) for each in whole]).T
+        times = np.array([seconds(turned) for turned in whole]).T
         ratio = statistics.SHIFT + times
         cells.append(
             [
                 f"`{pair[0]}`", solver_title(pair[1]), f"{len(whole)} of {len(plan.turned)}",
                 *(
-                    f"{sum(map(is_solved, each))}, {shifted_geometric_mean(times[turns]):.1f} s"
-                    for turns, each in enumerate(zip(*whole, strict=True))
+                    f"{sum(map(is_solved, column))}, {shifted_geometric_mean(times[turns]):.1f} s"
+                    for turns, column in enumerate(zip(*whole, strict=True))
                 ),
                 f"{np.exp(np.log(ratio.max(axis=0) / ratio.min(axis=0)).mean()):.2f}",
             ]
@@ -220,8 +220,8 @@ def editions_table(rows: list[Row], plan: Plan) -> Table:
             for solver in sorted(COMMERCIAL)
         }
         taken = (
-            {name for name, row in each.items() if row["status"] not in {TOO_LARGE, FAILED}}
-            for each in of.values()
+            {name for name, row in runs.items() if row["status"] not in {TOO_LARGE, FAILED}}
+            for runs in of.values()
         )
         common = sorted(set.intersection(*taken))
         if common:
@@ -229,11 +229,16 @@ def editions_table(rows: list[Row], plan: Plan) -> Table:
             line = [f"`{formulation}`", str(len(common)), f"{min(pairs):.0f} to {max(pairs):.0f}"]
             line += [
                 f"{sum(map(is_solved, mine))}, {shifted_geometric_mean(seconds(mine)):.1f} s"
-                for each in of.values()
-                for mine in [[each[name] for name in common]]
+                for runs in of.values()
+                for mine in [[runs[name] for name in common]]
             ]
             cells.append(line)
-    return ("formulation", "instances", "pairs", *(solver_title(each) for each in sorted(COMMERCIAL))), cells
+    return (
+        "formulation",
+        "instances",
+        "pairs",
+        *(solver_title(solver) for solver in sorted(COMMERCIAL)),
+    ), cells
 
 
 def part_of(run: Run) -> str:
@@ -284,9 +289,9 @@ def answer(rows: list[Row], plan: Plan) -> list[str]:
         unfinished = f"{len(rows)} of {plan.size} planned runs are done, and no number of pairs is complete."
         return [f"The measurement is under way: {unfinished}"]
     counts, reach = said[0]
-    each = len(next(iter(plan.instances.values())))
+    count = len(next(iter(plan.instances.values())))
     cold = (
-        f"Of {each} instances each with about {series(counts)} pairs of pixels, the following are proven "
+        f"Of {count} instances each with about {series(counts)} pairs of pixels, the following are proven "
         f"optimal in {plan.limit:g} s on one thread, from a cold start: {reach}."
     )
     sentences = [cold, "The [tables](#how-far-solvers-get) have each solver."]

@@ -80,14 +80,14 @@ class Plan:
         """All proofs, then every pair and free edition, one number of pairs after the other."""
         for names in self.instances.values():
             for name in names:
-                yield from (Run(name, each, PROVE, limit=self.limit) for each in PROBLEMS)
+                yield from (Run(name, formulation, PROVE, limit=self.limit) for formulation in PROBLEMS)
         for names in self.instances.values():
             for name in names:
                 for start in STARTS:
                     yield from (Run(name, *pair, start, limit=self.limit) for pair in PAIRS)
             for name in names:
-                for each in PROBLEMS:
-                    yield from (Run(name, each, solver, limit=self.limit) for solver in COMMERCIAL)
+                for formulation in PROBLEMS:
+                    yield from (Run(name, formulation, solver, limit=self.limit) for solver in COMMERCIAL)
 
     def last(self, best: list[tuple[str, str]]) -> Iterator[Run]:
         """The turned instances, then the long runs, of the best pairs; also the long proofs."""
@@ -95,7 +95,7 @@ class Plan:
             for name in self.turned:
                 yield from (Run(name, *pair, turns=turns, limit=self.limit) for pair in best)
         for name in self.long_ones:
-            yield from (Run(name, each, PROVE, limit=self.long) for each in PROBLEMS)
+            yield from (Run(name, formulation, PROVE, limit=self.long) for formulation in PROBLEMS)
             yield from (Run(name, *pair, limit=self.long) for pair in best)
 
     @property
@@ -123,7 +123,7 @@ def make_instance(name: str, turns: int = 0) -> Instance:
     return instance
 
 
-ASKED: Final = tuple(each.name for each in fields(Run))
+ASKED: Final = tuple(column.name for column in fields(Run))
 FOUND: Final = (
     "pairs", "integers", "columns", "version", "status", "objective", "bound", "root_bound", "cpu", "wall",
     "nodes", "integral", "beside", "machine", "note",
