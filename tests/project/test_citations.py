@@ -18,8 +18,8 @@ PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 @cache
 def modules() -> list[Path]:
     """Every module of the repository, and the layouts that stand for text."""
-    found = [path for part in PARTS for path in (ROOT / part).rglob("*") if path.suffix in {".py", ".j2"}]
-    return sorted([*ROOT.glob("*.py"), *found])
+    paths = [path for part in PARTS for path in (ROOT / part).rglob("*") if path.suffix in {".py", ".j2"}]
+    return sorted([*ROOT.glob("*.py"), *paths])
 
 
 @cache
@@ -54,10 +54,10 @@ def without_code(page: str) -> str:
 
 def rules(text: str) -> list[str]:
     """The numbers of rules that a text cites, ranges as in M1-M3 written out."""
-    found: list[str] = []
+    numbers: list[str] = []
     for letter, first, last in re.findall(r"\b([LMGNBOQWR])(\d{1,2})(?:-\1?(\d{1,2}))?\b", text):
-        found += [f"{letter}{number}" for number in range(int(first), int(last or first) + 1)]
-    return found
+        numbers += [f"{letter}{number}" for number in range(int(first), int(last or first) + 1)]
+    return numbers
 
 
 def test_every_rule_that_the_code_cites_is_on_the_page_of_rules():
@@ -125,12 +125,12 @@ def test_paths_that_pages_and_comments_name_are_there():
     path_like = re.compile(r"(?<![\w./])((?:models|export|templates|tests|docs|\.ci)/[\w./-]*[\w/])")
     missing = []
     for path in [*PAGES, *modules()]:
-        for found in path_like.findall(text_of(path)):
-            if path.suffix == ".j2" or (path.suffix == ".py" and "." not in found.rpartition("/")[2]):
+        for named in path_like.findall(text_of(path)):
+            if path.suffix == ".j2" or (path.suffix == ".py" and "." not in named.rpartition("/")[2]):
                 # layouts name each other from their own folder, and in code words with a / may be anything
                 continue
-            if not any(ROOT.glob(found.rstrip("/").replace("NAME", "*"))):
-                missing.append((place(path), found))
+            if not any(ROOT.glob(named.rstrip("/").replace("NAME", "*"))):
+                missing.append((place(path), named))
         for dotted in re.findall(
             r"\bcrossfield\.((?:models|export|templates)[a-z_0-9.]*[a-z_0-9])", text_of(path)
         ):

@@ -44,8 +44,8 @@ def test_every_command_and_its_options_are_listed(site):
 
 @pytest.fixture
 def address(site):
-    with served(site) as found:
-        yield found
+    with served(site) as served_at:
+        yield served_at
 
 
 FORMULAS = """
@@ -88,7 +88,8 @@ def test_a_model_has_every_line_of_its_declaration(browser, address):
     )
     declared = [declare(name) for name in FORMULATIONS]
     assert browser.execute_script(f"return {models}") == [
-        len(each.objective) + len(each.rows) + len(each.variables) for each in declared
+        len(declaration.objective) + len(declaration.rows) + len(declaration.variables)
+        for declaration in declared
     ]
 
 

@@ -61,7 +61,7 @@ def test_a_stroke_that_redraws_another_is_hidden_with_it(study, tmp_path):
 def test_chains_do_not_depend_on_how_the_drawing_is_turned(study):
     for name in ("mouse", "singular", "torus_patch"):
         instance = cf.sample(name, 24)
-        chains = [study.tracing.chains(each) for each in (instance, turned(instance), mirrored(instance))]
+        chains = [study.tracing.chains(moved) for moved in (instance, turned(instance), mirrored(instance))]
         assert counts(chains[0]) == counts(chains[1]) == counts(chains[2])
 
 
@@ -89,7 +89,9 @@ def test_hiding_changes_neither_the_mask_nor_the_other_strokes(study):
         strokes = strokes_of(instance)
         curves = study.hidden.hidden_curves(instance, curve, 100)
         assert len(curves) > 3
-        assert [len(each.stroke) for each in curves] == sorted((len(h.stroke) for h in curves), reverse=True)
+        assert [len(hiding.stroke) for hiding in curves] == sorted(
+            (len(h.stroke) for h in curves), reverse=True
+        )
         for hidden in curves:
             rest = hidden.rest
             gone = {tuple(pixel) for pixel in instance.stroke_pixels[hidden.stroke].tolist()}
@@ -97,7 +99,7 @@ def test_hiding_changes_neither_the_mask_nor_the_other_strokes(study):
             assert strokes_of(rest) == {at: value for at, value in strokes.items() if at not in gone}
             assert study.hidden.SHORTEST <= len(gone) <= study.hidden.MOST * len(strokes)
             assert (curve[hidden.stroke] == hidden.number).all()
-        assert {each.number for each in study.hidden.hidden_curves(instance, curve, 2)} == {
+        assert {hiding.number for hiding in study.hidden.hidden_curves(instance, curve, 2)} == {
             h.number for h in curves[:2]
         }
 

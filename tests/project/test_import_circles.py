@@ -13,24 +13,24 @@ PARTS = ("models", "export", "templates")
 
 def modules(root: Path) -> dict[str, Path]:
     """The modules below the parts of a package by name, packages by the name of their folder."""
-    found = {}
+    paths = {}
     for path in (path for part in PARTS for path in (root / part).rglob("*.py")):
         parts = path.relative_to(root).with_suffix("").parts
-        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
-    return found
+        paths[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return paths
 
 
 def imported(name: str, path: Path, known: dict[str, Path]) -> set[str]:
     """The known modules that a module imports by relative imports, wherever in its text they stand."""
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
-    found = set()
+    names = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level:
             base = [*package[: len(package) - node.level + 1], *filter(None, [node.module])]
             for alias in node.names:
                 target = ".".join([*base, alias.name])
-                found.add(target if target in known else ".".join(base))
-    return found & set(known)
+                names.add(target if target in known else ".".join(base))
+    return names & set(known)
 
 
 def circle(root: Path) -> list[str]:

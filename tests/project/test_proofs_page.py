@@ -28,7 +28,7 @@ def test_no_bound_is_above_an_energy_and_every_optimum_is_that_of_other_solvers(
 
 def test_no_solver_contradicts_what_is_proven(proofs):
     for name, row in proofs.read()["solvers"].items():
-        for what in ("cold", "tightened") if row["formulation"] == "miqp-exact" else ():
-            found, bound = row[what]["objective"], row[what]["bound"]
-            assert found is None or found >= row["proof"] - proofs.WITHIN, (name, what)
-            assert bound is None or bound <= row["energy"] + proofs.WITHIN, (name, what)
+        for windows in ("cold", "tightened") if row["formulation"] == "miqp-exact" else ():
+            objective, bound = row[windows]["objective"], row[windows]["bound"]
+            assert objective is None or objective >= row["proof"] - proofs.WITHIN, (name, windows)
+            assert bound is None or bound <= row["energy"] + proofs.WITHIN, (name, windows)

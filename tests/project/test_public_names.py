@@ -59,15 +59,15 @@ def test_one_word_has_one_meaning_and_options_are_keywords():
         thing = getattr(crossfield, name)
         if not inspect.isfunction(thing):
             continue
-        for number, each in enumerate(inspect.signature(thing).parameters.values()):
-            if each.name in WORDS and each.annotation not in WORDS[each.name]:
-                faults.append((name, each.name, each.annotation))
-            if each.name in {"seconds", "time_limit", "gap", "threads", "over", "deadline"}:
-                faults.append((name, each.name))
-            is_keyword = each.kind in {each.KEYWORD_ONLY, each.VAR_KEYWORD}
-            optional = number > 0 and each.default is not each.empty
-            if optional and not is_keyword and each.name not in POSITIONAL:
-                faults.append((name, each.name, "by position"))
+        for number, parameter in enumerate(inspect.signature(thing).parameters.values()):
+            if parameter.name in WORDS and parameter.annotation not in WORDS[parameter.name]:
+                faults.append((name, parameter.name, parameter.annotation))
+            if parameter.name in {"seconds", "time_limit", "gap", "threads", "over", "deadline"}:
+                faults.append((name, parameter.name))
+            is_keyword = parameter.kind in {parameter.KEYWORD_ONLY, parameter.VAR_KEYWORD}
+            optional = number > 0 and parameter.default is not parameter.empty
+            if optional and not is_keyword and parameter.name not in POSITIONAL:
+                faults.append((name, parameter.name, "by position"))
     assert faults == []
 
 
@@ -117,4 +117,6 @@ def test_the_reference_describes_every_parameter(name):
     assert len(described) == 2 or not named
     entries = re.findall(r"^([a-z_]\w*(?:, \w+)*)$", described[-1].partition("\n\n")[0], re.MULTILINE)
     listed = {word for entry in entries for word in entry.split(", ")}
-    assert [each for each in named if not each.startswith("_") and each not in listed] == []
+    assert [
+        parameter for parameter in named if not parameter.startswith("_") and parameter not in listed
+    ] == []

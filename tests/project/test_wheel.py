@@ -42,6 +42,6 @@ def in_tree():
 
 def test_the_wheel_holds_the_tree_byte_by_byte(wheel):
     expected = in_tree()
-    found = {name: content for name, content in wheel.items() if ".dist-info/" not in name}
-    assert sorted(expected) == sorted(found)
-    assert all(found[name] == content for name, content in expected.items())
+    packed = {name: content for name, content in wheel.items() if ".dist-info/" not in name}
+    assert sorted(expected) == sorted(packed)
+    assert all(packed[name] == content for name, content in expected.items())

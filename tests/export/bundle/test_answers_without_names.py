@@ -37,8 +37,8 @@ def test_values_without_names_follow_the_file_that_the_manifest_lists(tmp_path):
     point = with_products_lifted(problem).point(make_field(problem.instance))
     for file in ("lp", "mps"):
         path = raw_of_glpk(tmp_path / "x.sol", CanonicalForm(with_products_lifted(problem)), file, point)
-        for found in (read_solution(path, problem, held=held), read_solution(path, problem)):
-            np.testing.assert_array_equal(found.point, point)
+        for solution in (read_solution(path, problem, held=held), read_solution(path, problem)):
+            np.testing.assert_array_equal(solution.point, point)
         with pytest.raises(SolutionError, match="the problem has"):
             read_solution(path, problem, held={file: problem})
 

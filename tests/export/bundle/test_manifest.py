@@ -31,19 +31,19 @@ OPTIONS = [
 
 @for_each("name, options", OPTIONS)
 @for_each("gauge", ["strokes", "box"])
-def test_round_trip(name, options, gauge, tmp_path):
+def test_a_manifest_gives_its_problem_back(name, options, gauge, tmp_path):
     problem = make_problem(name, make_instance(gauge=gauge), **options)
     manifest = write_problem(problem, tmp_path)
     assert manifest.path == tmp_path / f"tiny.{name}.manifest.json"
     again = read_manifest(manifest.path)
     assert again.document == manifest.document
     assert (again.formulation, again.folder) == (name, tmp_path)
-    found = again.problem()
-    assert found.sha256 == problem.sha256
-    assert found.instance.sha256 == problem.instance.sha256
-    np.testing.assert_array_equal(found.lower, problem.lower)
+    rebuilt = again.problem()
+    assert rebuilt.sha256 == problem.sha256
+    assert rebuilt.instance.sha256 == problem.instance.sha256
+    np.testing.assert_array_equal(rebuilt.lower, problem.lower)
     if name == "qp-fixed":
-        np.testing.assert_array_equal(found.jumps, problem.jumps)
+        np.testing.assert_array_equal(rebuilt.jumps, problem.jumps)
 
 
 def test_refused_and_lifted_formats_are_listed(tmp_path):
@@ -61,24 +61,24 @@ def test_refused_and_lifted_formats_are_listed(tmp_path):
 def test_jumps_come_from_the_start_or_the_baseline(tmp_path):
     instance = make_instance("full")
     field = make_field(instance)
-    (given,) = write_all(instance, tmp_path, formulations=["qp-fixed"], formats=["mps"], start=field)
-    np.testing.assert_array_equal(given.problem().jumps, field.p)
-    listed = dict(given.document["jumps"])
+    (manifest,) = write_all(instance, tmp_path, formulations=["qp-fixed"], formats=["mps"], start=field)
+    np.testing.assert_array_equal(manifest.problem().jumps, field.p)
+    listed = dict(manifest.document["jumps"])
     assert listed == {pair: jump for pair, jump in enumerate(field.p.tolist()) if jump}
     (baseline,) = write_all(instance, tmp_path, formulations=["qp-fixed"], formats=["mps"])
     assert baseline.problem().jumps.shape == field.p.shape
 
 
 def test_options_apply_where_a_formulation_has_them(tmp_path):
-    seen = []
+    messages = []
     manifests = write_all(
         make_instance(),
         tmp_path,
         formats=["nl"],
         options={"facet": "printed", "relax": True},
-        progress=seen.append,
+        progress=messages.append,
     )
-    assert seen == list(FORMULATIONS)
+    assert messages == list(FORMULATIONS)
     options = {manifest.formulation: manifest.document["options"] for manifest in manifests}
     assert options["milp-mccormick"]["facet"] == "printed"
     assert options["miqp-exact"] == {"facet": "hull", "stroke_norm": 2, "beta_norm": 2, "relax": True}
@@ -112,7 +112,7 @@ def changed(path: Path, *keys: str, value: object) -> Path:
     return path
 
 
-def test_another_instance_beside_it(written):
+def test_another_instance_beside_a_manifest_is_refused(written):
     write_instance(make_instance(seed=9), written.parent / "tiny.instance.json")
     with pytest.raises(InstanceError, match=r"tiny\.instance\.json: is another instance"):
         read_manifest(written).problem()
@@ -121,7 +121,7 @@ def test_another_instance_beside_it(written):
         read_manifest(written).problem()
 
 
-def test_damaged_manifests(written):
+def test_damaged_manifests_are_refused(written):
     whole = written.read_bytes()
     other = [b"[]", b"null", b'"crossfield-manifest"', b"\xff\xfe", b"[" * 100000]
     other += [b'{"format": "crossfield-instance", "version": 1}']
@@ -156,7 +156,7 @@ def test_damaged_manifests(written):
         (["class"], "SDP", "class"),
     ],
 )
-def test_documents_that_break_the_schema(keys, value, message, written):
+def test_documents_that_break_the_schema_are_refused(keys, value, message, written):
     with pytest.raises(InstanceError, match=rf"manifest\.json: .*{message}"):
         read_manifest(changed(written, *keys, value=value))
 
@@ -174,14 +174,14 @@ def test_documents_that_break_the_schema(keys, value, message, written):
         (["sha256"], "0" * 64, InstanceError, "does not fit its own instance"),
     ],
 )
-def test_documents_that_contradict_themselves(keys, value, error, message, written):
+def test_documents_that_contradict_themselves_are_refused(keys, value, error, message, written):
     renamed = written.rename(written.with_name("renamed.json"))
     manifest = read_manifest(changed(renamed, *keys, value=value))
     with pytest.raises(error, match=rf"renamed\.json: .*{message}"):
         manifest.problem()
 
 
-def test_problems_that_no_manifest_records(tmp_path):
+def test_problems_that_no_manifest_records_are_refused(tmp_path):
     problem = make_problem("minlp-cubic", make_instance())
     for other in (with_products_lifted(problem), with_integers_fixed(problem, make_field(problem.instance))):
         with pytest.raises(InputError, match="a manifest cannot record minlp-cubic"):
@@ -232,5 +232,5 @@ def test_suffixes_in_upper_case_are_those_in_lower_case(tmp_path, name):
     upper = write(problem, tmp_path / name).files
     lower = write(problem, tmp_path / f"a{name[1:].lower()}").files
     assert name in upper
-    assert [each.lower() for each in upper] == [each.lower() for each in lower]
+    assert [file.lower() for file in upper] == [file.lower() for file in lower]
     assert list(upper.values()) == list(lower.values())

@@ -139,7 +139,7 @@ def test_xpress_takes_it(name: str, suffix: str, tmp_path: Path):
 # files
 
 
-def test_which_files_are_written(tmp_path: Path):
+def test_starts_are_written_for_the_solvers_that_take_them(tmp_path: Path):
     instance = make_instance()
     field = make_field(instance)
     written = {

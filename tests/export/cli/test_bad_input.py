@@ -115,8 +115,8 @@ REFUSED = [
     *((f"export {name}", f"{name}: ", reason) for name, (_, reason) in INSTANCES.items()),
     *((f"{command} cut{suffix}", f"cut{suffix}: ", "")
       for command in ("run", "export", "draw -o out.png") for suffix in (".json", ".npz")),
-    *((f"run {what} --size {size}", "", f"size is {size}; choose")
-      for what in ("mouse", "wave_sheet", "sketch.png") for size in (0, -1, 10**6)),
+    *((f"run {sketch} --size {size}", "", f"size is {size}; choose")
+      for sketch in ("mouse", "wave_sheet", "sketch.png") for size in (0, -1, 10**6)),
     ("run half.png", "half.png: is not a whole picture", ""),
     ("run blank.png", "blank.png: shows no stroke", ""),
     ("run sketch.png --mask small.png", "small.png: ", "50 x 40.* 60 x 40"),
@@ -152,8 +152,8 @@ REFUSED = [
 
 @for_each("arguments, begin, reason", REFUSED)
 def test_bad_input_is_refused(files, refused, arguments, begin, reason):
-    given = arguments if " -o " in arguments else f"{arguments} -o out"
-    line = refused(*given.split())
+    command = arguments if " -o " in arguments else f"{arguments} -o out"
+    line = refused(*command.split())
     assert line.startswith(begin)
     assert re.search(reason, line)
 

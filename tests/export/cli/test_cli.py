@@ -59,7 +59,7 @@ def child(*arguments, **options):
 
 
 @pytest.mark.smoke
-def test_a_tour_of_the_commands(tmp_path, crossfield):
+def test_each_command_reads_the_files_of_the_one_before(tmp_path, crossfield):
     """instance, export, solve, read, draw: each reads files of the previous command."""
     out = crossfield("instance skew --size 6 -o skew.json")
     instance = cf.read_instance("skew.json")

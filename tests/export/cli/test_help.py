@@ -120,20 +120,20 @@ def test_files_and_samples_have_the_same_default_size(tmp_path, capsys):
 
     drawing = tmp_path / "a.svg"
     drawing.write_text('<svg viewBox="0 0 9 9"><path d="M0 0L9 9M0 9L9 0" stroke="black"/></svg>')
-    made = tmp_path / "a.json"
-    assert invoke(["instance", str(drawing), "-o", str(made)]) == 0
-    assert cf.read_instance(made).sha256 == cf.read_sketch(drawing).sha256
+    written = tmp_path / "a.json"
+    assert invoke(["instance", str(drawing), "-o", str(written)]) == 0
+    assert cf.read_instance(written).sha256 == cf.read_sketch(drawing).sha256
     assert max(cf.sample("skew").mask.shape) == max(cf.read_sketch(drawing).mask.shape) == DEFAULT_SIZE
     assert f"{DEFAULT_SIZE} x " in capsys.readouterr().out
 
 
 def commands_of(group=None, prefix=""):
     """All commands by name."""
-    for name, each in (group or typer.main.get_command(app)).commands.items():
-        if hasattr(each, "commands"):
-            yield from commands_of(each, f"{name} ")
+    for name, command in (group or typer.main.get_command(app)).commands.items():
+        if hasattr(command, "commands"):
+            yield from commands_of(command, f"{name} ")
         else:
-            yield f"{prefix}{name}", each
+            yield f"{prefix}{name}", command
 
 
 def test_every_help_begins_with_an_example_and_every_option_has_a_panel(text):
@@ -142,7 +142,7 @@ def test_every_help_begins_with_an_example_and_every_option_has_a_panel(text):
         shown = text(name)
         assert words(shown).split("Example: ")[1].startswith(EXAMPLES[name]), name
         panels = re.findall(r"^╭─ ([A-Z][a-z ]+) ─", shown, re.MULTILINE)
-        assert panels == [each for each in ("Arguments", *PANELS) if each in panels], name
+        assert panels == [panel for panel in ("Arguments", *PANELS) if panel in panels], name
         output = shown.split("─ Output ─")[1]
         assert set(re.findall(r"^│ [ *]+--([a-z-]+)", output, re.MULTILINE)) <= set(PANELS["Output"].split())
     for group in ("", "library"):

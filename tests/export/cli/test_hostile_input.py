@@ -128,9 +128,9 @@ def read_by_child(*paths):
         [sys.executable, "-c", READER, *map(str, paths)], check=False, capture_output=True, text=True
     )
     assert (done.returncode, done.stderr) == (0, "")
-    found = [json.loads(line) for line in done.stdout.splitlines()]
-    assert len(found) == len(paths)
-    return {Path(path).name: (message, memory) for path, message, memory in found}
+    results = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(results) == len(paths)
+    return {Path(path).name: (message, memory) for path, message, memory in results}
 
 
 @pytest.mark.slow
@@ -140,8 +140,8 @@ def test_costly_drawings_are_read_or_refused_in_little_time(tmp_path):
     for number, data in enumerate(COSTLY_SVG.values()):
         paths.append(tmp_path / f"{number}.svg")
         paths[-1].write_bytes(data)
-    found = [message for message, _ in read_by_child(*paths).values()]
-    refused = {name: message for name, message in zip(COSTLY_SVG, found, strict=True) if message}
+    messages = [message for message, _ in read_by_child(*paths).values()]
+    refused = {name: message for name, message in zip(COSTLY_SVG, messages, strict=True) if message}
     assert set(refused) == {
         "rules of one class", "a point list without blanks", "a transform that never closes", "uses of uses",
     }  # fmt: skip
@@ -162,8 +162,8 @@ def test_small_files_do_not_take_much_memory(tmp_path):
     }
     for name, data in files.items():
         (tmp_path / name).write_bytes(data)
-    found = read_by_child(*(tmp_path / name for name in files))
-    messages = {name: words for name, (words, _) in found.items()}
+    results = read_by_child(*(tmp_path / name for name in files))
+    messages = {name: words for name, (words, _) in results.items()}
     assert messages["big.png"] == ""
     assert "holds an array 'extra' that does not belong in it" in messages["extra.npz"]
     assert (
@@ -171,8 +171,8 @@ def test_small_files_do_not_take_much_memory(tmp_path):
     )
     assert "lists 300000 stroke pixels, but its mask has 4 pixels" in messages["strokes.json"]
     assert f"more than {input_limits.MAX_LINES} lines" in messages["many.scap"]
-    assert found["many.scap"][1] < 350
-    assert found["big.png"][1] < 450
+    assert results["many.scap"][1] < 350
+    assert results["big.png"][1] < 450
 
 
 STRANGE_SVG = {

@@ -30,8 +30,8 @@ def folder(tmp_path_factory):
 
 
 def of(folder, suffix):
-    (found,) = folder.glob(f"*.proof.{suffix}")
-    return found
+    (path,) = folder.glob(f"*.proof.{suffix}")
+    return path
 
 
 def test_field_certificate_and_report_agree(folder):
@@ -52,8 +52,8 @@ def test_field_certificate_and_report_agree(folder):
 
 def test_a_proof_in_the_1_norm_is_checked_with_its_norm(tmp_path, capsys):
     instance = write_instance(tmp_path, 4, 0.2)
-    given = ["prove", instance, "--norm", "1", "--time-limit", "100", "--json"]
-    assert invoke([*given, "-o", str(tmp_path)]) == 0
+    command = ["prove", instance, "--norm", "1", "--time-limit", "100", "--json"]
+    assert invoke([*command, "-o", str(tmp_path)]) == 0
     report = json.loads(capsys.readouterr().out)
     assert invoke(["prove", "--check", str(of(tmp_path, "certificate.npz")), "--json"]) == 0
     assert json.loads(capsys.readouterr().out).items() <= report.items()

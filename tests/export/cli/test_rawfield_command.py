@@ -30,6 +30,6 @@ def test_a_raw_field_is_drawn_on_its_instance_and_no_other(capsys):
 def test_a_search_starts_at_a_raw_field():
     line = "solve bottle.json -m search --time-limit 2 --start theirs.rawfield -o {}"
     assert invoke(line.format("out").split()) == 0
-    (found,) = Path("out").glob("*.field.npz")
+    (path,) = Path("out").glob("*.field.npz")
     start = cf.read_field("theirs.rawfield", on=cf.read_instance("bottle.json")).energy().total
-    assert cf.read_field(found).energy().total <= start + 1e-9
+    assert cf.read_field(path).energy().total <= start + 1e-9

@@ -27,8 +27,8 @@ def report(folder):
 
 
 def test_a_sample_gets_its_field_and_its_surface(tmp_path, capsys):
-    given = ["shade", "mouse", "--size", "12", "--scale", "4", "-o", str(tmp_path / "out")]
-    assert invoke(given) == 0
+    command = ["shade", "mouse", "--size", "12", "--scale", "4", "-o", str(tmp_path / "out")]
+    assert invoke(command) == 0
     out = capsys.readouterr().out
     assert "mouse: 12 x 11" in out
     assert "undetermined: inside out it has the same crosses" in out
@@ -49,8 +49,8 @@ def test_a_saved_field_is_flipped_hinted_and_lit(saved, tmp_path, capsys):
     plain, turned = tmp_path / "plain", tmp_path / "turned"
     assert invoke(["shade", saved, "--scale", "3", "-q", "-o", str(plain)]) == 0
     assert capsys.readouterr().out == ""
-    given = "--flip --hint 5,6,20,90 --hint 2,8,30.5,-45 --light 0,30 --underlay mouse".split()  # noqa: SIM905
-    assert invoke(["shade", saved, *given, "--scale", "3", "--json", "-o", str(turned)]) == 0
+    options = "--flip --hint 5,6,20,90 --hint 2,8,30.5,-45 --light 0,30 --underlay mouse".split()  # noqa: SIM905
+    assert invoke(["shade", saved, *options, "--scale", "3", "--json", "-o", str(turned)]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert report(turned) == printed | {"files": FILES}
     assert printed["method"] is None
@@ -77,19 +77,19 @@ def test_the_report_places_the_pictures_on_the_drawing(tmp_path):
     with Image.open(tmp_path / "out" / "normals.png") as picture:
         opaque = np.argwhere(np.asarray(picture)[..., 3] > 0)[:, ::-1]
     corners = np.array([opaque.min(axis=0), opaque.max(axis=0) + 1])
-    found = np.array(grid["origin"]) + grid["pixel_size"] * corners
-    assert np.abs(found - [(360, -30), (540, 150)]).max() <= 1.5 * grid["pixel_size"]
+    placed = np.array(grid["origin"]) + grid["pixel_size"] * corners
+    assert np.abs(placed - [(360, -30), (540, 150)]).max() <= 1.5 * grid["pixel_size"]
 
 
 def test_a_rawfield_and_an_instance_are_taken(field, tmp_path):
     cf.write_field(field, tmp_path / "f.rawfield")
     cf.write_instance(field.instance, tmp_path / "i.json")
     instance = str(tmp_path / "i.json")
-    given = ["-q", "--scale", "2", "-o"]
-    raw = ["shade", str(tmp_path / "f.rawfield"), "--on", instance, *given, str(tmp_path / "raw")]
+    options = ["-q", "--scale", "2", "-o"]
+    raw = ["shade", str(tmp_path / "f.rawfield"), "--on", instance, *options, str(tmp_path / "raw")]
     assert invoke(raw) == 0
-    made = ["shade", instance, *given, str(tmp_path / "made")]
-    assert invoke(made) == 0
+    plain = ["shade", instance, *options, str(tmp_path / "made")]
+    assert invoke(plain) == 0
     assert report(tmp_path / "made")["method"] == "bend"
     assert report(tmp_path / "raw")["instance"] == report(tmp_path / "made")["instance"]
 
@@ -110,10 +110,10 @@ REFUSED = [
 
 
 def test_bad_options_are_refused_in_one_line_and_no_file_is_written(saved, tmp_path, capsys):
-    for given, reason in REFUSED:
-        assert invoke(["shade", saved, "-q", "-o", str(tmp_path / "out"), *given]) == 1, given
+    for options, reason in REFUSED:
+        assert invoke(["shade", saved, "-q", "-o", str(tmp_path / "out"), *options]) == 1, options
         line = capsys.readouterr().err
-        assert reason in line, (given, line)
+        assert reason in line, (options, line)
         assert len(line.splitlines()) == 1
         assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())
     assert invoke(["shade", "nothing", "-o", str(tmp_path / "out")]) == 1

@@ -22,15 +22,15 @@ def drawing(tmp_path):
 def test_a_sketch_a_sample_and_an_instance_file_get_the_weights(tmp_path, drawing):
     """An instance file keeps its other properties, and each weight that is not given."""
     file = cf.write_instance(cf.sample("mouse", 8, skew_weight=1e-3), tmp_path / "file.json")
-    for what, size, wanted in (
+    for source, size, wanted in (
         (drawing, ["--size", "8"], cf.read_sketch(drawing, size=8, **WEIGHTS)),
         ("mouse", ["--size", "8"], cf.sample("mouse", 8, **WEIGHTS)),
         ("wave_sheet", ["--size", "8"], cf.sample("wave_sheet", 8, **WEIGHTS)),
         (file, [], cf.sample("mouse", 8, **WEIGHTS)),
     ):
-        made = tmp_path / "made.npz"
-        assert invoke(["instance", str(what), *size, *GIVEN, "-o", str(made)]) == 0
-        instance = cf.read_instance(made)
+        path = tmp_path / "made.npz"
+        assert invoke(["instance", str(source), *size, *GIVEN, "-o", str(path)]) == 0
+        instance = cf.read_instance(path)
         assert instance.sha256 == wanted.sha256
         assert (instance.stroke_weight, instance.skew_weight) == (10.0, 1e-4)
     kept = cf.sample("mouse", 8, skew_weight=1e-3).with_weights(stroke_weight=10)
@@ -42,16 +42,16 @@ def test_weights_out_of_range_are_refused(tmp_path, capsys, drawing):
     file = cf.write_instance(cf.sample("skew", 4), tmp_path / "skew.json")
     for option, value in (("--stroke-weight", "-1"), ("--skew-weight", "nan"), ("--stroke-weight", "1e7")):
         name = option[2:].replace("-", "_")
-        for what in ("skew", drawing, file):
-            assert invoke(["instance", str(what), option, value, "-o", str(tmp_path / "out.npz")]) == 1
+        for source in ("skew", drawing, file):
+            assert invoke(["instance", str(source), option, value, "-o", str(tmp_path / "out.npz")]) == 1
             assert f"crossfield: {name} is {float(value)}; it must be between 0" in capsys.readouterr().err
         with pytest.raises(InstanceError, match=f"{name} is"):
             cf.read_sketch(drawing, size=8, **{name: float(value)})
     assert not (tmp_path / "out.npz").exists()
-    for given in ({"stroke_weight": MOST_WEIGHT}, {"skew_weight": MOST_WEIGHT}):
+    for weights in ({"stroke_weight": MOST_WEIGHT}, {"skew_weight": MOST_WEIGHT}):
         with pytest.raises(InstanceError, match="must be between"):  # on so coarse a grid
-            cf.sample("skew", 4, **given)
-        assert cf.sample("skew", 24, **given).stroke_coefficient > 0
+            cf.sample("skew", 4, **weights)
+        assert cf.sample("skew", 24, **weights).stroke_coefficient > 0
 
 
 def test_a_weight_means_the_same_on_every_grid():

@@ -48,8 +48,8 @@ def held(label: str, name: str) -> Problem:
     return problem_in_format(problem_of(label), FORMATS[name])
 
 
-def written(problem: Problem, path: Path, **given: Any) -> str:
-    write(problem, path, **given)
+def written(problem: Problem, path: Path, **options: Any) -> str:
+    write(problem, path, **options)
     return path.read_text("ascii")
 
 
@@ -65,14 +65,14 @@ def limits(problem: Problem) -> tuple[Any, Any]:
     return model.row_lower[: problem.n_rows], model.row_upper[: problem.n_rows]
 
 
-def assert_values(found: list[float], expected: Any) -> None:
-    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+def assert_values(values: list[float], expected: Any) -> None:
+    np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)
 
 
 def feasible_points(problem: Problem) -> Points:
     """Two random points, and two of fields with the jumps that `problem_of` may have fixed."""
     one, other = (make_field(problem.instance, seed) for seed in (2, 3))
-    return random_points(problem, 2, [problem.point(each) for each in (one, replace(other, p=one.p))])
+    return random_points(problem, 2, [problem.point(field) for field in (one, replace(other, p=one.p))])
 
 
 def tiny() -> Instance:
@@ -146,16 +146,16 @@ def as_parameters(text: str) -> tuple[str, list[str]]:
     """The model with variables as parameters, which prints `number value`, and what each number means."""
     meaning = ["objective"]
 
-    def printed(what: str, domain: str, expression: str) -> str:
-        meaning.append(what)
+    def printed(label: str, domain: str, expression: str) -> str:
+        meaning.append(label)
         return f'printf{domain}: "{len(meaning) - 1} %.17g\\n", {expression};\n'
 
-    def row(found: re.Match[str]) -> str:
-        tag, domain, left, sense, right = found.groups()
+    def row(match: re.Match[str]) -> str:
+        tag, domain, left, sense, right = match.groups()
         return printed(f"{tag} {sense}", domain, f"({left}) - ({right})")
 
-    def variable(found: re.Match[str]) -> str:
-        name, domain, attributes = found.groups()
+    def variable(match: re.Match[str]) -> str:
+        name, domain, attributes = match.groups()
         parts = re.split(r", (?=[<>]=)|(?<=integer), ", attributes.strip())
         ends.extend((name, domain, end[:2], end[3:]) for end in parts if end[:1] in set("<>"))
         return f"param {name}{domain};"
@@ -195,20 +195,20 @@ def test_glpk_evaluates_the_ampl_model_like_the_problem(label: str, tmp_path: Pa
     (tmp_path / "model.dat").write_text(data)
     out = glpsol("-m", tmp_path / "model.mod", "-d", tmp_path / "model.dat", "--check")
     lines = re.findall(r"^(\d+) (\S+)$", out, re.MULTILINE)
-    found: dict[str, list[float]] = {what: [] for what in meaning}
+    printed: dict[str, list[float]] = {name: [] for name in meaning}
     for number, value in lines:
-        found[meaning[int(number)]].append(float(value))
-    assert_values(found.pop("objective"), [problem.objective_value(point)])
+        printed[meaning[int(number)]].append(float(value))
+    assert_values(printed.pop("objective"), [problem.objective_value(point)])
     for family in problem.rows:
         sense = family.family.sense.replace("==", "=")
-        assert_values(found.pop(f"{family.family.tag} {sense}"), family.values(point))
+        assert_values(printed.pop(f"{family.family.tag} {sense}"), family.values(point))
     for block in problem.blocks.values():
         for sign, ends in ((">=", block.lower), ("<=", block.upper)):
-            stated = found.pop(
+            stated = printed.pop(
                 f"{sign} {block.name}", np.full(block.count, -np.inf if sign == ">=" else np.inf)
             )
             np.testing.assert_array_equal(stated, ends)
-    assert found == {}
+    assert printed == {}
 
 
 @pytest.mark.needs("glpk")
@@ -289,7 +289,7 @@ KINDS = {
 
 
 @for_each("formulation", KINDS)
-def test_qplib_types(formulation: str):
+def test_every_formulation_has_its_type_of_qplib(formulation: str):
     problem = problem_in_format(make_problem(formulation, make_instance("full")), FORMATS["qplib"])
     assert probtype(problem) == KINDS[formulation]
 
@@ -328,8 +328,8 @@ def test_a_start_has_its_place(name: str, tmp_path: Path):
     if name == "bar":
         labels = [*labels, CanonicalForm(problem).one.decode()]
         point = np.append(point, 1.0)
-        found = dict(re.findall(r"(\w+): (\S+);", text[text.index("STARTING_POINT") :]))
-        assert {key: float(value) for key, value in found.items()} == dict(
+        levels = dict(re.findall(r"(\w+): (\S+);", text[text.index("STARTING_POINT") :]))
+        assert {key: float(value) for key, value in levels.items()} == dict(
             zip(labels, point.tolist(), strict=True)
         )
         return

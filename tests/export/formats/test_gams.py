@@ -88,7 +88,7 @@ def test_text_is_plain(label: str):
     )
 
 
-def test_golden_file():
+def test_a_small_model_has_the_bytes_of_its_golden_file():
     """A small model that people can read; the other tests check its meaning."""
     instance = Instance.on_pixels("golden", [[True, True], [True, False]], [[0, 1]], [2.5], [0.5])
     text = b"".join(

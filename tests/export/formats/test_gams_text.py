@@ -99,7 +99,7 @@ def test_text_says_what_the_problem_is(number: int, tmp_path: Path):
 
 @for_each("name", FORMULATIONS)
 @for_each("instance", INSTANCES.values())
-def test_text_of_odd_instances(name: str, instance: Instance, tmp_path: Path):
+def test_text_of_odd_instances_says_what_the_problem_is(name: str, instance: Instance, tmp_path: Path):
     field = make_field(instance)
     assert_text(make_problem(name, instance), tmp_path, field)
 
@@ -115,7 +115,7 @@ def test_lists_of_names_that_fill_a_line(count: int, tmp_path: Path):
 @for_each("start", STARTS)
 @for_each("change", CHANGES)
 @for_each("name, gauge, options", combinations())
-def test_text_with_everything(
+def test_text_with_every_option_says_what_the_problem_is(
     name: str, gauge: str, options: dict[str, Any], change: str, start: bool, tmp_path: Path
 ):
     instance = corner(gauge)
@@ -126,7 +126,7 @@ def test_text_with_everything(
 
 @pytest.mark.slow
 @for_each("label", CASES)
-def test_text_of_other_shapes(label: str, tmp_path: Path):
+def test_text_of_other_shapes_says_what_the_problem_is(label: str, tmp_path: Path):
     assert_text(problem_of(label), tmp_path)
 
 

@@ -102,6 +102,6 @@ def test_verify_compares_optima_across_formats(written, two, tmp_path):
     assert weak.objective < whole.objective - 0.04
     assert weak.reason.startswith("a relaxation")
     called_exact = [replace(weak, group=whole.group, relaxes=""), replace(whole, proven=True)]
-    assert Verdict.DIFFERS in {each.verdict for each in judge_solves(called_exact)}
+    assert Verdict.DIFFERS in {check.verdict for check in judge_solves(called_exact)}
     too_high = [replace(weak, objective=0.3, bound=None), whole]
-    assert [each.verdict for each in judge_solves(too_high)] == [Verdict.DIFFERS, whole.verdict]
+    assert [check.verdict for check in judge_solves(too_high)] == [Verdict.DIFFERS, whole.verdict]

@@ -111,16 +111,16 @@ def test_an_angle_next_to_nothing_is_written(angle: float, suffix: str, tmp_path
 def test_names_suit_every_reader(label: str):
     problem = problem_of(label)
     problems = [problem, held(label)] if label in LOW_DEGREE else [problem]
-    for each in problems:
-        names = names_of(column_names(each.instance, each.blocks)) + (
-            names_of(row_names(each.rows)) if each.rows else []
+    for form in problems:
+        names = names_of(column_names(form.instance, form.blocks)) + (
+            names_of(row_names(form.rows)) if form.rows else []
         )
         assert (
-            len({name.lower() for name in [*names, CanonicalForm(each).one.decode(), "obj", "c_one"]})
-            == each.n_columns + each.n_rows + 3
+            len({name.lower() for name in [*names, CanonicalForm(form).one.decode(), "obj", "c_one"]})
+            == form.n_columns + form.n_rows + 3
         )
         assert all(re.fullmatch(r"[a-df-hj-mo-z][a-z0-9_]{0,14}", name) for name in names)
-        assert re.fullmatch(r"ONE_[0-9a-f]{11}", CanonicalForm(each).one.decode())
+        assert re.fullmatch(r"ONE_[0-9a-f]{11}", CanonicalForm(form).one.decode())
 
 
 @for_each("name", FORMULATIONS)
@@ -242,7 +242,7 @@ def test_mps_keeps_to_the_common_subset(label: str):
 @pytest.mark.parametrize(
     "file, pixels", [("milp-mccormick.lp", 3), ("miqcp-bilinear.lp", 3), ("milp-mccormick.mps", 2)]
 )
-def test_golden_files(file: str, pixels: int, tmp_path: Path):
+def test_small_models_have_the_bytes_of_their_golden_files(file: str, pixels: int, tmp_path: Path):
     """Small models that people can read, one stroke at 2.5 radians of weight 0.5 on two or three pixels.
 
     Each was compared with the formulas by hand: signs of (14)-(17) and (22)-(29), pi/2 and pi before p1 and

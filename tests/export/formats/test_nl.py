@@ -170,7 +170,7 @@ def test_binary_holds_the_numbers_themselves():
     np.testing.assert_array_equal(entries["f1"], point[NlOrder(problem).order])
 
 
-def test_golden_file():
+def test_a_small_model_has_the_bytes_of_its_golden_file():
     """A model of two pixels that people can read: (9) with a stroke at 2.5 radians of weight 0.5.
 
     Compared with the formula term by term: v0, v1 are alpha, v2, v3 beta, v4 is p1 and v5 p2, for which the

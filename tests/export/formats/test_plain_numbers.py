@@ -13,8 +13,8 @@ SCALAR = re.compile(r"np\.|\barray\(|dtype")
 """Marks of the representation of NumPy numbers and arrays, which plain numbers do not have."""
 
 
-def one_stroke(theta=1.0, w=1.0, **given):
-    return cf.Instance.on_pixels("two", np.ones((1, 2), bool), [[0, 0]], [theta], [w], **given)
+def one_stroke(theta=1.0, w=1.0, **weights):
+    return cf.Instance.on_pixels("two", np.ones((1, 2), bool), [[0, 0]], [theta], [w], **weights)
 
 
 def refusals(instance, folder):
@@ -26,16 +26,16 @@ def refusals(instance, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "given, better",
+    "refused, better",
     [
         ({"theta": 2e-8, "w": 1e-3}, {"theta": 0.0, "w": 1e-3}),
         ({"skew_coefficient": 1e-11}, {"skew_coefficient": 1e-8}),
         ({"skew_coefficient": 1e-11}, {"skew_coefficient": 0.0}),
     ],
 )
-def test_the_advice_of_a_writer_helps(given, better, tmp_path):
+def test_the_advice_of_a_writer_helps(refused, better, tmp_path):
     """A stroke that is nearly horizontal has a tiny cost at all weights; its direction can be changed."""
-    reasons = refusals(one_stroke(**given), tmp_path / "refused")
+    reasons = refusals(one_stroke(**refused), tmp_path / "refused")
     assert reasons
     assert all(
         "nearly horizontal exactly 0" in reason and "larger (0 removes a term)" in reason

@@ -32,7 +32,7 @@ def columns_of(model, problem: Problem) -> list:
 
 @pytest.mark.slow
 @for_each("label", [label for label in CASES if "far" not in label])
-def test_model_is_the_problem(label: str):
+def test_the_pyomo_model_is_the_problem(label: str):
     problem = problem_of(label)
     model = to_pyomo(problem)
     columns = columns_of(model, problem)

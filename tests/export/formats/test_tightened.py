@@ -78,20 +78,22 @@ def test_the_optimum_is_that_of_the_whole_problem(proof):
     [(1, ("milp-mccormick", "miqcp-bilinear-l1")), ("mixed", ("miqp-mccormick", "miqcp-bilinear"))],
 )
 def test_windows_of_another_norm_keep_the_optimum_of_its_formulations(norm, formulations, tmp_path):
-    found = cf.prove(random_instance(103, (2, 3), 9), norm=norm, jobs=1)
-    windows = remaining_windows(write_certificate(found, tmp_path / "it.npz"))
+    result = cf.prove(random_instance(103, (2, 3), 9), norm=norm, jobs=1)
+    windows = remaining_windows(write_certificate(result, tmp_path / "it.npz"))
     for name in FORMULATIONS:
-        problem = formulate(found.field.instance, name, p=found.field.p if FORMULATIONS[name].fixed else None)
+        problem = formulate(
+            result.field.instance, name, p=result.field.p if FORMULATIONS[name].fixed else None
+        )
         narrow = with_windows(problem, windows)
         assert ("the optimum stays" in narrow.tightened) == (name in formulations)
-        assert narrow.violation(narrow.point(found.field)).worst < 1e-9
+        assert narrow.violation(narrow.point(result.field)).worst < 1e-9
         assert Windows.of_document(narrow.windows.document()).norm == norm
-    other = formulate(found.field.instance, "milp-mccormick", stroke_norm=2)
+    other = formulate(result.field.instance, "milp-mccormick", stroke_norm=2)
     assert "may rise" in with_windows(other, windows).tightened
     if norm == 1:
-        plain = formulate(found.field.instance, "milp-mccormick")
+        plain = formulate(result.field.instance, "milp-mccormick")
         for problem in (plain, with_windows(plain, windows)):
-            assert cf.solve(problem, "highs").objective == pytest.approx(found.energy, abs=1e-6)
+            assert cf.solve(problem, "highs").objective == pytest.approx(result.energy, abs=1e-6)
 
 
 @pytest.mark.parametrize("gauge, least", [("strokes", 4), ("box", 1)])
@@ -140,10 +142,10 @@ def test_headers_and_manifests_say_where_they_come_from(proof, tmp_path):
 @pytest.mark.oracles
 def test_every_format_carries_them(proof, tmp_path):
     """All the programs that read the files find the narrow bounds."""
-    found = verify(exported(proof, tmp_path, ("milp-mccormick", "miqp-exact", "qp-fixed"))).checks
-    bad = [each for each in found if each.verdict in {Verdict.DIFFERS, Verdict.FAILED}]
+    checks = verify(exported(proof, tmp_path, ("milp-mccormick", "miqp-exact", "qp-fixed"))).checks
+    bad = [check for check in checks if check.verdict in {Verdict.DIFFERS, Verdict.FAILED}]
     assert not bad
-    read = {each.file.split(".", 2)[2] for each in found if each.verdict is Verdict.AGREES}
+    read = {check.file.split(".", 2)[2] for check in checks if check.verdict is Verdict.AGREES}
     present = {name for program in PROGRAMS.values() if not program.missing for name in program.formats}
     assert read >= {"nl", "lp", "mps", "mod"} & present
 

@@ -205,7 +205,7 @@ ENDATA
 """
 
 
-def test_every_section_by_hand(tmp_path, capsys):
+def test_every_section_of_an_mps_counts_as_by_hand(tmp_path, capsys):
     """At x = 0.5, k = 2.25, y = -0.1: 0.05 - 6.75 + 7 + 2/4 - 0.5/20 = 0.775;
     c1 = 0.5 - 0.02 + 0.25 - 0.025 = 0.705.
     """
@@ -332,17 +332,17 @@ def refused(capsys, *arguments):
     return err
 
 
-@for_each("what", BAD_MODELS)
-def test_bad_models_are_one_line(what, tmp_path, capsys):
-    (tmp_path / "m.mps").write_text(BAD_MODELS[what], errors="surrogateescape")
+@for_each("fault", BAD_MODELS)
+def test_bad_models_are_one_line(fault, tmp_path, capsys):
+    (tmp_path / "m.mps").write_text(BAD_MODELS[fault], errors="surrogateescape")
     (tmp_path / "p").write_text(GOOD_POINT)
     assert "m.mps: " in refused(capsys, tmp_path / "m.mps", tmp_path / "p")
 
 
-@for_each("what", BAD_POINTS)
-def test_bad_points_are_one_line(what, tmp_path, capsys):
+@for_each("fault", BAD_POINTS)
+def test_bad_points_are_one_line(fault, tmp_path, capsys):
     (tmp_path / "m.mps").write_text(linear())
-    (tmp_path / "p").write_text(BAD_POINTS[what], errors="surrogateescape")
+    (tmp_path / "p").write_text(BAD_POINTS[fault], errors="surrogateescape")
     refused(capsys, tmp_path / "m.mps", tmp_path / "p")
 
 

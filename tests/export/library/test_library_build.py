@@ -291,7 +291,9 @@ def test_points_are_feasible_beyond_the_tolerance_of_minlplib(built):
 
 def test_formulations_of_one_optimum_have_points_of_one_objective(built):
     for instance in ("cf_own_n004", "cf_own_n004_box", "cf_rand_n006_s2"):
-        found = {name: each["best"]["objective"] for name, each in by_formulation(built, instance).items()}
+        objectives = {
+            name: entry["best"]["objective"] for name, entry in by_formulation(built, instance).items()
+        }
         for one, other in (
             ("minlp-parity", "minlp-quartic"),
             ("minlp-quartic", "minlp-cubic"),
@@ -299,15 +301,15 @@ def test_formulations_of_one_optimum_have_points_of_one_objective(built):
             ("miqcp-bilinear", "miqp-mccormick"),
             ("miqcp-bilinear-l1", "milp-mccormick"),
         ):
-            assert found[one] == pytest.approx(found[other], rel=1e-9)
-        assert found["minlp-quartic"] <= found["qp-fixed"] + 1e-12
+            assert objectives[one] == pytest.approx(objectives[other], rel=1e-9)
+        assert objectives["minlp-quartic"] <= objectives["qp-fixed"] + 1e-12
 
 
 def test_the_printed_facet_gives_a_point_that_is_no_worse(built):
     hull, printed = (by_formulation(built, "cf_own_n004", facet) for facet in ("hull", "printed"))
     assert set(printed) == {"miqp-mccormick", "milp-mccormick"}
-    for name, each in printed.items():
-        assert each["best"]["objective"] <= hull[name]["best"]["objective"] + 1e-12
+    for name, entry in printed.items():
+        assert entry["best"]["objective"] <= hull[name]["best"]["objective"] + 1e-12
 
 
 # Counts, curvature, letters
@@ -347,7 +349,7 @@ def test_another_number_of_jobs_and_another_hash_seed_make_the_same_bytes(tmp_pa
 def test_the_1_norm_field_does_not_depend_on_earlier_runs_of_highs():
     """Its threads stay in the process, and another number of them makes the next run fail."""
     instance = sample("mouse", 4, gauge="box", stroke_weight=0.2)
-    found = []
+    energies = []
     for threads in (1, 2):
         highs = highspy.Highs()
         highs.setOptionValue("output_flag", False)
@@ -355,18 +357,18 @@ def test_the_1_norm_field_does_not_depend_on_earlier_runs_of_highs():
         highs.setOptionValue("threads", threads)
         highs.addConstr(highs.addVariable(ub=5, obj=-1, type=highspy.HighsVarType.kInteger) <= 2.5)
         assert highs.run() == highspy.HighsStatus.kOk
-        found.append(
-            [each.field.energy(1).total for each in improve_in_1norm(greedy_field(instance), "tiny")]
+        energies.append(
+            [improved.field.energy(1).total for improved in improve_in_1norm(greedy_field(instance), "tiny")]
         )
-    assert len(found[0]) == 2
-    assert found[0] == found[1]
+    assert len(energies[0]) == 2
+    assert energies[0] == energies[1]
 
 
 def test_nothing_whole_is_made_again(built, spec, copy):
-    made = []
+    messages = []
     before = {path.name: path.stat().st_mtime_ns for path in copy.glob("cf_*_n*")}
-    build(read_spec(spec), copy, progress=made.append)
-    assert made == ["index and checksums"]
+    build(read_spec(spec), copy, progress=messages.append)
+    assert messages == ["index and checksums"]
     assert before == {path.name: path.stat().st_mtime_ns for path in copy.glob("cf_*_n*")}
 
 
@@ -375,9 +377,9 @@ def test_only_missing_or_damaged_files_are_made_again(built, spec, copy):
     (copy / "cf_rand_n006_s2_qp.nl.gz").write_bytes(b"half")
     (copy / "cf_own_n004_box_parity.json").write_text("{}")
     (copy / ".cf_own_n004_qp.json.abc.part").write_bytes(b"half")
-    made = []
-    build(read_spec(spec), copy, progress=made.append)
-    assert sorted(line.split(": ")[1] for line in made[:-1]) == [
+    messages = []
+    build(read_spec(spec), copy, progress=messages.append)
+    assert sorted(line.split(": ")[1] for line in messages[:-1]) == [
         "cf_own_n004_box_parity",
         "cf_own_n004_milp",
         "cf_rand_n006_s2_qp",
@@ -422,9 +424,9 @@ def test_a_build_that_was_killed_continues_and_leaves_nothing_half_written(begun
     assert 0 < len(early) < len(whole)
     assert all(whole[name] == data for name, data in early.items())
     done = [name for name in early if re.fullmatch(r"cf_\w+", name.removesuffix(".json"))]
-    made = []
-    build(read_spec(spec), out, progress=made.append)
-    again = {line.split(": ")[1] + ".json" for line in made[:-1]}
+    messages = []
+    build(read_spec(spec), out, progress=messages.append)
+    again = {line.split(": ")[1] + ".json" for line in messages[:-1]}
     assert not again & set(done)
     assert content(out) == whole
 

@@ -69,13 +69,15 @@ def test_a_certificate_proves_all_entries_that_minimise_its_norm(built):
     assert bound["certificate"] == f"{STEM}.l1.certificate.npz"
     assert read_certificate(built / bound["certificate"]).norm == 1
     for other in (f"{STEM}_qp", f"{STEM}_box_exact"):
-        assert not [each for each in document(built, other)["bounds"] if "certificate" in each]
+        assert not [claim for claim in document(built, other)["bounds"] if "certificate" in claim]
     assert verify_library(built) == []
 
 
 def test_it_lies_in_the_library_with_its_checksum_and_its_checker(built):
     assert CERTIFICATE in (built / "SHA256SUMS").read_text()
-    assert CERTIFICATE in {each["file"] for each in document(built, f"{STEM}.about")["certificates"].values()}
+    assert CERTIFICATE in {
+        facts["file"] for facts in document(built, f"{STEM}.about")["certificates"].values()
+    }
     command = [sys.executable, built / "check_certificate.py", built / CERTIFICATE]
     assert subprocess.run(command, check=False, capture_output=True).returncode == 0
     assert (built / CERTIFICATE).stat().st_size < 100_000
@@ -131,5 +133,5 @@ def test_points_with_a_damaged_document_are_refused(lib, change_it, words):
 def test_a_rung_may_do_without(tmp_path):
     spec = spec_of(tmp_path, SPEC.replace("[3]", "[3]\nprove = false"))
     assert not any(planned.recipe.prove for planned in plan_library(spec))
-    for each in plan_library(default_spec()):
-        assert each.recipe.prove == (NORMS if each.recipe.gauge == "strokes" else ())
+    for shipped in plan_library(default_spec()):
+        assert shipped.recipe.prove == (NORMS if shipped.recipe.gauge == "strokes" else ())

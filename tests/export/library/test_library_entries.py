@@ -105,9 +105,9 @@ def test_an_entry_has_the_certificate_of_its_norm(name, norm):
 def test_a_proof_finds_no_better_point_than_the_known_one():
     norms = {"minlp-parity": 2, "miqcp-bilinear": "mixed", "milp-mccormick": 1}
     drawn = [
-        each
-        for each in (*cf.entries(rung="medium"), *cf.entries(rung="large"))
-        if each.facts["formulation"] in norms and not each.facts["tightened"]
+        known
+        for known in (*cf.entries(rung="medium"), *cf.entries(rung="large"))
+        if known.facts["formulation"] in norms and not known.facts["tightened"]
     ]
     for entry in np.random.default_rng(0).choice(drawn, 5, replace=False):
         proof = cf.prove(entry.instance, norm=norms[entry.facts["formulation"]], work=3_000_000)

@@ -86,14 +86,14 @@ def test_a_bad_family_is_named_with_its_place_and_remedy(tmp_path, case):
 
 def test_a_family_that_states_nothing_more_has_the_recipes_of_before():
     """Digests of recipes are in every document, so a new key there would change files that exist."""
-    found = [planned.recipe.document() for planned in plan_library(default_spec())]
-    assert {key for document in found for key in document} == {
+    recipes = [planned.recipe.document() for planned in plan_library(default_spec())]
+    assert {key for document in recipes for key in document} == {
         *("name", "sketch", "rung", "size", "seed", "gauge", "prove", "added")
     }
-    assert {key for document in found for key in document["sketch"]} == {
+    assert {key for document in recipes for key in document["sketch"]} == {
         *("kind", "what", "title", "sha256", "origin")
     }
-    sketch = next(each for each in default_spec().document()["sketches"] if "random" in each)
+    sketch = next(listed for listed in default_spec().document()["sketches"] if "random" in listed)
     assert sketch["seeds"] == [1, 2, 3]
     assert sketch.keys() <= tomllib.loads(SPEC)["sketches"][0].keys() | {
         *("title", "rungs", "sizes", "author", "license", "source", "added")
@@ -105,11 +105,11 @@ def test_a_family_that_states_nothing_more_has_the_recipes_of_before():
 
 def test_proven_points_are_optimal_under_the_gauge_strokes(built):
     exact = [entry for entry in built.entries if entry["formulation"] == "miqp-exact"]
-    assert {(each["source"]["gauge"], each["status"]) for each in exact} == {
+    assert {(sidecar["source"]["gauge"], sidecar["status"]) for sidecar in exact} == {
         ("strokes", "optimal"),
         ("box", "best known"),
     }
-    assert {each["solved"]["by"] for each in exact if each["status"] == "optimal"} == {"certificate"}
+    assert {sidecar["solved"]["by"] for sidecar in exact if sidecar["status"] == "optimal"} == {"certificate"}
 
 
 def test_less_work_gives_the_same_instances_and_points_of_no_lower_energy(built, tmp_path):
@@ -126,9 +126,9 @@ def test_less_work_gives_the_same_instances_and_points_of_no_lower_energy(built,
         for name in names:
             file = f"{name}.instance.json"
             assert (less.folder / file).read_bytes() == (built.folder / file).read_bytes()
-        energies[points] = [read_field(less.folder / f"{each}.field.json").energy().total for each in names]
-    proven = [read_field(built.folder / f"{each}.field.json").energy().total for each in names]
-    assert all(map(lambda *each: each[0] <= each[1] + 1e-12, proven, energies["greedy"]))
+        energies[points] = [read_field(less.folder / f"{one}.field.json").energy().total for one in names]
+    proven = [read_field(built.folder / f"{one}.field.json").energy().total for one in names]
+    assert all(map(lambda *one: one[0] <= one[1] + 1e-12, proven, energies["greedy"]))
     assert sum(energies["greedy"]) < sum(energies["none"])
 
 

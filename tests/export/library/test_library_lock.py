@@ -118,7 +118,7 @@ def field(opened, record):
 def test_a_worse_field_does_not_replace_a_better_one_that_came_meanwhile(lib, record, field):
     for solver, primal in (("first", 2.0), ("second", 3.0), ("third", 1.0)):
         add_record(lib, replace(record, solver=solver, primal=primal), field)
-    assert {each.solver: each.point is not None for each in read_ledger(lib).records} == {
+    assert {kept.solver: kept.point is not None for kept in read_ledger(lib).records} == {
         "first": False,
         "second": False,
         "third": True,

@@ -98,25 +98,25 @@ def test_a_library_with_points_is_the_same_on_every_processor_and_verifies_there
 def test_a_library_without_points_is_the_same_under_other_kernels(tmp_path):
     spec_of(tmp_path, SEARCHED)
     spec = tmp_path / "spec.toml"
-    found = []
+    libraries = []
     for number, processor in enumerate((PROCESSORS[0], PROCESSORS[-1])):
         folder = tmp_path / str(number)
         on(processor, "build", spec, "-o", folder, "--quiet")
-        found.append(content(folder))
-    first, other = found
+        libraries.append(content(folder))
+    first, other = libraries
     assert other.keys() == first.keys()
     assert [name for name in first if other[name] != first[name]] == []
 
 
 @pytest.mark.slow
 def test_given_points_are_stated_and_the_models_are_those_of_a_search(searched, spec, tmp_path):
-    made = build(read_spec(spec), tmp_path / "lib").folder
-    assert verify_library(made) == []
-    before, after = content(searched), content(made)
+    library = build(read_spec(spec), tmp_path / "lib").folder
+    assert verify_library(library) == []
+    before, after = content(searched), content(library)
     assert before.keys() == after.keys()
     stated = {name for name in before if before[name] != after[name]}
     assert all(name.endswith(".json") or name == "SHA256SUMS" for name in stated)
-    about = read_about(made / f"{STEM}.about.json")
+    about = read_about(library / f"{STEM}.about.json")
     old = read_about(searched / f"{STEM}.about.json")
     assert all(about[key] == old[key] for key in ("fields", "certificates"))
     assert "given" in about
@@ -131,10 +131,10 @@ def test_a_build_with_points_searches_for_nothing(searched, tmp_path):
     about = read_about(known / f"{STEM}.about.json")
     del about["certificates"]
     (known / f"{STEM}.about.json").write_text(json.dumps(about))
-    made = library_of(tmp_path, 'points = "known"\n' + SPEC).folder
-    fields = read_about(made / f"{SADDLE}.about.json")["fields"]
+    library = library_of(tmp_path, 'points = "known"\n' + SPEC).folder
+    fields = read_about(library / f"{SADDLE}.about.json")["fields"]
     assert {field["energy_2norm"] for field in fields.values()} == {poor}
-    assert read_library(made).entry(f"{STEM}_exact")["bounds"] == []
+    assert read_library(library).entry(f"{STEM}_exact")["bounds"] == []
 
 
 @pytest.mark.slow
@@ -143,14 +143,14 @@ def test_a_submission_keeps_given_points_and_another_build_gives_the_same(search
     known = shutil.copytree(searched, tmp_path / "known")
     worsened(known / f"{SADDLE}.about.json")
     spec = spec_of(tmp_path, 'points = "known"\n' + SPEC)
-    made = build(spec, tmp_path / "lib").folder
-    assert submit_one(made, searched / f"{SADDLE}_exact.sol").better_point
-    assert verify_library(made) == []
+    library = build(spec, tmp_path / "lib").folder
+    assert submit_one(library, searched / f"{SADDLE}_exact.sol").better_point
+    assert verify_library(library) == []
     other = tmp_path / "other"
     other.mkdir()
-    for path in (made / "ledger.json", *made.glob("cf_*_exact.field.json")):
+    for path in (library / "ledger.json", *library.glob("cf_*_exact.field.json")):
         shutil.copy(path, other)
-    assert content(build(spec, other).folder) == content(made)
+    assert content(build(spec, other).folder) == content(library)
 
 
 @pytest.mark.slow
@@ -164,12 +164,12 @@ def test_points_of_another_instance_are_reported_and_do_not_count(searched, tmp_
             renamed = renamed.replace(STEM.encode(), other.encode())
         path.with_name(path.name.replace(STEM, other)).write_bytes(renamed)
     lines = []
-    made = build(spec_of(tmp_path, text), tmp_path / "lib", progress=lines.append).folder
+    library = build(spec_of(tmp_path, text), tmp_path / "lib", progress=lines.append).folder
     assert [line for line in lines if "another instance" in line] == [
         f"{name}: the points given are of another instance; searched for others"
         for name in (f"{other}_box", other)
     ]
-    assert verify_library(made) == []
+    assert verify_library(library) == []
 
 
 @pytest.mark.slow
@@ -196,17 +196,17 @@ def test_the_points_that_ship_are_about_the_shipped_instances():
     assert sum(path.stat().st_size for path in spec.points.iterdir()) < 12_000_000
     points = read_points(spec.points)
     for planned in plan_library(spec):
-        given = points(planned.recipe.name)
-        assert given.instance == make_instance(planned.recipe).sha256
+        known = points(planned.recipe.name)
+        assert known.instance == make_instance(planned.recipe).sha256
         for role in ROLES:
-            field, facts = given.field(role).field, given.about["fields"][role]
-            assert field.instance.sha256 == given.instance
+            field, facts = known.field(role).field, known.about["fields"][role]
+            assert field.instance.sha256 == known.instance
             for norm in NORMS:
                 assert field.energy(norm).total == facts[f"energy_{norm}norm"]
-        certificates = given.certificates(make_instance(planned.recipe), NORMS)
-        assert all(found.facts["status"] == "optimal" for found in certificates)
+        certificates = known.certificates(make_instance(planned.recipe), NORMS)
+        assert all(certificate.facts["status"] == "optimal" for certificate in certificates)
         if planned.recipe.rung in {"tiny", "small"}:
-            assert tuple(found.norm for found in certificates) == planned.recipe.prove
+            assert tuple(certificate.norm for certificate in certificates) == planned.recipe.prove
 
 
 # Grades

@@ -110,7 +110,7 @@ def test_index_and_texts_state_the_release(mixed):
     assert [shown[key] for key in ("title", "version", "date-released")] == [
         release[key] for key in ("title", "version", "date")
     ]
-    assert [each["name"] for each in shown["authors"]] == release["authors"]
+    assert [author["name"] for author in shown["authors"]] == release["authors"]
     assert shown["references"][0]["doi"] == "10.1145/2710026"
     assert "Extrapolating curvature lines" in shown["message"]
     assert "## 1.2, 2026-03-01" in texts(mixed)["CHANGELOG.md"]

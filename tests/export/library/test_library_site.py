@@ -222,7 +222,7 @@ def test_texts_of_files_are_escaped_everywhere(other_library, tmp_path):
     for path in (tmp_path / "web").rglob("*.html"):
         page = Page(path)
         assert [attributes.get("defer") for attributes in page.all("script")] == [None]
-        assert not [each for _, each in page.elements if "onerror" in each]
+        assert not [values for _, values in page.elements if "onerror" in values]
         assert not page.misplaced
         assert page.open == []
     shown = Page(tmp_path / "web" / "entry" / f"{ENTRY}.html")
@@ -269,15 +269,17 @@ def test_pages_are_well_formed_and_accessible(pages):
         assert len(set(page.ids)) == len(page.ids)
         assert all("alt" in image for image in page.all("img"))
         assert len(page.all("caption")) == len(page.all("table"))
-        assert all(each.get("scope") for each in page.all("th"))
+        assert all(attributes.get("scope") for attributes in page.all("th"))
         assert all(nav.get("aria-label") for nav in page.all("nav"))
         assert all(
-            {"aria-label", "aria-labelledby"} & set(each)
-            for _, each in page.elements
-            if each.get("role") == "region"
+            {"aria-label", "aria-labelledby"} & set(attributes)
+            for _, attributes in page.elements
+            if attributes.get("role") == "region"
         )
         assert all(
-            each["aria-labelledby"] in page.ids for _, each in page.elements if "aria-labelledby" in each
+            attributes["aria-labelledby"] in page.ids
+            for _, attributes in page.elements
+            if "aria-labelledby" in attributes
         )
         levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
         assert levels[0] == 1
@@ -297,7 +299,7 @@ def test_an_entry_shows_its_sidecar(library, site, pages):
             repr(entry["best"]["objective"] + 0.0),
             *(repr(bound["bound"] + 0.0) for bound in entry["bounds"]),
         ]
-        assert {each for each in wanted if each not in texts} == set()
+        assert {word for word in wanted if word not in texts} == set()
         download = [anchor["href"] for anchor in page.all("a") if "download" in anchor]
         assert {f"../files/{file['name']}" for file in entry["files"]} <= set(download)
 
@@ -322,13 +324,13 @@ def test_pictures_hold_the_strokes_and_the_singularities(library, site):
         instance = read_instance(library.folder / entry["instance"]["file"])
         field = read_field(library.folder / f"{name}.field.json")
         picture = ET.parse(site / "pictures" / f"{name}.svg").getroot()
-        strokes = [each.get("d").count("M") for each in picture if each.get("stroke") == STROKE]
+        strokes = [element.get("d").count("M") for element in picture if element.get("stroke") == STROKE]
         assert sum(strokes) == len(instance.theta)
         drawn = ET.parse(site / "pictures" / f"{name}.field.svg").getroot()
-        crosses = [each.get("d").count("M") for each in drawn if each.get("stroke") in FAMILIES]
+        crosses = [element.get("d").count("M") for element in drawn if element.get("stroke") in FAMILIES]
         assert crosses == [instance.grid.size, instance.grid.size]
         index = field.singularities.index
-        dots = {each.get("fill"): len(each) for each in drawn if each.tag.endswith("}g")}
+        dots = {element.get("fill"): len(element) for element in drawn if element.tag.endswith("}g")}
         assert (dots.get(POSITIVE, 0), dots.get(NEGATIVE, 0)) == (sum(index > 0), sum(index < 0))
         assert count_singularities(field).startswith(f"{len(index) or 'no'} singularit")
 
@@ -371,7 +373,7 @@ def shown_rows(browser):
 def head(browser, title):
     """The head of a column of the table."""
     (column,) = [
-        each for each in browser.find_elements("css selector", "#table thead th") if each.text == title
+        cell for cell in browser.find_elements("css selector", "#table thead th") if cell.text == title
     ]
     return column
 
@@ -386,7 +388,7 @@ def test_no_page_complains_or_asks_anything_of_another_place(browser, address):
             "return [...document.images].every(each => each.complete ? each.naturalWidth : true)"
         )
     assert browser.get_log("browser") == []
-    events = [json.loads(each["message"])["message"] for each in browser.get_log("performance")]
+    events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
     asked = {
         event["params"]["request"]["url"]
         for event in events
@@ -413,12 +415,12 @@ def test_a_click_on_a_head_sorts_by_value_and_what_is_missing_comes_last(browser
             find(head(browser, title), "button").click()
             assert head(browser, title).get_attribute("aria-sort") == order
             held = [row[column] for row in shown_rows(browser)]
-            known = [float(each) for each in held if each]
+            known = [float(cell) for cell in held if cell]
             assert known == sorted(known, reverse=order == "descending")
-            assert all(not each for each in held[len(known) :])
+            assert all(not cell for cell in held[len(known) :])
     assert len(known) < len(held)
     others = [
-        each.get_attribute("aria-sort") for each in browser.find_elements("css selector", "#table thead th")
+        cell.get_attribute("aria-sort") for cell in browser.find_elements("css selector", "#table thead th")
     ]
     assert others.count("none") == len(others) - 1
     find(head(browser, "Name"), "button").click()
@@ -441,15 +443,15 @@ def test_everything_works_from_the_keyboard(browser, address):
     assert focused.rect["y"] >= 0
     press(browser, Keys.ENTER)
     assert browser.switch_to.active_element.get_attribute("id") == "main"
-    seen = []
-    while "Variables" not in seen:
+    names = []
+    while "Variables" not in names:
         press(browser, Keys.TAB)
         focused = browser.switch_to.active_element
         style = "const s = getComputedStyle(arguments[0]); return s.outlineStyle + parseFloat(s.outlineWidth)"
         assert browser.execute_script(style, focused) == "solid3"
-        seen.append(focused.get_attribute("name") or focused.text)
-        assert len(seen) < 60
-    assert {"q", "family", "status", "Clear", "Name"} <= set(seen)
+        names.append(focused.get_attribute("name") or focused.text)
+        assert len(names) < 60
+    assert {"q", "family", "status", "Clear", "Name"} <= set(names)
     press(browser, Keys.ENTER)
     assert head(browser, "Variables").get_attribute("aria-sort") == "ascending"
     press(browser, Keys.SPACE)
@@ -522,7 +524,7 @@ def test_the_filtered_entries_are_downloaded_as_one_archive(browser, address, li
     for entry in ("cf_mouse_n006_milp", "cf_rand_n006_s1_milp"):
         sidecar = library.entry(entry)
         wanted |= {f"{entry}.json", sidecar["instance"]["file"], *(file["name"] for file in sidecar["files"])}
-    assert files == {each: (library.folder / each).read_bytes() for each in wanted}
+    assert files == {path: (library.folder / path).read_bytes() for path in wanted}
 
 
 def test_it_works_from_a_folder_without_any_server(browser, site):

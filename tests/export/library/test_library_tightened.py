@@ -60,7 +60,7 @@ def test_it_has_the_optimum_of_its_plain_entry_and_names_its_certificate(built):
         assert (stated["certificate"], stated["plain"]) == (file, plain["name"])
         assert plain["name"] in [relation["entry"] for relation in narrow["equivalent"]]
         assert "tightened" not in plain
-        windows = [problem_of(built, each).blocks["alpha"] for each in (narrow, plain)]
+        windows = [problem_of(built, entry).blocks["alpha"] for entry in (narrow, plain)]
         width = [(block.upper - block.lower).sum() for block in windows]
         assert width[0] < width[1]
     rows = read_table(built.folder / "entries.csv")
@@ -91,19 +91,19 @@ def test_a_solver_finds_the_proven_optimum(built, token, solver):
 
 
 def test_an_entry_without_a_certificate_is_skipped_with_its_reason(tmp_path):
-    made = library_of(tmp_path, SPEC.replace("proven", "greedy"))
-    assert made.skipped == {
+    library = library_of(tmp_path, SPEC.replace("proven", "greedy"))
+    assert library.skipped == {
         f"{STEM}_{token}_tight": f"{STEM} has no certificate in the {norm}-norm; {REMEDY}"
         for token, norm in (("exact", 2), ("milp", 1))
     }
-    assert not any("tight" in name for name in made.document["entries"])
-    assert f"{STEM}_exact_tight: {STEM} has no certificate" in (made.folder / "README.md").read_text()
-    assert verify_library(made.folder) == []
-    proof = cf.prove(cf.read_instance(made.folder / f"{STEM}.instance.json"), jobs=1)
+    assert not any("tight" in name for name in library.document["entries"])
+    assert f"{STEM}_exact_tight: {STEM} has no certificate" in (library.folder / "README.md").read_text()
+    assert verify_library(library.folder) == []
+    proof = cf.prove(cf.read_instance(library.folder / f"{STEM}.instance.json"), jobs=1)
     cf.write_certificate(proof, tmp_path / "it.npz")
-    assert [each.outcome for each in submit(made.folder, [tmp_path / "it.npz"])] == ["accepted"]
-    assert f"{STEM}_exact_tight" in json.loads((made.folder / "library.json").read_text())["entries"]
-    assert verify_library(made.folder) == []
+    assert [result.outcome for result in submit(library.folder, [tmp_path / "it.npz"])] == ["accepted"]
+    assert f"{STEM}_exact_tight" in json.loads((library.folder / "library.json").read_text())["entries"]
+    assert verify_library(library.folder) == []
 
 
 def test_a_build_counts_the_entries_that_await_a_certificate_and_warns_of_none(tmp_path, capfd):
@@ -118,7 +118,7 @@ def test_a_field_outside_the_windows_is_not_better_and_not_refused(lib, tmp_path
     path = tmp_path / "worse.npz"
     field = cf.power_field(cf.read_instance(lib / f"{STEM}.instance.json"))
     cf.write_field(field, path)
-    assert [each.outcome for each in submit(lib, [path])] == ["not better"]
+    assert [result.outcome for result in submit(lib, [path])] == ["not better"]
 
 
 @pytest.mark.parametrize(

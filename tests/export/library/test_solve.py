@@ -47,16 +47,16 @@ def copy(small, tmp_path):
     return shutil.copytree(small, tmp_path / "copy")
 
 
-def record_of(lib, solver, name=MILP, **given):
+def record_of(lib, solver, name=MILP, **changes):
     sidecar = read_sidecar(lib / f"{name}.json")
-    facts = {"status": "optimal", "bound": sidecar["best"]["objective"]} | given
+    facts = {"status": "optimal", "bound": sidecar["best"]["objective"]} | changes
     return Record(name, sidecar["problem_sha256"], solver, "1", **facts)
 
 
 # bounds and status
 
 
-def test_the_rule_of_bounds():
+def test_a_bound_a_little_above_a_point_is_cut_and_one_far_above_is_refuted():
     """A little above a feasible point a bound is cut to it; far above it is wrong."""
     assert cut_bound(8.4e-9, 1.3e-28) == 1.3e-28
     assert not is_refuted(8.4e-9, 1.3e-28)
@@ -69,10 +69,10 @@ def test_the_rule_of_bounds():
 def test_agreement_needs_three_makers_whatever_the_order():
     """Every three programs of the table agree when, and only when, their makers differ."""
     for chosen in combinations(SOLVERS.values(), 3):
-        records = [Record("cf_a", "0" * 64, each.title, "1", "optimal", bound=1.0) for each in chosen]
-        different = len({each.maker for each in chosen}) == 3
-        for given in (records, records[::-1]):
-            assert ("solved" in entry_status(1.0, [], given, "cf_a")) == different
+        records = [Record("cf_a", "0" * 64, solver.title, "1", "optimal", bound=1.0) for solver in chosen]
+        different = len({solver.maker for solver in chosen}) == 3
+        for ordered in (records, records[::-1]):
+            assert ("solved" in entry_status(1.0, [], ordered, "cf_a")) == different
         assert "solved" not in entry_status(1.0, [], [replace(records[0], bound=0.9), *records[1:]], "cf_a")
     assert MAKERS["CPLEX in GAMS"] == MAKERS["CPLEX"]
 
@@ -111,8 +111,8 @@ def test_a_bound_above_the_point_is_cut_or_refused(above, error, lib):
     if error is not None:
         with pytest.raises(error, match=r"ledger\.json: has the bound .* take its record out"):
             rebuild(lib)
-        found = {finding.file: finding.what for finding in verify_library(lib)}
-        assert f"has the bound {best + above!r}" in found["ledger.json"]
+        defects = {finding.file: finding.what for finding in verify_library(lib)}
+        assert f"has the bound {best + above!r}" in defects["ledger.json"]
         return
     again = rebuild(lib).entry(MILP)
     assert again["bound"] == best == max(bound["bound"] for bound in again["bounds"])
@@ -129,7 +129,7 @@ def test_measured_bounds_above_a_point_found_later_are_dropped_and_others_stay(l
     for record in (wrong, right):
         add_record(lib, record)
     drop_refuted_bounds(read_library(lib))
-    after = {each.solver: each.bound for each in read_ledger(lib).records}
+    after = {kept.solver: kept.bound for kept in read_ledger(lib).records}
     assert after == {"Xpress": None, "HiGHS": right.bound}
 
 
@@ -168,7 +168,7 @@ def test_every_installed_program_solves_its_problems(opened, tmp_path):
     ]
     records = solve_library(lib, solvers=[*names, "highs"], time_limit=60.0, machine="a machine")
     best = read_sidecar(lib / f"{MILP}.json")["best"]["objective"]
-    mine = {each["solver"]: each for each in records if each["entry"] == MILP}
+    mine = {facts["solver"]: facts for facts in records if facts["entry"] == MILP}
     assert set(mine) == {SOLVERS[name].title for name in [*names, "highs"]}
     for record in mine.values():
         assert record["primal"] == pytest.approx(best, abs=2e-6)
@@ -218,7 +218,7 @@ def test_an_interrupted_rebuild_is_completed_by_the_next_solve(copy):
     findings = verify_library(copy)
     assert {"ledger.json"} <= {finding.file for finding in findings}
     assert not [finding for finding in findings if finding.remedy.startswith("remove")]
-    assert [each["entry"] for each in solve_library(copy, solvers=["highs"], time_limit=250.0)] == [
+    assert [record["entry"] for record in solve_library(copy, solvers=["highs"], time_limit=250.0)] == [
         "cf_a_n003_qp"
     ]
     assert verify_library(copy) == []

@@ -75,7 +75,7 @@ def entry_of(lib, name=MILP):
 
 def test_a_certificate_makes_every_entry_of_the_2_norm_optimal(lib, sent, tmp_path):
     before = {name: entry_of(lib, f"{STEM}_{name}") for name in ("exact", "cubic")}
-    assert {(each["status"], each["difficulty"]) for each in before.values()} == {("best known", "open")}
+    assert {(facts["status"], facts["difficulty"]) for facts in before.values()} == {("best known", "open")}
     result = submit_one(lib, sent / "s6.npz", by="A. Name")
     assert (result.kind, result.outcome, result.status) == ("certificate", "accepted", "optimal")
     assert set(result.entries) == {f"{STEM}_exact", f"{STEM}_cubic"}
@@ -117,8 +117,8 @@ def test_the_command_states_by_how_much_a_point_must_be_better(lib, sent, capsys
 
 def test_an_entry_stands_for_a_manifest_when_its_answer_is_read(lib, sent, tmp_path):
     """The field of the answer, which only the sidecar and the instance next to it describe."""
-    given = ["read", str(sent / f"{MILP}.sol"), "--manifest", str(lib / f"{MILP}.json")]
-    assert invoke([*given, "-o", str(tmp_path / "f.npz"), "--quiet"]) == 0
+    command = ["read", str(sent / f"{MILP}.sol"), "--manifest", str(lib / f"{MILP}.json")]
+    assert invoke([*command, "-o", str(tmp_path / "f.npz"), "--quiet"]) == 0
     field = cf.read_field(tmp_path / "f.npz")
     problem = problem_of(lib, entry_of(lib))
     stated = re.search(r"^Objective (\S+)", (sent / f"{MILP}.sol").read_text(), re.MULTILINE)
@@ -139,13 +139,19 @@ def test_files_of_all_kinds_in_one_call_are_one_rebuild_with_the_result_of_singl
     expected = [submit_one(single, file) for file in files]
     rebuilds, rebuild = [], submission.rebuild_locked
     monkeypatch.setattr(submission, "rebuild_locked", lambda *a, **k: rebuilds.append(1) or rebuild(*a, **k))
-    found = submit(lib, files)
+    results = submit(lib, files)
     assert len(rebuilds) == 1
-    assert [each.kind for each in found] == ["certificate", "field", "field", "solution", "certificate"]
-    assert [(each.outcome, each.entries, each.objective) for each in found] == [
-        (each.outcome, each.entries, each.objective) for each in expected
+    assert [result.kind for result in results] == ["certificate", "field", "field", "solution", "certificate"]
+    assert [(result.outcome, result.entries, result.objective) for result in results] == [
+        (result.outcome, result.entries, result.objective) for result in expected
     ]
-    assert [each.outcome for each in found] == ["accepted", "not better", "accepted", "accepted", "accepted"]
+    assert [result.outcome for result in results] == [
+        "accepted",
+        "not better",
+        "accepted",
+        "accepted",
+        "accepted",
+    ]
     assert content(single) == content(lib)
     assert verify_library(lib) == []
 
@@ -168,7 +174,7 @@ def test_refused_files_do_not_stop_the_others(lib, sent, tmp_path, capsys):
     errors = complaints(shown.err).splitlines()
     assert [line.split(": ")[1] for line in errors] == files
     assert "of an instance that is not in the library" in errors[0]
-    outcomes = [each["outcome"] for each in json.loads(shown.out)]
+    outcomes = [result["outcome"] for result in json.loads(shown.out)]
     assert outcomes == ["refused"] * len(files) + ["accepted"]
     assert invoke(command) == 1
     assert "not better" in capsys.readouterr().out
@@ -177,9 +183,9 @@ def test_refused_files_do_not_stop_the_others(lib, sent, tmp_path, capsys):
 
 
 def test_a_folder_is_submitted_without_the_files_of_other_kinds(lib, sent):
-    found = submit(lib, [sent])
-    skipped = {each.file.suffix for each in found if each.outcome == "skipped"}
-    assert "refused" not in {each.outcome for each in found}
+    results = submit(lib, [sent])
+    skipped = {result.file.suffix for result in results if result.outcome == "skipped"}
+    assert "refused" not in {result.outcome for result in results}
     assert skipped == {".obj", ".sings"}
     assert entry_of(lib, f"{STEM}_exact")["status"] == "optimal"
 
@@ -404,7 +410,7 @@ def test_the_best_run_of_each_solver_is_shown(lib):
         add_record(lib, Record(MILP, sha, solver, "1", bound=bound * best, **facts))
     submission.rebuild_locked(lib)
     runs = entry_of(lib)["runs"]
-    assert [(each["solver"], each["bound"] / best) for each in runs] == [
+    assert [(run["solver"], run["bound"] / best) for run in runs] == [
         ("Own", pytest.approx(0.1)),
         ("SCIP", pytest.approx(0.7)),
     ]
@@ -421,7 +427,7 @@ def test_submissions_at_one_moment_are_all_kept(lib, sent):
     assert [other.wait() for other in others] == [0] * len(names)
     ledger = read_ledger(lib)
     assert sorted(record.entry for record in ledger.records if record.point) == [MILP, f"{OTHER}_milp"]
-    assert sorted(each.instance for each in ledger.certificates) == [STEM, OTHER]
+    assert sorted(certificate.instance for certificate in ledger.certificates) == [STEM, OTHER]
     assert verify_library(lib) == []
     assert not (lib / ".lock").exists()
 

@@ -200,19 +200,19 @@ def check_defects(folder, file, words):
 
 
 @pytest.mark.slow
-@for_each("what", SUMS)
-def test_a_change_is_found(what, built, tmp_path):
-    spoil, file, words = SUMS[what]
+@for_each("name", SUMS)
+def test_a_change_is_found(name, built, tmp_path):
+    spoil, file, words = SUMS[name]
     lib = shutil.copytree(built, tmp_path / "lib")
     spoil(lib)
     check_defects(lib, file, words)
 
 
 @pytest.mark.slow
-@for_each("what", SEALED)
-def test_a_change_under_new_checksums_is_found(what, built, tmp_path):
+@for_each("name", SEALED)
+def test_a_change_under_new_checksums_is_found(name, built, tmp_path):
     lib = shutil.copytree(built, tmp_path / "lib")
-    SEALED[what](lib)
+    SEALED[name](lib)
     changed = {path.name for path in lib.iterdir() if path.read_bytes() != (built / path.name).read_bytes()}
     seal(lib)
     assert verify_library(lib)
@@ -221,9 +221,9 @@ def test_a_change_under_new_checksums_is_found(what, built, tmp_path):
 
 
 @pytest.mark.slow
-@for_each("what", REFUSED)
-def test_inputs_that_no_build_takes_are_found(what, built, tmp_path):
-    spoil, file, words = REFUSED[what]
+@for_each("name", REFUSED)
+def test_inputs_that_no_build_takes_are_found(name, built, tmp_path):
+    spoil, file, words = REFUSED[name]
     lib = shutil.copytree(built, tmp_path / "lib")
     spoil(lib)
     seal(lib)

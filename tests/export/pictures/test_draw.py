@@ -46,10 +46,10 @@ def frame_of(picture):
     return [side[at] for side in sides for at in (0, -1)]
 
 
-def place(found, picture):
+def place(dots, picture):
     """Middle of the found dots as (across, down), 0 to 1 within the outline."""
     top, bottom, left, right = frame_of(picture)
-    y, x = np.nonzero(found[top : bottom + 1, left : right + 1])
+    y, x = np.nonzero(dots[top : bottom + 1, left : right + 1])
     return x.mean() / (right - left), y.mean() / (bottom - top)
 
 

@@ -122,9 +122,9 @@ def test_a_bitmap_is_embedded_as_its_ink_alone(tmp_path):
     assert (element.get("width"), element.get("height")) == ("150", "110")
     kind, data = element.get("{http://www.w3.org/1999/xlink}href").split(",")
     assert kind == "data:image/png;base64"
-    found = Image.open(io.BytesIO(base64.b64decode(data)))
-    pixels = np.asarray(found.convert("RGBA"))
-    assert found.info.keys() <= {"transparency"}
+    embedded = Image.open(io.BytesIO(base64.b64decode(data)))
+    pixels = np.asarray(embedded.convert("RGBA"))
+    assert embedded.info.keys() <= {"transparency"}
     assert pixels[5, 5, 3] == 0
     assert pixels[60, 70].tolist() == [*bytes.fromhex(INK["red"][1:]), 255]
     assert pixels[30, 70].tolist() == [*bytes.fromhex(INK["black"][1:]), 255]
@@ -152,11 +152,11 @@ def test_a_drawing_in_space_lies_below_its_field_as_the_field_saw_it(tmp_path):
     path.write_text("".join(f"v {len(row.splitlines())}\n{row}\n" for row in rows))
     instance = read_sketch(path, size=12, view="60, 25")
     assert (instance.source, instance.view) == ("a.curves", "60, 25")
-    seen = read_curves(path.read_bytes(), "60,25")
+    curves = read_curves(path.read_bytes(), "60,25")
     with pytest.raises(InputError, match=r"lies elsewhere .* from the same side"):
         read_underlay(path, on=replace(instance, view=None))
     write_instance(instance, tmp_path / "a.json")
-    assert read_underlay(path, on=read_instance(tmp_path / "a.json")).page == seen.page
+    assert read_underlay(path, on=read_instance(tmp_path / "a.json")).page == curves.page
     with pytest.raises(InputError, match=r"b.svg: is flat: only a .curves file can be seen from 60, 25"):
         read_underlay(svg(tmp_path / "b.svg"), on=instance)
 

@@ -153,9 +153,9 @@ def test_spirals_keep_their_distance_from_themselves():
 @pytest.mark.parametrize("index", [0.25, -0.25])
 def test_lines_end_at_a_singularity(index):
     field = quarter(25, index, 0.45, 0.55)
-    found = field.singularities
-    assert found.index.tolist() == [index]
-    centre = np.array([found.column[0] + 0.5, -found.row[0] - 0.5])
+    singularities = field.singularities
+    assert singularities.index.tolist() == [index]
+    centre = np.array([singularities.column[0] + 0.5, -singularities.row[0] - 0.5])
     away = np.abs(all_points(streamlines(field, 0.7)) - centre).max(axis=1)
     assert 0.5 - 1e-9 < away.min() < 0.8
 
@@ -186,7 +186,7 @@ def test_combing_keeps_the_crosses_and_cuts_only_where_it_must():
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 6), (5, 1)])
-def test_tiny_grids(shape):
+def test_tiny_grids_have_streamlines(shape):
     field = field_of(np.ones(shape), lambda x, _: 0.6 + 0 * x, zero)
     lines = streamlines(field, 0.3)
     assert {int(line.families[0]) for line in lines} == {0, 1}

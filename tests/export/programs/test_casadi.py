@@ -40,7 +40,7 @@ def test_only_feasible_points_that_are_lower_are_kept(relaxed):
         value, rows = model.evaluate(point)
         outputs = {"x": point, "f": value, "g": rows}
         multipliers = [np.zeros(watch.sizes[name]) for name in list(watch.sizes)[3:]]
-        assert watch.eval([ca.DM(each) for each in (*outputs.values(), *multipliers)]) == [0]
+        assert watch.eval([ca.DM(column) for column in (*outputs.values(), *multipliers)]) == [0]
         return watch.value
 
     lower = problem.point(cf.power_field(problem.instance))

@@ -39,7 +39,7 @@ Best possible = {bound}
 )
 def test_the_states_of_gams_have_one_meaning(model, solver, bound, status):
     """The driver keeps the bound with every status, and the reader of answers has the same table."""
-    found = gams.outcome_of(OUTPUT.format(model=model, solver=solver, bound=bound))
-    assert (found.status, found.bound) == (status, bound)
+    outcome = gams.outcome_of(OUTPUT.format(model=model, solver=solver, bound=bound))
+    assert (outcome.status, outcome.bound) == (status, bound)
     if status is not Status.OPTIMAL_GLOBAL:
         assert status_of_gams(model, solver)[0] is status

@@ -47,10 +47,10 @@ def test_a_finer_normal_map_has_unit_normals_near_those_of_the_pixels():
 
 
 def test_a_plane_has_one_normal_up_to_its_border():
-    found = fine(plane(9, 0.5, -1.0), 7)
+    picture = fine(plane(9, 0.5, -1.0), 7)
     normal = np.array([-0.5, 1.0, 1.0]) / 1.5
-    assert np.abs(found.normals[found.opacity > 0] - normal).max() < 1e-12
-    assert np.abs(np.linalg.norm(found.normals, axis=-1) - 1).max() < 1e-12
+    assert np.abs(picture.normals[picture.opacity > 0] - normal).max() < 1e-12
+    assert np.abs(np.linalg.norm(picture.normals, axis=-1) - 1).max() < 1e-12
 
 
 def outlined(mask, scale=8):
@@ -118,10 +118,10 @@ def test_light_comes_back_with_the_cosine_and_mirrored_light_is_mirrored():
     assert frontal[:3] == pytest.approx(encoded(1.09 + 0.08 * np.sqrt(0.5)))
     side = shade_by_light(Raster(np.array([[[0.8, 0.0, 0.6]]]), one), Light(np.pi, 0.0))[0, 0]
     assert side[:3] == pytest.approx(encoded(0.04 + 0.06 + 0.08 * 0.8))  # in the lamp's shade
-    found = fine(ball(16), 4)
-    left, right = shade_by_light(found, Light(2.0, 0.7)), shade_by_light(found, Light(np.pi - 2.0, 0.7))
+    picture = fine(ball(16), 4)
+    left, right = shade_by_light(picture, Light(2.0, 0.7)), shade_by_light(picture, Light(np.pi - 2.0, 0.7))
     assert np.abs(left - right[:, ::-1]).max() < 1e-9
-    rows, columns = np.nonzero(left[..., 0] == left[found.opacity == 1][:, 0].max())
+    rows, columns = np.nonzero(left[..., 0] == left[picture.opacity == 1][:, 0].max())
     assert rows.mean() < 32
     assert columns.mean() < 32
 
@@ -136,10 +136,10 @@ def test_a_matcap_has_one_colour_for_each_normal_and_all_are_colours():
     grid = np.random.default_rng(1).normal(size=(500, 3))
     normals = np.abs(grid / np.linalg.norm(grid, axis=1, keepdims=True)) * np.sign(grid) ** (1, 1, 2)
     assert (matcap_ball(normals) >= 0).all()
-    found = fine(ball(16), 4)
-    coloured = matcap(found)
+    picture = fine(ball(16), 4)
+    coloured = matcap(picture)
     assert ((coloured >= 0) & (coloured <= 1)).all()
-    turned = Raster(found.normals[::-1], found.opacity[::-1])
+    turned = Raster(picture.normals[::-1], picture.opacity[::-1])
     assert (matcap(turned) == coloured[::-1]).all()
-    light = coloured[found.opacity == 1][:, :3].sum(axis=1)
+    light = coloured[picture.opacity == 1][:, :3].sum(axis=1)
     assert np.ptp(light) > 0.8

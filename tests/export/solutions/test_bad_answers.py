@@ -114,14 +114,14 @@ def test_windows_line_ends_change_nothing(path):
         ),
     ],
 )
-def test_faults_of_binary_files(old, new, fault):
+def test_faults_of_binary_files_are_named(old, new, fault):
     data = (HERE / "asl-20190605_binary.sol").read_bytes()
     assert old in data
     with pytest.raises(SolutionError, match=rf"byte \d+: .*{fault}"):
         parse_raw(data.replace(old, new, 1))
 
 
-def test_files_that_cannot_be_read(tmp_path, monkeypatch):
+def test_files_that_cannot_be_read_are_refused(tmp_path, monkeypatch):
     for path in (tmp_path, tmp_path / "none.sol"):
         with pytest.raises(InputError):
             read_raw(path)
@@ -212,7 +212,7 @@ def test_one_long_name_does_not_widen_all_names():
 @pytest.mark.parametrize(
     "document", [b"[" * 100_000, b'{ "SolutionInfo": {"Status": ' + b"9" * 100_000 + b"}}"]
 )
-def test_hostile_json(document):
+def test_hostile_json_is_refused_or_read(document):
     start = b"" if document.startswith(b"{") else b'{ "SolutionInfo": '
     attempt(start + document)
 

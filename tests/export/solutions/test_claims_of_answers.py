@@ -80,8 +80,8 @@ def by_names(problem, values):
 @pytest.fixture(scope="module")
 def milp():
     field = make_field(make_instance("full"))
-    found = formulate(field.instance, MILP)
-    return found, found.point(field)
+    formulated = formulate(field.instance, MILP)
+    return formulated, formulated.point(field)
 
 
 # claims against the point
@@ -254,14 +254,14 @@ def test_jumps_do_not_wrap_around(milp):
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory):
     """For each reader an answer that a real solver wrote, and its problem; also without zeros."""
-    found = {}
+    by_reader = {}
     for path in sorted(GOOD, key=lambda path: path.suffix == ".txt"):  # answers in other text come last
         reader, status = FILES[path.name]
         if status in WITH_POINT and problem_of(path) in {"milp", "qp", "quartic"}:
-            found.setdefault(reader, (path.read_bytes(), problem(problem_of(path))))
-    data, milp = found["cbc"]
-    found["cbc without zeros"] = (re.sub(rb"(?m)^ +\d+ \S+ +0 .*\n", b"", data), milp)
-    found["cplex without zeros"] = ((TINY / "cplex-22.2.0.1_milp_optimal_nonzero.sol").read_bytes(), milp)
+            by_reader.setdefault(reader, (path.read_bytes(), problem(problem_of(path))))
+    data, milp = by_reader["cbc"]
+    by_reader["cbc without zeros"] = (re.sub(rb"(?m)^ +\d+ \S+ +0 .*\n", b"", data), milp)
+    by_reader["cplex without zeros"] = ((TINY / "cplex-22.2.0.1_milp_optimal_nonzero.sol").read_bytes(), milp)
     folder = tmp_path_factory.mktemp("answers")
     write(milp, folder / "m.mps")
     model = highspy.Highs()
@@ -270,12 +270,12 @@ def answers(tmp_path_factory):
     model.run()
     for style in (0, 4):
         model.writeSolution(str(folder / "x.sol"), style)
-        found[f"highs {style}"] = ((folder / "x.sol").read_bytes(), milp)
+        by_reader[f"highs {style}"] = ((folder / "x.sol").read_bytes(), milp)
     point = read_solution(folder / "x.sol", milp).point[NlOrder(milp).order]
     path = write_ampl_sol(folder / "a.sol", "optimal solution found", point, milp.n_rows, 0)
-    found["ampl text"] = (path.read_bytes(), milp)
-    found["ampl binary"] = (binary_sol(b"optimal solution found", milp, point), milp)
-    return found
+    by_reader["ampl text"] = (path.read_bytes(), milp)
+    by_reader["ampl binary"] = (binary_sol(b"optimal solution found", milp, point), milp)
+    return by_reader
 
 
 def binary_sol(message, of, point):
@@ -320,9 +320,9 @@ def damages(data):
         yield b"".join([*lines[at:], *lines[:at]])
         yield b"".join([*lines[:at], lines[at].rstrip() + b" 7\n", *lines[at + 1 :]])
         yield b"".join([*lines[:at], lines[at].replace(b".", b","), *lines[at + 1 :]])
-    found = list(re.finditer(rb"-?\d+\.?\d*(?:[eE][-+]?\d+)?", data))
+    matches = list(re.finditer(rb"-?\d+\.?\d*(?:[eE][-+]?\d+)?", data))
     for place, value in zip(
-        found[:: max(1, len(found) // 10)],
+        matches[:: max(1, len(matches) // 10)],
         [b"1e300", b"nan", b"-0", b"0x1p3", b"4294967296", b"1e999", b"-1e-300", b"1e5", b"", b"\xff\xfe"]
         * 10,
         strict=False,

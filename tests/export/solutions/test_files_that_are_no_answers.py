@@ -101,7 +101,7 @@ def highs(model, tmp_path_factory):
         ("style3.sol", r"HiGHS, style 3 \(GLPK pretty\).*write_solution_style = 0"),
     ],
 )
-def test_what_highs_writes_besides_its_solution(highs, file, words):
+def test_what_highs_writes_besides_its_solution_is_named(highs, file, words):
     assert re.search(words, refusal(highs / file))
 
 
@@ -118,7 +118,7 @@ def test_the_report_of_glpsol_is_called_one(model, tmp_path):
 
 
 @pytest.mark.needs("gurobi")
-def test_what_gurobi_writes_besides_its_solution(model, tmp_path):
+def test_what_gurobi_writes_besides_its_solution_is_named(model, tmp_path):
     import gurobipy
 
     with (
@@ -145,7 +145,7 @@ def test_what_gurobi_writes_besides_its_solution(model, tmp_path):
 
 
 @pytest.mark.needs("cplex")
-def test_what_cplex_writes_besides_its_solution(model, tmp_path):
+def test_what_cplex_writes_besides_its_solution_is_named(model, tmp_path):
     import cplex
 
     solver = cplex.Cplex(str(model))
@@ -162,7 +162,7 @@ def test_what_cplex_writes_besides_its_solution(model, tmp_path):
 
 @pytest.mark.needs("xpress")
 @pytest.mark.filterwarnings("ignore")
-def test_what_xpress_writes_besides_its_solution(model, tmp_path):
+def test_what_xpress_writes_besides_its_solution_is_named(model, tmp_path):
     import xpress
 
     solver = xpress.problem()
@@ -182,7 +182,7 @@ def test_what_xpress_writes_besides_its_solution(model, tmp_path):
         (b"NAME\nROWS\n N obj\n", r"model file \(MPS\)"),
         (b"p lp min 1 2 3\nn p x\n", r"model file \(GLPK\)"),
     ])  # fmt: skip
-def test_other_siblings_by_their_first_lines(data, words):
+def test_siblings_are_recognised_by_their_first_lines(data, words):
     with pytest.raises(SolutionError, match=words):
         parse_raw(data)
 

@@ -119,17 +119,17 @@ def judged(tmp_path_factory):
 
     def by_read(path):
         try:
-            found = read_solution(path, problem("milp"), tolerance=1e-5)
+            solution = read_solution(path, problem("milp"), tolerance=1e-5)
         except SolutionError:
             return None
-        return None if found.point is None else ("" if found.contradictions else found.objective)
+        return None if solution.point is None else ("" if solution.contradictions else solution.objective)
 
     def by_checker(path):
         try:
-            found = check_point.check(str(folder / "m.mps"), str(path))
+            verdict = check_point.check(str(folder / "m.mps"), str(path))
         except check_point.BadInputError:
             return None
-        return "" if not found.agrees or found.worst > 1e-5 else float(found.objective)
+        return "" if not verdict.agrees or verdict.worst > 1e-5 else float(verdict.objective)
 
     def run(data):
         path = folder / "x.sol"

@@ -36,7 +36,7 @@ def listed(raw):
         b'{"solution": {"a": 1, "b_2": -0.0025}, "status": "feasible"}',
         b'{"status": "feasible", "a": 1, "objective": 3, "b_2": -0.0025}',
     ])  # fmt: skip
-def test_lists_of_names_and_values(data):
+def test_lists_of_names_and_values_are_read(data):
     raw = parse_raw(data)
     assert listed(raw) == {b"a": 1, b"b_2": -0.0025}
     assert (raw.status, raw.omits_zeros) == ("feasible", False)
@@ -56,7 +56,7 @@ def test_lists_of_names_and_values(data):
         (b'{"variables": 3}', "is not a name with a value"),
         (b'{"a": 1,', "line 1: the JSON is damaged or cut off at column 9"),
     ])  # fmt: skip
-def test_faults_in_lists_and_documents(data, fault):
+def test_faults_in_lists_and_documents_are_named(data, fault):
     with pytest.raises(SolutionError, match=fault):
         parse_raw(data)
 
@@ -66,7 +66,7 @@ def test_faults_in_lists_and_documents(data, fault):
         ("unbounded", "unbounded"), ("maxTimeLimit", "limit-with-point"),
         ("globallyOptimal", "optimal-global"), ("Optimal", "optimal-local"), ("words of a tool", "feasible"),
     ])  # fmt: skip
-def test_claims_of_a_plain_document(word, status):
+def test_claims_of_a_plain_document_are_kept(word, status):
     document = {"status": word, "objective": 3.5, "bound": 3, "variables": {"x": 2}}
     raw = parse_raw(json.dumps(document).encode())
     pointless = status in {"infeasible", "unbounded"}
@@ -76,7 +76,7 @@ def test_claims_of_a_plain_document(word, status):
 
 @for_each("code, status", [(1, "optimal-global"), (2, "feasible"), (0, "no-point"), (-1, "infeasible"),
         (-2, "unbounded")])  # fmt: skip
-def test_codes_of_pulp(code, status):
+def test_codes_of_pulp_are_statuses(code, status):
     data = re.sub(rb'"sol_status": \d', b'"sol_status": %d' % code, text("pulp-3.3.2_milp_optimal.json"))
     assert parse_raw(data).status == status
 
@@ -84,7 +84,7 @@ def test_codes_of_pulp(code, status):
 # listings
 
 
-def test_exact_fractions_of_qsopt():
+def test_exact_fractions_of_qsopt_are_numbers():
     third = b"1%b/3%b" % (b"0" * 400, b"0" * 400)
     head = b"status = OPTIMAL\nstatus OPTIMAL\n\tValue = -7/2\nVARS:\n"
     raw = parse_raw(head + b"x = 1/3\ny = -%b\nREDUCED COST:\nx = 5\n" % third)
@@ -115,7 +115,7 @@ def test_python_mip_states_no_objective():
         ("Time Limit Reached", "limit-with-point"), ("Optimal Solution Found", "optimal-global"),
         ("Stopping After Finding First Feasible Solution", "feasible"),
     ])  # fmt: skip
-def test_banners_of_symphony(banner, status):
+def test_banners_of_symphony_are_statuses(banner, status):
     data = text("symphony-5.6.17_milp_optimal.txt").replace(b"Optimal Solution Found", banner.encode())
     assert parse_raw(data).status == status
 
@@ -125,7 +125,7 @@ def test_banners_of_symphony(banner, status):
         ("Integer optimal solution", "optimal-global"), ("Aborted, integer feasible", "limit-with-point"),
         ("Time limit exceeded, integer feasible", "limit-with-point"),
     ])  # fmt: skip
-def test_words_of_cplex(words, status):
+def test_words_of_cplex_are_statuses(words, status):
     data = text("cplex-by-layout_milp_display.txt").replace(b"Integer optimal solution", words.encode())
     raw = parse_raw(data)
     assert (raw.status, raw.objective) == (status, 0.55653608285)
@@ -141,7 +141,7 @@ def test_an_infeasible_problem_in_a_log_of_cplex():
         (1, "optimal-global"), (2, "optimal-local"), (8, "feasible"), (10, "infeasible"), (4, "infeasible"),
         (3, "unbounded"), (14, "limit-without-point"),
     ])  # fmt: skip
-def test_states_in_a_gams_listing(code, status):
+def test_states_in_a_gams_listing_are_statuses(code, status):
     data = text("gams-by-layout_milp_optimal.lst").replace(b"MODEL STATUS      1", b"MODEL STATUS %6d" % code)
     raw = parse_raw(data)
     assert (raw.status, raw.has_point) == (status, status in {"optimal-global", "optimal-local", "feasible"})
@@ -225,7 +225,7 @@ def test_the_best_of_a_pool_is_the_default_and_without_objectives_the_first():
     assert (raw.message, listed(raw)) == ("solution 2 of 2", {b"x": 2})
 
 
-def test_the_pool_of_gurobi():
+def test_a_solution_of_the_pool_of_gurobi_is_chosen_by_number():
     path = TINY / "gurobi-13.0.3_milp_pool.json"
     second = read_raw(path, 2)
     entries = json.loads(path.read_bytes())["Vars"]

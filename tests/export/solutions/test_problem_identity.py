@@ -30,8 +30,8 @@ def solved(ring, tmp_path_factory):
 
 
 def only(folder: Path, pattern: str) -> Path:
-    (found,) = folder.glob(pattern)
-    return found
+    (path,) = folder.glob(pattern)
+    return path
 
 
 def read(solution: Path, manifest: Path, field: Path) -> int:

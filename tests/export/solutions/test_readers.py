@@ -79,7 +79,7 @@ def ampl(
         ("asl-20190605_binary", "ampl-binary", "feasible", [0.1] * 5, 2),
     ],
 )
-def test_files_of_real_solvers(file, reader, status, values, rows):
+def test_files_of_real_solvers_are_read(file, reader, status, values, rows):
     raw = read_raw(HERE / f"{file}.sol")
     assert (raw.reader, raw.status, raw.values.tolist(), raw.rows) == (reader, status, values, rows)
     assert raw.has_point == bool(values)
@@ -117,7 +117,7 @@ def test_files_are_told_by_content_and_may_be_packed(tmp_path):
         ("Words of a later version", "Feasible", "error"),
     ],
 )
-def test_claims_of_highs(words, primal, status):
+def test_claims_of_highs_are_statuses(words, primal, status):
     raw = parse_raw(highs(["a 1"], status=words, primal=primal))
     assert (raw.status, raw.message, raw.values.tolist()) == (status, words, [1])
 
@@ -142,7 +142,7 @@ def test_claims_of_highs(words, primal, status):
         (-1, "error", "error"),
     ],
 )
-def test_solve_codes(code, with_point, without_point):
+def test_solve_codes_are_statuses(code, with_point, without_point):
     tail = f"objno 0 {code}\n"
     assert parse_raw(ampl(tail=tail)).status == with_point
     if without_point:
@@ -185,7 +185,7 @@ def test_infeasible_or_unbounded_is_believed_from_its_words_alone():
 )
 @for_each("duals", [0, 2])
 @for_each("options", [(1, 1, 0), (), (1, 1, 0, 20020401)])
-def test_layouts_of_ampl_text(options, duals, tail):
+def test_every_layout_of_ampl_text_is_read(options, duals, tail):
     raw = parse_raw(ampl(options=options, duals=duals, tail=tail))
     assert (raw.values.tolist(), raw.rows) == ([1.5, -2], 2)
     assert raw.status == ("limit-with-point" if "403" in tail else "feasible")
@@ -235,7 +235,7 @@ def test_values_in_order_belong_to_a_problem_of_the_same_size():
         ("4.9e-324", 5e-324),
     ],
 )
-def test_spellings_of_numbers(text, value):
+def test_every_spelling_of_a_number_is_read(text, value):
     assert parse_raw(ampl(values=(1, text))).values.tolist() == [1, value]
     for data in (
         highs([f"x {text}", "y 1"]).decode().replace("Objective 1", f"Objective {text}"),
@@ -259,7 +259,7 @@ def test_spellings_of_numbers(text, value):
 @for_each(
     "text", ["nan", "1_0", "0x10", "1,5", "--1", "1e", "1.5.3", "e5", "-", "1.#IND", "x" * 64, "1" * 64]
 )
-def test_what_is_not_a_number(text):
+def test_what_is_not_a_number_is_refused(text):
     with pytest.raises(SolutionError, match=r"line 9: "):
         parse_raw(highs(["a 1", f"b {text}", "c 1"]))
     with pytest.raises(SolutionError, match=r"line 13: "):
@@ -393,7 +393,7 @@ def test_values_that_are_not_finite_are_not_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_solve_codes_of_binary_files():
+def test_solve_codes_of_binary_files_are_statuses():
     data = (HERE / "asl-20190605_binary.sol").read_bytes()
     assert parse_raw(data + struct.pack("<4i", 8, 0, 403, 8)).status == "limit-with-point"
     assert parse_raw(data + struct.pack("<3i", 4, 1, 4)).status == "feasible"

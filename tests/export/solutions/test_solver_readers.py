@@ -63,7 +63,7 @@ def swapped(file, old, new):
 
 
 @for_each("path", GOOD)
-def test_reader_status_and_point(path):
+def test_every_file_has_its_reader_its_status_and_its_point(path):
     reader, status = FILES[path.name]
     raw = read_raw(path)
     assert (raw.reader, raw.status) == (reader, status)
@@ -129,7 +129,7 @@ def test_a_missing_column_is_zero_only_where_zeros_are_omitted(tmp_path):
 
 
 @for_each("code", range(1, 21))
-def test_codes_of_gurobi(code):
+def test_codes_of_gurobi_are_statuses(code):
     with_point = {
         "SolutionInfo": {"Status": code, "ObjVal": 3},
         "Vars": [{"VarName": "x", "X": 2}, {"VarName": "y"}],
@@ -167,7 +167,7 @@ def test_the_incumbent_of_a_pool_is_read():
         (118, UNBOUNDED), (104, LIMIT), (107, LIMIT), (113, LIMIT), (131, LIMIT), (108, NOTHING),
         (114, NOTHING), (11, LIMIT), (14, ERROR), (301, ERROR), (9999999, ERROR),
     ])  # fmt: skip
-def test_codes_of_cplex(code, status):
+def test_codes_of_cplex_are_statuses(code, status):
     raw = parse_raw(swapped(f"{C}_qp_optimal.sol", b'StatusValue="1"', f'StatusValue="{code}"'.encode()))
     assert (raw.status, raw.has_point) == (status, status not in {INFEASIBLE, UNBOUNDED})
 
@@ -185,7 +185,7 @@ def test_a_stopped_simplex_claims_a_point_only_when_it_is_feasible():
         ("unbounded", UNBOUNDED, UNBOUNDED), ("unknown", FEASIBLE, SILENT),
         ("words of a later version", ERROR, ERROR),
     ])  # fmt: skip
-def test_words_of_scip(words, status, without_point):
+def test_words_of_scip_are_statuses(words, status, without_point):
     raw = parse_raw(f"solution status: {words}\nobjective value: 3\nx 3 \t(obj:1)\n".encode())
     assert (raw.status, raw.message, raw.values.tolist()) == (status, words, [3])
     raw = parse_raw(f"solution status: {words}\nno solution available\n".encode())
@@ -207,7 +207,7 @@ def test_cbc_with_rows_and_marks_gives_the_same_columns():
         ("Stopped on iterations", LIMIT), ("Stopped on difficulties", ERROR), ("Status unknown", ERROR),
         ("Stopped on time (no integer solution - continuous used)", NOTHING),
     ])  # fmt: skip
-def test_words_of_cbc(words, status):
+def test_words_of_cbc_are_statuses(words, status):
     raw = parse_raw(f"{words} - objective value 3.00000000\n      0 x    3   0\n".encode())
     assert (raw.reader, raw.status, raw.message) == ("cbc", status, words)
     kept = status in WITH_POINT or status == ERROR
@@ -257,7 +257,7 @@ def test_one_comes_first_in_lp_and_last_in_mps(tmp_path, order):
         ("bas", "f u", LIMIT), ("bas", "n u", INFEASIBLE), ("bas", "f n", UNBOUNDED),
         ("bas", "u u", NOTHING), ("bas", "i f", NOTHING),
     ])  # fmt: skip
-def test_letters_of_glpk(kind, letters, status):
+def test_letters_of_glpk_are_statuses(kind, letters, status):
     line = {"mip": "2.5", "ipt": "2.5 7", "bas": "b 2.5 7"}[kind]
     raw = parse_raw(f"s {kind} 1 1 {letters} -3\ni 1 {line}\nj 1 {line}\ne o f\n".encode())
     assert (raw.status, raw.values.tolist()) == (status, [] if status in {INFEASIBLE, UNBOUNDED} else [2.5])
@@ -266,7 +266,7 @@ def test_letters_of_glpk(kind, letters, status):
 @pytest.mark.parametrize(
     "word, value", [("EPS", 0), ("  EPS", 0), ("+INF", np.inf), ("-INF", -np.inf), ("-1.5E+00", -1.5)]
 )
-def test_special_values_of_gams(word, value):
+def test_special_values_of_gams_are_numbers(word, value):
     data = re.sub(rb"(alpha_00_01,).*", rb"\g<1>" + word.encode(), text(f"{A}_conopt_qp_optimal.csv"))
     assert parse_raw(data).values[1] == value
 
@@ -277,7 +277,7 @@ def test_special_values_of_gams(word, value):
         (10, 1, INFEASIBLE), (13, 10, ERROR), (14, 3, NOTHING), (14, 7, ERROR), (19, 1, INFEASIBLE),
         (99, 1, ERROR),
     ])  # fmt: skip
-def test_states_of_gams(model, solver, status):
+def test_states_of_gams_are_statuses(model, solver, status):
     data = text(f"{A}_conopt_qp_optimal.csv").replace(
         b"model_status,2\nsolver_status,1", f"model_status,{model}\nsolver_status,{solver}".encode()
     )

@@ -37,12 +37,12 @@ LATE = {"greedy": 8, "power": 4, "polyvector": 4, "bend": 4, "search": 40, "prov
 def test_a_method_ends_at_its_limit_with_a_valid_field(method, seconds, tmp_path):
     clock = Ticking()
     request = Request(cf.sample("mouse", 12), tmp_path, Limits(seconds, threads=1), clock=clock)
-    *_, found = METHODS[method].find(request)
+    *_, candidate = METHODS[method].find(request)
     assert clock.now <= 1 + seconds + LATE[method]
-    assert np.isfinite(found.field.energy().total)
-    assert (found.field.alpha >= request.instance.alpha_lower - 1e-12).all()
-    assert (found.field.alpha <= request.instance.alpha_upper + 1e-12).all()
-    assert (np.abs(found.field.beta) <= np.pi / 4 + 1e-12).all()
+    assert np.isfinite(candidate.field.energy().total)
+    assert (candidate.field.alpha >= request.instance.alpha_lower - 1e-12).all()
+    assert (candidate.field.alpha <= request.instance.alpha_upper + 1e-12).all()
+    assert (np.abs(candidate.field.beta) <= np.pi / 4 + 1e-12).all()
 
 
 def test_two_stages_without_time_return_the_start(tmp_path):
@@ -91,8 +91,8 @@ def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
 def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsys):
     stale = tmp_path / "mouse.proof.certificate.npz"
     stale.write_bytes(b"of an earlier call")
-    given = ["prove", "mouse", "--size", "24", "--norm", norm, "--time-limit", "0.1", "--json"]
-    assert invoke([*given, "-o", str(tmp_path)]) == 1
+    command = ["prove", "mouse", "--size", "24", "--norm", norm, "--time-limit", "0.1", "--json"]
+    assert invoke([*command, "-o", str(tmp_path)]) == 1
     output = capsys.readouterr()
     assert UNPROVEN in output.err
     assert UNPROVEN in json.loads(output.out)["reason"]
@@ -104,7 +104,7 @@ def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsy
 
 def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
     cf.prove(cf.sample("mouse", 4))  # compiles what proofs need
-    given = ["solve", "mouse", "--size", "24", "-m", "prove", "--time-limit", "0.1", "-o", str(tmp_path)]
-    assert invoke(given) == 0
+    command = ["solve", "mouse", "--size", "24", "-m", "prove", "--time-limit", "0.1", "-o", str(tmp_path)]
+    assert invoke(command) == 0
     assert UNPROVEN in " ".join(capsys.readouterr().err.split())
     assert [path.name for path in tmp_path.iterdir()] == ["mouse.prove.field.npz"]

@@ -30,7 +30,7 @@ def solvers():
 
 def answers(problem, solvers, folder, only=tuple(BUNDLED)):
     """The answers of the solvers that take a problem, by solver and format; None where they fail honestly."""
-    found = {}
+    solutions = {}
     for solver, form in [(name, form) for name in only for form in BUNDLED[name]]:
         taking = suitability_in_format(problem, solver, form).answer
         if taking != "yes" and (taking, solver) != ("local", "ipopt"):
@@ -40,7 +40,7 @@ def answers(problem, solvers, folder, only=tuple(BUNDLED)):
         except UnsupportedByFormatError as error:
             if "readers drop or refuse values" not in str(error):  # a weight is too small for files
                 raise
-            found[solver, form] = None
+            solutions[solver, form] = None
             continue
         files = SolveFiles.for_model(folder / f"{solver}.{form}", solver)
         limits = cf.Limits(SECONDS, gap=0.0)
@@ -49,20 +49,20 @@ def answers(problem, solvers, folder, only=tuple(BUNDLED)):
         except SolverError as error:
             if "ended with an error" not in str(error):  # Bonmin, with great weights
                 raise
-            found[solver, form] = None
+            solutions[solver, form] = None
             continue
         except SolutionError as error:
             weights = problem.instance.stroke_coefficient, problem.instance.skew_coefficient
             # Without a cost, a column that is bounded from one side only may go to infinity.
             if min(weights) > 0 or "no column" not in str(error):
                 raise
-            found[solver, form] = None
+            solutions[solver, form] = None
             continue
         again = cf.read_solution(files.solution, held)
         assert (again.status, again.objective) == (solution.status, solution.objective)
         assert_consistent(held, solution)
-        found[solver, form] = solution
-    return found
+        solutions[solver, form] = solution
+    return solutions
 
 
 def assert_consistent(held, solution):
@@ -83,10 +83,12 @@ def assert_consistent(held, solution):
     )
 
 
-def optima(found):
+def optima(solutions):
     """Objectives of optimal answers, each with the greatest amount that its broken rows saved."""
-    points = [each for each in found.values() if each is not None and each.status in OPTIMAL]
-    return [(each.objective, objective_leeway(each.problem, each.point)) for each in points]
+    points = [
+        solution for solution in solutions.values() if solution is not None and solution.status in OPTIMAL
+    ]
+    return [(solution.objective, objective_leeway(solution.problem, solution.point)) for solution in points]
 
 
 def assert_equal_optima(instance, values, least=None):
@@ -107,10 +109,10 @@ def assert_answers_of(seed, solvers, folder):
     else:
         problems = [cf.formulate(instance, name), cf.formulate(instance, name, relax=True)]
     for problem in problems:
-        found = answers(problem, solvers, folder)
+        solutions = answers(problem, solvers, folder)
         if problem.convex or not problem.formulation.options.relax:
-            assert_equal_optima(instance, optima(found))
-        count.update((problem.name, *key) for key, each in found.items() if each is not None)
+            assert_equal_optima(instance, optima(solutions))
+        count.update((problem.name, *key) for key, solution in solutions.items() if solution is not None)
     norm = norm_of(problems[0].formulation)
     if norm is None:
         return count
@@ -119,9 +121,9 @@ def assert_answers_of(seed, solvers, folder):
         problem = cf.formulate(instance, other, p=field.p if FORMULATIONS[other].fixed else None)
         if norm_of(problem.formulation) == norm:
             pinned = problem if FORMULATIONS[other].fixed else cf.with_integers_fixed(problem, field)
-            found = answers(pinned, solvers, folder, only=("ipopt",))
-            assert_equal_optima(instance, optima(found), best.energy(norm).total)
-            count.update((other, "at jumps") for each in found.values() if each is not None)
+            solutions = answers(pinned, solvers, folder, only=("ipopt",))
+            assert_equal_optima(instance, optima(solutions), best.energy(norm).total)
+            count.update((other, "at jumps") for solution in solutions.values() if solution is not None)
     return count
 
 

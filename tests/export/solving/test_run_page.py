@@ -26,8 +26,8 @@ def folder(tmp_path_factory):
 
 @pytest.fixture
 def address(folder):
-    with served(folder) as found:
-        yield f"{found}/index.html"
+    with served(folder) as site:
+        yield f"{site}/index.html"
 
 
 def displayed(browser, layer):

@@ -16,8 +16,8 @@ from crossfield.models.proof.certificate import read_certificate
 
 @pytest.mark.slow
 def test_a_run_says_what_is_proven_of_every_field(tmp_path, capsys):
-    given = ["run", "skew", "--size", "4", "--time-limit", "20", "--threads", "1"]
-    assert invoke([*given, "-o", str(tmp_path)]) == 0
+    command = ["run", "skew", "--size", "4", "--time-limit", "20", "--threads", "1"]
+    assert invoke([*command, "-o", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     report = json.loads((tmp_path / "report.json").read_text())
     certificate = read_certificate(tmp_path / report["proof"]["certificate"])
@@ -41,8 +41,8 @@ def test_the_gap_is_relative_to_the_energy(tmp_path, energy, gap, optimal):
 
 
 def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
-    given = ["solve", "mouse", "--size", "6", "-m", "prove", "--time-limit", "60", "--json"]
-    assert invoke([*given, "-o", str(tmp_path)]) == 0
+    command = ["solve", "mouse", "--size", "6", "-m", "prove", "--time-limit", "60", "--json"]
+    assert invoke([*command, "-o", str(tmp_path)]) == 0
     facts = json.loads(capsys.readouterr().out)
     field = cf.read_field(tmp_path / "mouse.prove.field.npz")
     certificate = read_certificate(tmp_path / "mouse.prove.certificate.npz", on=field.instance)

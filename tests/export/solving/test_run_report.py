@@ -31,7 +31,7 @@ def test_stages_are_all_the_time_whatever_is_rounded():
 @pytest.mark.slow
 def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
     instance = cf.sample("mouse", 8, stroke_weight=10)
-    given = [
+    command = [
         "run",
         "mouse",
         "--size",
@@ -44,7 +44,7 @@ def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
         "1",
         "-q",
     ]
-    assert invoke([*given, "-o", str(tmp_path)]) == 0
+    assert invoke([*command, "-o", str(tmp_path)]) == 0
     document = json.loads((tmp_path / "report.json").read_text())
     assert {key: document["instance"][key] for key in ("sha256", "w_strokes", "w_beta", "stroke_weight")} == {
         "sha256": instance.sha256,

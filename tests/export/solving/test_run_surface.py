@@ -22,9 +22,9 @@ def report():
 
 
 def test_a_surface_without_doubts_is_drawn_and_one_with_is_not(report, tmp_path, capsys):
-    found = _draw_surface(report, tmp_path, silent, never)
-    trusted = not found.surface.doubts
-    assert found.shaded == trusted == (tmp_path / "shaded.png").exists()
+    drawn = _draw_surface(report, tmp_path, silent, never)
+    trusted = not drawn.surface.doubts
+    assert drawn.shaded == trusted == (tmp_path / "shaded.png").exists()
     for surface, doubt in ((ball(8), ""), (replace(ball(8), doubts=("it is flat",)), "it is flat")):
         with_surface = replace(report, surface=surface)
         document = json.loads(json.dumps(with_surface.document()))["surface"]

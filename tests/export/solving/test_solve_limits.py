@@ -136,7 +136,7 @@ def test_an_event_ends_a_run_with_the_fields_so_far(tmp_path):
     report = cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(600.0), progress=progress, stop=asked)
     assert report.interrupted == "polyvector"
     assert report.field is report.kept.field
-    assert {each.method for each in report.candidates} <= {
+    assert {candidate.method for candidate in report.candidates} <= {
         "start",
         "greedy",
         "power",

@@ -306,7 +306,7 @@ def test_highs_takes_the_start_as_incumbent_and_a_wide_gap_ends_its_search(tmp_p
 
 
 @pytest.mark.parametrize(
-    "given",
+    "limits",
     [
         {"time_limit": 0},
         {"time_limit": float("nan")},
@@ -315,9 +315,9 @@ def test_highs_takes_the_start_as_incumbent_and_a_wide_gap_ends_its_search(tmp_p
         {"threads": 100000},
     ],
 )
-def test_impossible_limits_are_refused(given):
+def test_impossible_limits_are_refused(limits):
     with pytest.raises(InputError, match=r"out of range|must be between"):
-        cf.Limits(**given)
+        cf.Limits(**limits)
 
 
 def test_only_a_search_and_a_proof_go_without_a_time_limit(tmp_path):

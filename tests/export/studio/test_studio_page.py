@@ -17,8 +17,8 @@ BOX = "const r = document.querySelector(arguments[0]).getBoundingClientRect(); r
 
 @pytest.fixture(scope="module")
 def page():
-    with studio() as found:
-        yield found
+    with studio() as served:
+        yield served
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def until(browser, holds):
 
 def settled(browser):
     """The browser once all answers to the last edit have arrived."""
-    until(browser, lambda each: each.execute_script(READY))
+    until(browser, lambda page: page.execute_script(READY))
     return browser
 
 
@@ -228,7 +228,7 @@ def test_it_fits_and_can_be_read(empty, tmp_path, width, scheme):
     assert wide <= window == width
     assert beyond == []
     worst = browser.execute_script(CONTRAST)
-    assert [found for found in worst if found[0] < 4.5 and "disabled" not in found[1]] == []
+    assert [contrast for contrast in worst if contrast[0] < 4.5 and "disabled" not in contrast[1]] == []
     assert browser.get_log("browser") == []
 
 

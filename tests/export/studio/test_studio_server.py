@@ -14,8 +14,8 @@ pytestmark = pytest.mark.smoke
 
 @pytest.fixture(scope="module")
 def page():
-    with studio("skew") as found:
-        yield found
+    with studio("skew") as served:
+        yield served
 
 
 def test_the_page_loads_nothing_from_elsewhere(page):
@@ -67,16 +67,16 @@ def test_the_drawing_of_the_command_line_is_the_first(page):
 
 
 def test_a_coarse_field_comes_before_a_fine_one(page):
-    found = page.steps("compute?page=b&edit=1&size=72", changed(size=72))
-    steps = [(step["stage"], step.get("size")) for step in found]
+    answers = page.steps("compute?page=b&edit=1&size=72", changed(size=72))
+    steps = [(step["stage"], step.get("size")) for step in answers]
     steps = [step for step in steps if step != ("surface", 48)]  # only if it is ready before the fine field
     assert steps == [("field", 48), ("field", 72), ("surface", 72), ("done", None)]
 
 
 def test_an_overtaken_edit_ends_without_its_result(page):
     page.steps("compute?page=c&edit=5&size=16", changed())
-    (found,) = page.steps("compute?page=c&edit=4&size=16", changed())
-    assert found == {"stage": "overtaken"}
+    (answer,) = page.steps("compute?page=c&edit=4&size=16", changed())
+    assert answer == {"stage": "overtaken"}
 
 
 def test_a_newer_edit_stops_work_that_has_begun(page):
@@ -100,10 +100,10 @@ def test_two_pages_do_not_overtake_each_other(page):
 
 
 def test_a_drawing_without_lines_and_a_damaged_one_get_a_message(page):
-    (found,) = page.steps("compute?page=g&edit=1&size=16", changed(strokes=[]))
-    assert "draw one" in found["message"]
-    (found,) = page.steps("compute?page=g&edit=2&size=16", b"nothing")
-    assert "session" in found["message"]
+    (answer,) = page.steps("compute?page=g&edit=1&size=16", changed(strokes=[]))
+    assert "draw one" in answer["message"]
+    (answer,) = page.steps("compute?page=g&edit=2&size=16", b"nothing")
+    assert "session" in answer["message"]
 
 
 def test_files_are_opened_and_refused(page):
@@ -151,7 +151,7 @@ def test_a_missing_package_is_reported_with_its_remedy(monkeypatch, capsys):
     import sys
 
     monkeypatch.setitem(sys.modules, "uvicorn", None)
-    for name in [each for each in sys.modules if each.startswith("crossfield.export.studio.server")]:
+    for name in [module for module in sys.modules if module.startswith("crossfield.export.studio.server")]:
         monkeypatch.delitem(sys.modules, name)
     assert invoke(["studio", "--no-browser"]) == 1
     assert "pip install 'crossfield[studio]'" in capsys.readouterr().err

@@ -112,25 +112,25 @@ def test_an_enclosed_area_that_was_left_out_is_included_by_a_click():
         }
         | {"size": 32}
     )
-    found = read_drawn(ring)
-    rows, columns = np.nonzero(found.kinds == LEFT_OUT)
+    drawn = read_drawn(ring)
+    rows, columns = np.nonzero(drawn.kinds == LEFT_OUT)
     assert len(rows)
-    x, y = found.instance.origin
-    pixel = found.instance.pixel_size
+    x, y = drawn.instance.origin
+    pixel = drawn.instance.pixel_size
     middle = len(rows) // 2
     point = [x + pixel * (columns[middle] + 0.5), y + pixel * (rows[middle] + 0.5)]
     edits = Document.from_json(PEBBLE | {
         "size": 32, "page": list(ring.page), "mask": click(*point),
         "strokes": [{"points": s.points.ravel().tolist(), "mark": s.mark} for s in ring.strokes],
     })  # fmt: skip
-    assert read_drawn(edits).instance.mask.sum() > found.instance.mask.sum()
+    assert read_drawn(edits).instance.mask.sum() > drawn.instance.mask.sum()
 
 
 def test_hints_are_placed_on_pixels_and_those_outside_are_left_out():
     hints = [{"x": 30, "y": 25, "slant": 40, "tilt": 90}, {"x": -9, "y": 500, "slant": 40, "tilt": 90}]
-    given = document(hints=hints)
-    instance = read_drawn(given).instance
-    (hint,) = hints_on_mask(given, instance)
+    session = document(hints=hints)
+    instance = read_drawn(session).instance
+    (hint,) = hints_on_mask(session, instance)
     x, y = instance.origin
     assert (hint.column, hint.row) == (
         int((30 - x) / instance.pixel_size),
@@ -147,7 +147,7 @@ def test_solver_files_come_with_their_manifest():
     name, content = download(changed(size=8), "solver", "milp-mccormick", "mps")
     assert name == "pebble.solver.zip"
     names = zipfile.ZipFile(io.BytesIO(content)).namelist()
-    assert {each.split(".", 1)[1] for each in names} >= {
+    assert {file.split(".", 1)[1] for file in names} >= {
         "instance.json", "milp-mccormick.manifest.json", "milp-mccormick.mps",
     }  # fmt: skip
 
@@ -164,9 +164,9 @@ def test_the_commands_of_the_menu_compute_the_same(tmp_path, monkeypatch, capsys
     monkeypatch.chdir(tmp_path)
     hints = [{"x": 30, "y": 25, "slant": 40, "tilt": -90}]
     data = changed(hints=hints, flip=True)
-    for what in ("drawing", "instance", "layers", "surface", "field"):
-        name, content = download(data, what)
-        (tmp_path / (f"page.{what}" if what in {"layers", "field"} else name)).write_bytes(content)
+    for kind in ("drawing", "instance", "layers", "surface", "field"):
+        name, content = download(data, kind)
+        (tmp_path / (f"page.{kind}" if kind in {"layers", "field"} else name)).write_bytes(content)
     commands = field_step(data)[0]["commands"]
     for command in commands[:3]:
         assert invoke(shlex.split(command)[1:]) == 0, capsys.readouterr().err
@@ -180,8 +180,8 @@ def test_the_commands_of_the_menu_compute_the_same(tmp_path, monkeypatch, capsys
 def test_the_python_lines_of_the_menu_compute_the_same(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     data = changed(hints=[{"x": 30, "y": 25, "slant": 40, "tilt": -90}])
-    for what in ("drawing", "instance", "surface"):
-        name, content = download(data, what)
+    for kind in ("drawing", "instance", "surface"):
+        name, content = download(data, kind)
         (tmp_path / name).write_bytes(content)
     exec("\n".join(field_step(data)[0]["python"]), {})
     archive = zipfile.ZipFile(tmp_path / "pebble.surface.zip")
@@ -200,10 +200,10 @@ def picture():
 
 
 def test_a_picture_is_traced_to_strokes_with_marks():
-    found = open_drawing(picture(), "photo.png")
-    assert found["page"] == [0, 0, 200, 160]
-    lines = [np.reshape(s["points"], (-1, 2)) for s in found["strokes"] if s["mark"] == "line"]
-    cuts = [np.reshape(s["points"], (-1, 2)) for s in found["strokes"] if s["mark"] == "cut"]
+    session = open_drawing(picture(), "photo.png")
+    assert session["page"] == [0, 0, 200, 160]
+    lines = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "line"]
+    cuts = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "cut"]
     assert len(lines) == len(cuts) == 1
     assert np.abs(lines[0][:, 1] - 80.5).max() < 2
     assert np.ptp(lines[0][:, 0]) > 150

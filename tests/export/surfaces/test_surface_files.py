@@ -41,21 +41,21 @@ def size_of(path):
 
 def check_mesh(surface):
     """Each quad is a pixel: its corners, heights and place on a picture; counter-clockwise, a manifold."""
-    found, grid = parsed(to_obj(surface, "any.mtl")), surface.instance.grid
+    mesh, grid = parsed(to_obj(surface, "any.mtl")), surface.instance.grid
     height, width = surface.instance.mask.shape
-    assert found["f"].shape == (grid.size, 4, 3)
-    assert (np.ptp(found["f"], axis=2) == 0).all()
-    corner = found["f"][..., 0] - 1
-    assert sorted(set(corner.ravel())) == list(range(len(found["v"])))
-    points = found["v"][corner]
+    assert mesh["f"].shape == (grid.size, 4, 3)
+    assert (np.ptp(mesh["f"], axis=2) == 0).all()
+    corner = mesh["f"][..., 0] - 1
+    assert sorted(set(corner.ravel())) == list(range(len(mesh["v"])))
+    points = mesh["v"][corner]
     steps = np.array([[0, 1], [1, 1], [1, 0], [0, 0]])  # right and down: lower left, lower right, ...
     assert (points[..., 0] == grid.columns[:, None] + steps[:, 0]).all()
     assert (points[..., 1] == height - grid.rows[:, None] - steps[:, 1]).all()
     expected = surface.heights[grid.rows[:, None] + steps[:, 1], grid.columns[:, None] + steps[:, 0]]
     assert np.abs(points[..., 2] - expected).max() < 1e-6
-    assert np.abs(found["vt"] - found["v"][:, :2] / (width, height)).max() < 1e-6
-    assert np.abs(np.linalg.norm(found["vn"], axis=1) - 1).max() < 1e-5
-    assert (found["vn"][:, 2] > 0).all()
+    assert np.abs(mesh["vt"] - mesh["v"][:, :2] / (width, height)).max() < 1e-6
+    assert np.abs(np.linalg.norm(mesh["vn"], axis=1) - 1).max() < 1e-5
+    assert (mesh["vn"][:, 2] > 0).all()
     faces = corner.tolist()
     sides = Counter(side for face in faces for side in zip(face, face[1:] + face[:1], strict=True))
     assert max(sides.values()) == 1  # neighbours walk their common side in opposite directions
@@ -73,9 +73,9 @@ def test_every_mask_becomes_a_manifold_of_its_pixels(mask):
 def test_a_ball_has_the_normals_of_a_ball():
     surface = ball(32, part=0.8)
     check_mesh(surface)
-    found = parsed(to_obj(surface, "any.mtl"))
-    place = (found["v"] - (16, 16, 0)) / 16
-    off = np.degrees(np.arccos(np.clip(np.sum(place * found["vn"], axis=1), -1, 1)))
+    mesh = parsed(to_obj(surface, "any.mtl"))
+    place = (mesh["v"] - (16, 16, 0)) / 16
+    off = np.degrees(np.arccos(np.clip(np.sum(place * mesh["vn"], axis=1), -1, 1)))
     assert off.mean() < 0.8
     assert off.max() < 6  # at the border only one side is known
     assert np.degrees(np.arccos(np.sum(ball_normals(surface) * surface.normals, axis=1))).max() < 1

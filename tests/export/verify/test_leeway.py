@@ -21,7 +21,7 @@ def following(problem: Problem) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_less_than_what_was_saved(name: str):
+def test_the_leeway_is_no_less_than_what_was_saved(name: str):
     problem = formulate(sample("skew", 4), name)
     for held in (
         (problem, problem_in_format(problem, FORMATS["lp"])) if name != "minlp-parity" else (problem,)

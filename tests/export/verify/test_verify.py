@@ -112,12 +112,12 @@ def refuses(path: Path, solver: str) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("instance", LARGER)
 @each_solver
-def test_optima_agree(verified: Callable[[str], Verification], solver: str, instance: str):
-    found = [f for f in verified(instance).checks if f.program == solver and f.step == "solve"]
-    assert found
-    assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.LIMIT, Verdict.REFUSED, Verdict.NOT_TRIED}
-    assert all(f.reason for f in found if f.verdict != Verdict.AGREES)
-    for check in (f for f in found if f.verdict == Verdict.AGREES):
+def test_the_optima_of_all_solvers_agree(verified: Callable[[str], Verification], solver: str, instance: str):
+    solves = [f for f in verified(instance).checks if f.program == solver and f.step == "solve"]
+    assert solves
+    assert {f.verdict for f in solves} <= {Verdict.AGREES, Verdict.LIMIT, Verdict.REFUSED, Verdict.NOT_TRIED}
+    assert all(f.reason for f in solves if f.verdict != Verdict.AGREES)
+    for check in (f for f in solves if f.verdict == Verdict.AGREES):
         others = [f for f in verified(instance).checks if f.group == check.group and f.proven]
         assert all(is_same_optimum(check.objective, other.objective) for other in others)
 
@@ -126,10 +126,10 @@ def test_optima_agree(verified: Callable[[str], Verification], solver: str, inst
 def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
     """No time limit comes near: convex problems, or linear ones with products of binaries, of two pixels."""
     write_all(on_grid(1, 2), tmp_path, formulations=PROVEN, start=make_field(on_grid(1, 2)))
-    found = [f for f in verify(tmp_path, seconds=250).checks if f.step == "solve"]
-    assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
+    solves = [f for f in verify(tmp_path, seconds=250).checks if f.step == "solve"]
+    assert {f.verdict for f in solves} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
     present = {name for name, solver in SOLVERS.items() if not solver.missing}
-    assert {f.program for f in found if f.verdict == Verdict.AGREES} == present
+    assert {f.program for f in solves if f.verdict == Verdict.AGREES} == present
 
 
 def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path: Path):
@@ -150,7 +150,7 @@ def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_options_and_packed_files(tmp_path: Path):
+def test_packed_files_with_options_are_read(tmp_path: Path):
     """Printed facet, box, 1-norms, binary .nl, scalar GAMS, .gz."""
     instance = make_instance("hole", "box")
     chosen = {"facet": "printed", "stroke_norm": 1, "beta_norm": 1}
@@ -218,11 +218,11 @@ def forge(manifest: Path, path: Path, data: bytes) -> None:
 @pytest.mark.slow
 def test_a_wrong_file_is_noticed_by_every_program(spoiled: Verification, name: str):
     formulation, kind, *_ = WRONG[name]
-    found = {f.program: f for f in spoiled.checks if f.problem == f"{name} {formulation}"}
+    checks = {f.program: f for f in spoiled.checks if f.problem == f"{name} {formulation}"}
     expected = {entry.name for entry in PROGRAMS.values() if kind in entry.formats and not entry.missing}
-    assert set(found) == expected
+    assert set(checks) == expected
     blind = blind_to(name)
-    for program, check in found.items():
+    for program, check in checks.items():
         if check.verdict == Verdict.REFUSED or program in blind:
             continue
         bad = {Verdict.DIFFERS, Verdict.FAILED} | ({Verdict.NOT_TRIED} if program == "cbc" else set())
@@ -260,9 +260,9 @@ def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
     lines = path.read_text().splitlines(keepends=True)
     lines[4] = " 0 0 0\n"
     forge(tmp_path / "crash.miqcp-bilinear.manifest.json", path, "".join(lines).encode())
-    found = {f.problem.split()[0]: f for f in verify(tmp_path, programs=["scip"]).checks}
-    assert found["crash"].verdict in {Verdict.FAILED, Verdict.DIFFERS}
-    assert found["well"].verdict == Verdict.AGREES
+    checks = {f.problem.split()[0]: f for f in verify(tmp_path, programs=["scip"]).checks}
+    assert checks["crash"].verdict in {Verdict.FAILED, Verdict.DIFFERS}
+    assert checks["well"].verdict == Verdict.AGREES
 
 
 def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -275,7 +275,7 @@ def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.slow
-def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_the_command_reports_what_differs(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     write_all(on_grid(1, 2), tmp_path, formulations=["qp-fixed"], formats=["lp"])
     assert invoke(["verify", str(tmp_path), "--solve", "10", "-p", "highs", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["ok"] is True
@@ -312,8 +312,8 @@ def test_an_answer_of_xpress_that_was_cut_short_has_all_columns(tmp_path: Path):
 @pytest.fixture(scope="session")
 def solvers() -> Iterator[Solvers]:
     """Solvers, with a child process for each program in use."""
-    with Solvers() as found:
-        yield found
+    with Solvers() as running:
+        yield running
 
 
 CLAIMS = [
@@ -327,7 +327,7 @@ CLAIMS = [
 @pytest.mark.slow
 @each_solver
 @for_each("kind, name", CLAIMS)
-def test_claims_are_true(
+def test_claims_of_the_table_of_solvers_are_true(
     verified: Callable[[str], Verification],
     solvers: Solvers,
     tmp_path: Path,
@@ -339,12 +339,12 @@ def test_claims_are_true(
     verification = verified("1 x 3" if kind == "whole" else RELAXED)
     problem = read_manifest(verification.folder / f"small.{name}.manifest.json").problem()
     taking = suitability(problem, solver)
-    found = [f for f in verification.checks if f.problem == f"small {name}" and f.step == "solve"]
-    mine = [f for f in found if f.program == solver]
+    solves = [f for f in verification.checks if f.problem == f"small {name}" and f.step == "solve"]
+    mine = [f for f in solves if f.program == solver]
     if taking.answer == "yes":
         assert {f.verdict for f in mine} & {Verdict.AGREES, Verdict.LIMIT, Verdict.NOT_TRIED}
     elif taking.answer == "no" and (path := verification.folder / f"small.{name}.{taking.format}").exists():
-        optimum = min(f.objective for f in found if f.objective is not None)
+        optimum = min(f.objective for f in solves if f.objective is not None)
         shutil.copytree(verification.folder, tmp_path, dirs_exist_ok=True)
         assert not proves(
             solvers, problem_in_format(problem, FORMATS[taking.format]), tmp_path / path.name, solver, optimum

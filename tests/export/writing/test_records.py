@@ -61,8 +61,8 @@ def test_any_number_survives_and_none_is_longer_than_needed(value):
 
 
 def test_numbers_look_as_people_write_them():
-    given = [0.0, -0.0, 3.0, -2.0, 0.5, 1e-6, 1e22, 1e14]
-    assert [number_text(value) for value in given] == [
+    numbers = [0.0, -0.0, 3.0, -2.0, 0.5, 1e-6, 1e22, 1e14]
+    assert [number_text(value) for value in numbers] == [
         "0",
         "0",
         "3",
@@ -72,15 +72,15 @@ def test_numbers_look_as_people_write_them():
         "1e+22",
         "100000000000000",
     ]
-    assert signed_texts(np.array(given[:4])).tolist() == [b"+ 0", b"+ 0", b"+ 3", b"- 2"]
+    assert signed_texts(np.array(numbers[:4])).tolist() == [b"+ 0", b"+ 0", b"+ 3", b"- 2"]
     assert number_text(np.float64(0.1)) == "0.1"
     assert number_text(np.int32(7)) == "7"
 
 
 @given(st.lists(FINITE, min_size=1, max_size=30))
 def test_words_are_the_numbers_of_an_array(values):
-    found = words(np.array(values))
-    lines = text([found, b"\n"], len(values)).decode().splitlines()
+    texts = words(np.array(values))
+    lines = text([texts, b"\n"], len(values)).decode().splitlines()
     assert [float(line) for line in lines] == values
     assert lines == [number_text(value + 0.0) for value in values]
     assert words(values[0]) == number_text(values[0]).encode()
@@ -160,9 +160,9 @@ def test_numbers_grow_a_digit_within_a_block_and_between_blocks(first, monkeypat
 LAYOUTS = [(name, dialect) for name, entry in FORMATS.items() for dialect in entry.dialects]
 
 
-def written(problem, path, **given):
+def written(problem, path, **options):
     """The bytes of all files of a format, by name."""
-    return {name: (path.parent / name).read_bytes() for name in write(problem, path, **given).files}
+    return {name: (path.parent / name).read_bytes() for name in write(problem, path, **options).files}
 
 
 @for_each("suffix, dialect", LAYOUTS)
@@ -173,12 +173,12 @@ def test_blocks_leave_no_seam_in_any_format(name, suffix, dialect, tmp_path, mon
         instance = Instance.on_pixels("line", np.ones((1, count), bool), [[0, 0]], [2.5], [0.5])
         problem, field = make_problem(name, instance), make_field(instance)
         start = field if FORMATS[suffix].has_start else None
-        given = {"path": tmp_path / f"x.{suffix}", "dialect": dialect, "start": start}
-        expected = written(problem, **given)
+        options = {"path": tmp_path / f"x.{suffix}", "dialect": dialect, "start": start}
+        expected = written(problem, **options)
         for block in (1, 4):
             with monkeypatch.context() as patch:
                 patch.setattr(records, "BLOCK", block)
-                assert written(problem, **given) == expected
+                assert written(problem, **options) == expected
 
 
 @for_each("suffix, dialect", LAYOUTS)
@@ -237,5 +237,5 @@ def test_points_of_any_size_are_starting_points():
     point = points_of(problem)[0] * 10.0 ** np.arange(-150, 150, 30)
     lines = b"".join(nl.generate(CanonicalForm(problem), start=point)).decode().splitlines()
     at = lines.index(f"x{problem.n_columns}")
-    found = [float(line.split()[1]) for line in lines[at + 1 : at + 1 + problem.n_columns]]
-    np.testing.assert_array_equal(found, point[NlOrder(problem).order])
+    levels = [float(line.split()[1]) for line in lines[at + 1 : at + 1 + problem.n_columns]]
+    np.testing.assert_array_equal(levels, point[NlOrder(problem).order])
