@@ -1,0 +1,1 @@
+"""From a mesh file to an instance."""

@@ -1,0 +1,42 @@
+"""The built-in meshes are oriented manifolds of the shapes that their names say."""
+
+import numpy as np
+import pytest
+from crossfield.models.mesh.shapes import MESHES
+
+EULER = {
+    "disc": 1, "star": 1, "plate": -1, "cube": 2, "bracket": 0, "stairs": 2, "pin": 2, "flange": 0, "gear": 2,
+    "bump": 0, "half_torus": 0, "doughnut": 0, "three_parts": 2 + 0 + 1,
+}  # fmt: skip
+FLAT = ("disc", "star", "plate")
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_built_in_meshes_have_the_topology_of_their_shape(name):
+    mesh = MESHES[name][1]()
+    mesh.check()
+    assert mesh.euler_characteristic == EULER[name]
+    # Gauss and Bonnet: the defects inside and the turns of the boundary make 2 pi for each unit of it.
+    boundary = mesh.on_boundary
+    turns = mesh.defect[boundary] - np.pi
+    assert mesh.defect[~boundary].sum() + turns.sum() == pytest.approx(2 * np.pi * EULER[name])
+    assert mesh.parts == (3 if name == "three_parts" else 1)
+
+
+@pytest.mark.parametrize("name", FLAT)
+def test_flat_sheets_face_upwards(name):
+    assert (MESHES[name][1]().normals[:, 2] > 0).all()
+
+
+@pytest.mark.parametrize("name", sorted(set(MESHES) - {*FLAT, "bump", "half_torus", "three_parts"}))
+def test_closed_bodies_have_their_normals_outside(name):
+    mesh = MESHES[name][1]()
+    first, second, third = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    assert (first * np.cross(second, third)).sum() / 6 > 0  # the volume
+
+
+def test_rings_close_round_every_inner_vertex():
+    for name in ("cube", "plate", "doughnut"):
+        mesh = MESHES[name][1]()
+        turn = mesh.defect[mesh.ring_vertices] - mesh.rings.sums(mesh.kappa)
+        np.testing.assert_allclose(turn, 2 * np.pi * np.round(turn / (2 * np.pi)), atol=1e-9)
