@@ -19,7 +19,8 @@ from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.verify.checks import Check
 from crossfield.export.verify.verify import verify
 from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import REFERENCE, Instance
+from crossfield.models.instance.grid import REFERENCE
+from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
 
 SUFFIXES: Final = (".svg", ".png", ".scap")
