@@ -1,0 +1,52 @@
+"""The programs in docs/ that measure: each can be imported, and measures a small input with real parts."""
+
+import json
+from dataclasses import asdict
+
+import pytest
+from places import ROOT
+
+NEEDS = {"conf": "sphinx", "studio_pictures": "selenium", "studio_times": "selenium"}
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "docs").glob("*.py")))
+def test_every_program_can_be_imported(docs_module, name):
+    if name in NEEDS:
+        pytest.importorskip(NEEDS[name])
+    docs_module(name)
+
+
+@pytest.mark.parametrize("part", ["paper", "optima", "solvers"])
+def test_the_first_row_of_proofs_is_measured(docs_module, part, tmp_path, monkeypatch):
+    proofs = docs_module("proofs")
+    monkeypatch.setattr(proofs, "SIZE", 8)
+    _, row = next(iter(proofs.PARTS[part](proofs.Request((), 1.0, None, tmp_path))))
+    assert json.loads(json.dumps(row))["energy"] >= 0
+
+
+@pytest.mark.parametrize("measure, name", [("hidden", "mouse"), ("missed", "mouse"), ("surface", "vase")])
+def test_a_field_is_measured(docs_module, measure, name):
+    fields = docs_module("fields")
+    rows = fields.Task(measure, name, 16, 0.0, None, 0.1, ("power",)).rows()
+    assert {row[5] for row in rows} == {"power"}
+
+
+@pytest.mark.filterwarnings("ignore:An input array is constant")  # the confidence, on so small a surface
+@pytest.mark.parametrize(
+    "part, arguments", [("known", ["vase"]), ("trust", ["mouse", "mouse"]), ("times", ["mouse"])]
+)
+def test_a_surface_is_measured(docs_module, part, arguments):
+    assert docs_module("surface").MEASURES[part](*arguments, 12)
+
+
+def test_a_run_of_the_study_is_measured(docs_module):
+    rows, work = docs_module("studying.rows"), docs_module("studying.work")
+    row = work.perform((rows.Run("practice", "skew", 8, "greedy"), None))
+    assert row["status"] != rows.FAILED, row
+
+
+def test_a_run_of_a_solver_is_measured(docs_module, tmp_path):
+    study, plan = docs_module("solver_study"), docs_module("studying.solvers.plan")
+    run = next(run for run in plan.QUICK.first() if run.solver == "highs")
+    row = study.row_of_run(tmp_path / "solvers.csv", [json.dumps(asdict(run)), "0", "60"], quick=True)
+    assert row["objective"] >= 0
