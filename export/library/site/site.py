@@ -7,8 +7,7 @@ templates, templates/site/*.html.j2, escape every text from a file.
 from __future__ import annotations
 
 import shutil
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -35,7 +34,6 @@ from ..plan.spec import RUNGS
 ASSETS: Final = ("site.css", "site.js", "icon.svg")  # copied from the templates
 FOLDERS: Final = ("entry", "files", "instance", "pictures")
 PAGES: Final = ("index.html", "about.html")
-STATUSES: Final = ("optimal", "claimed", "best known")
 
 _SHOWN: Final = {".svg", ".png"}
 _ROLES: Final = {
@@ -199,7 +197,6 @@ def _write_pages(
         citation=read_bytes(library.folder / "CITATION.cff").decode(),
         licence=read_bytes(library.folder / "LICENSE").decode(),
         solu=SOLU,
-        statistics={"statuses": status_table(library.entries), "solvers": solvers(library.entries)},
     )
     for instance in shown:
         write(
@@ -224,42 +221,6 @@ def _choices(entries: tuple[dict[str, Any], ...]) -> dict[str, list[str]]:
     keys = ("family", "rung", "formulation", "class", "difficulty", "status")
     choices = {key: list(dict.fromkeys(entry[key] for entry in entries)) for key in keys}
     return choices | {"rung": [name for name in RUNGS if name in choices["rung"]]}
-
-
-@dataclass(frozen=True)
-class CrossTable:
-    """Cells as text, by name of the row, in the order of the columns."""
-
-    columns: tuple[str, ...]
-    rows: dict[str, list[str]]
-
-
-def status_table(entries: Sequence[dict[str, Any]]) -> CrossTable:
-    """Return the numbers of entries by rung and status."""
-    numbers = Counter((entry["rung"], entry["status"]) for entry in entries)
-    shown = [rung for rung in RUNGS if any(key[0] == rung for key in numbers)]
-    return CrossTable(STATUSES, {rung: [str(numbers[rung, status]) for status in STATUSES] for rung in shown})
-
-
-def solvers(entries: Sequence[dict[str, Any]]) -> CrossTable | None:
-    """Return how many entries of a formulation each solver solved, of those with a run; None without runs."""
-    solved, tried = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
-    for entry in entries:
-        for run in entry["runs"]:
-            key = entry["formulation"], run["solver"]
-            tried[key] += 1
-            solved[key] += run["status"] == "optimal"
-    if not tried:
-        return None
-    names = tuple(sorted({solver for _, solver in tried}))
-    rows = {
-        name: [
-            f"{solved[name, solver]} of {tried[name, solver]}" if tried[name, solver] else ""
-            for solver in names
-        ]
-        for name in dict.fromkeys(entry["formulation"] for entry in entries)
-    }
-    return CrossTable(names, rows)
 
 
 def count(number: int) -> str:
