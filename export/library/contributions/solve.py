@@ -36,7 +36,6 @@ from ..ledger.ledger import (
     Record,
     RunStatus,
     add_record,
-    check_text,
     read_ledger,
     write_ledger,
 )
@@ -69,8 +68,7 @@ def solve_library(
         if missing := SOLVERS[_check_known(name, SOLVERS, "solver")].missing:
             raise MissingSolverError(missing)
     chosen = dict.fromkeys(solvers or [name for name, solver in SOLVERS.items() if not solver.missing])
-    check_text("by", by)
-    check_text("machine", machine)
+    Record("cf_none", "0" * 64, "none", "0", "no point", by=by, machine=machine).check()
     library, records = read_library(folder), []
     if has_unbuilt_records(library):
         library = _bring_up_to_date(library, progress)

@@ -9,27 +9,24 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from ....models.errors import InputError, naming, shortened
+from ....models.errors import InputError, naming
 from ....models.field.field import CrossField, Norm
 from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import read_document, schema_error
 from ....models.processes.process_groups import catch_interrupts
 from ....models.storage import read_bytes, write_bytes
 from .. import documents
-from ..plan.spec import check_day
+from ..plan.spec import check_day, describe_schema_error
 
 FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
 LEDGER: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
-_LONGEST: Final = 200  # characters of a text
-_VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 
 
 @dataclass(frozen=True)
@@ -62,23 +59,14 @@ class Record:
 
     def check(self) -> None:
         """Raise InputError that names the invalid value unless a ledger can hold the record."""
-        for name in ("solver", "by", "machine"):
-            check_text(name, getattr(self, name))
-        if not _VERSION.fullmatch(self.version):
-            raise InputError(
-                f"version is {shortened(self.version)!r}; give at most 60 letters, digits, blanks and "
-                ". , _ + - ( ), beginning with a letter or a digit"
-            )
         check_day(self.date or "", "date")
-        for name in ("primal", "bound", "seconds", "threads", "time_limit"):
+        for name in ("primal", "bound", "seconds", "time_limit"):
             value = getattr(self, name)
-            least, sign = (-math.inf, "") if name in ("primal", "bound") else (0, " that is not negative")
-            if value is not None and not (least <= value and math.isfinite(value)):
-                raise InputError(f"{name.replace('_', ' ')} is {value}; give a finite number{sign}")
+            if value is not None and not math.isfinite(value):
+                raise InputError(f"{name} is {value}; give a finite number")
         error = schema_error(Ledger(Path(), (self,)).document(), "library-ledger", documents.__name__)
         if error is not None:
-            place = error.json_path.removeprefix("$.records[0].")
-            raise InputError(f"{place}: {shortened(error.message)}; a ledger cannot hold this record")
+            raise InputError(describe_schema_error(error).removeprefix("records[0]."))
 
 
 @dataclass(frozen=True)
@@ -156,7 +144,6 @@ class Ledger:
         self, instance: str, norm: Norm, instance_sha256: str, data: bytes, by: str | None = None
     ) -> Ledger:
         """Return the ledger with a certificate that replaces the earlier one of the instance in the norm."""
-        check_text("by", by)
         name = f"{instance}.{hashlib.sha256(data).hexdigest()[:12]}.certificate.npz"
         new = SubmittedCertificate(instance, norm, instance_sha256, name, by)
         others = [certificate for certificate in self.certificates if certificate.key != new.key]
@@ -172,12 +159,6 @@ class Ledger:
             "records": list(map(_row_document, self.records)),
             **({"certificates": certificates} if certificates else {}),
         }
-
-
-def check_text(name: str, text: str | None) -> None:
-    """Raise InputError that names the text unless a ledger can hold it."""
-    if text is not None and (not text.isprintable() or not 0 < len(text) <= _LONGEST):
-        raise InputError(f"{name} must be one line of at most {_LONGEST} printable characters")
 
 
 def _row_document(row: Record | SubmittedCertificate) -> dict[str, Any]:

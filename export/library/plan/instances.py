@@ -26,8 +26,7 @@ def make_instance(recipe: InstanceRecipe) -> Instance:
     try:
         # The coefficients of the paper, 1 and 1e-6, on every grid, so that published results apply.
         of_paper = {name: getattr(Instance, name) for name in ("stroke_coefficient", "skew_coefficient")}
-        instance = replace(make(recipe), name=recipe.name, **of_paper)
-        return instance.with_weights(**recipe.sketch.weights)
+        return replace(make(recipe), name=recipe.name, **of_paper)
     except NoStrokeError as error:
         raise NoStrokeError(f"{recipe.name}: {error}") from error
     except CrossfieldError as error:
@@ -56,7 +55,6 @@ def _drawing_instance(recipe: InstanceRecipe) -> Instance:
 
 def _random_instance(recipe: InstanceRecipe) -> Instance:
     assert recipe.seed is not None  # as the schema of specifications demands
-    # Weights are set later, because coefficients of the paper replace them by default.
     return random_instance(
         recipe.seed,
         size=recipe.size,

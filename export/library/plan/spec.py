@@ -6,7 +6,6 @@ names in tables, and combinations of keys. Files are relative to the folder of t
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
@@ -36,8 +35,7 @@ PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by defau
 SketchKind = Literal["sample", "file", "random"]
 Effort = Literal["search", "none", "greedy", "proven"]
 """Work for the points of a sketch."""
-WEIGHTS: Final = ("stroke_weight", "skew_weight")
-RANDOM: Final = ("share", "mask_share", "strokes", "noise", *WEIGHTS)
+RANDOM: Final = ("share", "mask_share", "strokes", "noise")
 """Keys of random sketches that are options of `random_instance`."""
 DEFAULT: Final = Path(__file__).with_name("default.toml")
 
@@ -145,14 +143,8 @@ class Sketch:
 
     @property
     def drawn(self) -> dict[str, Any]:
-        """The options of random strokes, other than weights, by name."""
-        shape = {"mask_share": RAGGED_SHARE if self.what == "ragged" else 1.0}
-        return shape | {key: value for key, value in self.random if key not in WEIGHTS}
-
-    @property
-    def weights(self) -> dict[str, float]:
-        """The stated weights by name; the coefficients of the paper replace a missing one."""
-        return {key: value for key, value in self.random if key in WEIGHTS}
+        """The options of random strokes by name."""
+        return {"mask_share": RAGGED_SHARE if self.what == "ragged" else 1.0} | dict(self.random)
 
     def settings(self) -> dict[str, Any]:
         """Return the stated options of its instances that have a default, other than sizes."""
@@ -231,58 +223,19 @@ def spec_of(document: dict[str, Any], path: Path) -> Spec:
 
 
 def _check_form(document: dict[str, Any]) -> None:
-    for key, value in (("format", FORMAT), ("version", VERSION)):
-        if document.get(key) != value or isinstance(document[key], bool):
-            raise InputError(f"{key}: must be {value!r}; give a specification of a library of this version")
     try:
         error = schema_error(document, "library-spec", __package__)
     except ValueError as large:  # of a whole number of more digits than Python writes
         raise InputError("holds a number of thousands of digits; write a smaller one") from large
     if error is not None:
-        raise InputError(_key_message(error) or _value_message(error))
+        raise InputError(describe_schema_error(error))
 
 
-def _key_message(error: Any) -> str | None:
-    """The message about an unknown or missing key; None if the error is about a value."""
-    table, rule, place = error.instance, error.validator_value, error.json_path[2:]
-    known = error.schema.get("properties", {})
-    match error.validator:
-        case "additionalProperties":
-            key = next(key for key in table if key not in known)
-            words = f"is unknown; the keys here are {', '.join(known)}"
-        case "required":
-            key = next(key for key in rule if key not in table)
-            words = f"there is none; write {known[key].get('description', 'it')}"
-        case "dependentRequired":
-            key, needed = next(
-                (key, need) for key, (need,) in rule.items() if key in table and need not in table
-            )
-            words = f"goes with {needed}; write both, or leave it out"
-        case _:
-            return None
-    return f"{place}.{key}: {words}" if place else f"{key}: {words}"
-
-
-def _value_message(error: Any) -> str:
-    """The message about a value; the place of an entry is the place of its list."""
-    place, schema, value = error.json_path[2:], error.schema, shortened(error.instance)
-    if not isinstance(error.instance, dict):
-        place = re.sub(r"\[\d+\]$", "", place)
-    match error.validator:
-        case "uniqueItems":
-            twice = next(word for n, word in enumerate(error.instance) if word in error.instance[:n])
-            words = f"{shortened(twice)!r} is listed twice; list it once"
-        case "minimum" | "maximum" if {"minimum", "maximum"} <= schema.keys():
-            words = f"{value} is out of range; choose {schema['minimum']} to {schema['maximum']}"
-        case "enum":
-            words = f"there is no {value!r}; choose from {', '.join(schema['enum'])}"
-        case "oneOf":
-            words = f"needs exactly one of {', '.join(get_args(SketchKind))}"
-        case "pattern":
-            words = f"{value!r} is not allowed; write {schema['description']}"
-        case _:
-            words = f"must be {schema['description']}"
-    return f"{place}: {words}"
+def describe_schema_error(error: Any) -> str:
+    """Return place and fault of a schema error, and as the remedy the description in the schema."""
+    place = error.json_path[2:]
+    fault = f"{shortened(error.message, 200)}; write {error.schema['description']}"
+    return f"{place}: {fault}" if place else fault
 
 
 def _read_document(document: dict[str, Any], folder: Path) -> Spec:

@@ -57,7 +57,7 @@ def built(tmp_path_factory):
     [
         ("", ""),
         ('seeds = "1-5"', "seeds = [3, 1, 5, 4, 2]"),
-        ("share = 0.3", 'share = 0.3\nstrokes = "curved"\nnoise = 0.1\nskew_weight = 1e-3'),
+        ("share = 0.3", 'share = 0.3\nstrokes = "curved"\nnoise = 0.1'),
         ('points = "proven"', 'points = "none"'),
     ],
 )
@@ -71,7 +71,7 @@ BAD = {
     "range that falls": ('"1-5"', '"5-1"', "sketches[0].seeds: '5-1' must rise"),
     "range too long": ('"1-5"', '"1-200000"', "by less than 100000"),
     "proof of fixed jumps": ('"exact", "milp"', '"qp"', "formulations: fam has proven points"),
-    "share of nothing": ("0.3", "0", "sketches[0].share: must be a number above 0"),
+    "share of nothing": ("0.3", "0", "; write a number above 0"),
 }
 
 
