@@ -74,7 +74,7 @@ def write_formulations() -> None:
 
 def kinds_in_short() -> str:
     """Numbers of formulations by kind, and the solvers that close them."""
-    convex = [f"`{name}`" for name in FORMULATIONS if declare(name).convex]
+    convex = [f"`{name}`" for name in FORMULATIONS if declare(name).is_convex]
     _, rows = tables()["solvers"]
     solvers = [column for column in rows[0] if column != "formulation"]
     closed = {row["formulation"] for row in rows if any(row[solver] == "yes" for solver in solvers)}

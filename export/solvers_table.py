@@ -45,10 +45,10 @@ TRAITS: Final[dict[str, Callable[[Problem], bool]]] = {
         bool(p.integer.any()) and p.objective_degree == 2 and p.row_degree < 2
     ),
     "a non-convex quadratic objective": lambda p: (
-        p.objective_degree == 2 and p.row_degree < 2 and not p.convex
+        p.objective_degree == 2 and p.row_degree < 2 and not p.is_convex
     ),
     "integers": lambda p: bool(p.integer.any()),
-    "non-convexity": lambda p: not p.convex and max(p.objective_degree, p.row_degree) > 1,
+    "non-convexity": lambda p: not p.is_convex and max(p.objective_degree, p.row_degree) > 1,
 }
 """Traits of problems that a solver may refuse."""
 

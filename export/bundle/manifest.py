@@ -203,7 +203,7 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
         "paper": formulation.paper,
         "options": asdict(options),
         "class": problem.problem_class,
-        "convex": problem.convex,
+        "convex": problem.is_convex,
         "counts": {
             "columns": problem.n_columns,
             "binary": sum(block.count for block in form.blocks("binary")),

@@ -186,6 +186,6 @@ def _reason_of_refusal(problem: Problem, start: Start, solver: str) -> str:
     taking = suitability(problem, solver)
     if taking.answer == "no":
         return f"{solver} does not take {problem.name}: {taking.reason}"
-    if STARTS[solver].needs_convex and not start.problem.convex:
+    if STARTS[solver].needs_convex and not start.problem.is_convex:
         return f"{solver} uses a start of convex problems only, and {problem.name} is not convex there"
     return ""

@@ -162,7 +162,7 @@ def choose_format(problem: Problem, solver: str) -> Suitability:
 
 
 def _describe_class(problem: Problem) -> str:
-    return f"{'a convex' if problem.convex else 'a non-convex'} {problem.problem_class}"
+    return f"{'a convex' if problem.is_convex else 'a non-convex'} {problem.problem_class}"
 
 
 class SolveFiles(NamedTuple):

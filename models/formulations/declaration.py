@@ -250,7 +250,7 @@ class Formulation:
         return bool(self.lifted) and self.options.relax
 
     @property
-    def convex(self) -> bool:
+    def is_convex(self) -> bool:
         """Whether its continuous relaxation is convex as written: linear rows, a sum of squares."""
         return _is_convex(self.objective, self.rows, self.fixed)
 

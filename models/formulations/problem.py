@@ -118,7 +118,7 @@ class Problem:
         """A table of its columns and rows, for notebooks."""
         facts = {
             "formulation": f"{self.name}: {self.formulation.summary}",
-            "class": self.problem_class + (", convex" if self.convex else ""),
+            "class": self.problem_class + (", convex" if self.is_convex else ""),
             "instance": self.instance.summary,
             "columns": ", ".join(
                 f"{block.count} {block.name}{' (integer)' * block.integer}" for block in self.blocks.values()
@@ -262,7 +262,7 @@ class Problem:
 
     @property
     def problem_class(self) -> str:
-        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP; `convex` states whether a QP is convex."""
+        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP; `is_convex` states whether a QP is."""
         integer = "MI" if self.integer.any() else ""
         if max(self.objective_degree, self.row_degree) > 2:
             return f"{integer}NLP"
@@ -273,9 +273,9 @@ class Problem:
         return f"{integer}LP"
 
     @property
-    def convex(self) -> bool:
+    def is_convex(self) -> bool:
         """Whether its continuous relaxation is known to be convex."""
-        return self.formulation.convex
+        return self.formulation.is_convex
 
     def merged_objective(self, degree: int, *, up_to: int = ANY_DEGREE) -> tuple[Ints, Floats]:
         """Monomials of that degree, each set of columns once, sorted.
@@ -331,7 +331,7 @@ class Problem:
         """
         from .arrays import build_highs, check_highs
 
-        check_highs(self.problem_class, convex=self.convex)
+        check_highs(self.problem_class, convex=self.is_convex)
         return build_highs(self.to_arrays(), self.instance.name)
 
     def objective_value(self, point: Floats) -> float:

@@ -14,7 +14,7 @@ from ..field.field import AbsoluteNorm, CrossField, Norm
 from ..field.jumps import best_jumps
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
-from ..search.absolute_fit import alternate_absolute, fit_absolute
+from ..search.angle_program import alternate_absolute, fit_absolute
 from .descent import COARSEST, Descent
 from .lattice import Lattice
 

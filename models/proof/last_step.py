@@ -16,7 +16,7 @@ from ..instance.angles import QUARTER
 from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
-from ..search.absolute_fit import absolute_fit
+from ..search.angle_program import solve_angle_program
 from ..search.box_qp import field_at
 from ..smooth.sparse_systems import stroke_weight
 from .check_certificate import (
@@ -102,7 +102,7 @@ def _minimise_on_piece(instance: Instance, terms: EnergyTerms, step: LastStep, p
         return BoxMinimum(field_at(instance, low, p), np.inf, cuts, multipliers)
     above, below = _deductions(terms, step, piece)
     tilt = np.concatenate([np.zeros(n), 4 * (above - below) * (terms.norm != 1)])
-    fit = absolute_fit(
+    fit = solve_angle_program(
         instance, p, terms.norm, low, high, tilt=tilt, lines=piece.line[at], target=step.theta[at]
     )
     multipliers[0, : 2 * m], multipliers[0, 2 * m + n :] = fit.multipliers[: 2 * m], fit.multipliers[-n:]

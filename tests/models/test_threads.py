@@ -13,7 +13,7 @@ import pytest
 PROGRAM = """
 import hashlib, json, time
 import crossfield as cf
-from crossfield.models.search.absolute_fit import fit_absolute
+from crossfield.models.search.angle_program import fit_absolute
 from crossfield.models.search.box_qp import FreeField, fit_in_box
 from crossfield.models.search.energy import LinearSolver
 from crossfield.models.search.improvement import settle

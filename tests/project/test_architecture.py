@@ -66,7 +66,7 @@ def test_two_modules_of_the_mathematics_call_a_solver_in_memory_and_none_knows_a
     }
     assert users == {
         "models/formulations/arrays.py": {"highspy"},
-        "models/search/absolute_fit.py": {"clarabel"},
+        "models/search/angle_program.py": {"clarabel"},
     }
 
 

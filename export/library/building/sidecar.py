@@ -49,7 +49,7 @@ def sidecar_of(
         "problem_sha256": problem.sha256,
         "class": problem.problem_class,
         "probtype": probtype(problem),
-        "convex": problem.convex,
+        "convex": problem.is_convex,
         "counts": problem_counts(problem),
         "curvature": problem_curvature(problem),
         "files": listed,

@@ -215,7 +215,9 @@ class _SolveSession:
 
 def _has_proof(problem: Problem, solver: str, solution: Solution) -> bool:
     """Whether the solver ended with a proof of a global optimum."""
-    if solution.problem.formulation.is_weakened or not (problem.convex or SOLVERS[solver].proves == "global"):
+    if solution.problem.formulation.is_weakened or not (
+        problem.is_convex or SOLVERS[solver].proves == "global"
+    ):
         return False
-    local = problem.convex and solution.status == Status.OPTIMAL_LOCAL
+    local = problem.is_convex and solution.status == Status.OPTIMAL_LOCAL
     return SOLVERS[solver].proves != "local" and (solution.status == Status.OPTIMAL_GLOBAL or local)

@@ -11,7 +11,7 @@ from crossfield.export.verify.leeway import objective_leeway
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS, norm_of
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.search.absolute_fit import fit_absolute
+from crossfield.models.search.angle_program import fit_absolute
 from crossfield.models.search.box_qp import fit_in_box
 from odd_instances import odd_instance
 
@@ -110,7 +110,7 @@ def assert_answers_of(seed, solvers, folder):
         problems = [cf.formulate(instance, name), cf.formulate(instance, name, relax=True)]
     for problem in problems:
         solutions = answers(problem, solvers, folder)
-        if problem.convex or not problem.formulation.options.relax:
+        if problem.is_convex or not problem.formulation.options.relax:
             assert_equal_optima(instance, optima(solutions))
         count.update((problem.name, *key) for key, solution in solutions.items() if solution is not None)
     norm = norm_of(problems[0].formulation)

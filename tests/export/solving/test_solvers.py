@@ -148,7 +148,7 @@ def test_every_pair_of_the_table_is_solved(label, solver):
     assert solution.status in SOLVED
     assert solution.violation.worst < 1e-6
     assert solution.objective <= problem.objective_value(problem.point(cf.greedy_field(SMALL))) + 1e-6
-    if problem.convex:
+    if problem.is_convex:
         everyone = [solution_of(label, other).objective for label_, other in DONE if label_ == label]
         assert everyone == pytest.approx([solution.objective] * len(everyone), abs=2e-5)
 

@@ -107,7 +107,12 @@ CLASSES = {
 def test_every_formulation_has_its_class(name, expected):
     field = make_field(make_instance())
     problem = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
-    assert (problem.problem_class, problem.convex, problem.objective_degree, problem.row_degree) == expected
+    assert (
+        problem.problem_class,
+        problem.is_convex,
+        problem.objective_degree,
+        problem.row_degree,
+    ) == expected
     if name != "qp-fixed":
         relaxed = formulate(field.instance, name, relax=True)
         assert relaxed.problem_class == expected[0].removeprefix("MI").replace("NLP", "NLP")

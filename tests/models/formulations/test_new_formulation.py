@@ -48,7 +48,7 @@ def test_a_new_formulation_is_listed(toy, instance):
     problem = cf.formulate(instance, "toy")
     (listed,) = (row for row in tables()["formulations"][1] if row["name"] == "toy")
     assert (listed["class"], listed["summary"]) == ("MILP", "directions alone")
-    assert (problem.problem_class, problem.convex, toy.option_names) == (
+    assert (problem.problem_class, problem.is_convex, toy.option_names) == (
         "MILP",
         True,
         {"relax", "stroke_norm"},

@@ -107,7 +107,7 @@ def test_lifted_problems_are_exact(name):
     """At any angles and any binary p1, with z = p1 beta, far outside of the bounds as well."""
     problem = make_problem(name, make_instance())
     other = with_products_lifted(problem)
-    assert (other.objective_degree, other.row_degree, other.convex) == (2, 1, name == "minlp-quartic")
+    assert (other.objective_degree, other.row_degree, other.is_convex) == (2, 1, name == "minlp-quartic")
     rng = np.random.default_rng(7)
     for point in points_of(problem):
         p1 = rng.integers(0, 2, problem.blocks["p1"].count)
@@ -130,13 +130,13 @@ def test_convex_problems_have_positive_semidefinite_hessians():
     for label in LOW_DEGREE:
         problem = problem_in_format(problem_of(label), FORMATS["lp"])
         if problem.row_degree > 1:
-            assert not problem.convex
+            assert not problem.is_convex
             continue
         index, coefficient = problem.merged_objective(2)
         hessian = np.zeros((problem.n_columns, problem.n_columns))
         np.add.at(hessian, (index[:, 0], index[:, 1]), coefficient)
         least = np.linalg.eigvalsh(hessian + hessian.T)[0] if len(coefficient) else 0.0
-        if problem.convex:
+        if problem.is_convex:
             assert least > -1e-12
         elif len(problem.instance.grid.first):
             assert least < -1e-3

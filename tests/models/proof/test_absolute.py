@@ -14,7 +14,7 @@ from crossfield.models.proof.check_certificate import has_forced_jump
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.last_step import energy_terms
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.search.absolute_fit import Residuals, absolute_fit, fit_absolute
+from crossfield.models.search.angle_program import Residuals, fit_absolute, solve_angle_program
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 
@@ -144,7 +144,7 @@ def test_any_multipliers_bound_the_energy_in_a_box(norm):
     lower = np.concatenate([fitted.alpha, fitted.beta]) - rng.uniform(0, 1, 24)
     upper = lower + rng.uniform(0, 1, 24)
     tilt = rng.normal(0, 0.1, 24)
-    best = absolute_fit(instance, field.p, norm, lower, upper, tilt=tilt)
+    best = solve_angle_program(instance, field.p, norm, lower, upper, tilt=tilt)
     for _ in range(50):
         x = rng.uniform(lower, upper)
         energy = cf.CrossField(instance, x[:12], x[12:], field.p).energy(norm).total

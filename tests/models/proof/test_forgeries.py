@@ -18,7 +18,7 @@ from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.clusters import zero_clusters
 from crossfield.models.proof.prove import prove
-from crossfield.models.search.absolute_fit import alternate_absolute
+from crossfield.models.search.angle_program import alternate_absolute
 from exhaustive import optimum, random_instance
 from proofs_round_fields import prove_round
 

@@ -1,4 +1,4 @@
-"""The best angles for given jumps, and the bound from their multipliers.
+"""The best angles for given jumps in any norm, and the bound from their multipliers.
 
 With x = (alpha, beta), shape (2n,), the energy at jumps p (docs/mathematics.md, 5) is sum k phi(Mx + c): two
 rows for each pair, A and B with k = 2, one for each stroke, R with k = w_strokes w, and one for each pixel,
@@ -108,7 +108,7 @@ class Residuals:
 
 
 @dataclass(frozen=True, eq=False)
-class AbsoluteFit:
+class AngleFit:
     """The best angles x (2n,) in a box, the multipliers (r,) of `Residuals`, and the bound that they give.
 
     Multipliers are 0 where weights are 0.
@@ -119,7 +119,7 @@ class AbsoluteFit:
     bound: float
 
 
-def absolute_fit(
+def solve_angle_program(
     instance: Instance,
     p: Ints,
     norm: Norm,
@@ -129,7 +129,7 @@ def absolute_fit(
     tilt: Floats | None = None,
     lines: Ints | None = None,
     target: Floats | None = None,
-) -> AbsoluteFit:
+) -> AngleFit:
     """Compute the angles that minimise the energy minus tilt x in a box, with Clarabel.
 
     p: jumps, shape (m,). lower, upper: the box of x = (alpha, beta) in radians, shapes (2n,). tilt: shape
@@ -141,7 +141,7 @@ def absolute_fit(
     x, multipliers = _solve_program(terms, lower, upper, tilt)
     multipliers = np.where(terms.squared, multipliers, np.clip(multipliers, -1.0, 1.0))
     multipliers[terms.weight == 0] = 0.0
-    return AbsoluteFit(x, multipliers, terms.bound(multipliers, lower, upper, tilt))
+    return AngleFit(x, multipliers, terms.bound(multipliers, lower, upper, tilt))
 
 
 def _solve_program(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
@@ -210,7 +210,7 @@ def _clarabel_settings() -> clarabel.DefaultSettings:
 def fit_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, Floats]:
     """Return the field of least energy for the jumps of `field`, and the multipliers of its strokes, (s,)."""
     instance, m, within = field.instance, len(field.p), angle_bounds(field.instance)
-    fit = absolute_fit(instance, field.p, norm, *within)
+    fit = solve_angle_program(instance, field.p, norm, *within)
     # Rounding makes equal angles equal, which the solver returns with its error.
     rounded = np.clip(np.round(fit.x, _DECIMALS), *within)
     fields = [field_at(instance, x, field.p) for x in (rounded, fit.x)]
