@@ -56,7 +56,6 @@ cf.analytic("cone", -1)                                  | size is -1; choose 1 
 cf.random_instance(-1)                                   | seed is -1; choose 0 to
 cf.random_instance(1, share="x")                         | share is 'x'; give a number
 cf.random_instance(1, mask_share=True)                   | mask_share is True
-cf.random_instance(1, noise=np.nan)                      | noise is nan; choose 0 to
 cf.random_instance(1, name=3)                            | name is 3; give text or None
 cf.Limits("60")                                          | time_limit is '60'; give a number
 cf.Limits(True)                                          | time_limit is True

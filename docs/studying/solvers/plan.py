@@ -13,6 +13,7 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.symmetries import turned
 from crossfield.models.sketch.samples import SAMPLES
 
+from ..random_curves import instance_of_curves
 from ..rows import DATA as FOLDER
 from ..rows import Keyed, Row, Rows
 
@@ -114,10 +115,10 @@ def make_instance(name: str, turns: int = 0) -> Instance:
     kind, size, *seed = name.split()
     if kind in SAMPLES:
         instance = cf.sample(kind, int(size))
+    elif kind == "pixels":
+        instance = cf.random_instance(int(seed[0]), size=int(size), mask_share=MASK_SHARE)
     else:
-        noise = 0.0 if kind == "pixels" else NOISE
-        about = {"size": int(size), "strokes": kind, "mask_share": MASK_SHARE, "noise": noise}
-        instance = cf.random_instance(int(seed[0]), **about)  # type: ignore[arg-type]
+        instance = instance_of_curves(kind, int(size), int(seed[0]), MASK_SHARE, NOISE)
     for _ in range(turns):
         instance = turned(instance)
     return instance

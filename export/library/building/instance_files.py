@@ -117,7 +117,6 @@ def _source_facts(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
         share = drawn.get("share", STROKE_SHARE)
         parameters |= {"generator": "NumPy PCG64", "mask": recipe.sketch.what, "stroke_share": share}
         parameters |= {"ragged_share": drawn["mask_share"]} if recipe.sketch.what == "ragged" else {}
-        parameters |= {key: drawn[key] for key in ("strokes", "noise") if key in drawn}
     return {
         "sketch": recipe.sketch.what,
         "kind": kind_of(recipe),

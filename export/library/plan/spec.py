@@ -35,7 +35,7 @@ PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by defau
 SketchKind = Literal["sample", "file", "random"]
 Effort = Literal["search", "none", "greedy", "proven"]
 """Work for the points of a sketch."""
-RANDOM: Final = ("share", "mask_share", "strokes", "noise")
+RANDOM: Final = ("share", "mask_share")
 """Keys of random sketches that are options of `random_instance`."""
 DEFAULT: Final = Path(__file__).with_name("default.toml")
 
@@ -408,8 +408,6 @@ def _read_random(table: dict[str, Any], shape: str, place: str) -> tuple[tuple[s
     """The stated options of random strokes, in order."""
     if shape == "full" and "mask_share" in table:
         raise InputError(f'{place}mask_share: goes with random = "ragged"; omit it, or change the shape')
-    if table.get("noise", 0) > 0 and table.get("strokes", "pixels") == "pixels":
-        raise InputError(f'{place}noise: goes with strokes = "straight" or "curved"; write one, or omit it')
     return tuple((key, table[key]) for key in RANDOM if key in table)
 
 

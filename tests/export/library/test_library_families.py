@@ -57,7 +57,7 @@ def built(tmp_path_factory):
     [
         ("", ""),
         ('seeds = "1-5"', "seeds = [3, 1, 5, 4, 2]"),
-        ("share = 0.3", 'share = 0.3\nstrokes = "curved"\nnoise = 0.1'),
+        ("share = 0.3", "share = 0.25"),
         ('points = "proven"', 'points = "none"'),
     ],
 )
