@@ -87,7 +87,7 @@ def known(name: str, size: int) -> Rows:
             "flat": flat.mean(), "cross": np.degrees(field.cross_error(true.u_angle, true.v_angle)).mean(),
             "mean": error.mean(), "most": np.percentile(error, 95), "hinted": hinted_error.mean(),
             "side": float(angles(estimate.normals, true.normals).mean() <= error.mean() + 1e-9),
-            "firm": estimate.firmness, "alike": rank_correlation(1 - estimate.confidence, error),
+            "alike": rank_correlation(1 - estimate.confidence, error),
         }  # fmt: skip
         facts = {"surface": name, "size": size, "way": way, "doubts": len(estimate.doubts)}
         rows.append(facts | {key: round(float(value), 4) for key, value in numbers.items()})
@@ -166,7 +166,7 @@ def trust(name: str, drawing: str, size: int) -> Rows:
     off = right_angle_deviation(field, estimate.heights)
     numbers = {
         "unfit": np.mean(off > OFF), "slant": np.degrees(np.arccos(estimate.normals[:, 2])).mean(),
-        "confidence": estimate.confidence.mean(), "firm": estimate.firmness,
+        "confidence": estimate.confidence.mean(),
     }  # fmt: skip
     facts = {
         "drawing": name,
@@ -230,16 +230,14 @@ def by_surface(rows: Rows) -> str:
 
 
 def with_hints(rows: Rows) -> str:
-    """As `by_surface` with one hint, and the cross errors and firmness of exact crosses and of bend."""
+    """As `by_surface` with one hint, and the cross errors of bend."""
     table = []
     for name, size in dict.fromkeys((row["surface"], row["size"]) for row in rows):
         exact, bend, *_ = [row for row in rows if (row["surface"], row["size"]) == (name, size)]
         cells = [f"{row['mean']:.1f} to {row['hinted']:.1f}" for row in (exact, bend)]
-        firm = [f"{row['firm']:.3f}" for row in (exact, bend)]
-        table.append([f"`{name}`", str(size), f"{bend['cross']:.2f}", *cells, *firm])
+        table.append([f"`{name}`", str(size), f"{bend['cross']:.2f}", *cells])
     heads = (
         "surface", "size", "cross error of `bend`", "exact: without, with hint", "`bend`: without, with hint",
-        "firmness, exact", "firmness, `bend`",
     )  # fmt: skip
     return markdown(heads, table)
 
@@ -261,7 +259,7 @@ def by_drawing(rows: Rows) -> str:
     table = [
         [
             row["drawing"], f"{row['unfit']:.0%}", str(row["spots"]), f"{row['slant']:.0f}",
-            f"{row['confidence']:.2f}", f"{row['firm']:.3f}", str(len(row["doubts"])),
+            f"{row['confidence']:.2f}", str(len(row["doubts"])),
         ]
         for row in rows
     ]  # fmt: skip
@@ -271,7 +269,6 @@ def by_drawing(rows: Rows) -> str:
         "singular spots",
         "mean slant",
         "mean confidence",
-        "firmness",
         "doubts",
     )
     return markdown(heads, table)

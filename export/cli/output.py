@@ -300,13 +300,11 @@ _ONLY_IF_ANY: Final = (
 
 def show_surface(surface: Surface, folder: Path) -> None:
     """Print the fit of a surface, its undetermined parts, doubts about it, and the folder of its files."""
-    from ...models.surface.trust import describe_firmness
     from ..surfaces.files import surface_facts
 
     facts = surface_facts(surface)
-    sentences = ("doubts", "freedom", "firmness")
+    sentences = ("doubts", "freedom")
     show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in sentences})
-    print_line(_wrap(f"firmness: {describe_firmness(surface.firmness)}"))
     for text in surface.freedom:
         print_line(_wrap(f"undetermined: {text}"))
     if surface.freedom:

@@ -182,7 +182,6 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
     off = np.degrees(right_angle_deviation(surface.field, surface.heights))
     slant = np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1.0, 1.0)))
     numbers = {
-        "firmness": surface.firmness,
         "confidence_mean": surface.confidence.mean(),
         "confidence_least_tenth": np.percentile(surface.confidence, 10),
         "right_angle_error_mean_degrees": off.mean(),

@@ -20,11 +20,13 @@ from .equations import FORGIVEN, Equations, Weights, descend, normals_of
 from .hints import Hint, check_hints, hint_rows
 from .stencils import Crosses, GridLevel, Stencils, levels_of
 from .surface import Surface
-from .trust import confidence_of, doubts_of, firmness, freedom_of, right_angle_deviation
+from .trust import confidence_of, doubts_of, right_angle_deviation
 
 FIRST: Final = Weights(even=1e-4, facing=1e-2)  # stiff, so that starts converge to the same surface
 WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)  # found on surfaces of docs/surface.md
 CLEARLY: Final = 0.8  # ratio of energies below which a plane's surface is preferred to the dome's
+INSIDE_OUT: Final = "inside out it has the same crosses: see whether it bulges the right way"
+"""What the crosses of every surface leave undetermined."""
 TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z from -z
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
 
@@ -90,12 +92,11 @@ def surface(
         z = _solve_part(level, part_hints, cut, flip=flip)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
-        parts_done.append((level.grid.size, level, z, part_hints))
-    _, level, z, part_hints = max(parts_done, key=itemgetter(0))
-    firm = firmness(level, z, [hint_rows(hint, level) for hint in part_hints])
+        parts_done.append((level.grid.size, part_hints))
+    _, part_hints = max(parts_done, key=itemgetter(0))
     off = right_angle_deviation(field, heights)
-    freedom = freedom_of(firm, hinted=_decide_side(part_hints))
-    lifted = Surface(field, heights, confidence_of(field, off), (), freedom, firm)
+    freedom = () if _decide_side(part_hints) else (INSIDE_OUT,)
+    lifted = Surface(field, heights, confidence_of(field, off), (), freedom)
     slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
     late = ("time was over before it had settled",) if cut.off else ()
     return replace(lifted, doubts=(*doubts_of(field, off, slant), *late))

@@ -31,10 +31,7 @@ class Surface(Pictured):
         Sentences with reasons not to trust the surface. Without any, one surface fits the crosses, which may
         still be wrong between strokes.
     freedom
-        Sentences that describe other surfaces with the same crosses.
-    firmness
-        Smallest change of the angles between the lines in space when the normals turn, in radians per radian,
-        of the largest part of the mask (docs/surface.md).
+        Sentences that describe other surfaces with the same crosses; flatter and deeper ones often fit too.
 
     """
 
@@ -43,7 +40,6 @@ class Surface(Pictured):
     confidence: Floats
     doubts: tuple[str, ...] = ()
     freedom: tuple[str, ...] = ()
-    firmness: float = 0.0
 
     @property
     def instance(self) -> Instance:
