@@ -1,4 +1,4 @@
-"""The same sketch on a grid of half the resolution, and prolongation of a field to the fine grid.
+"""The same sketch on a grid of half the resolution, and its field on the fine grid.
 
 The smooth energy of a field is the same on both grids: differences between neighbours double, and there is a
 quarter of the pairs. So the weights of strokes and of beta, which are sums over pixels, become four times
@@ -18,14 +18,9 @@ from ..instance.angles import HALF
 from ..instance.domain import Floats, Ints
 from ..instance.instance import MOST_WEIGHT, Instance, round_to_digits
 from ..instance.terms import parity_sign
-from ..processes.deadline import Over, never
 from .box_qp import FreeField
-from .energy import LinearSolver
-from .improvement import improved_field, settle
 
-_ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
-CREEP: Final = 1e-3
-"""Relative fall of the energy in a round: a smaller one does not justify a round on a fine grid."""
+_ALIGNED: Final = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
 
 
 def halve_resolution(instance: Instance) -> Instance | None:
@@ -50,18 +45,6 @@ def halve_resolution(instance: Instance) -> Instance | None:
         stroke_coefficient=min(4 * instance.stroke_coefficient, MOST_WEIGHT),
         skew_coefficient=min(4 * instance.skew_coefficient, MOST_WEIGHT),
     )
-
-
-def prolong_field(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
-    """The improved field that grows on the fine grid of an instance out of a field on the coarse one."""
-    return improved_field(grow_field(coarse, instance, over), stop=over)
-
-
-def grow_field(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
-    """The field that grows on the fine grid: its crosses and jumps start as the coarse ones, then settle."""
-    state = copy_to_fine_grid(coarse, instance)
-    settle(state, LinearSolver(), over, enough=CREEP)
-    return state.fit_in_bounds(over)
 
 
 def copy_to_fine_grid(coarse: CrossField, instance: Instance) -> FreeField:

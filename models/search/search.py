@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -26,9 +26,8 @@ from ..processes.process_pool import parallel_map
 from ..smooth.polyvector import power_field
 from ..smooth.sparse_systems import one_thread
 from .box_qp import FreeField, stroke_bounds
-from .coarse_grid import halve_resolution, prolong_field
 from .energy import LinearSolver
-from .improvement import improved_field, pixel_curves, settle
+from .improvement import pixel_curves, settle
 from .landscape import FieldPoint
 from .nearest_stroke import nearest_strokes
 from .starts import polyvector_start, rounded_energy, start_fields
@@ -39,13 +38,9 @@ Explorers = Callable[[list[PatchTask]], list[PatchResult]]
 
 _PATCH: Final = 320  # pixels; its matrix has 640 rows, and a change of one jump costs 0.3 ms
 _PATCHES: Final = 4  # per round
-_FINE: Final = 0.6  # share of the seconds that is reserved for the grid of higher resolution
-_COARSE: Final = 60  # rounds on a grid of lower resolution
-_LATEST: Final = 4  # fields that are brought from there
 _KICKS: Final = 40  # per patch
 _APART: Final = 3  # rounds on a small grid in which each patch is explored from a start of its own
 _SETTLE: Final = 8  # rounds between two improvements of the whole grid
-_IMPROVE: Final = 32  # rounds between two trials of turning whole curves, which reach beyond a patch
 _PATIENCE: Final = 200  # perturbations per pixel without success that end a search
 _ALONE: Final = 64  # pixels up to which starting processes would take longer than the search
 _HURRY: Final = 5.0  # seconds; with less, starting processes would take a good part of them
@@ -178,27 +173,6 @@ class _Ends:
         """Whether work has to end now, even in the middle of a round."""
         return self.interrupted() or self.deadline.passed()
 
-    def coarse(self) -> _Ends:
-        """The limits of the search on the grid of half the resolution."""
-        many = _COARSE if self.rounds is None else min(self.rounds, _COARSE)
-        return replace(self, deadline=self.deadline.share(1 - _FINE), rounds=many)
-
-
-def _fields_from_coarse(
-    instance: Instance, seed: int, ends: _Ends, explorers: Explorers
-) -> Iterator[CrossField]:
-    """Fields found on the grid of half the resolution, prolonged to this one, the best there first."""
-    coarse = halve_resolution(instance)
-    if coarse is None:
-        return
-    sooner = ends.coarse()
-    hunt = _Hunt(coarse, seed, _starts(coarse, None, sooner))
-    hunt.run(explorers, sooner, silent)
-    for field in hunt.latest(ends.over):
-        if ends.over():
-            return
-        yield prolong_field(field, instance, ends.over)
-
 
 def _starts(instance: Instance, start: CrossField | None, ends: _Ends) -> list[CrossField]:
     """All starts, the lowest first."""
@@ -224,7 +198,6 @@ class _Hunt:
         self._state = FreeField.of(start)
         self._bounds = stroke_bounds(instance)
         self._solver = LinearSolver()
-        self._latest = [start]
         self._unsettled = False
         # Parts without a stroke are constant and cost nothing.
         self._reached = nearest_strokes(instance) >= 0
@@ -245,21 +218,8 @@ class _Hunt:
         """Whether this round explores from several starts."""
         return not self.is_large and self.round < _APART
 
-    def latest(self, over: Over) -> list[CrossField]:
-        """The last fields that were the best for a round or more, the best first."""
-        return [self.best(over), *self._latest[-_LATEST:-1][::-1]]
-
-    def offer(self, field: CrossField) -> None:
-        """Adopt this field if it is lower."""
-        if field.energy().total < self._state.energy - LOWER:
-            self._start, self._state, self._unsettled = field, FreeField.of(field), False
-            self.energies.append((self.round, field.energy().total))
-
     def run(self, explorers: Explorers, ends: _Ends, progress: Progress) -> str:
-        """Adopt fields from coarser grids, then explore until a limit is met; return which one."""
-        if self.is_large:
-            for field in _fields_from_coarse(self._instance, self._seed, ends, explorers):
-                self.offer(field)
+        """Explore until a limit is met; return which one."""
         while not (ended := ends.reason_to_end(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
@@ -309,12 +269,8 @@ class _Hunt:
             lower = [(task, better) for task, better in zip(tasks, points, strict=True) if better is not None]
             for task, better in sorted(lower, key=lambda pair: pair[1].energy):
                 self._adopt(task, better, over)
-        if any(points) and self._unsettled:
-            self._latest.append(self._state.field)
         if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.is_large):
             self._settle(over)
-        if self.is_large and (self.round + 1) % _IMPROVE == 0:
-            self.offer(improved_field(self.best(over), stop=over))
 
     def _adopt_in_starts(self, points: list[FieldPoint | None]) -> None:
         """Adopt lower points in the fields that were explored, and the lowest of these."""

@@ -22,7 +22,7 @@ from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
 from ..smooth.sparse_systems import one_thread, solve_locally
 from .box_qp import FreeField, fit_in_box, stroke_bounds
-from .coarse_grid import CREEP, copy_to_fine_grid, halve_resolution
+from .coarse_grid import copy_to_fine_grid, halve_resolution
 from .energy import LinearSolver, energy_at
 from .greedy import greedy_field, rough_greedy
 from .improvement import improved_field, settle
@@ -34,6 +34,7 @@ _EFFORT: Final = 32768  # pixels of all approximate fields of one grid
 _LIFTED: Final = 4  # fields of a coarse grid that grow to the next one: their fusion, and the lowest
 _HASTE: Final = 2  # steps of angles, and of jumps, of an approximate field
 _HASTY: Final = 0.1  # relative residual of such a step
+_CREEP: Final = 1e-3  # relative fall of the energy in a round: a smaller one does not justify another round
 _FAINT: Final = 1e-2  # of the polynomials of an approximate field, whose values fade away from strokes
 
 
@@ -157,7 +158,7 @@ def _fuse_states(states: list[FreeField], over: Over) -> FreeField:
             break
         best = fuse_fields(best, candidate.field)
     state = FreeField.of(best)
-    settle(state, LinearSolver(), over, enough=CREEP)
+    settle(state, LinearSolver(), over, enough=_CREEP)
     return min(state, states[0], key=_state_energy)
 
 
