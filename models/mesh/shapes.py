@@ -83,14 +83,15 @@ def torus(around: int, through: int, *, half: bool = False) -> Mesh:
 def blocks(filled: Bools) -> Mesh:
     """The surface of a body of unit cubes, filled (x, y, z), with two faces for each side of a cube."""
     padded = np.pad(filled, 1)
-    corners, faces = [], []
+    corners: list[NDArray[np.int64]] = []
+    faces: list[NDArray[np.int64]] = []
     for axis in range(3):
         for sign in (1, -1):
             cell = np.argwhere(padded & ~np.roll(padded, -sign, axis))
             one, other = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]][::sign]
             base = cell + (np.eye(3, dtype=int)[axis] if sign > 0 else 0)
             square = np.stack([base, base + one, base + one + other, base + other], axis=1)
-            start = 4 * sum(map(len, corners))
+            start = 4 * sum(len(part) for part in corners)
             number = start + 4 * np.arange(len(square))[:, None]
             even = (cell.sum(axis=1) - cell[:, axis]) % 2 == 0
             halves = np.where(even[:, None], [[0, 1, 2, 0, 2, 3]], [[0, 1, 3, 1, 2, 3]])
