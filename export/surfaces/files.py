@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.arguments import check_arguments
-from ...models.field.rawfield import vertices_of
+from ...models.field.triangles import vertices_of
 from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import make_folder, write_bytes

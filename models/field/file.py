@@ -1,4 +1,4 @@
-"""Field files: .npz and JSON (field.schema.json), with field and instance, and .rawfield (rawfield.py).
+"""Field files: .npz and JSON (field.schema.json) with the instance, and files of directions alone.
 
 An .npz holds alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
 version as JSON text, and the arrays of the instance's own .npz, their names preceded by `instance_`.
@@ -35,6 +35,7 @@ from ..instance.file import (
 from ..instance.grid import Grid
 from ..instance.instance import Instance
 from ..storage import read_bytes, write_bytes
+from .exchange import most_exchange_bytes, parse_ply, parse_rosy, parse_vtk, to_ply, to_rosy, to_vtk
 from .field import CrossField
 from .rawfield import most_rawfield_bytes, parse_rawfield, to_obj, to_rawfield, to_sings
 
@@ -60,8 +61,8 @@ def write_field(field: CrossField, path: str | Path) -> Path:
     field
         The field.
     path
-        File to write; the suffix .npz, .json or .rawfield selects the format. A .rawfield comes with its mesh
-        (.obj) and its singularities (.sings).
+        File to write; the suffix .npz, .json, .rawfield, .rosy, .ply or .vtk selects the format. A .rawfield
+        and a .rosy come with their mesh (.obj), a .rawfield with its singularities (.sings).
 
     Returns
     -------
@@ -78,8 +79,9 @@ def write_field(field: CrossField, path: str | Path) -> Path:
     """
     path = Path(path)
     write = _look_up_suffix(_WRITERS, path, "written")
-    if write is to_rawfield:
+    if write in (to_rawfield, to_rosy):
         write_bytes(path.with_suffix(".obj"), to_obj(field.instance))
+    if write is to_rawfield:
         write_bytes(path.with_suffix(".sings"), to_sings(field))
     return write_bytes(path, write(field))
 
@@ -91,10 +93,11 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     Parameters
     ----------
     path
-        A .npz, .json or .rawfield file. A .rawfield has four vectors per face, in any order and of any
-        length: u, v, -u and -v. Its faces are the triangles that `write_field` writes, or one per pixel.
+        A .npz, .json, .rawfield, .rosy, .ply or .vtk file. A .rawfield has four vectors per face, in any
+        order and of any length: u, v, -u and -v. Faces are those of the mesh; on a grid the triangles that
+        `write_field` writes, or one per pixel.
     on
-        The instance that the field must be on. A .rawfield needs it, because it contains none.
+        The instance that the field must be on. All files but .npz and .json need it: they contain none.
 
     Returns
     -------
@@ -104,18 +107,19 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     Raises
     ------
     InputError
-        For another suffix, an unreadable file, and a .rawfield without an instance.
+        For another suffix, an unreadable file, and a file that needs an instance without one.
     InstanceError
         For a damaged file and for another instance; the message names the place.
 
     """
     path = Path(path)
     with naming(path):
-        if path.suffix.lower() == ".rawfield":
+        if path.suffix.lower() in _DIRECTIONS:
             if on is None:
                 raise InputError("holds no instance; give the instance: read_field(path, on=instance)")
-            return parse_rawfield(read_bytes(path, most_rawfield_bytes(on)), on)
-        read = _look_up_suffix(_READERS, path, "read", ".rawfield")
+            most, parse = _DIRECTIONS[path.suffix.lower()]
+            return parse(read_bytes(path, most(on)), on)
+        read = _look_up_suffix(_READERS, path, "read", *_DIRECTIONS)
         field = read(read_bytes(path, MAX_ARCHIVE))
         if on is not None:
             field.check_instance(on)
@@ -248,5 +252,15 @@ _WRITERS: Final[dict[str, Callable[[CrossField], bytes]]] = {
     ".npz": _field_to_npz,
     ".json": field_to_json,
     ".rawfield": to_rawfield,
+    ".rosy": to_rosy,
+    ".ply": to_ply,
+    ".vtk": to_vtk,
 }
 _READERS: Final[dict[str, Callable[[bytes], CrossField]]] = {".npz": _field_of_npz, ".json": field_of_json}
+_DIRECTIONS: Final[dict[str, tuple[Callable[[Instance], int], Callable[[bytes, Instance], CrossField]]]] = {
+    ".rawfield": (most_rawfield_bytes, parse_rawfield),
+    ".rosy": (most_exchange_bytes, parse_rosy),
+    ".ply": (most_exchange_bytes, parse_ply),
+    ".vtk": (most_exchange_bytes, parse_vtk),
+}
+"""Files of directions alone: the most bytes that are read for an instance, and their reader."""
