@@ -84,9 +84,6 @@ def detect_file_kind(data: bytes, suffix: str) -> FileKind:
     return "svg" if suffix == ".svg" and is_text else "picture"
 
 
-def suffix_by_content(data: bytes, suffix: str) -> str:
-    """Suffix that fits the content of a drawing whose file has this one. Raises InputError."""
-    kind = detect_file_kind(data, suffix)
-    if kind != "picture":
-        return f".{kind}"
+def suffix_of_picture(data: bytes) -> str:
+    """Suffix of a picture by its content; Netpbm's for unknown content."""
     return next((suffix for suffix, start in _SIGNATURES.items() if re.match(start, data)), ".pnm")

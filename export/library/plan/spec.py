@@ -19,7 +19,8 @@ from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
 from ....models.instance.instance import GAUGES
-from ....models.sketch.drawing_file import suffix_by_content
+from ....models.sketch.drawing_file import suffix_of_picture
+from ....models.sketch.publication import publishable_sketch
 from ....models.sketch.random_strokes import RAGGED_SHARE
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
@@ -413,9 +414,11 @@ def _read_random(table: dict[str, Any], shape: str, place: str) -> tuple[tuple[s
 def _read_drawing(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
     what, mask = table["file"], table.get("mask", "")
     source = table.get("file_name", Path(what).name)
-    drawing = _read_file(folder / what, f"{place}file")
-    with naming(folder / what):
-        suffix = suffix_by_content(drawing, Path(source).suffix)
+    drawn = _read_file(folder / what, f"{place}file")
+    try:
+        drawing, suffix = publishable_sketch(drawn, Path(source).suffix.lower())
+    except InputError as error:
+        raise InputError(f"{place}file: {what}: {error}") from error
     masked = _read_file(folder / mask, f"{place}mask") if mask else b""
     return {
         "what": source,
@@ -423,7 +426,7 @@ def _read_drawing(table: dict[str, Any], place: str, folder: Path) -> dict[str, 
         "drawing": drawing,
         "suffix": suffix,
         "mask": masked,
-        "mask_suffix": suffix_by_content(masked, Path(mask).suffix) if masked else "",
+        "mask_suffix": suffix_of_picture(masked) if masked else "",
     }
 
 

@@ -32,7 +32,9 @@ from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.file import read_instance
 from crossfield.models.search.greedy import greedy_field
+from crossfield.models.sketch.publication import svg_of_curves
 from crossfield.models.sketch.samples import sample, sample_svg
+from crossfield.models.sketch.svg import read_svg
 from libraries import HEAD, content
 from loops import for_each
 
@@ -249,7 +251,9 @@ def test_the_instance_file_is_the_instance_of_the_drawing(built, spec):
     )
     assert instance.sha256 == document["instance"]["sha256"] == make_instance(wanted).sha256
     assert (document["source"]["sketch"], document["source"]["kind"]) == ("drawn by hand.svg", "file")
-    assert (built.folder / "cf_own.sketch.svg").read_bytes() == sample_svg("mouse").encode()
+    assert (built.folder / "cf_own.sketch.svg").read_bytes() == svg_of_curves(
+        read_svg(sample_svg("mouse").encode())
+    )
     assert document["instance"]["pixels"] == instance.grid.size
     assert document["instance"]["pairs"] == len(instance.grid.first)
 

@@ -1,4 +1,4 @@
-"""Sketches of a library: published files, and a site that accepts plain files alone."""
+"""Sketches of a library: only strokes are published, and a site accepts plain files alone."""
 
 import shutil
 
@@ -7,31 +7,44 @@ from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.site.site import write_site
 from crossfield.models.errors import InputError
 from crossfield.models.instance.file import read_instance
-from crossfield.models.sketch.drawing_file import suffix_by_content
 from libraries import library_of
-from loops import for_each
-from PIL import Image
-from small_drawings import png, read
+from small_drawings import read
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
-DRAWN = b"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 150 110" fill="none" stroke="#000">
-<title>a window</title><path d="M20 30H120V90H20Z"/><path d="M20 60H120M70 30V90" stroke="#e00000"/></svg>"""
-BLANK = Image.new("L", (3, 3), 255)
+HOSTILE = b"""<?xml version="1.0"?><?xml-stylesheet href="http://evil.example/a.css"?>
+<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://evil.example/svg11.dtd">
+<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 150 110"
+ onload="alert('loaded')"><title>evil title</title><!-- evil comment --><metadata>evil</metadata>
+<script>alert('script')</script><script href="http://evil.example/x.js"/>
+<style>@import url(http://evil.example/style.css); path { filter: url(http://evil.example/f#x) }</style>
+<image xlink:href="http://evil.example/track.png" width="150" height="110"/>
+<use xlink:href="http://evil.example/other.svg#a"/>
+<foreignObject><iframe xmlns="http://www.w3.org/1999/xhtml" src="http://evil.example"/></foreignObject>
+<a xlink:href="javascript:alert(1)"><g fill="none" stroke="#000"><path d="M20 30H120V90H20Z"/>
+<path d="M20 60H120" stroke="#e00000" onclick="alert('clicked')"/>
+<path id="&quot;&gt;&lt;script&gt;" d="M70 30V90" stroke="#e00000"/></g></a>
+<text>http://evil.example</text><animate href="#a" attributeName="d"/></svg>"""
+SHOWN = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 150 110" fill="none" stroke="#000" \
+stroke-width="0.375" stroke-linecap="round" stroke-linejoin="round">
+<path d="M20 30L120 30 120 90 20 90 20 30"/>
+<path stroke="#c8102e" d="M20 60L120 60M70 30L70 90"/>
+</svg>
+"""
 SPEC = """formulations = ["qp-fixed"]
 [rungs.medium]
 sizes = [8]
 formats = ["lp"]
 [[sketches]]
-name = "window"
-file = "window.xml"
+name = "evil"
+file = "evil.html"
 """
 
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sketches")
-    (folder / "window.xml").write_bytes(DRAWN)
+    (folder / "evil.html").write_bytes(HOSTILE)
     return library_of(folder, SPEC).folder
 
 
@@ -40,31 +53,18 @@ def lib(built, tmp_path):
     return shutil.copytree(built, tmp_path / "lib")
 
 
-def test_a_sketch_is_published_byte_for_byte_with_the_suffix_of_its_content(built):
-    assert (built / "cf_window.sketch.svg").read_bytes() == DRAWN
-    instance = read_instance(built / "cf_window_n008.instance.json")
-    wanted = read(DRAWN, 8, "window.xml")
+def test_a_published_sketch_has_its_strokes_and_nothing_else_of_its_file(built):
+    assert (built / "cf_evil.sketch.svg").read_text() == SHOWN
+    instance = read_instance(built / "cf_evil_n008.instance.json")
+    wanted = read(HOSTILE, 8, "evil.html")
     assert (instance.theta.tolist(), instance.w.tolist()) == (wanted.theta.tolist(), wanted.w.tolist())
     assert verify_library(built) == []
+    for path in built.iterdir():
+        for word in (b"evil.example", b"alert", b"evil title", b"foreignObject"):
+            assert word not in path.read_bytes(), path.name
 
 
-@for_each(
-    "data, suffix, expected",
-    [
-        (png(BLANK, "GIF"), ".html", ".gif"),
-        (png(BLANK, "JPEG"), ".svg", ".jpg"),
-        (png(BLANK, "PNG"), "", ".png"),
-        (b"neither this nor that", ".html", ".pnm"),
-        (b"#9 9\n{\n}\n", ".html", ".scap"),
-        (b"v 2\n0 0 0\n1 0 0\n", ".svg", ".curves"),
-        (DRAWN, ".html", ".svg"),
-    ],
-)
-def test_the_suffix_of_a_published_file_follows_from_its_content(data, suffix, expected):
-    assert suffix_by_content(data, suffix) == expected
-
-
-@pytest.mark.parametrize("name", ["cf_window.sketch.svg", "SHA256SUMS"])
+@pytest.mark.parametrize("name", ["cf_evil.sketch.svg", "SHA256SUMS"])
 def test_a_site_refuses_a_link_and_names_it(lib, tmp_path, name):
     (lib / name).rename(tmp_path / "elsewhere")
     (lib / name).symlink_to(tmp_path / "elsewhere")
