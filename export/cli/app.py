@@ -330,7 +330,7 @@ def _error_line(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return "there is not enough memory; choose a smaller --size"
     if isinstance(error, OSError):
-        what = (error.strerror or str(error)).lower()
-        return f"{error.filename or 'a file'}: {what}; check the path and the free space"
-    what = f"{type(error).__name__}: {shortened(error)}"
-    return f"internal error, please report it: {what} (crossfield --debug ... shows the traceback)"
+        reason = (error.strerror or str(error)).lower()
+        return f"{error.filename or 'a file'}: {reason}; check the path and the free space"
+    reason = f"{type(error).__name__}: {shortened(error)}"
+    return f"internal error, please report it: {reason} (crossfield --debug ... shows the traceback)"

@@ -77,14 +77,14 @@ def require_suffix(path: Path, allowed: tuple[str, ...]) -> None:
         raise InputError(f"has {has}, which selects no format; use {', '.join(allowed)}", file=path)
 
 
-def find_drawing(what: str) -> str | None:
+def find_drawing(source: str) -> str | None:
     """Drawing below the field of a sketch or a sample; None for an instance, which has no drawing."""
     from ...models.sketch.samples import SAMPLES
 
-    path = Path(what)
+    path = Path(source)
     if path.is_file():
-        return None if path.suffix.lower() in {".json", ".npz"} else what
-    return what if what in SAMPLES and SAMPLES[what].kind == "sketch" else None
+        return None if path.suffix.lower() in {".json", ".npz"} else source
+    return source if source in SAMPLES and SAMPLES[source].kind == "sketch" else None
 
 
 def check_names(names: list[str] | None, table: Mapping[str, Any], kind: str) -> list[str]:

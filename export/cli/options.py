@@ -26,9 +26,9 @@ _gap = partial(typer.Option, "--gap", min=0.0)
 _jobs = partial(typer.Option, "--jobs", min=1, max=MOST)
 
 
-def _norm_option(option: str, what: str) -> Any:
+def _norm_option(option: str, terms: str) -> Any:
     """Option for a norm."""
-    words = f"{what} in absolute values (1) or squares (2), where a formulation offers both."
+    words = f"{terms} in absolute values (1) or squares (2), where a formulation offers both."
     return typer.Option(option, min=1, max=2, help=words)
 
 

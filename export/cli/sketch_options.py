@@ -78,13 +78,13 @@ class SketchOptions:
         """Whether an option decides which strokes of a drawing are curvature lines."""
         return self.silhouette != "none" or bool(self.curvature) or self.view is not None
 
-    def read(self, what: str, *, quiet: bool = False) -> Instance:
+    def read(self, source: str, *, quiet: bool = False) -> Instance:
         """Instance of a sketch file, a built-in sample or an instance file, small enough for the memory.
 
         Prints the warnings of the reader unless quiet. Raises InputError, and InstanceError for a weight that
         is out of range.
         """
-        path = Path(what)
+        path = Path(source)
         is_saved = path.is_file() and path.suffix.lower() in {".json", ".npz"}
         instance = self._read_instance(path) if is_saved else self._read_drawing(path)
         instance = instance.with_weights(stroke_weight=self.stroke_weight)

@@ -100,7 +100,7 @@ _NARROWEST: Final = 52.0  # room for a heading
 
 @check_arguments
 def draw(
-    what: CrossField | Instance | Surface,
+    subject: CrossField | Instance | Surface,
     path: str | Path,
     *,
     kind: str | None = None,
@@ -110,7 +110,7 @@ def draw(
 
     Parameters
     ----------
-    what
+    subject
         An Instance, a CrossField or a Surface.
     path
         The file to write; its suffix, .png, .svg or .pdf, decides the format.
@@ -141,28 +141,28 @@ def draw(
         raise InputError(
             f"a picture cannot be written as {path.suffix!r}; use one of {', '.join(SUFFIXES)}", file=path
         )
-    if isinstance(what, Surface):
+    if isinstance(subject, Surface):
         if kind is not None or underlay is not None:
             raise InputError("a surface has one picture, on no drawing; leave kind and underlay out")
         chosen = SHADED
     else:
-        kind = kind or _default_kind(what, suffix, underlaid=underlay is not None)
-        chosen = _find_kind(kind, what)
-        if kind == LAYERS and isinstance(what, CrossField):
-            return write_bytes(path, _draw_layers(what, suffix, underlay))
+        kind = kind or _default_kind(subject, suffix, underlaid=underlay is not None)
+        chosen = _find_kind(kind, subject)
+        if kind == LAYERS and isinstance(subject, CrossField):
+            return write_bytes(path, _draw_layers(subject, suffix, underlay))
         if underlay is not None:
             raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}")
     with fixed_settings():
-        return write_bytes(path, _save_figure(_draw_panels(what, chosen), suffix))
+        return write_bytes(path, _save_figure(_draw_panels(subject, chosen), suffix))
 
 
 @check_arguments
-def preview(what: CrossField | Instance | Surface) -> bytes:
+def preview(subject: CrossField | Instance | Surface) -> bytes:
     """Draw a small picture for notebooks.
 
     Parameters
     ----------
-    what
+    subject
         An instance, a field or a surface.
 
     Returns
@@ -171,14 +171,14 @@ def preview(what: CrossField | Instance | Surface) -> bytes:
         A PNG.
 
     """
-    kind = SHADED if isinstance(what, Surface) else KINDS[_default_kind(what, ".png", underlaid=False)]
+    kind = SHADED if isinstance(subject, Surface) else KINDS[_default_kind(subject, ".png", underlaid=False)]
     with fixed_settings():
-        return _save_figure(_draw_panels(what, kind), ".png", dots=_PREVIEW_DOTS)
+        return _save_figure(_draw_panels(subject, kind), ".png", dots=_PREVIEW_DOTS)
 
 
-def _default_kind(what: CrossField | Instance, suffix: str, *, underlaid: bool) -> str:
+def _default_kind(subject: CrossField | Instance, suffix: str, *, underlaid: bool) -> str:
     """The default kind of picture."""
-    if isinstance(what, Instance):
+    if isinstance(subject, Instance):
         return "instance"
     return LAYERS if suffix == ".svg" or underlaid else "field"
 
@@ -210,25 +210,27 @@ def _save_figure(figure: Any, suffix: str, *, dots: int = _DOTS) -> bytes:
     return stream.getvalue()
 
 
-def _find_kind(kind: str, what: Subject) -> PictureKind:
+def _find_kind(kind: str, subject: Subject) -> PictureKind:
     """The kind of that name. Raises InputError for an unknown one, and for one that needs a field."""
     if kind not in KINDS:
         raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(KINDS)}")
-    if KINDS[kind].needs_field and isinstance(what, Instance):
+    if KINDS[kind].needs_field and isinstance(subject, Instance):
         raise InputError(
-            f"{what.name} is an instance without a field, which kind {kind} needs; solve it first, "
+            f"{subject.name} is an instance without a field, which kind {kind} needs; solve it first, "
             "or use kind instance"
         )
     return KINDS[kind]
 
 
-def _draw_panels(what: Subject, kind: PictureKind) -> Any:
+def _draw_panels(subject: Subject, kind: PictureKind) -> Any:
     """The figure: panels in a row, headings above, legend and caption below; every length in points."""
     from matplotlib.figure import Figure
 
-    instance = what if isinstance(what, Instance) else what.instance
-    field = what if isinstance(what, CrossField) else None
-    picture = panels.PanelContent(instance, field, kind.size, what if isinstance(what, Surface) else None)
+    instance = subject if isinstance(subject, Instance) else subject.instance
+    field = subject if isinstance(subject, CrossField) else None
+    picture = panels.PanelContent(
+        instance, field, kind.size, subject if isinstance(subject, Surface) else None
+    )
     height, width = (side * picture.unit for side in picture.instance.mask.shape)
     above = _EDGE + _LINE * any(heading for heading, _ in kind.panels)
     below = _EDGE + _LINE * (1 + kind.legend)

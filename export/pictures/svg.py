@@ -36,10 +36,10 @@ def web_sheet_svg(sheet: Sheet, dark: dict[str, str]) -> bytes:
     body = list(_svg_body(sheet, _COARSE))
     text = "".join(body)
     rules = "".join(
-        f'[{what}="{light}"]{{{what}:{night}}}'
+        f'[{attribute}="{light}"]{{{attribute}:{night}}}'
         for light, night in dark.items()
-        for what in ("fill", "stroke")
-        if f'{what}="{light}"' in text
+        for attribute in ("fill", "stroke")
+        if f'{attribute}="{light}"' in text
     )
     style = f"<style>@media (prefers-color-scheme:dark){{{rules}}}</style>"
     return _svg_document(

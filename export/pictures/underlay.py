@@ -53,14 +53,14 @@ class Underlay:
     scale: float = 1.0
 
 
-def read_underlay(what: str | Path, *, on: Instance) -> Underlay:
+def read_underlay(source: str | Path, *, on: Instance) -> Underlay:
     """The drawing of an instance, from a sketch file or a drawn sample; .curves is seen from the same side.
 
     Raises InputError for an unreadable file, a computed sample, and a drawing that lies elsewhere.
     """
-    path = Path(what)
-    sampled = not path.is_file() and str(what) in SAMPLES
-    data = sample_svg(str(what)).encode() if sampled else read_file(path)
+    path = Path(source)
+    sampled = not path.is_file() and str(source) in SAMPLES
+    data = sample_svg(str(source)).encode() if sampled else read_file(path)
     with naming(path):
         content = parse_drawing(data, path.suffix, DEFAULT_SIZE, view=on.view)
         frame = Frame(*on.origin, on.pixel_size, *on.mask.shape)

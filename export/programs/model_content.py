@@ -44,12 +44,12 @@ class Algebra:
     row_quadratic: Floats
 
     @classmethod
-    def of(cls, columns: list[str], rows: list[str], **given: Any) -> Self:
+    def of(cls, columns: list[str], rows: list[str], **facts: Any) -> Self:
         """The model; `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out."""
         for name, width in (("quadratic", 2), ("matrix", 2), ("row_quadratic", 3)):
-            found = given.pop(name, None) or Terms(np.zeros((0, width), np.int64), np.zeros(0))
-            given |= {f"{name}_at": found.at, name: found.value}
-        arrays = {"integer": np.zeros(len(columns), dtype=bool)} | given
+            found = facts.pop(name, None) or Terms(np.zeros((0, width), np.int64), np.zeros(0))
+            facts |= {f"{name}_at": found.at, name: found.value}
+        arrays = {"integer": np.zeros(len(columns), dtype=bool)} | facts
         kinds = {name: bool if name == "integer" else None for name in arrays}
         return cls(columns=columns, rows=rows, **{key: np.asarray(arrays[key], kinds[key]) for key in arrays})
 

@@ -108,18 +108,18 @@ DOWNLOADS: Final = {
 """The entries of the menu by name."""
 
 
-def download(data: bytes, what: str, formulation: str = "", form: str = "") -> tuple[str, bytes]:
+def download(data: bytes, kind: str, formulation: str = "", form: str = "") -> tuple[str, bytes]:
     """Name and content of the file of an entry; several files are one archive. Raises InputError."""
-    if what not in DOWNLOADS:
-        raise InputError(f"there is no download {shortened(what)!r}; choose one of {', '.join(DOWNLOADS)}")
+    if kind not in DOWNLOADS:
+        raise InputError(f"there is no download {shortened(kind)!r}; choose one of {', '.join(DOWNLOADS)}")
     document = Document.from_bytes(data)
     with tempfile.TemporaryDirectory(prefix="crossfield-") as name:
         folder = Path(name)
-        DOWNLOADS[what].write(document, folder, formulation, form)
+        DOWNLOADS[kind].write(document, folder, formulation, form)
         files = sorted(path for path in folder.rglob("*") if path.is_file())
         if len(files) == 1:
             return files[0].name, files[0].read_bytes()
-        return f"{document.name}.{what}.zip", _pack_files(files, folder)
+        return f"{document.name}.{kind}.zip", _pack_files(files, folder)
 
 
 def _pack_files(files: list[Path], folder: Path) -> bytes:

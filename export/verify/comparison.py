@@ -118,13 +118,13 @@ def _are_close(reported: Any, expected: Any, tolerance: float) -> Bools:
     return np.asarray(np.isclose(reported, expected, rtol=tolerance, atol=tolerance * 1e-3))
 
 
-def _value_difference(what: str, values: Floats, expected: Floats, accuracy: float) -> str:
+def _value_difference(label: str, values: Floats, expected: Floats, accuracy: float) -> str:
     known = ~np.isnan(values)
     wrong = known & ~np.isclose(values, expected, rtol=accuracy, atol=accuracy)
     if not wrong.any():
         return ""
     place = tuple(np.argwhere(wrong)[0])
-    return f"{what} at point {place[0]} is {values[place]:.12g} instead of {expected[place]:.12g}"
+    return f"{label} at point {place[0]} is {values[place]:.12g} instead of {expected[place]:.12g}"
 
 
 def behaviour_difference(reported: Behaviour, problem: Problem, points: Points) -> str:

@@ -70,10 +70,10 @@ def search_fields(
     return baseline, [searched, *low, *fitted, *staged], proven
 
 
-def given_fields(given: InstancePoints, instance: Instance, recipe: InstanceRecipe) -> InstanceFields:
+def given_fields(points: InstancePoints, instance: Instance, recipe: InstanceRecipe) -> InstanceFields:
     """Return the given points, without any search; a certificate is checked."""
-    low = [given.field(f"least_{norm}") for norm in NORMS]
-    return given.field("baseline"), low, given.certificates(instance, recipe.prove)
+    low = [points.field(f"least_{norm}") for norm in NORMS]
+    return points.field("baseline"), low, points.certificates(instance, recipe.prove)
 
 
 def _nearest_stroke_field(instance: Instance) -> KnownField:

@@ -38,14 +38,14 @@ def make_instance_files(task: InstanceTask) -> Files | NoStrokeError:
         instance = make_instance(task.recipe)
     except NoStrokeError as error:
         return error
-    given = task.given if task.given and task.given.instance == instance.sha256 else None
+    points = task.given if task.given and task.given.instance == instance.sha256 else None
     sent = [
         check_certificate(proof.data, proof.file, instance, proof.provenance)
         for proof in task.proofs
         if proof.instance_sha256 == instance.sha256
     ]
     baseline, low, proven = (
-        given_fields(given, instance, task.recipe) if given else search_fields(instance, task.recipe, sent)
+        given_fields(points, instance, task.recipe) if points else search_fields(instance, task.recipe, sent)
     )
     submitted = [field.known() for field in task.fields]
     every = [
@@ -83,10 +83,10 @@ def _are_equal(first: CrossField, second: CrossField) -> bool:
 
 
 def _instance_document(instance: Instance, task: InstanceTask, fields: dict[str, Any]) -> dict[str, Any]:
-    given = {"given": task.given.sha256} if task.given and task.given.sha256 else {}
+    facts = {"given": task.given.sha256} if task.given and task.given.sha256 else {}
     recipe = task.recipe
     stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added}
-    return given | {
+    return facts | {
         "format": ABOUT_FORMAT,
         "version": VERSION,
         "name": task.name,

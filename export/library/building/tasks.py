@@ -64,9 +64,9 @@ class InstanceTask:
     def sha256(self) -> str:
         """Digest of everything that its files depend on."""
         fields = [[hashlib.sha256(field.data).hexdigest(), asdict(field.provenance)] for field in self.fields]
-        given = [self.given.sha256] if self.given and self.given.sha256 else []
+        points = [self.given.sha256] if self.given and self.given.sha256 else []
         proofs = [[proof.file, asdict(proof.provenance)] for proof in self.proofs]
-        return digest([program_version(), self.recipe.document(), fields, *given, *proofs])
+        return digest([program_version(), self.recipe.document(), fields, *points, *proofs])
 
 
 @dataclass(frozen=True)

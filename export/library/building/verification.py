@@ -49,8 +49,8 @@ class Defect:
         """Return an error about a file, whose message names defect and remedy."""
         name = Path(error.file).name if error.file else file
         message = str(error).removeprefix(f"{error.file}: ")
-        what, _, remedy = message.rpartition("; ")
-        return cls(name, what, remedy) if what else cls(name, message)
+        reason, _, remedy = message.rpartition("; ")
+        return cls(name, reason, remedy) if reason else cls(name, message)
 
     def __str__(self) -> str:
         return f"{self.file}: {self.what}; {self.remedy}"
@@ -123,8 +123,8 @@ def _find_differences(
         library = read_library(folder)
         stated = library.document["generator"]
         if stated != program_version():
-            what = f"was made by {stated}, so {program_version()} cannot make it again to compare it"
-            yield Defect(INDEX, what, f"verify with {stated}")
+            reason = f"was made by {stated}, so {program_version()} cannot make it again to compare it"
+            yield Defect(INDEX, reason, f"verify with {stated}")
             return
         with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
             again = Path(temporary)
@@ -177,12 +177,12 @@ def _check_point(task: tuple[Path, str, list[str]]) -> list[Defect]:
         try:
             result = check(str(folder / model), str(folder / point))
         except BadInputError as error:
-            what = str(error).replace(f"{folder}{os.sep}", "")
-            defects.append(Defect(point, f"the checker refuses it: {what}"))
+            reason = str(error).replace(f"{folder}{os.sep}", "")
+            defects.append(Defect(point, f"the checker refuses it: {reason}"))
             continue
         if result.worst > FEASIBLE:
-            what = f"is not feasible against {model}: worst violation {float(result.worst):.3g}"
-            defects.append(Defect(point, what))
+            reason = f"is not feasible against {model}: worst violation {float(result.worst):.3g}"
+            defects.append(Defect(point, reason))
         if not result.agrees:
             defects.append(Defect(point, f"claims another objective than it has against {model}"))
     return defects

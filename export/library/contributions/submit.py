@@ -176,8 +176,8 @@ class _SubmitSession:
             if submitted.kind:
                 return checks[submitted.kind](submitted.path)
             if submitted.listed:
-                what = "is no solution, field or certificate; give one of these"
-                raise InputError(what, file=submitted.path)
+                reason = "is no solution, field or certificate; give one of these"
+                raise InputError(reason, file=submitted.path)
         except CrossfieldError as error:
             return Submission(submitted.path, submitted.kind, "refused", error=error)
         return Submission(submitted.path, "", "skipped")
@@ -288,8 +288,8 @@ class _SubmitSession:
             and (self.entry == sidecar["name"] or (self.entry is None and "tightened" not in sidecar))
         ]
         if not sidecars:
-            what = f"is a {kind} of an instance that is not in the library: {instance.summary}"
-            raise InputError(what, file=path)
+            reason = f"is a {kind} of an instance that is not in the library: {instance.summary}"
+            raise InputError(reason, file=path)
         return sidecars
 
     # certificates
@@ -304,8 +304,8 @@ class _SubmitSession:
             if norm_minimised(sidecar["formulation"], sidecar["options"]["facet"]) == norm
         ]
         if not sidecars:
-            what = f"proves a bound in the norm {norm}, which no entry of {instance.name} minimises"
-            raise InputError(what, file=path)
+            reason = f"proves a bound in the norm {norm}, which no entry of {instance.name} minimises"
+            raise InputError(reason, file=path)
         names = tuple(sidecar["name"] for sidecar in sidecars)
         self._check_objective(path, sidecars[0], certificate.field)
         stem = sidecars[0]["instance"]["file"].removesuffix(".instance.json")

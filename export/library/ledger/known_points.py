@@ -74,8 +74,8 @@ class InstancePoints:
             certificate.norm, proven["status"], proven["bound"],
         )  # fmt: skip
         if not is_same or not math.isclose(facts["energy"], proven["energy"], rel_tol=_SAME, abs_tol=_SAME):
-            what = f"states another norm, status, bound or energy than {name}; {_REMEDY}"
-            raise InputError(what, file=about_file(self.about["name"]))
+            reason = f"states another norm, status, bound or energy than {name}; {_REMEDY}"
+            raise InputError(reason, file=about_file(self.about["name"]))
         return replace(certificate, file=certificate_file(self.about["name"], norm), facts=facts)
 
 

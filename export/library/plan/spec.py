@@ -374,25 +374,25 @@ def _read_sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[R
     kind = next(kind for kind in get_args(SketchKind) if kind in table)
     word = table[kind]
     if kind == "file":
-        what = _read_drawing(table, place, folder)
+        drawn = _read_drawing(table, place, folder)
     elif kind == "random":
         shape = "full square" if word == "full" else "ragged part of a square"
         title = f"random strokes on a {shape}"
-        what = {"what": word, "title": title, "seeds": seeds_of(table["seeds"], f"{place}seeds")}
-        what["random"] = _read_random(table, word, place)
+        drawn = {"what": word, "title": title, "seeds": seeds_of(table["seeds"], f"{place}seeds")}
+        drawn["random"] = _read_random(table, word, place)
     else:
         _check_known(word, SAMPLES, f"{place}sample", "sample ")
-        what = {"what": word, "title": SAMPLES[word].description}
+        drawn = {"what": word, "title": SAMPLES[word].description}
     sketch = Sketch(
         name,
         kind,
-        title=table.get("title", what.pop("title")),
+        title=table.get("title", drawn.pop("title")),
         rungs=wanted,
         sizes=tuple((rung, _whole_numbers(sizes[rung])) for rung in wanted if rung in sizes),
         origin=Origin.of(table),
         added=check_day(table.get("added", ""), f"{place}added"),
         points=table.get("points", "search"),
-        **what,
+        **drawn,
     )
     every = [size for rung in rungs if rung.name in wanted for size in sketch.sizes_on(rung)]
     for size in every:
@@ -412,13 +412,13 @@ def _read_random(table: dict[str, Any], shape: str, place: str) -> tuple[tuple[s
 
 
 def _read_drawing(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
-    what, mask = table["file"], table.get("mask", "")
-    source = table.get("file_name", Path(what).name)
-    drawn = _read_file(folder / what, f"{place}file")
+    file, mask = table["file"], table.get("mask", "")
+    source = table.get("file_name", Path(file).name)
+    drawn = _read_file(folder / file, f"{place}file")
     try:
         drawing, suffix = publishable_sketch(drawn, Path(source).suffix.lower())
     except InputError as error:
-        raise InputError(f"{place}file: {what}: {error}") from error
+        raise InputError(f"{place}file: {file}: {error}") from error
     masked = _read_file(folder / mask, f"{place}mask") if mask else b""
     return {
         "what": source,

@@ -213,10 +213,10 @@ class _Records:
             raise self.fault(counts.complaint or "a count is negative")
         return counts
 
-    def take_numbers(self, what: str) -> Floats:
+    def take_numbers(self, kind: str) -> Floats:
         record = self.take()
         if len(record) % 8:
-            raise self.fault(f"{len(record)} bytes cannot hold {what} of 8 bytes")
+            raise self.fault(f"{len(record)} bytes cannot hold {kind} of 8 bytes")
         return np.frombuffer(record, "<f8").astype(np.float64)
 
     def take_code(self) -> int | None:
