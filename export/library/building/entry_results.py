@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any, Final
 
 from ....models.errors import InputError
@@ -16,7 +18,7 @@ from ..ledger.grades import (
     relative_gap,
     shown_runs,
 )
-from ..ledger.ledger import LEDGER, Record
+from ..ledger.ledger import Record
 from ..ledger.points import METHOD, BestPoint, provenance_by
 from ..plan.equivalence import equivalent_entries
 from ..plan.instances import formulate_entry
@@ -49,20 +51,27 @@ def entry_results(task: EntryTask, best: BestPoint) -> dict[str, Any]:
 
 
 def _records(task: EntryTask, best: BestPoint) -> list[Record]:
-    """The records about this problem and those with the same optimum."""
+    """The records about this problem and those with the same optimum, without bounds that the point refutes.
+
+    The point is feasible to more digits than a solver keeps its rows.
+    """
     problems = {task.name: best.problem.sha256}
     for relative in equivalent_entries(task.recipe, task.relatives):
         if relative["entry"] is not None:
             instance, jumps = best.problem.instance, best.known.field.p
             problem = formulate_entry(instance, relative["formulation"], "hull", jumps)
             problems[relative["entry"]] = problem.sha256
-    return [record for record in task.records if problems.get(record.entry) == record.problem_sha256]
+    return [
+        replace(record, bound=None) if is_refuted(record.bound or -math.inf, best.objective) else record
+        for record in task.records
+        if problems.get(record.entry) == record.problem_sha256
+    ]
 
 
 def _bounds(task: EntryTask, best: BestPoint, records: list[Record]) -> list[dict[str, Any]]:
     """The best dual bound of each solver for this optimum, and the bounds of tangent and certificate.
 
-    A bound is at most the best objective. Raises InputError if the point contradicts it.
+    A bound is at most the best objective. Raises InputError if the point contradicts a computed one.
     """
     bounds, name = [], task.name
     stated = ("solver", "version", "bound", "status", "seconds", "threads")
@@ -79,11 +88,10 @@ def _bounds(task: EntryTask, best: BestPoint, records: list[Record]) -> list[dic
     for facts in bounds:
         bound = float(facts["bound"])
         if is_refuted(bound, best.objective):
-            remedy = "build again without it" if facts["status"] == "computed" else "take its record out"
             raise InputError(
-                f"has the bound {bound!r} of {facts['via'] or name} by {facts['solver']}, "
-                f"but {name} has a feasible point of {best.objective!r}; that bound is wrong, {remedy}",
-                file=facts.get("certificate", LEDGER),
+                f"has the bound {bound!r} of {name} by {facts['solver']}, but there is a feasible point of "
+                f"{best.objective!r}; that bound is wrong, build again without it",
+                file=facts.get("certificate"),
             )
         facts["bound"] = cut_bound(bound, best.objective)
     return bounds

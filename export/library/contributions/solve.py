@@ -30,15 +30,8 @@ from ...statuses import Status
 from ..building.build import has_unbuilt_records, rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import library_lock
-from ..ledger.grades import is_better, is_refuted
-from ..ledger.ledger import (
-    Ledger,
-    Record,
-    RunStatus,
-    add_record,
-    read_ledger,
-    write_ledger,
-)
+from ..ledger.grades import is_better
+from ..ledger.ledger import Record, RunStatus, add_record, read_ledger
 from ..ledger.points import clipped_field, complete_point
 from ..plan.spec import RUNGS
 
@@ -71,7 +64,7 @@ def solve_library(
     Record("cf_none", "0" * 64, "none", "0", "no point", by=by, machine=machine).check()
     library, records = read_library(folder), []
     if has_unbuilt_records(library):
-        library = _bring_up_to_date(library, progress)
+        library = rebuild(library.folder, progress=progress)
     try:
         with Solvers() as at_work:
             work = _SolveSession(library, at_work, time_limit)
@@ -88,49 +81,14 @@ def solve_library(
                     records.append(asdict(add_record(library.folder, record, field)))
     finally:  # records count although Ctrl-C or an error ended the runs
         if has_unbuilt_records(library):
-            _bring_up_to_date(library, progress)
+            rebuild(library.folder, progress=progress)
     return records
-
-
-def _bring_up_to_date(library: Library, progress: Progress) -> Library:
-    """Rebuild what follows from the ledger, without the measured bounds that its points refute."""
-    with library_lock(library.folder, _PURPOSE, progress):
-        drop_refuted_bounds(library)
-    return rebuild(library.folder, progress=progress)
 
 
 def _check_known(name: str, table: Any, kind: str) -> str:
     if name not in table:
         raise InputError(f"there is no {kind} {name!r}; choose from {', '.join(table)}")
     return name
-
-
-def drop_refuted_bounds(library: Library) -> None:
-    """Remove measured bounds that a point found later refutes. The caller holds the lock."""
-    ledger = read_ledger(library.folder)
-    dropped: dict[Record, Record] = {}
-    for document in library.entries:
-        records = ledger.records_of(document["name"], document["problem_sha256"])
-        measured = [record for record in records if record.bound is not None]
-        best = _least_objective(library, document, ledger) if measured else 0.0
-        dropped |= {
-            record: replace(record, bound=None)
-            for record in measured
-            if is_refuted(record.bound or 0.0, best)
-        }
-    write_ledger(replace(ledger, records=tuple(dropped.get(record, record) for record in ledger.records)))
-
-
-def _least_objective(library: Library, document: dict[str, Any], ledger: Ledger) -> float:
-    """The least objective of an entry at its best point and at the ledger's fields of its instance."""
-    problem, file = problem_of(library, document), document["instance"]["file"]
-    relatives = (sidecar["name"] for sidecar in library.entries if sidecar["instance"]["file"] == file)
-    records = [record for name in relatives if (record := ledger.record_with_field(name)) is not None]
-    fields = [
-        field for field in map(ledger.read_field, records) if field.instance.sha256 == problem.instance.sha256
-    ]
-    values = [problem.objective_value(complete_point(problem, field)) for field in fields]
-    return float(min([document["best"]["objective"], *values]))
 
 
 @dataclass
@@ -189,7 +147,7 @@ class _SolveSession:
             bound = solution.objective - GAP * abs(solution.objective)
         record = replace(
             record,
-            bound=None if bound is None or is_refuted(bound, best) else bound,
+            bound=bound,
             seconds=None if solution.seconds is None else round(solution.seconds, 3),
         )
         if solution.point is None:

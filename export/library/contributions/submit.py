@@ -30,8 +30,8 @@ from ...writing.stamps import is_stated
 from ..building.build import has_unbuilt_records, rebuild_locked
 from ..documents.documents import Library, about_file, existing_folder, problem_of, read_about, read_library
 from ..documents.lock import library_lock
-from ..ledger.grades import FEASIBLE, SAME, is_better, is_refuted
-from ..ledger.ledger import LEDGER, Record, read_ledger, write_ledger
+from ..ledger.grades import FEASIBLE, SAME, is_better
+from ..ledger.ledger import Record, read_ledger, write_ledger
 from ..ledger.points import clipped_field, complete_point
 from ..plan.recipe import norm_minimised
 from .submitted_files import SubmittedFile, find_submitted_files
@@ -148,8 +148,8 @@ def submit(
 class _SubmitSession:
     """A submission in progress: the ledger with all accepted records.
 
-    problems: by entry; fields: accepted ones by the SHA-256 of their instance; bounds: accepted ones by
-    entry; certified: accepted ones by instance and norm.
+    problems: by entry; fields: accepted ones by the SHA-256 of their instance; certified: accepted bounds by
+    instance and norm.
     """
 
     library: Library
@@ -157,7 +157,6 @@ class _SubmitSession:
     facts: RunFacts
     problems: dict[str, Problem] = field(default_factory=dict)
     fields: dict[str, list[CrossField]] = field(default_factory=dict)
-    bounds: dict[str, float] = field(default_factory=dict)
     certified: dict[tuple[str, Norm], float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -321,8 +320,6 @@ class _SubmitSession:
             self.ledger = self.ledger.with_certificate(stem, norm, instance.sha256, data, self.facts.by)
             self.certified[stem, norm] = certificate.bound
             self.fields.setdefault(instance.sha256, []).append(certificate.field)
-            for name in names:
-                self.bounds[name] = max(certificate.bound, self.bounds.get(name, certificate.bound))
         return Submission(
             path,
             "certificate",
@@ -356,21 +353,11 @@ class _SubmitSession:
     def _check_objective(
         self, path: Path, sidecar: dict[str, Any], checked: CrossField, violation: Violation | None = None
     ) -> float:
-        """The objective of a field. Raises SolutionError if it is not feasible or lies below a dual bound."""
+        """The objective of a field. Raises SolutionError if it is not feasible."""
         problem = self._problem(sidecar)
         point = complete_point(problem, checked)
         _check_feasible(path, sidecar["name"], violation or problem.violation(point))
-        objective = problem.objective_value(point)
-        bounds = [sidecar["bound"], self.bounds.get(sidecar["name"])]
-        bound = max((bound for bound in bounds if bound is not None), default=None)
-        if bound is not None and is_refuted(bound, objective):
-            raise SolutionError(
-                f"is feasible with objective {objective!r}, "
-                f"but the library has the dual bound {bound!r} of {sidecar['name']}; "
-                f"that bound is wrong, take its record out of {LEDGER} first",
-                file=path,
-            )
-        return float(objective)
+        return float(problem.objective_value(point))
 
 
 def _check_feasible(path: Path, entry: str, violation: Violation) -> None:

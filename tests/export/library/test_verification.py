@@ -151,11 +151,6 @@ REFUSED = {
         ABOUT,
         "a number that is not finite",
     ),
-    "a bound above the point": (
-        edit("ledger.json", records=lambda records: [records[0] | {"bound": 1e3}]),
-        "ledger.json",
-        "that bound is wrong",
-    ),
     "a bound in the ledger": (
         edit("ledger.json", records=lambda records: [records[0] | {"bound": 1e-3}]),
         MILP,
