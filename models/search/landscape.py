@@ -18,7 +18,7 @@ So this gain is a formula in the entries of G at that pixel.
 Updates lose digits. Where the parities of all jumps fit together and every stroke has the same sign of beta,
 (alpha + c, beta -+ c) costs w_beta alone. Then H has an eigenvalue of about w_beta, and a jump that ends this
 state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is computed
-from its definition (`PatchEnergy`). If the updates give another energy, G is computed again.
+from its definition (`Landscape.defined_energy`). If the updates give another energy, G is computed again.
 Gains that no energy can have are discarded too.
 """
 
@@ -32,7 +32,6 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.linalg.blas import dgemm
 
-from ..field.field import CrossField
 from ..instance.angles import HALF
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
@@ -116,43 +115,6 @@ class Patch:
         return pairs, steps[pairs]
 
 
-class PatchEnergy:
-    """The 2-norm energy by its definition, free of errors of updates, where only a patch changes."""
-
-    def __init__(self, instance: Instance, pixels: Ints, x: Floats, p: Ints) -> None:
-        """Take over angles x (2n,) and jumps p (m,); those outside the pixels (k,) stay."""
-        grid, free = instance.grid, np.zeros(len(x) // 2, dtype=bool)
-        free[pixels] = True
-        self._instance = instance
-        self._pairs = np.nonzero(free[grid.first] | free[grid.second])[0].astype(np.int32)
-        ends = np.concatenate([grid.first[self._pairs], grid.second[self._pairs]])
-        # Local numbers: the pixels of the patch, and then their neighbours outside, whose angles stay.
-        outside = np.setdiff1d(ends, pixels)
-        number = np.zeros(grid.size, dtype=np.int32)
-        number[np.concatenate([pixels, outside])] = np.arange(len(pixels) + len(outside))
-        self._terms = instance.pair_terms.select(self._pairs, number)
-        alpha, beta = np.split(x, 2)
-        self._alpha, self._beta = alpha[outside], beta[outside]
-        strokes = np.nonzero(free[instance.stroke_terms.point])[0].astype(np.int32)
-        self._strokes = instance.stroke_terms.select(strokes, number)
-        field, terms = CrossField(instance, alpha, beta, p), instance.stroke_terms
-        pair = field.residual_a**2 + field.residual_b**2
-        stroke = terms.weight * terms.residuals(alpha, beta) ** 2
-        pair[self._pairs], stroke[strokes] = 0.0, 0.0
-        skew = instance.skew_coefficient * (beta[~free] ** 2).sum()
-        self._rest = float(2 * pair.sum() + stroke.sum() + skew)
-
-    def __call__(self, x: Floats, p: Ints) -> float:
-        """The energy at the patch's angles x (2k,) and the jumps p (m,) of the whole field."""
-        inside = np.split(x, 2)
-        alpha, beta = np.concatenate([inside[0], self._alpha]), np.concatenate([inside[1], self._beta])
-        jumps = p[self._pairs]
-        a, b = self._terms.residual_a(alpha, jumps), self._terms.residual_b(beta, jumps)
-        r = self._strokes.residuals(alpha, beta)
-        skew = self._instance.skew_coefficient * float(inside[1] @ inside[1])
-        return self._rest + 2 * float(a @ a + b @ b) + float(self._strokes.weight @ (r * r)) + skew
-
-
 class Landscape:
     """The least energy over a patch's angles at jumps that change step by step; angles outside stay.
 
@@ -166,7 +128,6 @@ class Landscape:
         self.patch = patch
         self.p = p.copy()
         self._around = x
-        self._defined = PatchEnergy(patch.instance, patch.pixels, x, p)
         soft = max(PULL, _SOFTEST - patch.instance.skew_coefficient)
         self._soft = np.repeat([PULL, soft], len(patch.pixels))
         self._lower, self._upper = (end[patch.unknowns] for end in stroke_bounds(patch.instance))
@@ -177,17 +138,27 @@ class Landscape:
     @property
     def angles(self) -> Floats:
         """The angles (alpha, beta) of the whole field, shape (2n,)."""
-        x = self._around.copy()
-        x[self.patch.unknowns] = self._x
-        return x
+        return self._with_patch(self._x)
 
     @property
     def point(self) -> FieldPoint:
         """The field within its bounds, with its energy by definition."""
         inside = np.clip(self._x, self._lower, self._upper)
+        return FieldPoint(self.defined_energy(inside), self._with_patch(inside), self.p.copy())
+
+    def _with_patch(self, inside: Floats) -> Floats:
+        """The angles (2n,) of the whole field with these angles (2k,) inside the patch."""
         x = self._around.copy()
         x[self.patch.unknowns] = inside
-        return FieldPoint(self._defined(inside, self.p), x, self.p.copy())
+        return x
+
+    def defined_energy(self, inside: Floats) -> float:
+        """The 2-norm energy of the field by its definition, with these angles (2k,) inside the patch."""
+        instance, (alpha, beta) = self.patch.instance, np.split(self._with_patch(inside), 2)
+        strokes = instance.stroke_terms
+        off = strokes.residuals(alpha, beta)
+        smooth = instance.pair_terms.costs(alpha, beta, self.p).sum()
+        return float(smooth + strokes.weight @ (off * off) + instance.skew_coefficient * (beta @ beta))
 
     def save_state(self) -> _State:
         """A state for `restore`."""
@@ -322,7 +293,7 @@ class Landscape:
         """The energy of the present angles with all penalties."""
         held = self._x[list(self._held)] - list(self._held.values())
         pulls = float(self._soft @ (self._x * self._x)) + _HOLD * float(held @ held)
-        return self._defined(self._x, self.p) + pulls
+        return self.defined_energy(self._x) + pulls
 
     def _push_of(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
         """The change of b, shape (2k,), and the change of c - 2 x'b."""
