@@ -46,8 +46,5 @@ class AbsoluteDescent(Descent):
         """The field, fitted."""
         return alternate_absolute(field, self.norm, over)
 
-    def _search(self, seconds: float) -> None:
+    def _search_once(self) -> None:
         """Do nothing: rounding finds better fields than the search, which is for the 2-norm."""
-
-    def _find_better_field(self) -> bool:
-        return False

@@ -67,9 +67,9 @@ _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above whic
 
 # Fields
 _BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
-_WIDE: Final = 0.01  # relative gap of the first level above which a poor field may cause it
-_SEARCH: Final = 0.05  # share of the time left for a search between levels
-_ROUNDS: Final = 5  # rounds of a search without a limit of time
+_WIDE: Final = 0.01  # relative gap of a level above which a poor field may cause it
+_SEARCH: Final = 0.05  # share of the time left for the search
+_ROUNDS: Final = 5  # rounds of the search without a limit of time
 
 _ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which a first smaller one is rounded: few digits may do
 
@@ -124,10 +124,7 @@ class _Chain:
 
 @dataclass
 class Descent:
-    """A descent in the 2-norm, and its state: the best field, and the chain of levels that proves most.
-
-    searched: seconds of the last search between levels.
-    """
+    """A descent in the 2-norm, and its state: the best field, and the chain of levels that proves most."""
 
     better_field = staticmethod(better_field)
 
@@ -141,8 +138,7 @@ class Descent:
     progress: Progress
     chain: _Chain = field(default_factory=_Chain)
     proven: _Chain = field(default_factory=_Chain)
-    searches: int = 0
-    searched: float = 0.0
+    searched: bool = False
     began: float = 0.0
 
     @staticmethod
@@ -177,8 +173,8 @@ class Descent:
 
     def run(self) -> str:
         """Go through chains of levels until a limit is met or nothing helps; return the reason."""
-        ended = self._go_through_levels()
-        while not ended or (ended == "labels" and self._find_better_field()):
+        ended = ""
+        while not ended:
             ended = self._go_through_levels()
         return self.ends.reason() or ended
 
@@ -196,7 +192,7 @@ class Descent:
             if (reason := self._reason_to_end()) or left is None:
                 return reason or "time"
             lattice = smaller_lattice(left) if rising and not patient else finer_lattice(left)
-            self._search_between_levels(lattice)
+            self._search_once()
             better = self.energy(self.best) < self.energy(centre) * (1 - _BETTER)
             if better and (len(self.chain.last_of_spacings) <= _SETTLED or _is_at_seam(self.best, lattice)):
                 return self.ends.reason()
@@ -272,7 +268,7 @@ class Descent:
             if minimum.bound < energy:
                 field = minimum.field
                 better = field_in_windows(self.instance, field.alpha, field.beta, field.p)
-                self._offer(self.improve_field(better, self.ends.over))
+                self.best = min(self.best, self.improve_field(better, self.ends.over), key=self.energy)
 
     def _add_clusters(self, dual: Dual) -> None:
         """Add clusters at the beginning of a spacing, if vortices cause the gap."""
@@ -290,53 +286,23 @@ class Descent:
         stalled = len(gaps) == 2 and gaps[1] > _STALLED * gaps[0]
         return vortex or stalled
 
-    def _search_between_levels(self, lattice: Lattice) -> None:
-        """Search for a better field after a first level with a wide gap, and before a level that takes long.
-
-        A search that would not be twice as long as the last one is left out.
-        """
-        began, left = time.monotonic(), self.ends.deadline.left()
-        wide = self.searches == 0 and self.gap > _WIDE * self.energy(self.best)
-        late = lattice.start[-1] > _FEW or len(self.chain.last_of_spacings) == _SETTLED
-        if not wide and not (late and self.searches <= 2):
+    def _search_once(self) -> None:
+        """Search once for a better field, where the gap of a level is wide; a poor field may cause it."""
+        if self.searched or self.gap <= _WIDE * self.energy(self.best) or self.ends.over():
             return
-        seconds = min(_SEARCH * left, began - self.began)
-        if math.isinf(left) or seconds >= 2 * self.searched:
-            self._search(seconds)
-            self.searched = time.monotonic() - began
-
-    def _find_better_field(self) -> bool:
-        """Whether a search finds a better field, with as much time left as the last chain took."""
-        before, spent = self.energy(self.best), time.monotonic() - self.began
-        while not self.ends.over():
-            left = self.ends.deadline.left()
-            self._search(left / 2 if left > 2 * spent else left)
-            if math.isinf(left) or self.ends.deadline.left() > spent:
-                better = self.energy(self.best) < before * (1 - _BETTER)
-                if better or math.isinf(left):
-                    return better
-        return False
-
-    def _search(self, seconds: float) -> None:
-        """Search for a better field from the best one; without a limit of time, for some rounds."""
-        if self.ends.over():
-            return
-        timed = math.isfinite(self.ends.deadline.left())
+        self.searched, left = True, self.ends.deadline.left()
+        timed, seconds = math.isfinite(left), min(_SEARCH * left, time.monotonic() - self.began)
         result = search(
             self.instance,
             limits=Limits().until(self.ends.deadline.within(seconds)) if timed else None,
             rounds=None if timed else _ROUNDS,
-            seed=self.seed + self.searches,
+            seed=self.seed,
             jobs=self.jobs,
             start=self.best,
             progress=lambda line: self.progress(f"search: {line}"),
             stop=self.ends.stop,
         )
-        self.searches += 1
-        self._offer(result.field)
-
-    def _offer(self, field: CrossField) -> None:
-        self.best = min(self.best, field, key=self.energy)
+        self.best = min(self.best, result.field, key=self.energy)
 
     def _has_time_for(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for a level on the next lattice: its record, and passes that take as long."""

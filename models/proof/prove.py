@@ -64,7 +64,7 @@ def prove(
     work
         Number of labels, counted at each rounding, after which to end: a limit that no clock decides.
     seed
-        Seed of the search that follows where the lattices leave a gap.
+        Seed of the search that follows a level with a wide gap.
     jobs
         Number of processes of that search.
     progress

@@ -26,7 +26,7 @@ def test_shares_that_are_carried_on_rise_faster():
 
 
 @pytest.mark.slow
-def test_where_no_finer_level_fits_the_rest_goes_to_the_search(monkeypatch, tmp_path):
+def test_where_no_finer_level_fits_a_smaller_one_raises_the_bound(monkeypatch, tmp_path):
     """The bound rises once more on the labels that are left, and the certificate has one more level."""
     instance = cf.sample("ring", 12)
     monkeypatch.setattr(descent, "MOST_LABELS", 30_000)
@@ -36,7 +36,6 @@ def test_where_no_finer_level_fits_the_rest_goes_to_the_search(monkeypatch, tmp_
     before, last = proof.levels[-2:]
     assert last.allowed.sum() < before.allowed.sum()
     assert last.bound > before.bound
-    assert proof.energy <= cf.search(instance, rounds=5, jobs=1).field.energy().total + 1e-9
     # The checker has the best shares of later pixels, so it may prove more than the rounded ones.
     assert last.bound * (1 - 1e-5) <= proof.bound <= proof.energy
     assert write_certificate(proof, tmp_path / "it.npz").bound == proof.bound
