@@ -1,4 +1,4 @@
-"""Clusters: tables on the alphas of 2 x 2 pixels, which raise the bound where a field has a vortex.
+"""Clusters: tables on the alphas of 2 x 2 pixels, which raise the 2-norm bound where a field has a vortex.
 
 They tighten the relaxation, as in Sontag et al., Tightening LP relaxations for MAP using message passing (UAI
 2008); the tables are the dual variables of a quad's consistency with its pairs.
@@ -177,9 +177,7 @@ def _fill_reparametrised(state: State, theta: Floats) -> None:
 def _pair_slacks(lattice: Lattice, state: State, corner: _Corner) -> Floats:
     """The costs of pairs with their tables, less their shares, at a corner of both ends."""
     i, j = state.first, state.second
-    size = np.square if lattice.norm == 2 else np.abs
-    cost = lattice.instance.pair_terms.least_costs(corner.alpha, corner.beta, size)
-    cost -= lattice.h**2 if lattice.norm == 2 else 0.0
+    cost = lattice.instance.pair_terms.least_costs(corner.alpha, corner.beta) - lattice.h**2
     cost -= state.shares_first[state.start_first[:-1] + corner.label[i]]
     cost -= state.shares_second[state.start_second[:-1] + corner.label[j]]
     clusters = state.clusters
@@ -270,7 +268,7 @@ def _reduced_costs(table: int, rows: IndexTable, state: State) -> Floats:
         if cheapest + least < reached:
             fill_product_over_beta(ragged, betas_i, betas_j, state.power, half)
             reached = _lower_to(best, min_plus(shares_i, _transposed(half)), in_alpha, (rows_i, rows_j))
-    _add_matrix(best, _negative_table(table, rows, state), -state.h * state.h if state.power == 2 else 0.0)
+    _add_matrix(best, _negative_table(table, rows, state), -state.h * state.h)
     return best
 
 
