@@ -25,7 +25,6 @@ import numpy as np
 
 from ..field.field import CrossField, Norm, field_in_windows
 from ..field.jumps import free_jumps
-from ..instance.angles import QUARTER
 from ..instance.instance import Instance
 from ..processes.compilation import Crew
 from ..processes.deadline import Deadline, Over, Progress, never
@@ -37,7 +36,7 @@ from .check_certificate import MOST_COUNT, has_forced_jump, is_convex
 from .clusters import table_sizes
 from .dual import Dual
 from .last_step import energy_terms, last_step_on, minimise_on_boxes
-from .lattice import Lattice, nearest_labels
+from .lattice import Lattice
 from .pruning import RemainingCells, finer_lattice, smaller_lattice
 from .record import EXACT, LevelRecord, Proof
 from .rounding import Rounding, better_field
@@ -49,7 +48,6 @@ MOST_LABELS: Final = 50_000_000  # labels of a level, for memory: each takes som
 _TABLES: Final = 4  # numbers of tables that take as much memory as a label
 _DECIMALS: Final = 7  # digits of centres in rad: their last digits differ between processors
 _SETTLED: Final = 4  # spacings after which little is lost where the centre is another field
-_NEAR: Final = 0.75  # share of pi/4 from the centre to an alpha near both ends of the labels
 
 # Passes
 _PASSES: Final = 3  # passes forwards and backwards between two roundings, which do another one
@@ -194,7 +192,7 @@ class Descent:
             lattice = smaller_lattice(left) if rising and not patient else finer_lattice(left)
             self._search_once()
             better = self.energy(self.best) < self.energy(centre) * (1 - _BETTER)
-            if better and (len(self.chain.last_of_spacings) <= _SETTLED or _is_at_seam(self.best, lattice)):
+            if better and len(self.chain.last_of_spacings) <= _SETTLED:
                 return self.ends.reason()
             if _is_too_large(dual, lattice) or not self._has_time_for(dual, lattice):
                 if patient and not rising:
@@ -337,11 +335,6 @@ def _is_too_large(dual: Dual, lattice: Lattice) -> bool:
     many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
     many = many or bool(max(lattice.alpha_count.max(), lattice.beta_count.max()) > MOST_COUNT)
     return many or lattice.h < np.pi / 2 / _FINEST
-
-
-def _is_at_seam(field: CrossField, lattice: Lattice) -> bool:
-    """Whether a cross of the field is near both ends of the labels, where no box is small."""
-    return bool(np.abs(nearest_labels(field, lattice)[0] - lattice.alpha).max() > _NEAR * QUARTER)
 
 
 def _centre_at(field: CrossField) -> CrossField:
