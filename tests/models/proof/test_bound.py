@@ -1,18 +1,14 @@
 """The bound of a lattice against all labellings of small ones, after passes, with threads and pruning."""
 
 from dataclasses import replace
-from itertools import product
 
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.field.field import field_in_windows
-from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.compilation import crew
 from crossfield.models.proof.dual import Dual
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import finer_lattice
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 from labellings import discrete, least_labelling
@@ -128,59 +124,3 @@ def test_threads_change_no_bit():
             )
     assert lattice.start[-1] > 30_000  # so that they were used
     assert states[0] == states[1] == states[2]
-
-
-def holds(lattice, cross):
-    """Whether each pixel's cross, under one of its labels, lies in a cell of four allowed labels."""
-    inside = np.zeros(lattice.instance.grid.size, bool)
-    for turn, sign in product(range(-4, 5), (1, -1)):
-        if (turn % 2 == 0) != (sign == 1):
-            continue
-        alpha, beta = cross[0] + turn * HALF, sign * cross[1]
-        k = (alpha - lattice.alpha) / lattice.h - lattice.offset - lattice.alpha_first
-        m = (beta - lattice.beta) / lattice.h - lattice.offset - lattice.beta_first
-        for nudge in (-1e-9, 1e-9):
-            row, column = np.floor(k + nudge).astype(int), np.floor(m + nudge).astype(int)
-            on = (
-                (row >= 0)
-                & (row < lattice.alpha_count - 1)
-                & (column >= 0)
-                & (column < lattice.beta_count - 1)
-            )
-            row, column = np.where(on, row, 0), np.where(on, column, 0)
-            begin = lattice.start[:-1] + row * lattice.beta_count + column
-            corners = [begin, begin + 1, begin + lattice.beta_count, begin + lattice.beta_count + 1]
-            inside |= on & np.all(
-                [lattice.allowed[np.minimum(c, lattice.start[-1] - 1)] for c in corners], axis=0
-            )
-    return inside.all()
-
-
-@pytest.mark.slow
-def test_pruning_keeps_every_field_of_no_more_energy():
-    dropped = 0
-    with crew(1) as hands:
-        for seed in range(30):
-            instance = random_instance(seed, shape=(3, 3))
-            rng = np.random.default_rng(seed)
-            best = first_field(instance)
-            energy = best.energy().total * rng.uniform(1, 1.2) + 1e-3
-            dual = Dual(Lattice.whole(best, 8), hands)
-            for _ in range(3):
-                dual.ascend(4)
-                dual.quantise()
-                bound = dual.bound()
-                assert bound <= best.energy().total
-                lattice = finer_lattice(dual.remaining_cells(bound, energy))
-                dropped += (~lattice.allowed).sum()
-                assert holds(lattice, (best.alpha, best.beta))
-                for _ in range(20):
-                    wide = 10 ** rng.uniform(-4, -0.5)
-                    alpha = best.alpha + rng.normal(0, wide, instance.grid.size)
-                    beta = np.clip(best.beta + rng.normal(0, wide, instance.grid.size), -HALF / 2, HALF / 2)
-
-                    field = field_in_windows(instance, alpha, beta, best.p)
-                    if field.energy().total <= energy:
-                        assert holds(lattice, (field.alpha, field.beta)), seed
-                dual.move(lattice)
-    assert dropped > 0

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.angles import HALF, QUARTER
-from crossfield.models.proof.check_certificate import has_forced_jump, is_convex, last_step
-from crossfield.models.proof.last_step import energy_terms, minimise_on_boxes
 from crossfield.models.proof.lattice import Lattice
 from exhaustive import random_instance
 
@@ -100,47 +98,3 @@ def test_computed_costs_of_the_four_labels_round_a_cross_average_to_no_more_than
                 average = average + weight * cost[lattice.start[:-1] + (k + a) * lattice.beta_count + m + b]
         exact = misfit(instance, lattice.alpha + at[0], lattice.beta + at[1])
         assert (average <= exact + 1e-12).all(), (seed, h)
-
-
-@pytest.mark.slow
-def test_a_forced_jump_is_best_and_the_tilted_quadratic_below_the_energy_all_over_the_boxes():
-    cases = np.zeros(2, int)
-    for seed in range(150):
-        rng = np.random.default_rng(seed)
-        instance = random_instance(seed, shape=(2, 3))
-        size = instance.grid.size
-        smooth = CrossField(
-            instance,
-            instance.alpha_lower + QUARTER + rng.uniform(-0.9, 0.9),
-            np.full(size, rng.uniform(-QUARTER, QUARTER)),
-            np.zeros(len(instance.grid.first), int),
-        ).with_best_jumps()
-        wide = rng.uniform(0.01, 0.5)
-        ends = [rng.uniform(0, wide, size) for _ in range(4)]
-        beta_low = np.maximum(smooth.beta - ends[2], -QUARTER)
-        beta_high = np.minimum(smooth.beta + ends[3], QUARTER)
-        low, high = (smooth.alpha - ends[0], beta_low), (smooth.alpha + ends[1], beta_high)
-        terms = energy_terms(instance, 2)
-        boxes = np.stack([low[0], high[0], low[1], high[1]], axis=1)
-        step = last_step(terms, boxes, smooth.alpha, smooth.p.astype(int))
-        pairs, convex = has_forced_jump(terms, step.p, boxes), is_convex(terms, step)
-        enough = np.inf if seed % 2 else 0.0
-        least = minimise_on_boxes(instance, terms, step, enough).bound if convex else -np.inf
-        for corner in range(20):
-            t, s = rng.uniform(0, 1, (2, size)) if corner else rng.integers(0, 2, (2, size))
-            alpha = low[0] + t * (high[0] - low[0])
-            beta = low[1] + s * (high[1] - low[1])
-            field = CrossField(instance, alpha, beta, step.p.astype(np.int32))
-            mine = field.residual_a**2 + field.residual_b**2
-            best = mine.copy()
-            for turn in range(-3, 4):
-                other = CrossField(instance, alpha, beta, step.p.astype(np.int32) + turn)
-                best = np.minimum(best, other.residual_a**2 + other.residual_b**2)
-            assert np.allclose(best[pairs], mine[pairs], atol=1e-12), seed
-            if convex:
-                energy = 2 * best.sum() + misfit(instance, alpha, beta).sum()
-                assert least <= energy + 1e-12, seed
-                at = instance.stroke_index
-                ends = np.abs([low[0][at] - step.theta[at], high[0][at] - step.theta[at]])
-                cases += [1, ends.max() > QUARTER]
-    assert (cases > 50).all(), cases
