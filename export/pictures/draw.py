@@ -16,14 +16,16 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.arguments import check_arguments
-from ...models.errors import InputError
+from ...models.errors import DomainError, InputError
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
+from ...models.instance.mesh import Mesh
 from ...models.storage import write_bytes
 from ...models.surface.surface import Surface
 from . import panels
 from .canvas import draw_sheet, set_coordinates
 from .layers import field_sheet
+from .mesh_view import draw_mesh
 from .svg import sheet_svg
 from .underlay import Underlay, read_underlay
 
@@ -96,6 +98,8 @@ _GAP: Final = 14.0
 _LINE: Final = 13.0  # height of a line of text
 _CHARACTER: Final = 4.0  # width of a character of the caption, at most
 _NARROWEST: Final = 52.0  # room for a heading
+_MESH_SIDE: Final = 400.0  # points of the side of a picture of a mesh
+_ON_MESHES: Final = ("instance", "crosses")  # kinds of pictures of instances and fields on meshes
 
 
 @check_arguments
@@ -116,7 +120,7 @@ def draw(
         The file to write; its suffix, .png, .svg or .pdf, decides the format.
     kind
         A name in KINDS; an Instance has only `instance`, and a Surface one picture without a name. By default
-        `layers` for a field as SVG or with an underlay, and `field` otherwise.
+        `layers` for a field as SVG or with an underlay, `crosses` on a mesh, and `field` otherwise.
     underlay
         The drawing (SVG, bitmap, .scap) or sample from which the instance was read. Its strokes become the
         bottom of `layers`; nothing else of the file is copied.
@@ -148,6 +152,9 @@ def draw(
     else:
         kind = kind or _default_kind(subject, suffix, underlaid=underlay is not None)
         chosen = _find_kind(kind, subject)
+        if isinstance(_instance_of(subject).domain, Mesh):
+            with fixed_settings():
+                return write_bytes(path, _save_figure(_draw_on_mesh(subject, underlay), suffix))
         if kind == LAYERS and isinstance(subject, CrossField):
             return write_bytes(path, _draw_layers(subject, suffix, underlay))
         if underlay is not None:
@@ -173,6 +180,8 @@ def preview(subject: CrossField | Instance | Surface) -> bytes:
     """
     kind = SHADED if isinstance(subject, Surface) else KINDS[_default_kind(subject, ".png", underlaid=False)]
     with fixed_settings():
+        if not isinstance(subject, Surface) and isinstance(_instance_of(subject).domain, Mesh):
+            return _save_figure(_draw_on_mesh(subject, None), ".png", dots=_PREVIEW_DOTS)
         return _save_figure(_draw_panels(subject, kind), ".png", dots=_PREVIEW_DOTS)
 
 
@@ -180,6 +189,8 @@ def _default_kind(subject: CrossField | Instance, suffix: str, *, underlaid: boo
     """The default kind of picture."""
     if isinstance(subject, Instance):
         return "instance"
+    if isinstance(subject.instance.domain, Mesh):
+        return "crosses"
     return LAYERS if suffix == ".svg" or underlaid else "field"
 
 
@@ -219,14 +230,39 @@ def _find_kind(kind: str, subject: Subject) -> PictureKind:
             f"{subject.name} is an instance without a field, which kind {kind} needs; solve it first, "
             "or use kind instance"
         )
+    if isinstance(_instance_of(subject).domain, Mesh) and kind not in _ON_MESHES:
+        raise DomainError(
+            f"a picture of kind {kind} shows pixels, and {_instance_of(subject).name} is on a mesh; "
+            f"choose one of {', '.join(_ON_MESHES)}"
+        )
     return KINDS[kind]
+
+
+def _instance_of(subject: Subject) -> Instance:
+    return subject if isinstance(subject, Instance) else subject.instance
+
+
+def _draw_on_mesh(subject: CrossField | Instance, underlay: object) -> Any:
+    """The figure of a mesh with a caption below."""
+    from matplotlib.figure import Figure
+
+    if underlay is not None:
+        raise DomainError("a mesh lies on no drawing; leave the underlay out")
+    side, below = _MESH_SIDE / _POINTS, (2 * _EDGE + _LINE) / _POINTS
+    figure = Figure(figsize=(side, side + below), facecolor="white")
+    axes = figure.add_axes((0.0, below / (side + below), 1.0, side / (side + below)))
+    draw_mesh(axes, subject)
+    figure.text(
+        0.5, _EDGE / _POINTS / (side + below), _caption(subject, full=False), ha="center", color="#444444"
+    )
+    return figure
 
 
 def _draw_panels(subject: Subject, kind: PictureKind) -> Any:
     """The figure: panels in a row, headings above, legend and caption below; every length in points."""
     from matplotlib.figure import Figure
 
-    instance = subject if isinstance(subject, Instance) else subject.instance
+    instance = _instance_of(subject)
     field = subject if isinstance(subject, CrossField) else None
     picture = panels.PanelContent(
         instance, field, kind.size, subject if isinstance(subject, Surface) else None
@@ -236,7 +272,7 @@ def _draw_panels(subject: Subject, kind: PictureKind) -> Any:
     below = _EDGE + _LINE * (1 + kind.legend)
     pitch, count = max(width, _NARROWEST) + _GAP, len(kind.panels)
     row = count * pitch - _GAP + kind.bar
-    caption = _caption(picture, full=count > 1)
+    caption = _caption(subject, full=count > 1)
     keys = panels.legend_keys(picture) if kind.legend else []
     words = _CHARACTER * max(len(caption), sum(len(key.get_label()) + 8 for key in keys))
     page = np.array([max(row, words) + 2 * _EDGE, above + height + below])
@@ -256,16 +292,15 @@ def _draw_panels(subject: Subject, kind: PictureKind) -> Any:
     return figure
 
 
-def _caption(picture: panels.PanelContent, *, full: bool) -> str:
-    instance = picture.instance
-    parts = [
-        f"{instance.grid.width} × {instance.grid.height} pixels",
-        f"{len(instance.theta)} stroke pixel{'' if len(instance.theta) == 1 else 's'}",
-    ]
-    if picture.field is not None:
-        parts.append(count_singularities(picture.field))
-    if picture.field is not None and full:
-        squared, absolute = (picture.field.energy(norm).total for norm in (2, 1))
+def _caption(subject: Subject, *, full: bool) -> str:
+    instance = _instance_of(subject)
+    domain, plural = instance.domain, "" if len(instance.theta) == 1 else "s"
+    size = f"{domain.size} faces" if isinstance(domain, Mesh) else f"{domain.width} × {domain.height} pixels"
+    parts = [size, f"{len(instance.theta)} stroke {domain.kind}{plural}"]
+    if isinstance(subject, CrossField):
+        parts.append(count_singularities(subject))
+    if isinstance(subject, CrossField) and full:
+        squared, absolute = (subject.energy(norm).total for norm in (2, 1))
         parts.append(f"energy {squared:.4g} (2-norm), {absolute:.4g} (1-norm)")
     if full:
         parts.append(f"gauge {instance.gauge}")

@@ -166,6 +166,11 @@ class Mesh(Domain):
         return _unit(self._cross)
 
     @cached_property
+    def areas(self) -> Floats:
+        """Area of each face, shape (n,)."""
+        return np.asarray(np.sqrt(_dot(self._cross, self._cross)) / 2)
+
+    @cached_property
     def frames(self) -> Floats:
         """Unit x and y axis of each face, shape (n, 2, 3)."""
         x, z = _unit(self._edge_vectors(0)), self.normals

@@ -1,0 +1,177 @@
+"""A mesh with its strokes, crosses and singularities, seen from where most of them show, with matplotlib."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, Final
+
+import numpy as np
+
+from ...models.field.field import CrossField
+from ...models.field.triangles import vectors_of
+from ...models.instance.domain import Bools, Floats
+from ...models.instance.instance import Instance
+from ...models.instance.mesh import Mesh
+from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE
+
+SHARP: Final = np.radians(30)  # angle between two faces from which their edge is drawn dark
+MOST_CROSSES: Final = 4000  # faces in view with a cross each; of more, one in several has one
+_LIGHT: Final = np.array([0.35, 0.45, 0.82])  # towards the lamp, in the viewer's frame
+_PAPER: Final = 0.97  # brightness of a face towards the lamp
+_SHADE: Final = 0.30  # of which a face away from it loses this much
+_EDGE: Final = "#00000018"
+_DARK: Final = "#404040"
+_ARM: Final = 0.40  # half the length of a line of a cross, in roots of its share of the area
+_WIDTH: Final = 0.055  # of a line of a cross, in the same unit
+_DOT: Final = 0.016  # radius of a dot, in sides of the picture
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A direction of view: axes, unit vectors (3, 3): to the right, upwards, to the viewer."""
+
+    axes: Floats
+
+    @classmethod
+    def from_side(cls, side: Floats) -> View:
+        """The view from a side, with z upwards, or y where that is the side."""
+        forward = side / np.linalg.norm(side)
+        up = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
+        right = np.cross(up, forward)
+        right /= np.linalg.norm(right)
+        return cls(np.stack([right, np.cross(forward, right), forward]))
+
+    @classmethod
+    def of(cls, mesh: Mesh, marked: Floats) -> View:
+        """The view from one of 26 sides in which most marked normals (k, 3) and most of the area show."""
+        if np.ptp(mesh.vertices[:, 2]) == 0:
+            return cls.from_side(np.array([0.0, 0.0, 1.0]))
+        tilted = np.array([1.0, 0.8, 0.7])  # no face of a box is seen from its edge
+        sides = [tilted * side for side in product((1, -1, 0.2), repeat=3) if side != (0.2, 0.2, 0.2)]
+
+        def score(side: Floats) -> float:
+            direction = side / np.linalg.norm(side)
+            front = np.clip(mesh.normals @ direction, 0, None)
+            seen = (marked @ direction > 0.25).mean() if len(marked) else 0.0
+            return float(
+                2 * seen + np.minimum(front, 0.6) @ mesh.areas / mesh.areas.sum() + 0.05 * direction[2]
+            )
+
+        return cls.from_side(max(sides, key=lambda side: round(score(side), 9)))
+
+    def project(self, points: Floats) -> Floats:
+        """Points (..., 3) in the viewer's frame: right, up, towards the viewer."""
+        return np.asarray(points @ self.axes.T)
+
+
+def draw_mesh(axes: Any, subject: CrossField | Instance) -> None:
+    """Draw a field or an instance on a mesh into axes of matplotlib: everything from far to near."""
+    from matplotlib.collections import PolyCollection
+
+    field = subject if isinstance(subject, CrossField) else None
+    instance = subject if isinstance(subject, Instance) else subject.instance
+    mesh = instance.mesh
+    vertex, turns = _NONE, np.zeros(0)
+    if field is not None:
+        vertex, turns = field.singularities.vertex, field.singularities.index
+    view = View.of(mesh, _vertex_normals(mesh)[vertex])
+    points = view.project(mesh.vertices)
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    side, corners, towards = float((high - low).max()), points[mesh.faces], view.project(mesh.normals)
+    shown = np.ones(mesh.size, dtype=bool) if len(mesh.boundary) else towards[:, 2] > 0
+    shapes = list(corners[shown][:, :, :2])
+    colours, depth = [_shades(towards[shown])], [corners[shown][:, :, 2].mean(axis=1)]
+    edges = [np.tile(_rgba(_EDGE), (len(shapes), 1))]
+
+    def add(polygons: Floats, depths: Floats, colour: str) -> None:
+        shapes.extend(polygons)
+        depth.append(depths)
+        colours.append(np.tile(_rgba(colour), (len(polygons), 1)))
+        edges.append(np.zeros((len(polygons), 4)))
+
+    for ends, colour, width, above in _line_marks(mesh, field, instance, shown):
+        flat = view.project(ends)
+        add(_strips(flat[:, :, :2], width), flat[:, :, 2].mean(axis=1) + above * side, colour)
+    radius = _DOT * side * np.where(np.abs(turns) < 0.5, 1.0, 1.4)
+    for colour, some in ((POSITIVE, turns > 0), (NEGATIVE, turns < 0)):
+        place, height = points[vertex[some], :2], points[vertex[some], 2] + 2 * _DOT * side
+        for paint, part, above in ((PAPER, 1.25, 0.0), (colour, 1.0, 1e-6 * side)):
+            circle = part * radius[some, None, None] * _CIRCLE
+            add(place[:, None] + circle, height + above, paint)
+    nearest = np.argsort(np.concatenate(depth), kind="stable")
+    axes.add_collection(
+        PolyCollection(
+            [shapes[number] for number in nearest],
+            facecolors=np.concatenate(colours)[nearest],
+            edgecolors=np.concatenate(edges)[nearest],
+            linewidths=0.25,
+        )
+    )
+    margin = 0.03 * side
+    axes.set_xlim(low[0] - margin, high[0] + margin)
+    axes.set_ylim(low[1] - margin, high[1] + margin)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+_CIRCLE: Final = np.stack([np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)], axis=1)
+_NONE: Final = np.zeros(0, dtype=np.int32)
+
+
+def _line_marks(
+    mesh: Mesh, field: CrossField | None, instance: Instance, shown: Bools
+) -> list[tuple[Floats, str, float, float]]:
+    """Segments (k, 2, 3) of lines, their colour, width, and by how much they lie above the faces."""
+    size = np.sqrt(mesh.areas)
+    marks: list[tuple[Floats, str, float, float]] = []
+    sharp = np.nonzero(mesh.dihedral > SHARP)[0]
+    edges = np.concatenate([mesh.pair_vertices[sharp], mesh.edge_vertices(mesh.boundary)])
+    typical = float(np.median(size))
+    marks.append((mesh.vertices[edges], _DARK, 0.6 * _WIDTH * typical, 2e-3))
+    if field is not None:
+        every = -(-int(shown.sum()) // MOST_CROSSES)
+        faces = np.nonzero(shown)[0][:: max(every, 1)].astype(np.int32)
+        arm = _ARM * size[faces, None] * np.sqrt(every)
+        for line, colour in enumerate(FAMILIES):
+            reach = arm * vectors_of(field)[faces, line]
+            ends = np.stack([mesh.centres[faces] - reach, mesh.centres[faces] + reach], axis=1)
+            marks.append((ends, colour, _WIDTH * typical * np.sqrt(every), 1e-3))
+    else:
+        seen = shown[instance.stroke_index]
+        faces, theta = np.asarray(instance.stroke_index[seen]), np.asarray(instance.theta[seen])
+        reach = _ARM * size[faces, None] * mesh.vectors(faces, theta)
+        ends = np.stack([mesh.centres[faces] - reach, mesh.centres[faces] + reach], axis=1)
+        marks.append((ends, STROKE, 1.5 * _WIDTH * typical, 1e-3))
+    return marks
+
+
+def _vertex_normals(mesh: Mesh) -> Floats:
+    """Normal of each vertex: the mean of those of its faces, by area, (v, 3)."""
+    weighted = mesh.normals * mesh.areas[:, None]
+    total = np.zeros_like(mesh.vertices)
+    for corner in range(3):
+        np.add.at(total, mesh.faces[:, corner], weighted)
+    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])
+
+
+def _shades(normals: Floats) -> Floats:
+    """Grey (k, 4) of faces with normals in the viewer's frame; back sides are lit from behind."""
+    light = np.abs(normals @ (_LIGHT / np.linalg.norm(_LIGHT)))
+    grey = _PAPER - _SHADE * (1 - light)
+    return np.stack([grey, grey, grey, np.ones_like(grey)], axis=1)
+
+
+def _strips(segments: Floats, width: float) -> Floats:
+    """Segments (k, 2, 2) as rectangles (k, 4, 2)."""
+    along = segments[:, 1] - segments[:, 0]
+    length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    across = width / 2 * np.stack([-along[:, 1], along[:, 0]], axis=1) / length
+    start, end = segments[:, 0], segments[:, 1]
+    return np.stack([start - across, end - across, end + across, start + across], axis=1)
+
+
+def _rgba(colour: str) -> tuple[float, ...]:
+    from matplotlib.colors import to_rgba
+
+    return tuple(to_rgba(colour))
