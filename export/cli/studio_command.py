@@ -21,7 +21,7 @@ def studio_command(
         str | None,
         typer.Argument(
             metavar="[SKETCH|SAMPLE]",
-            help="A drawing (SVG, .scap, .curves), a saved session, or a drawn sample.",
+            help="A drawing (SVG, picture, .scap, .curves), a saved session, or a drawn sample.",
         ),
     ] = None,
     *,

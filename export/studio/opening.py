@@ -1,20 +1,32 @@
-"""Strokes of the page from a file: SVG, .scap and .curves by their curves."""
+"""Strokes of the page from a file: SVG, .scap and .curves by their curves, pictures by thinned ink."""
 
 from __future__ import annotations
 
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
 
 from ...models.errors import InputError
-from ...models.instance.domain import Floats
+from ...models.instance.domain import Bools, Floats
 from ...models.sketch.bitmap import Bitmap
-from ...models.sketch.cover import Box
+from ...models.sketch.cover import Box, block_means
 from ...models.sketch.curves import Curves, flatten, run_numbers
 from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
-from ...models.sketch.read import DEFAULT_SIZE, name_from_text
+from ...models.sketch.read import name_from_text
+from ...models.sketch.thinning import thin_shape
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
+_THINNED: Final = 700  # pixels on the longer side of a picture while it is traced
+_INK: Final = 0.3
+_RED: Final = 0.5
+_SMOOTH: Final = 2.0  # pixels over which a traced line is smoothed
+_SHORTEST: Final = 6  # pixels of a traced line; shorter ones are burrs of the thinning
+_AROUND: Final = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
+
+_Pixel = tuple[int, int]
+_Way = list[_Pixel]
 
 
 def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[str, Any]:
@@ -27,13 +39,8 @@ def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[s
     stem, dot, suffix = file_name.rpartition(".")
     suffix = f".{suffix.lower()}" if dot else ""
     spatial = detect_file_kind(data, suffix) == "curves"
-    drawing = parse_drawing(data, suffix, DEFAULT_SIZE, view=view if spatial else None)
-    if isinstance(drawing, Bitmap):
-        raise InputError(
-            "a picture has no strokes to edit; trace it in a drawing program, or read it with "
-            "`crossfield instance`"
-        )
-    page, strokes = _strokes_of_curves(drawing)
+    drawing = parse_drawing(data, suffix, _THINNED // 4, view=view if spatial else None)
+    page, strokes = _trace_picture(drawing) if isinstance(drawing, Bitmap) else _strokes_of_curves(drawing)
     return {
         "name": name_from_text(stem or file_name),
         "page": list(page),
@@ -59,3 +66,70 @@ def _strokes_of_curves(curves: Curves) -> tuple[Box, list[dict[str, Any]]]:
         for part, line in zip(np.split(segments, starts[1:]), curves.line[owner[starts]], strict=True)
     ]
     return page, strokes
+
+
+def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
+    """Page and strokes of a picture: the middle lines of its ink, from one end or junction to the next."""
+    reduced = max(1.0, max(picture.ink.shape) / _THINNED)
+    rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in picture.ink.shape)
+    small = block_means(picture.ink, rows, columns)
+    red = block_means(picture.red * picture.ink, rows, columns) / np.maximum(small, 1e-6)
+    line = thin_shape(small * max(1.0, reduced / picture.stroke_width) > _INK)
+    ways = [np.array(way) for way in _trace_ways(line)]
+    ways = [way for way in ways if len(way) >= _SHORTEST] or ways
+    is_red = np.array([np.median(red[tuple(way.T)]) > _RED for way in ways], dtype=bool)
+    as_lines = is_red if is_red.any() and not is_red.all() else np.ones(len(ways), dtype=bool)
+    scale = reduced * picture.reduction
+    strokes = [
+        _stroke_document(scale * (_smooth(way)[:, ::-1] + 0.5), line=bool(marked))
+        for way, marked in zip(ways, as_lines, strict=True)
+    ]
+    return (0.0, 0.0, float(picture.width), float(picture.height)), strokes
+
+
+def _smooth(way: NDArray[np.int64]) -> Floats:
+    """The pixels of a way as a smooth line with the same ends, with half of its points."""
+    even = ndimage.gaussian_filter1d(way.astype(np.float64), _SMOOTH, axis=0, mode="nearest")
+    if (way[0] == way[-1]).all():
+        even = ndimage.gaussian_filter1d(way[:-1].astype(np.float64), _SMOOTH, axis=0, mode="wrap")
+        return np.concatenate([even[::2], even[:1]])
+    even[0], even[-1] = way[0], way[-1]
+    return np.concatenate([even[:-1:2], even[-1:]])
+
+
+def _trace_ways(line: Bools) -> list[_Way]:
+    """The pixels of a thinned drawing as ways from one end or junction to the next, each link once."""
+    there: set[_Pixel] = {(row, column) for row, column in np.argwhere(line).tolist()}
+    links = {pixel: _neighbours(pixel, there) for pixel in there}
+    used: set[tuple[_Pixel, _Pixel]] = set()
+
+    def walk(first: _Pixel, second: _Pixel) -> _Way:
+        way = [first, second]
+        used.update({(first, second), (second, first)})
+        while len(links[way[-1]]) == 2:
+            after = next((pixel for pixel in links[way[-1]] if (way[-1], pixel) not in used), None)
+            if after is None:
+                break
+            used.update({(way[-1], after), (after, way[-1])})
+            way.append(after)
+        return way
+
+    # Ends and junctions first; what is left are closed ways.
+    order = sorted(there, key=lambda pixel: (len(links[pixel]) == 2, pixel))
+    return [
+        walk(pixel, neighbour)
+        for pixel in order
+        for neighbour in links[pixel]
+        if (pixel, neighbour) not in used
+    ]
+
+
+def _neighbours(pixel: _Pixel, there: set[_Pixel]) -> list[_Pixel]:
+    """The neighbours of a pixel; one at a corner counts only if no neighbour at a side is next to it."""
+    row, column = pixel
+    return [
+        (row + down, column + right)
+        for down, right in _AROUND
+        if (row + down, column + right) in there
+        and not (down and right and ((row, column + right) in there or (row + down, column) in there))
+    ]

@@ -16,6 +16,7 @@ from crossfield.export.studio.opening import open_drawing
 from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, hints_on_mask, read_drawn
 from crossfield.export.studio.views import field_step
 from crossfield.models.sketch.samples import sample_svg
+from PIL import Image, ImageDraw
 from studios import CONTRADICTING, PEBBLE, changed
 
 
@@ -185,6 +186,28 @@ def test_the_python_lines_of_the_menu_compute_the_same(tmp_path, monkeypatch):
     exec("\n".join(field_step(data)[0]["python"]), {})
     archive = zipfile.ZipFile(tmp_path / "pebble.surface.zip")
     assert archive.read("surface.obj") == (tmp_path / "surface" / "surface.obj").read_bytes()
+
+
+def picture():
+    """A red line and a black circle on paper, as PNG."""
+    image = Image.new("RGB", (200, 160), "white")
+    pen = ImageDraw.Draw(image)
+    pen.line([20, 80, 180, 80], fill=(220, 0, 0), width=3)
+    pen.ellipse([120, 10, 170, 60], outline="black", width=3)
+    stream = io.BytesIO()
+    image.save(stream, "PNG")
+    return stream.getvalue()
+
+
+def test_a_picture_is_traced_to_strokes_with_marks():
+    session = open_drawing(picture(), "photo.png")
+    assert session["page"] == [0, 0, 200, 160]
+    lines = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "line"]
+    cuts = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "cut"]
+    assert len(lines) == len(cuts) == 1
+    assert np.abs(lines[0][:, 1] - 80.5).max() < 2
+    assert np.ptp(lines[0][:, 0]) > 150
+    assert np.abs(np.hypot(*(cuts[0] - [145.5, 35.5]).T) - 24).max() < 3
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,12 @@
 """Outlines with a gap, drawings that enclose nothing, holes, and strokes without room between them."""
 
 import crossfield as cf
+import numpy as np
 import pytest
 from crossfield.models.sketch.samples import samples
+from crossfield.models.sketch.thinning import thin_shape
 from PIL import Image, ImageDraw
+from scipy import ndimage
 from small_drawings import png, read, svg
 
 SKETCHES = [known.name for known in samples() if known.kind == "sketch"]
@@ -79,3 +82,16 @@ def test_drawings_off_their_page_are_warned_of():
     data = drawing([("M10 10H90V190H10Z", "black")])
     (text,) = read(data, 48).reading.warnings
     assert text.startswith("48% of the pixels to solve for lie off the page")
+
+
+def test_thinning_leaves_lines_of_one_pixel():
+    image = Image.new("1", (120, 80))
+    ImageDraw.Draw(image).line((10, 10, 100, 60), fill=1, width=9)
+    ImageDraw.Draw(image).ellipse((20, 40, 50, 70), fill=0, outline=1, width=5)
+    shape = np.asarray(image)
+    line = thin_shape(shape)
+    assert not (line & ~shape).any()
+    assert ndimage.label(line, np.ones((3, 3)))[1] == ndimage.label(shape, np.ones((3, 3)))[1]
+    assert not ndimage.binary_opening(line, np.ones((2, 2))).sum() > 4
+    neighbours = ndimage.convolve(line.astype(int), np.ones((3, 3)), mode="constant")
+    assert (line & (neighbours == 2)).sum() == 2
