@@ -145,20 +145,9 @@ def _find_polyvector(request: Request) -> Iterator[Candidate]:
 
 def _find_bend(request: Request) -> Iterator[Candidate]:
     request.progress("bend field")
-    deadline, start = request.deadline(), request.start
-    limit = deadline if start is None else deadline.share(_STARTING)
+    over = request.stop_at_limit()
     hard = polyvector_field(request.instance, hold=max(HOLDS))
-    yield _time_candidate("bend", lambda: bend_field(hard, stop=_stop_between_steps(request, limit)))
-    if start is not None:
-        yield _time_candidate(
-            "start + bend", lambda: bend_field(start, stop=_stop_between_steps(request, deadline))
-        )
-
-
-def _stop_between_steps(request: Request, deadline: Deadline) -> Over:
-    """Return a function that states before a step whether the deadline or the caller ends the work."""
-    late = deadline.steps()
-    return lambda: late() or request.stop()
+    yield _time_candidate("bend", lambda: bend_field(hard, stop=over))
 
 
 def _find_by_search(request: Request) -> Iterator[Candidate]:

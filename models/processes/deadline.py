@@ -78,17 +78,6 @@ class Deadline:
         """Whether the moment has passed."""
         return self.left() == 0.0
 
-    def steps(self) -> Over:
-        """A function that returns whether the deadline would pass during a step as long as the last one."""
-        began = [self.clock()]
-
-        def over() -> bool:
-            now = self.clock()
-            last, began[0] = now - began[0], now
-            return self.at - now <= last
-
-        return over
-
     def later(self, seconds: float) -> Deadline:
         """The moment that many seconds after this one; before it for a negative number."""
         return replace(self, at=self.at + seconds)

@@ -220,7 +220,7 @@ def test_a_run_without_solvers_still_computes_a_field(tmp_path, files, instance)
     report = json.loads(done.stdout)
     assert report == json.loads((tmp_path / "out" / "report.json").read_text())
     assert {row["method"] for row in report["methods"]} == {
-        "start", "greedy", "power", "power + QP", "polyvector", "polyvector + QP", "bend", "start + bend",
+        "start", "greedy", "power", "power + QP", "polyvector", "polyvector + QP", "bend",
         "search", "prove",
     }  # fmt: skip
     assert set(report["failures"]) == {"two-stage"}

@@ -33,18 +33,6 @@ def test_a_deadline_tells_what_is_left_and_when_it_has_passed():
     assert (deadline.left(), deadline.passed()) == (0.0, True)
 
 
-def test_a_step_that_would_end_late_is_not_begun():
-    clock = Clock()
-    over = Deadline.after(10.0, clock).steps()
-    assert not over()
-    clock.now += 4.0
-    assert not over()  # 6 s are left
-    clock.now += 4.0
-    assert over()  # 2 s are left, and the last step took 4 s
-    clock.now += 1.0
-    assert over()
-
-
 @given(SECONDS, st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1), SECONDS, SECONDS)))
 def test_the_parts_of_a_budget_are_no_more_than_the_whole(seconds, steps):
     """For any use of their shares, all parts end by the deadline of the whole."""

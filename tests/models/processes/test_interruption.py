@@ -57,7 +57,7 @@ def test_ctrl_c_in_the_search_ends_the_run_with_its_best_field(tmp_path):
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["interrupted"] == "search"
     by_method = {row["method"]: row for row in report["methods"]}
-    smooth = {"power", "power + QP", "polyvector", "polyvector + QP", "bend", "start + bend"}
+    smooth = {"power", "power + QP", "polyvector", "polyvector + QP", "bend"}
     assert set(by_method) == {"start", "greedy", "search"} | smooth
     assert by_method["search"]["interrupted"] is True
     assert cf.read_field(tmp_path / "lowest.npz").energy().total == pytest.approx(
