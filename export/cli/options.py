@@ -165,7 +165,7 @@ Gzip = Annotated[bool, typer.Option("--gzip", help="Compress the model files (.g
 
 MethodName = Annotated[
     str | None,
-    _method(help="Compute the field with this method: {methods}; `crossfield list` describes them."),
+    _method(help="Compute the field with a method of: {methods}. `crossfield list` describes them."),
 ]
 SolverName = Annotated[
     str | None,
@@ -189,8 +189,7 @@ SecondsInAll = Annotated[
     float,
     _time_limit(
         help="Seconds in total, including reading and writing files; methods that do not search end earlier."
-        " power, polyvector and bend always complete their first factorisation. The first proof on a machine"
-        " compiles its functions before, in up to a minute."
+        " power, polyvector and bend always complete their first factorisation."
     ),
 ]
 SecondsPerMethod = Annotated[

@@ -356,5 +356,5 @@ def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) 
     title = "formulations whose optimum each solver proves from our files (--json: reasons)"
     show_table(title, ("solver", "formulations"), takes)
     show("formats", "formats")
-    show("methods (solve --method)", "methods")
+    show("methods (of run; of solve --method, except prove)", "methods")
     show("readers of solution files", "readers")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from ...models.errors import InputError, SolutionError, SolverError
+from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
 from . import options
 from .inputs import check_names, full_formulation_names, read_start
@@ -17,7 +17,6 @@ from .sketch_options import Size, SketchOptions
 if TYPE_CHECKING:
     from ..solutions.solution import Solution
     from ..solving.methods import Candidate, Request
-    from ..solving.proven import ProvenBound
 
 
 def solve_command(
@@ -57,13 +56,11 @@ def solve_command(
         )
         if method is not None:
             _check_method(method, solver, relax=relax)
-            candidate, proven, reason, target = _solve_by_method(method, request)
+            candidate, target = _solve_by_method(method, request)
         else:
             solution, target = _solve_by_solver(str(formulation), solver, request, relax=relax)
     if method is not None:
-        _print_candidate(candidate, proven, target, printing)
-        if reason:
-            print_notice(reason)
+        _print_candidate(candidate, target, printing)
         return
     print_solution(solution, target, printing)
     if solution.point is None:
@@ -84,30 +81,24 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
     if name not in METHODS and name in {*FORMULATIONS, *short_names()}:
         raise typer.BadParameter(f"{name} is a formulation, not a method; write -f {name}")
     check_names([name], METHODS, "method")
+    if name == "prove":
+        raise typer.BadParameter("the method prove has a command of its own; write crossfield prove")
     if relax:
         raise typer.BadParameter("--relax needs --formulation; methods do not take it")
     if solver is not None:
         raise typer.BadParameter(f"--solver {solver}: the method {name} has its own solvers")
 
 
-def _solve_by_method(name: str, request: Request) -> tuple[Candidate, ProvenBound | None, str, Path]:
-    """Final field of a method, its proof if any, why a proof has no bound, and the file of the field."""
+def _solve_by_method(name: str, request: Request) -> tuple[Candidate, Path]:
+    """Final field of a method, and its file."""
     from ...models.field.file import write_field
-    from ...models.storage import make_folder, remove_file
+    from ...models.storage import make_folder
     from ..solving.methods import METHODS
-    from ..solving.proven import ProvenBound
 
     target = make_folder(request.folder) / f"{request.instance.name}.{name}.field.npz"
     *_, candidate = METHODS[name].find(request)
     write_field(candidate.field, target)
-    if candidate.proof is None:
-        return candidate, None, "", target
-    certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
-    try:
-        return candidate, ProvenBound.write(candidate.proof, certificate), "", target
-    except SolverError as error:
-        remove_file(certificate)  # it is of an earlier proof
-        return candidate, None, str(error), target
+    return candidate, target
 
 
 def _solve_by_solver(
@@ -135,16 +126,9 @@ def _solve_by_solver(
     return solution, target
 
 
-def _print_candidate(
-    candidate: Candidate, proven: ProvenBound | None, field: Path, printing: options.PrintOptions
-) -> None:
+def _print_candidate(candidate: Candidate, field: Path, printing: options.PrintOptions) -> None:
     """Print the facts of a method's field and the path of its file."""
-    facts = candidate.facts()
-    if proven:
-        facts |= proven.facts(facts["energy_2_norm"])
-
-    lines = [f"field: {field}", *([f"certificate: {proven.certificate}"] if proven else [])]
-    printing.show_facts(candidate.field.instance.summary, facts, *lines)
+    printing.show_facts(candidate.field.instance.summary, candidate.facts(), f"field: {field}")
     if candidate.interrupted:
         print_notice("interrupted; the best field so far was kept")
 

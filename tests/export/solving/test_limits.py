@@ -100,11 +100,3 @@ def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsy
     assert document == json.loads((tmp_path / "mouse.proof.json").read_text())
     assert (document["status"], document["bound"], document["levels"]) == ("unproven", 0.0, [])
     assert {path.name for path in tmp_path.iterdir()} == {"mouse.proof.field.npz", "mouse.proof.json"}
-
-
-def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
-    cf.prove(cf.sample("mouse", 4))  # compiles what proofs need
-    command = ["solve", "mouse", "--size", "24", "-m", "prove", "--time-limit", "0.1", "-o", str(tmp_path)]
-    assert invoke(command) == 0
-    assert UNPROVEN in " ".join(capsys.readouterr().err.split())
-    assert [path.name for path in tmp_path.iterdir()] == ["mouse.prove.field.npz"]

@@ -9,7 +9,6 @@ from dataclasses import replace
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.methods import METHODS
 from crossfield.export.solving.proven import ProvenBound
 from crossfield.models.proof.certificate import read_certificate
 
@@ -38,17 +37,6 @@ def test_a_run_says_what_is_proven_of_every_field(tmp_path, capsys):
 def test_the_gap_is_relative_to_the_energy(tmp_path, energy, gap, optimal):
     facts = ProvenBound(2.0, tmp_path).facts(energy)
     assert facts == {"bound_2_norm": 2.0, "gap_2_norm": gap, "proven_optimal": optimal}
-
-
-def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
-    command = ["solve", "mouse", "--size", "6", "-m", "prove", "--time-limit", "60", "--json"]
-    assert invoke([*command, "-o", str(tmp_path)]) == 0
-    facts = json.loads(capsys.readouterr().out)
-    field = cf.read_field(tmp_path / "mouse.prove.field.npz")
-    certificate = read_certificate(tmp_path / "mouse.prove.certificate.npz", on=field.instance)
-    assert facts["energy_2_norm"] == pytest.approx(field.energy().total, rel=1e-12)
-    assert (facts["proven_optimal"], facts["bound_2_norm"]) == (True, certificate.bound)
-    assert METHODS["prove"].timed
 
 
 @pytest.mark.parametrize(
@@ -89,9 +77,9 @@ assert proof.seconds < 500
     kept = call("-c", program)
     assert any(path.name.startswith("clusters.") for path in kept)
     out = tmp_path / "out"
-    options = ["-m", "prove", "--time-limit", "100", "-o", str(out), "--quiet"]
-    assert kept == call("-m", "crossfield", "solve", "mouse", "--size", "8", *options)
-    assert (out / "mouse.prove.certificate.npz").exists()
+    options = ["--time-limit", "100", "-o", str(out), "--quiet"]
+    assert kept == call("-m", "crossfield", "prove", "mouse", "--size", "8", *options)
+    assert (out / "mouse.proof.certificate.npz").exists()
 
 
 @pytest.mark.slow
