@@ -59,7 +59,12 @@ class Manifest:
         instance = self.instance()
         try:
             problem = narrow_windows(
-                formulate(instance, self.formulation, p=self._jumps(instance), **self.document["options"]),
+                formulate(
+                    instance,
+                    self.formulation,
+                    p=jumps_of_list(self.document["jumps"], instance, self.path),
+                    **self.document["options"],
+                ),
                 self._windows,
             )
         except FormulationError as error:
@@ -84,18 +89,6 @@ class Manifest:
     @property
     def _windows(self) -> Windows | None:
         return Windows.of_document(self.document["windows"]) if "windows" in self.document else None
-
-    def _jumps(self, instance: Instance) -> Ints | None:
-        if self.document["jumps"] is None:
-            return None
-        jumps = np.zeros(len(instance.domain.first), dtype=np.int32)
-        listed = np.array(self.document["jumps"], dtype=np.int64).reshape(-1, 2)
-        if (listed[:, 0] >= len(jumps)).any():
-            raise InstanceError(
-                "lists a jump of a pair that the instance does not have; export again", file=self.path
-            )
-        jumps[listed[:, 0]] = listed[:, 1]
-        return jumps
 
 
 @check_arguments
@@ -218,7 +211,7 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
             {"name": row.family.tag, "over": row.family.over, "count": row.count, "paper": row.family.paper}
             for row in problem.rows
         ],
-        "jumps": _nonzero_jumps(problem),
+        "jumps": nonzero_jumps(problem),
         **tightening,
         "sha256": problem.sha256,
         "files": files,
@@ -237,10 +230,24 @@ def _column_blocks(problem: Problem) -> list[dict[str, Any]]:
     ]
 
 
-def _nonzero_jumps(problem: Problem) -> list[list[int]] | None:
+def nonzero_jumps(problem: Problem) -> list[list[int]] | None:
     """[pair, jump] of every pair whose jump is data and not zero; None where jumps are variables."""
     if problem.jumps is None:
         return None
     at = np.nonzero(problem.jumps)[0]
     listed: list[list[int]] = np.stack([at, problem.jumps[at]], axis=1).tolist()
     return listed
+
+
+def jumps_of_list(listed: list[list[int]] | None, instance: Instance, path: Path) -> Ints | None:
+    """The jumps that `nonzero_jumps` listed. Raises InstanceError, about a file, for an unknown pair."""
+    if listed is None:
+        return None
+    jumps = np.zeros(len(instance.domain.first), dtype=np.int32)
+    pairs, values = np.array(listed, dtype=np.int64).reshape(-1, 2).T
+    if (pairs >= len(jumps)).any():
+        raise InstanceError(
+            "lists a jump of a pair that the instance does not have; write it again", file=path
+        )
+    jumps[pairs] = values
+    return jumps

@@ -42,7 +42,6 @@ class ProblemArrays:
         Sides of the rows, shape (m,); -inf and inf without a side. Constants of rows are on these sides.
     row_products, row_factors
         Products of the rows: row, first and second column, shape (k, 3), and their factors, shape (k,).
-        `row_q` returns the matrix of one row.
     lower, upper
         Bounds of the columns, shape (n,).
     integer
@@ -72,16 +71,6 @@ class ProblemArrays:
     row_names: Names | None
     nonlinear: tuple[str, ...]
     family_rows: dict[str, slice]
-
-    @property
-    def quadratic_rows(self) -> Ints:
-        """Numbers of the rows with products, in ascending order."""
-        return np.unique(self.row_products[:, 0])
-
-    def row_q(self, row: int) -> sparse.csr_array:
-        """Quadratic part of a row: the symmetric matrix P of 0.5 x'Px, shape (n, n)."""
-        chosen = self.row_products[:, 0] == row
-        return quadratic_matrix(self.row_products[chosen, 1:], self.row_factors[chosen], len(self.c))
 
     def objective_value(self, point: Floats) -> float:
         """Objective at a point (n,)."""

@@ -6,9 +6,10 @@ from dataclasses import asdict
 from typing import Any
 
 from ....models.formulations.problem import Problem
+from ...bundle.manifest import nonzero_jumps
 from ...writing.curvature import probtype
 from ..documents.citation import REFERENCES
-from ..documents.documents import FORMAT, VERSION, listed_jumps
+from ..documents.documents import FORMAT, VERSION
 from ..documents.statistics import problem_counts, problem_curvature
 from ..ledger.points import BestPoint
 from ..plan.equivalence import equivalent_entries
@@ -44,7 +45,7 @@ def sidecar_of(
         "formulation": problem.name,
         "paper": problem.formulation.paper,
         "options": asdict(problem.formulation.options),
-        "jumps": listed_jumps(problem),
+        "jumps": nonzero_jumps(problem),
         **_tightening(task, problem),
         "problem_sha256": problem.sha256,
         "class": problem.problem_class,

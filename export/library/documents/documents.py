@@ -12,15 +12,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from ....models.errors import InputError, InstanceError
-from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, formulate, with_windows
 from ....models.instance.file import read_document, read_instance
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.proof.tightening import remaining_windows
 from ....models.storage import read_bytes
+from ...bundle.manifest import jumps_of_list
 from ..plan.spec import Spec, spec_of
 
 FORMAT: Final = "crossfield-library-entry"
@@ -120,15 +118,8 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
     """
     folder = library.folder if isinstance(library, Library) else Path(library)
     path = folder / document["instance"]["file"]
-    instance, jumps = read_instance(path), None
-    if FORMULATIONS[document["formulation"]].fixed:
-        jumps = np.zeros(len(instance.domain.first), dtype=np.int32)
-        listed = np.array(document["jumps"] or [], dtype=np.int64).reshape(-1, 2)
-        if (listed[:, 0] >= len(jumps)).any():
-            raise InstanceError(
-                "a jump of a pair is listed that the instance does not have; build the library again"
-            )
-        jumps[listed[:, 0]] = listed[:, 1]
+    instance = read_instance(path)
+    jumps = jumps_of_list(document["jumps"], instance, folder / f"{document['name']}.json")
     problem = formulate(instance, document["formulation"], p=jumps, **document["options"])
     if "tightened" in document:
         problem = tightened_by(
@@ -145,15 +136,6 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
 def tightened_by(certificate: Certificate, problem: Problem) -> Problem:
     """Return a problem in the windows that a certificate leaves."""
     return with_windows(problem, remaining_windows(certificate))
-
-
-def listed_jumps(problem: Problem) -> list[list[int]] | None:
-    """Return nonzero jumps as [pair, jump] if they are data, None if they are variables."""
-    if problem.jumps is None:
-        return None
-    at = np.nonzero(problem.jumps)[0]
-    listed: list[list[int]] = np.stack([at, problem.jumps[at]], axis=1).tolist()
-    return listed
 
 
 def files_of_entry(sidecar: dict[str, Any]) -> list[str]:
