@@ -41,9 +41,11 @@ if TYPE_CHECKING:
     from .export.solving.run import run as run
     from .export.surfaces.files import write_surface as write_surface
     from .models.errors import CrossfieldError as CrossfieldError
+    from .models.errors import DomainError as DomainError
     from .models.errors import FormulationError as FormulationError
     from .models.errors import InputError as InputError
     from .models.errors import InstanceError as InstanceError
+    from .models.errors import MeshError as MeshError
     from .models.errors import MissingSolverError as MissingSolverError
     from .models.errors import NoStrokeError as NoStrokeError
     from .models.errors import OutputError as OutputError
@@ -61,6 +63,7 @@ if TYPE_CHECKING:
     from .models.instance.file import read_instance as read_instance
     from .models.instance.file import write_instance as write_instance
     from .models.instance.instance import Instance as Instance
+    from .models.mesh.read import read_mesh as read_mesh
     from .models.processes.limits import Limits as Limits
     from .models.proof.certificate import Certificate as Certificate
     from .models.proof.certificate import read_certificate as read_certificate
@@ -87,11 +90,13 @@ _HOME: Final = {
     "Certificate": ".models.proof.certificate",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
+    "DomainError": ".models.errors",
     "FormulationError": ".models.errors",
     "Hint": ".models.surface.hints",
     "InputError": ".models.errors",
     "Instance": ".models.instance.instance",
     "InstanceError": ".models.errors",
+    "MeshError": ".models.errors",
     "LibraryEntry": ".export.library.building.shipped_entries",
     "Light": ".export.shading.colours",
     "Limits": ".models.processes.limits",
@@ -126,6 +131,7 @@ _HOME: Final = {
     "read_field": ".models.field.file",
     "read_instance": ".models.instance.file",
     "read_manifest": ".export.bundle.manifest",
+    "read_mesh": ".models.mesh.read",
     "read_sketch": ".models.sketch.read",
     "read_solution": ".export.solutions.solution",
     "run": ".export.solving.run",

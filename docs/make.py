@@ -13,6 +13,7 @@ from typing import Any
 
 import crossfield as cf
 import numpy as np
+from crossfield.export.cli.domains import BOTH, DOMAINS
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import DEFAULTS
 from crossfield.export.solvers_table import PROGRAMS
@@ -330,6 +331,12 @@ def write_architecture() -> None:
 
     (DOCS / "architecture.svg").write_text(rooms.picture(DOCS.parent))
     columns = ("folder", "content", "uses, besides the top of `models/`")
+    domains = [
+        [f"`{command}`", *("yes" if kind in kinds else "no" for kind in BOTH)]
+        for command, kinds in DOMAINS.items()
+    ]
+    columns_of_domains = ("command", "sketches, on pixels", "meshes, on faces")
+    replace_between(DOCS / "architecture.md", "domains", markdown(columns_of_domains, domains))
     replace_between(DOCS / "architecture.md", "folders", markdown(columns, rooms.table(DOCS.parent)))
 
 

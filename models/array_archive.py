@@ -76,6 +76,9 @@ class ArrayArchive:
             raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")
         self._unread = set(self._members)
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._members
+
     def arrays(self, expected: Mapping[str, ExpectedArray], prefix: str = "") -> Arrays:
         """The expected arrays by name, without the prefix. Raises InstanceError for any other array."""
         return {name: self._array(prefix + name, name, limits) for name, limits in expected.items()}

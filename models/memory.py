@@ -9,17 +9,21 @@ from typing import Final
 
 from .errors import InputError
 
-BYTES_PER_PIXEL: Final = 5000
-"""Memory that a pixel of a grid needs while its problem is written."""
+BYTES_PER_POINT: Final = 5000
+"""Memory that a pixel of a grid or a face of a mesh needs while its problem is written."""
 
 
-def check_memory(pixels: int) -> None:
-    """Raise InputError if a grid needs more memory than is available; do nothing where that is unknown."""
-    needed, available = pixels * BYTES_PER_PIXEL, available_memory()
+def check_memory(points: int, kind: str = "pixel") -> None:
+    """Raise InputError if so many points of a kind, pixels or faces, need more memory than is available.
+
+    Do nothing where that is unknown.
+    """
+    what, remedy = {"pixel": ("a grid", "smaller size"), "face": ("a mesh", "coarser mesh")}[kind]
+    needed, available = points * BYTES_PER_POINT, available_memory()
     if available is not None and needed > available:
         raise InputError(
-            f"a grid of {pixels} pixels needs about {needed / 1e9:.1f} GB to be written, "
-            f"but {available / 1e9:.1f} GB are free; choose a smaller size"
+            f"{what} of {points} {kind}s needs about {needed / 1e9:.1f} GB to be written, "
+            f"but {available / 1e9:.1f} GB are free; choose a {remedy}"
         )
 
 

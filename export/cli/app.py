@@ -12,6 +12,7 @@ import logging
 import os
 import signal
 import sys
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Final, NoReturn
 
@@ -32,6 +33,7 @@ from .inputs import (
     require_suffix,
 )
 from .library_command import library
+from .mesh_options import MeshOptions
 from .option_groups import command as command_of
 from .output import (
     INTERRUPTED,
@@ -87,7 +89,7 @@ def root(
 
 @command("run")
 def run_command(
-    source: options.Input,
+    source: options.SketchInput,
     output: options.Folder,
     *,
     sketch: SketchOptions,
@@ -106,7 +108,7 @@ def run_command(
     limits = Limits(time_limit, threads=threads)
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = sketch.read(source, quiet=printing.quiet)
+        instance = sketch.read(source, "run", quiet=printing.quiet)
     if not (printing.quiet or printing.as_json):
         print_line(plan_sentence(limits))
     with show_progress(quiet=printing.quiet) as show:
@@ -122,12 +124,14 @@ def instance_command(
     output: options.Output,
     *,
     sketch: SketchOptions,
+    mesh: MeshOptions,
+    crosses: options.Crosses = None,
     gauge: options.Gauge = None,
     skew_weight: options.SkewWeight = None,
 ) -> None:
-    """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels.
+    """Write a sketch, a sample or a mesh as an instance (.json, .npz): strokes on pixels or faces.
 
-    Every command takes this file in place of a sketch.
+    Other commands take this file in place of a sketch or a mesh.
 
     With the suffix .png, write the mask of the instance: white where the field is wanted. Edit it in a paint
     program and pass it to --mask.
@@ -138,8 +142,10 @@ def instance_command(
     require_suffix(output, (".json", ".npz", ".png"))
     with show_progress() as show:
         show("reading the sketch")
-        instance = sketch.read(source).with_weights(skew_weight=skew_weight)
+        instance = sketch.read(source, "instance", mesh=mesh).with_weights(skew_weight=skew_weight)
         instance = instance if gauge is None else instance.with_gauge(gauge)
+        if crosses is not None:
+            instance = replace(instance, orthogonal=crosses == "orthogonal")
         (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
     print_line(f"{output}: {instance.summary}")
 
@@ -173,7 +179,7 @@ def export_command(
     formats = check_names(file_format or list(DEFAULTS), FORMATS, "format")
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = SketchOptions(size).read(source, quiet=printing.quiet)
+        instance = SketchOptions(size).read(source, "export", quiet=printing.quiet)
         field, jumps_of, windows = read_start(start, instance), None, None
         if tightened is not None:
             from ...models.proof.certificate import read_certificate
@@ -264,7 +270,7 @@ def draw_command(
     require_suffix(output, tuple(SUFFIXES))
     with show_progress() as show:
         show("reading")
-        subject = read_field_or_instance(source, on)
+        subject = read_field_or_instance(source, on, "draw")
         show("drawing")
         draw(subject, output, kind=kind, underlay=underlay)
     print_line(str(output))
@@ -328,7 +334,7 @@ def _error_line(error: Exception) -> str:
     if isinstance(error, CrossfieldError):
         return str(error)
     if isinstance(error, MemoryError):
-        return "there is not enough memory; choose a smaller --size"
+        return "there is not enough memory; choose a smaller --size or a coarser mesh"
     if isinstance(error, OSError):
         reason = (error.strerror or str(error)).lower()
         return f"{error.filename or 'a file'}: {reason}; check the path and the free space"

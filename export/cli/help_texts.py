@@ -35,6 +35,7 @@ NAMES: Final = {
         lambda readers: dict.fromkeys(re.split(r"[ ,]", reader.description)[0] for reader in readers),
     ),
     "samples": _names_in("...models.sketch.samples", "SAMPLES"),
+    "meshes": _names_in("...models.mesh.formats", "MESH_READERS"),
     "size": _names_in("...models.sketch.read", "DEFAULT_SIZE", lambda size: [str(size)]),
     "most weight": _names_in("...models.instance.instance", "MOST_WEIGHT", lambda weight: [f"{weight:,.0f}"]),
     "stroke weight": _names_in(
@@ -61,7 +62,9 @@ def fill_names(text: str) -> str:
 FACTS: Final = "Facts about the run"
 """Panel of the options that only describe a run, some of which set limits in other commands."""
 PANELS: Final = {
-    "Sketch": "size mask silhouette curvature view gauge stroke-weight skew-weight",
+    "Sketch": "size mask silhouette curvature view",
+    "Mesh": "sharp directions weights",
+    "Instance": "crosses gauge stroke-weight skew-weight",
     "Formulation": "formulation facet stroke-norm beta-norm relax norm tightened",
     "Method and solver": "method solver start program solve search",
     "Entries": "rung",

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import CrossfieldError, InputError, InstanceError
+from .domains import check_domain
 
 if TYPE_CHECKING:
     from ...models.field.field import CrossField
@@ -43,11 +44,20 @@ def read_described_problem(path: Path) -> tuple[Problem, Mapping[str, Problem] |
     return problem, manifest.problems_by_format(problem)
 
 
-def read_field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:
+def read_field_or_instance(path: Path, on: Path | None, command: str) -> CrossField | Instance:
     """Field or instance in a file; on: file of the instance of a .rawfield.
 
-    Raises InputError for a file that holds neither.
+    Raises InputError for a file that holds neither, and DomainError for a domain that the command does not
+    take.
     """
+    from ...models.instance.instance import Instance
+
+    content = _read_content(path, on)
+    check_domain(content if isinstance(content, Instance) else content.instance, command)
+    return content
+
+
+def _read_content(path: Path, on: Path | None) -> CrossField | Instance:
     from ...models.field.file import read_field
     from ...models.instance.file import read_instance
 

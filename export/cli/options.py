@@ -13,10 +13,8 @@ import typer
 from ...models.processes.job_counts import MOST
 from .output import print_json, print_line, show_facts
 
-_KINDS_OF_SKETCH: Final = (
-    "a drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples}; or an instance file"
-    " (.json, .npz)."
-)
+_SKETCH: Final = "a drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples};"
+_SAVED: Final = "or an instance file (.json, .npz)."
 
 _folder = partial(typer.Option, "-o", "--output", metavar="DIR")
 _method = partial(typer.Option, "-m", "--method", metavar="NAME")
@@ -34,15 +32,24 @@ def _norm_option(option: str, terms: str) -> Any:
 
 # Input and output
 
-Input = Annotated[str, typer.Argument(metavar="SKETCH|SAMPLE|INSTANCE", help=f"One of: {_KINDS_OF_SKETCH}")]
-OptionalInput = Annotated[
-    str | None, typer.Argument(metavar="[SKETCH|SAMPLE|INSTANCE]", help=f"One of: {_KINDS_OF_SKETCH}")
+Input = Annotated[
+    str,
+    typer.Argument(
+        metavar="SKETCH|SAMPLE|MESH|INSTANCE",
+        help=f"One of: {_SKETCH} a triangle mesh ({{meshes}}); {_SAVED}",
+    ),
+]
+SketchInput = Annotated[
+    str, typer.Argument(metavar="SKETCH|SAMPLE|INSTANCE", help=f"One of: {_SKETCH} {_SAVED}")
+]
+OptionalSketchInput = Annotated[
+    str | None, typer.Argument(metavar="[SKETCH|SAMPLE|INSTANCE]", help=f"One of: {_SKETCH} {_SAVED}")
 ]
 FieldOrInput = Annotated[
     str,
     typer.Argument(
         metavar="FIELD|SKETCH|SAMPLE|INSTANCE",
-        help=f"A field (.npz, .json, .rawfield); or the input for a new field: {_KINDS_OF_SKETCH}",
+        help=f"A field (.npz, .json, .rawfield); or the input for a new field: {_SKETCH} {_SAVED}",
     ),
 ]
 FieldOrInstance = Annotated[
@@ -255,6 +262,14 @@ Gauge = Annotated[
         "--gauge",
         help="Range of 90 degrees for the angle alpha: around the stroke in each pixel (strokes, exact),"
         " or 0 to 90 as in the paper (box).",
+    ),
+]
+Crosses = Annotated[
+    Literal["orthogonal", "skewed"] | None,
+    typer.Option(
+        "--crosses",
+        help="Crosses of right angles, without variables for the skew (orthogonal), or of any angles"
+        " (skewed); by default orthogonal on meshes and skewed on sketches.",
     ),
 ]
 SkewWeight = Annotated[

@@ -27,7 +27,7 @@ UNPROVEN: Final = "unproven"
 
 
 def prove_command(
-    source: options.OptionalInput = None,
+    source: options.OptionalSketchInput = None,
     output: options.ProofFolder = None,
     *,
     norm: options.Norm = "2",
@@ -56,7 +56,7 @@ def prove_command(
 
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = SketchOptions(size).read(source, quiet=printing.quiet)
+        instance = SketchOptions(size).read(source, "prove", quiet=printing.quiet)
         proof = prove(
             instance,
             norm=NORMS[norm],

@@ -56,7 +56,7 @@ def shade_command(
                 file=source,
             )
         if saved is None:
-            field = _compute_field(sketch.read(source, quiet=printing.quiet), show)
+            field = _compute_field(sketch.read(source, "shade", quiet=printing.quiet), show)
             underlay = underlay or find_drawing(source)
         else:
             field = saved
@@ -76,7 +76,7 @@ def _read_saved_field(source: str, on: Path | None) -> CrossField | None:
     path = Path(source)
     if on is None and not (path.is_file() and path.suffix.lower() in SAVED):
         return None
-    content = read_field_or_instance(path, on)
+    content = read_field_or_instance(path, on, "shade")
     return content if isinstance(content, CrossField) else None
 
 

@@ -1,4 +1,4 @@
-"""Options that read a sketch, a sample or an instance file.
+"""Options that read a sketch, a sample, a mesh or an instance file.
 
 `run`, `shade` and `instance` have all of them. The other commands have --size, and take the file that
 `instance` wrote for everything else.
@@ -6,13 +6,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from ...models.errors import InputError
+from ...models.errors import InputError, naming
+from .domains import check_domain, is_mesh_file
+from .mesh_options import MeshOptions
 from .output import print_warnings
 
 if TYPE_CHECKING:
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 Size = Annotated[
     int | None, typer.Option("--size", help="Pixels on the longer side of the grid; {size} by default.")
 ]
+
+_PLAIN: Final = MeshOptions()
 
 
 @dataclass(frozen=True)
@@ -78,15 +82,27 @@ class SketchOptions:
         """Whether an option decides which strokes of a drawing are curvature lines."""
         return self.silhouette != "none" or bool(self.curvature) or self.view is not None
 
-    def read(self, source: str, *, quiet: bool = False) -> Instance:
-        """Instance of a sketch file, a built-in sample or an instance file, small enough for the memory.
+    def read(self, source: str, command: str, *, mesh: MeshOptions = _PLAIN, quiet: bool = False) -> Instance:
+        """Instance of a sketch or mesh file, a sample or an instance file, small enough for the memory.
 
-        Prints the warnings of the reader unless quiet. Raises InputError, and InstanceError for a weight that
-        is out of range.
+        Prints the warnings of the reader unless quiet. Raises DomainError for a domain that the command does
+        not take, InputError, and InstanceError for a weight that is out of range.
         """
         path = Path(source)
-        is_saved = path.is_file() and path.suffix.lower() in {".json", ".npz"}
-        instance = self._read_instance(path) if is_saved else self._read_drawing(path)
+        suffix = path.suffix.lower() if path.is_file() else ""
+        on_mesh = is_mesh_file(path, command)
+        if mesh != _PLAIN and not on_mesh:
+            raise InputError("is no mesh file; leave --sharp, --directions and --weights out", file=path)
+        if suffix in {".json", ".npz"}:
+            instance = self._read_instance(path)
+        elif on_mesh:
+            if replace(self, stroke_weight=None) != SketchOptions():
+                raise InputError("is a mesh; leave out the options that read a sketch", file=path)
+            instance = mesh.read(path)
+        else:
+            instance = self._read_drawing(path)
+        with naming(path):
+            check_domain(instance, command)
         instance = instance.with_weights(stroke_weight=self.stroke_weight)
         print_warnings(instance, quiet=quiet)
         return instance
@@ -129,7 +145,7 @@ class SketchOptions:
 
         if self.size is not None or self.mask is not None:
             raise InputError(
-                "is an instance, which has its own grid and mask; leave --size and --mask out", file=path
+                "is an instance, which has its own grid or mesh; leave --size and --mask out", file=path
             )
         if self._chooses_strokes:
             raise InputError(
@@ -138,5 +154,5 @@ class SketchOptions:
                 file=path,
             )
         instance = read_instance(path)
-        check_memory(instance.grid.size)
+        check_memory(instance.domain.size, instance.domain.kind)
         return instance

@@ -46,7 +46,7 @@ def solve_command(
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = SketchOptions(size).read(source, quiet=printing.quiet)
+        instance = SketchOptions(size).read(source, "solve", quiet=printing.quiet)
         request = Request(
             instance,
             output,

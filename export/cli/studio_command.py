@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from ...models.errors import InputError
+from .domains import is_mesh_file
 from .output import print_line, show_progress
 
 
@@ -67,6 +68,7 @@ def _read_strokes(drawing: str) -> dict[str, Any]:
     path = Path(drawing)
     if not path.is_file() and drawing in SAMPLES:
         return open_drawing(sample_svg(drawing).encode(), f"{drawing}.svg")
+    is_mesh_file(path, "studio")  # raises an error for a mesh
     data = read_file(path)
     with naming(path):
         if data.lstrip().startswith(b"{"):

@@ -42,6 +42,8 @@ def read(path: Path) -> Algebra:
     if re.search(r"ERROR|too many errors|not valid", output) or not copy.exists():
         raise RefusedError(f"CBC cannot read it: {' '.join(re.findall(r'.*(?:ERROR|errors).*', output)[:1])}")
     model = highs_program.read(copy)
+    if len(model.quadratic):
+        raise RefusedError("CBC reads its products, and ignores them when it solves")
     lines = [line.removeprefix("**").split() for line in listed.read_text("utf-8").splitlines()[1:]]
     names = [words[1] for words in lines]
     one = next((at for at, name in enumerate(names) if is_one_column(name)), None)

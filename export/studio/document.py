@@ -17,9 +17,9 @@ from ...models.errors import InputError, InstanceError, NoStrokeError, shortened
 from ...models.input_limits import MAX_ELEMENTS, MAX_SEGMENTS
 from ...models.instance.domain import Bools, Floats, Ints
 from ...models.instance.file import parse_json
-from ...models.instance.instance import STROKE_WEIGHT
+from ...models.instance.instance import STROKE_WEIGHT, name_from_text
 from ...models.sketch.curves import Curves, lines_as_cubics
-from ...models.sketch.read import Silhouette, name_from_text
+from ...models.sketch.read import Silhouette
 
 Mark = Literal["line", "cut", "ignored"]
 EditKind = Literal["paint", "erase", "toggle"]

@@ -10,11 +10,11 @@ from scipy import ndimage
 
 from ...models.errors import InputError
 from ...models.instance.domain import Bools, Floats
+from ...models.instance.instance import name_from_text
 from ...models.sketch.bitmap import Bitmap
 from ...models.sketch.cover import Box, block_means
 from ...models.sketch.curves import Curves, flatten, run_numbers
 from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
-from ...models.sketch.read import name_from_text
 from ...models.sketch.thinning import thin_shape
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing

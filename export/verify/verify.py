@@ -175,7 +175,7 @@ def random_field(problem: Problem, seed: int) -> CrossField:
     """A random field on the problem's instance within all bounds; jumps that are data are kept."""
     rng, data = np.random.default_rng(seed), problem.data
     alpha = rng.uniform(data["alpha_lo"], data["alpha_up"])
-    beta = rng.uniform(data["beta_lo"], data["beta_up"])
+    beta = rng.uniform(data["beta_lo"], data["beta_up"]) * (not problem.instance.orthogonal)
     jumps = rng.integers(data["p_min"], data["p_max"] + 1).astype(np.int32)
     return CrossField(problem.instance, alpha, beta, jumps if problem.jumps is None else problem.jumps)
 

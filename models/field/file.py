@@ -1,7 +1,7 @@
 """Field files: .npz and JSON (field.schema.json) with the instance, and files of directions alone.
 
-An .npz holds alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
-version as JSON text, and the arrays of the instance's own .npz, their names preceded by `instance_`.
+An .npz holds alpha, beta (n,) and p (m,) in the order of the instance's points and pairs, `head` with format
+and version as JSON text, and the arrays of the instance's own .npz, their names preceded by `instance_`.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from ..instance.file import (
 )
 from ..instance.grid import Grid
 from ..instance.instance import Instance
+from ..instance.mesh import MOST_FACES, Mesh
 from ..storage import read_bytes, write_bytes
 from .exchange import most_exchange_bytes, parse_ply, parse_rosy, parse_vtk, to_ply, to_rosy, to_vtk
 from .field import CrossField
@@ -167,14 +168,27 @@ def _read_embedded(read: Callable[[_Entry], Instance], source: _Entry) -> Instan
 
 def field_to_json(field: CrossField) -> bytes:
     """Return the bytes of the field's JSON file, its instance included."""
+    blocks = _rows_of_faces(field) if isinstance(field.instance.domain, Mesh) else _rows_of_pixels(field)
+    instance = instance_to_json(field.instance).rstrip().replace("\n", "\n  ")
+    text = f'{{\n  "format": "{FORMAT}",\n  "version": {VERSION},\n  "instance": {instance}'
+    for key, columns in blocks.items():
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        content = ",\n".join(f"    {json.dumps(row)}" for row in rows)
+        text += f',\n  "{key}": [\n{content}\n  ]'
+    return f"{text}\n}}\n".encode()
+
+
+def _rows_of_pixels(field: CrossField) -> dict[str, tuple[np.ndarray[Any, Any], ...]]:
+    """Columns of the rows of a field on pixels."""
     grid = field.instance.grid
     upper, right = (_jump_column(field, table) for table in grid.pair_number)
-    columns = (grid.rows, grid.columns, field.alpha, field.beta, upper, right)
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    pixels = ",\n".join(f"    {json.dumps(row)}" for row in rows)
-    instance = instance_to_json(field.instance).rstrip().replace("\n", "\n  ")
-    head = f'  "format": "{FORMAT}",\n  "version": {VERSION},\n  "instance": {instance},\n'
-    return f'{{\n{head}  "pixels": [\n{pixels}\n  ]\n}}\n'.encode()
+    return {"pixels": (grid.rows, grid.columns, field.alpha, field.beta, upper, right)}
+
+
+def _rows_of_faces(field: CrossField) -> dict[str, tuple[np.ndarray[Any, Any], ...]]:
+    """Columns of the rows of a field on faces, and of its jumps."""
+    mesh = field.instance.mesh
+    return {"faces": (field.alpha, field.beta), "jumps": (mesh.first, mesh.second, field.p)}
 
 
 def _jump_column(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
@@ -189,17 +203,45 @@ def field_of_json(data: bytes) -> CrossField:
     """Read a field from the bytes of a JSON file. Raises InstanceError with the place in the document."""
     document = parse_json(decode_json(data))
     check_version(document, FORMAT, VERSION)
-    checked = check_schema(document, "field", __package__, rows={"pixels": _are_pixels})
+    tests = {"pixels": _are_pixels, "faces": _are_faces, "jumps": _are_jumps}
+    checked = check_schema(document, "field", __package__, rows=tests)
     instance = _read_embedded(instance_of_document, checked["instance"])
-    row, column, alpha, beta, upper, right = zip(*checked["pixels"], strict=True)
-    _check_places(instance.grid, np.array([row, column], dtype=np.int32))
-    p = np.zeros(len(instance.grid.first), dtype=np.int32)
-    for name, table, jumps in zip(("upper", "right"), instance.grid.pair_number, (upper, right), strict=True):
-        _fill_jumps(instance.grid, p, table, np.array(jumps, dtype=np.float64), name)
     try:
+        if "faces" in checked:
+            return _field_on_faces(instance, checked)
+        row, column, alpha, beta, upper, right = zip(*checked["pixels"], strict=True)
+        _check_places(instance.grid, np.array([row, column], dtype=np.int32))
+        p = np.zeros(len(instance.grid.first), dtype=np.int32)
+        tables = zip(("upper", "right"), instance.grid.pair_number, (upper, right), strict=True)
+        for name, table, jumps in tables:
+            _fill_jumps(instance.grid, p, table, np.array(jumps, dtype=np.float64), name)
         return _make_field(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
+
+
+def _field_on_faces(instance: Instance, document: dict[str, Any]) -> CrossField:
+    """The field of a document with faces and jumps. Raises InstanceError for pairs of another mesh."""
+    mesh = instance.mesh
+    alpha, beta = np.array(document["faces"], dtype=np.float64).T
+    *pairs, p = np.array(document["jumps"], dtype=np.int32).reshape(-1, 3).T
+    if not np.array_equal(pairs, [mesh.first, mesh.second]):
+        raise InstanceError("$.jumps: lists other pairs of faces than the mesh has; write it again")
+    return _make_field(instance, alpha, beta, p)
+
+
+def _are_faces(rows: list[Any]) -> bool:
+    """Whether all rows obey the schema of a face: [alpha, beta]."""
+    return bool(rows) and number_table(rows, 2) is not None
+
+
+def _are_jumps(rows: list[Any]) -> bool:
+    """Whether all rows obey the schema of a jump: [face, face, jump]."""
+    table = number_table(rows, 3)
+    if table is None or (table % 1 != 0).any():
+        return False
+    faces = table[:, :2]
+    return bool(((faces >= 0) & (faces < MOST_FACES)).all() and (np.abs(table[:, 2]) <= _MOST_JUMP).all())
 
 
 def _are_pixels(rows: list[Any]) -> bool:

@@ -1,4 +1,8 @@
-"""Instance files: documented JSON (instance.schema.json, mask as text rows) and .npz for large grids."""
+"""Instance files: documented JSON (instance.schema.json, mask as text rows) and .npz for large ones.
+
+A file has a mask with its strokes, or a mesh with its strokes (mesh_file.py). Whether crosses are orthogonal
+and the weights of pairs are written only where they are not the default.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,10 @@ from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
 from ..storage import read_bytes, write_bytes
 from .domain import Floats
+from .grid import Grid
 from .instance import Instance
+from .mesh import MOST_FACES, Mesh
+from .mesh_file import MESH_ARCHIVE, MESH_ROWS, mesh_arguments, mesh_arrays, mesh_blocks
 
 FORMAT: Final = "crossfield-instance"
 VERSION: Final = 1
@@ -30,19 +37,21 @@ _SCALARS = {
     "view": "view",
     "w_strokes": "stroke_coefficient",
     "w_beta": "skew_coefficient",
-    "pixel_size": "pixel_size",
+    "orthogonal": "orthogonal",
 }
-"""Attributes of an instance by the keys of a file."""
-_ARRAYS = ("mask", "stroke_pixels", "theta", "w")
+"""Attributes of an instance by the keys of a file; view and orthogonal only where they are chosen."""
 _MOST_ERRORS: Final = 100  # of a document; the outermost of them is reported
 _ARCHIVE: Final = {
     "head": ExpectedArray(1, MAX_HEAD, "u"),
-    "origin": ExpectedArray(1, 2),
-    "mask": ExpectedArray(2, MAX_GRID, "b"),
-    "stroke_pixels": ExpectedArray(2, MAX_GRID**2, "iuf"),
     "theta": ExpectedArray(1, MAX_GRID**2),
     "w": ExpectedArray(1, MAX_GRID**2),
 }
+_GRID_ARCHIVE: Final = {
+    "origin": ExpectedArray(1, 2),
+    "mask": ExpectedArray(2, MAX_GRID, "b"),
+    "stroke_pixels": ExpectedArray(2, MAX_GRID**2, "iuf"),
+}
+_WEIGHTS: Final = {"pair_weights": ExpectedArray(1, max(2 * MAX_GRID**2, 2 * MOST_FACES))}
 
 
 @check_arguments
@@ -107,22 +116,37 @@ def read_instance(path: str | Path) -> Instance:
 
 
 def instance_to_json(instance: Instance) -> str:
-    """The instance as JSON text, one line per stroke pixel [row, column, theta, w] and per mask row."""
-    head = _head(instance) | {"origin": list(instance.origin)}
-    lines = [f"  {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
-    mask = ",\n".join(
-        '    "' + "".join("#" if inside else "." for inside in row) + '"' for row in instance.mask
-    )
+    """The instance as JSON text: one line per mask row, vertex, face, weight of a pair, and stroke."""
+    blocks = mesh_blocks(instance) if isinstance(instance.domain, Mesh) else _grid_blocks(instance)
+    if instance.pair_weights is not None:
+        blocks["pair_weights"] = list(map(repr, instance.pair_weights.tolist()))
+    head = _head(instance)
+    if isinstance(instance.domain, Grid):
+        head["origin"] = list(instance.origin)
+    lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
+    for key, rows in blocks.items():
+        content = ",\n".join(f"    {row}" for row in rows)
+        lines.append(f'  "{key}": [\n{content}\n  ]')
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _grid_blocks(instance: Instance) -> dict[str, list[str]]:
+    """Lines of JSON for the rows of the mask and the strokes [row, column, theta, w]."""
     rows = zip(instance.stroke_pixels.tolist(), instance.theta.tolist(), instance.w.tolist(), strict=True)
-    strokes = ",\n".join(f"    [{r}, {c}, {angle!r}, {weight!r}]" for (r, c), angle, weight in rows)
-    return "{\n" + "\n".join(lines) + f'\n  "mask": [\n{mask}\n  ],\n  "strokes": [\n{strokes}\n  ]' + "\n}\n"
+    return {
+        "mask": ['"' + "".join("#" if inside else "." for inside in row) + '"' for row in instance.mask],
+        "strokes": [f"[{r}, {c}, {angle!r}, {weight!r}]" for (r, c), angle, weight in rows],
+    }
 
 
 def _head(instance: Instance) -> dict[str, Any]:
-    """Format, version and scalars; a view only if there is one."""
+    """Format, version and scalars; a view and right angles only if there are any."""
     scalars = {key: getattr(instance, name) for key, name in _SCALARS.items()}
-    if instance.view is None:
-        del scalars["view"]
+    for key, default in (("view", None), ("orthogonal", False)):
+        if scalars[key] == default:
+            del scalars[key]
+    if isinstance(instance.domain, Grid):
+        scalars["pixel_size"] = instance.pixel_size
     return {"format": FORMAT, "version": VERSION} | scalars
 
 
@@ -184,8 +208,23 @@ def _check_writable(document: object) -> None:
 def instance_of_document(document: object) -> Instance:
     """Read an instance from a parsed JSON document. Raises InstanceError with the place in the document."""
     check_version(document, FORMAT, VERSION)
+    assert isinstance(document, dict)
+    on_mesh = "vertices" in document
+    tests = {key: _table_test(test) for key, test in MESH_ROWS.items()} if on_mesh else _GRID_ROWS
+    checked = check_schema(document, "instance", __package__, rows={"pair_weights": _are_weights} | tests)
+    more = {name: checked[key] for key, name in _SCALARS.items() if key in checked}
+    if "pair_weights" in checked:
+        more["pair_weights"] = checked["pair_weights"]
+    try:
+        if on_mesh:
+            return Instance.on_faces(**{"orthogonal": False} | more | mesh_arguments(checked))
+        return Instance.on_pixels(**more | _pixel_arguments(checked))
+    except OverflowError as error:
+        raise InstanceError("holds a number beyond the range of doubles") from error
 
-    document = check_schema(document, "instance", __package__, rows={"strokes": _are_strokes})
+
+def _pixel_arguments(document: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of `Instance.on_pixels` from the mask and the strokes of a document."""
     width = len(document["mask"][0])
     for number, row in enumerate(document["mask"]):
         if len(row) != width:
@@ -196,17 +235,14 @@ def instance_of_document(document: object) -> Instance:
     mask = np.frombuffer(letters, dtype=np.uint8).reshape(-1, width) == ord("#")
     strokes = document["strokes"]
     check_counts(len(strokes), int(np.count_nonzero(mask)))
-    try:
-        return Instance.on_pixels(
-            mask=mask,
-            stroke_pixels=np.array([stroke[:2] for stroke in strokes], dtype=np.int32).reshape(-1, 2),
-            theta=np.array([stroke[2] for stroke in strokes], dtype=float),
-            w=np.array([stroke[3] for stroke in strokes], dtype=float),
-            origin=tuple(document.get("origin", (0.0, 0.0))),
-            **{name: document[key] for key, name in _SCALARS.items() if key in document},
-        )
-    except OverflowError as error:
-        raise InstanceError("holds a number beyond the range of doubles") from error
+    return {
+        "mask": mask,
+        "stroke_pixels": np.array([stroke[:2] for stroke in strokes], dtype=np.int32).reshape(-1, 2),
+        "theta": np.array([stroke[2] for stroke in strokes], dtype=float),
+        "w": np.array([stroke[3] for stroke in strokes], dtype=float),
+        "origin": tuple(document.get("origin", (0.0, 0.0))),
+        "pixel_size": document.get("pixel_size", 1.0),
+    }
 
 
 def check_counts(strokes: int, pixels: int) -> None:
@@ -217,13 +253,24 @@ def check_counts(strokes: int, pixels: int) -> None:
         )
 
 
-def _are_strokes(rows: list[Any]) -> bool:
-    """Whether all rows obey the schema of a stroke."""
-    table = number_table(rows, 4)
-    if table is None:
-        return False
+def _table_test(test: Callable[[Floats], bool], width: int = 3) -> Callable[[list[Any]], bool]:
+    """Whether rows are tables of numbers of this width that pass a test."""
+    return lambda rows: (table := number_table(rows, width)) is not None and test(table)
+
+
+def _are_strokes(table: Floats) -> bool:
+    """Whether rows [row, column, theta, w] obey the schema of a stroke."""
     w = table[:, 3]
     return are_places(table[:, :2]) and bool(((w > 0) & (w <= 1)).all())
+
+
+_GRID_ROWS: Final = {"strokes": _table_test(_are_strokes, 4)}
+
+
+def _are_weights(values: list[Any]) -> bool:
+    """Whether all values are positive numbers."""
+    table = number_table([values], len(values))
+    return table is not None and bool((table > 0).all())
 
 
 def are_places(numbers: Floats) -> bool:
@@ -292,28 +339,41 @@ def check_version(document: object, form: str, version: int) -> None:
 
 def instance_arrays(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
     """The instance as named arrays; `head` is JSON text with format, version and scalars."""
-    arrays = {
-        "head": np.frombuffer(json.dumps(_head(instance)).encode(), dtype=np.uint8),
-        "origin": np.array(instance.origin),
+    arrays: dict[str, np.ndarray[Any, Any]] = {
+        "head": np.frombuffer(json.dumps(_head(instance)).encode(), dtype=np.uint8)
     }
-    return arrays | {key: getattr(instance, key) for key in _ARRAYS}
+    if isinstance(instance.domain, Mesh):
+        arrays |= mesh_arrays(instance)
+    else:
+        arrays["origin"] = np.array(instance.origin)
+        arrays |= {"mask": instance.mask, "stroke_pixels": instance.stroke_pixels}
+    arrays |= {"theta": instance.theta, "w": instance.w}
+    return arrays if instance.pair_weights is None else arrays | {"pair_weights": instance.pair_weights}
 
 
 def instance_of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
     """Read an instance from arrays whose names start with a prefix. Raises InstanceError."""
-    return instance_of_arrays(archive.arrays(_ARCHIVE, prefix))
+    of_domain = MESH_ARCHIVE if f"{prefix}vertices" in archive else _GRID_ARCHIVE
+    weights = _WEIGHTS if f"{prefix}pair_weights" in archive else {}
+    return instance_of_arrays(archive.arrays(_ARCHIVE | of_domain | weights, prefix))
 
 
 def instance_of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
     """The instance whose arrays `instance_arrays` returned. Raises InstanceError with the array's name."""
     head = parse_head(arrays)
     check_version(head, FORMAT, VERSION)
-    check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
     try:
-        scalars = {name: head[key] for key, name in _SCALARS.items() if key != "view"}
+        more: dict[str, Any] = {
+            name: head[key] for key, name in _SCALARS.items() if key not in {"view", "orthogonal"}
+        }
+        more |= {"view": head.get("view"), "orthogonal": head.get("orthogonal", False)}
+        more["pair_weights"] = arrays.get("pair_weights")
+        if "vertices" in arrays:
+            return Instance.on_faces(**more, **mesh_arguments(arrays))
+        check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
         x, y = arrays["origin"].astype(np.float64).tolist()
-        entries: dict[str, Any] = scalars | {key: arrays[key] for key in _ARRAYS}
-        return Instance.on_pixels(origin=(x, y), view=head.get("view"), **entries)
+        entries: dict[str, Any] = {key: arrays[key] for key in ("mask", "stroke_pixels", "theta", "w")}
+        return Instance.on_pixels(origin=(x, y), pixel_size=head["pixel_size"], **more, **entries)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error
 

@@ -68,6 +68,15 @@ def _boolean_array(values: Any) -> Bools:
     return mask
 
 
+def name_from_text(text: str, what: str = "sketch") -> str:
+    """An instance name made from any text, at most 32 long; runs of other characters become `_`.
+
+    what: first word where the text has no letter to begin with.
+    """
+    name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+    return (name if re.match(r"[a-z]", name) else f"{what}_{name}".strip("_"))[:32].rstrip("_")
+
+
 def round_to_digits(value: float) -> float:
     """The number to 12 significant digits, equal on processors that differ in the last digit."""
     return float(f"{value:.12g}") + 0.0  # no -0.0
@@ -98,7 +107,8 @@ class Instance(Pictured):
     theta
         Stroke directions, float (s,), in radians counter-clockwise from the x axis of the point's frame (of
         a pixel: to the right, y up). Stored modulo pi, rounded to 12 decimals, and as 0 within 1e-8 of the
-        axis, because readers of files drop such small costs.
+        axis, because readers of files drop such small costs; pi/4 has all its digits, so that a window
+        begins at 0.
     w
         Reliability of each direction, float (s,), in (0, 1]; above 1e-3 rounded to 12 decimals.
     stroke_coefficient, skew_coefficient
@@ -226,7 +236,8 @@ class Instance(Pictured):
         self._check_strokes()
         self._check_pair_weights()
         theta = np.round(wrap(self.theta, 0.0, np.pi), _DECIMALS)
-        self._freeze("theta", np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta))
+        theta = np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta)
+        self._freeze("theta", np.where(theta == np.round(QUARTER, _DECIMALS), QUARTER, theta))
         self._freeze("w", np.where(self.w > _FINE, np.round(self.w, _DECIMALS), self.w))
 
     def __repr__(self) -> str:

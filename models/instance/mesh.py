@@ -58,16 +58,17 @@ class Mesh(Domain):
         if twice.any():
             at = np.concatenate([order[1:][twice], order[:-1][twice]])
             raise MeshError(
-                f"{_list_faces(at // 3)} go along the same edge in the same direction: they are turned "
+                f"{list_faces(at // 3)} go along the same edge in the same direction: they are turned "
                 "against their neighbours, or more than two share it; orient all faces alike and remove "
                 "inner walls"
             )
-        fans = np.bincount(start[self._opposite < 0], minlength=len(self.vertices)) > 1
-        fans[self._fan_vertices()] = True
-        if fans.any():
-            at = np.nonzero(fans[self.faces].any(axis=1))[0]
+        used = np.unique(start)
+        faces_in_fan = np.bincount(self._walk_around(used)[1], minlength=len(used))
+        split = used[faces_in_fan != np.bincount(start)[used]]
+        if len(split):
+            at = np.nonzero(np.isin(self.faces, split).any(axis=1))[0]
             raise MeshError(
-                f"{_list_faces(at)} touch others at vertex {int(np.argmax(fans))} alone; "
+                f"{list_faces(at)} touch others at vertex {int(split[0])} alone; "
                 "split it, so that each vertex has one fan of faces"
             )
 
@@ -84,7 +85,7 @@ class Mesh(Domain):
             raise MeshError(f"has a coordinate that is not a number up to {_FARTHEST:g}")
         wrong = ((self.faces < 0) | (self.faces >= len(self.vertices))).any(axis=1)
         if wrong.any():
-            raise MeshError(f"{_list_faces(np.nonzero(wrong)[0])} name a vertex that does not exist")
+            raise MeshError(f"a vertex does not exist in {list_faces(np.nonzero(wrong)[0])}")
 
     def _check_shapes(self) -> None:
         edges = [self._edge_vectors(corner) for corner in range(3)]
@@ -93,7 +94,7 @@ class Mesh(Domain):
         thin = ~(twice_area > _THINNEST * longest * longest)
         if thin.any():
             raise MeshError(
-                f"{_list_faces(np.nonzero(thin)[0])} have no area: two corners are one, or all lie on a "
+                f"no area in {list_faces(np.nonzero(thin)[0])}: two corners are one, or all lie on a "
                 "line; merge close vertices and remove such faces"
             )
 
@@ -244,35 +245,32 @@ class Mesh(Domain):
         """The vertex of each ring, ascending, shape (r,)."""
         return np.nonzero(~self.on_boundary)[0].astype(np.int32)
 
-    @cached_property
-    def _walks(self) -> tuple[Ints, Ints]:
-        """Directed edges that rings cross, in order, and the ring of each."""
+    def _walk_around(self, vertices: Ints) -> tuple[Ints, Ints]:
+        """The fan of faces around each vertex, counter-clockwise: directed edges that return to the vertex.
+
+        Returns the edges of all vertices, (k,), and the place of each one's vertex in the list, (k,).
+        """
         start, _ = self._edges
         first = np.full(len(self.vertices), -1, dtype=np.int32)
         first[start[::-1]] = np.arange(len(start) - 1, -1, -1, dtype=np.int32)
-        ring = np.arange(len(self.ring_vertices), dtype=np.int32)
-        begin = first[self.ring_vertices]
-        at, rings, crossed = begin, [ring], []
-        while len(ring):
-            incoming = at - at % 3 + (at + 2) % 3  # the edge that returns to the vertex
-            crossed.append(incoming)
+        first[start[self.boundary]] = self.boundary  # where an open fan begins
+        place = np.arange(len(vertices), dtype=np.int32)
+        begin = first[vertices]
+        at, places, returning = begin, [place], []
+        while len(place):
+            incoming = at - at % 3 + (at + 2) % 3
+            returning.append(incoming)
             at = self._opposite[incoming]
-            open_ = at != begin[ring]
-            ring, at = ring[open_], at[open_]
-            rings.append(ring)
-        order = np.argsort(np.concatenate(rings[:-1] or [ring]), kind="stable")
-        return np.concatenate(crossed or [at])[order], np.concatenate(rings[:-1] or [ring])[order]
-
-    def _fan_vertices(self) -> Ints:
-        """Inner vertices whose faces are more than one ring."""
-        number = np.bincount(self.faces.ravel(), minlength=len(self.vertices))[self.ring_vertices]
-        split = np.bincount(self._walks[1], minlength=len(number)) != number
-        return np.asarray(self.ring_vertices[split])
+            open_ = (at >= 0) & (at != begin[place])
+            place, at = place[open_], at[open_]
+            places.append(place)
+        order = np.argsort(np.concatenate(places[:-1] or [place]), kind="stable")
+        return np.concatenate(returning or [at])[order], np.concatenate(places[:-1] or [place])[order]
 
     @cached_property
     def rings(self) -> Rings:
         """The ring around each vertex of `ring_vertices`."""
-        crossed, ring = self._walks
+        crossed, ring = self._walk_around(self.ring_vertices)
         pair_of = np.full(3 * self.size, -1, dtype=np.int32)
         pair_of[self.pair_edges] = np.arange(len(self.pair_edges), dtype=np.int32)
         forward = pair_of[crossed] >= 0
@@ -339,7 +337,7 @@ def _edge_keys(start: Ints, end: Ints, vertices: int) -> NDArray[np.int64]:
     return start.astype(np.int64) * vertices + end
 
 
-def _list_faces(numbers: NDArray[Any]) -> str:
+def list_faces(numbers: NDArray[Any]) -> str:
     """Numbers of faces for an error, the first ones of many."""
     unique = np.unique(numbers)
     text = ", ".join(map(str, unique[:_SHOWN].tolist()))

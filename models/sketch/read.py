@@ -7,7 +7,6 @@ field, so their pixels leave the mask. In a sketch of one colour all strokes are
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from ..arguments import check_arguments
 from ..errors import InputError, NoStrokeError, naming, printable, shortened
 from ..instance.angles import line_of
 from ..instance.domain import Bools
-from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading
+from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading, name_from_text
 from .bitmap import read_white_pixels
 from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
 from .doubts import (
@@ -257,12 +256,6 @@ def read_mask(data: bytes, page: Box | None) -> Bools:
     if not white.any():
         raise InputError("the mask is black all over; paint the region to solve white")
     return white
-
-
-def name_from_text(text: str) -> str:
-    """An instance name made from any text, at most 32 long; runs of other characters become `_`."""
-    name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
-    return (name if re.match(r"[a-z]", name) else f"sketch_{name}".strip("_"))[:32].rstrip("_")
 
 
 def check_size(size: int) -> None:

@@ -10,12 +10,13 @@ import pytest
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.file import read_instance, write_instance
+from crossfield.models.instance.instance import name_from_text
 from crossfield.models.instance.symmetries import mirrored, transposed, turned
 from crossfield.models.sketch.bitmap import read_bitmap
 from crossfield.models.sketch.cover import Frame, cover_by_segments
 from crossfield.models.sketch.curves import flatten
 from crossfield.models.sketch.pen_strokes import read_scap
-from crossfield.models.sketch.read import name_from_text, read_sketch
+from crossfield.models.sketch.read import read_sketch
 from crossfield.models.sketch.svg import read_svg
 from hypothesis import given, settings
 from hypothesis import strategies as st

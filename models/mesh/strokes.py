@@ -1,0 +1,139 @@
+"""Strokes on faces: along sharp edges, boundaries and polylines, and in given directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, MeshError, shortened
+from ..input_limits import MAX_BYTES
+from ..instance.angles import HALF, arctangent, cosine, sine
+from ..instance.domain import Bools, Floats, Ints
+from ..instance.instance import whole_numbers
+from ..instance.mesh import Mesh
+from ..storage import read_bytes
+
+_LEAST_AGREEMENT: Final = 0.5  # length of the mean of several directions, below which a face has no stroke
+_EQUAL: Final = 1e-9  # degrees by which rounding may move an angle between faces
+_UPRIGHT: Final = 1e-6  # share of a vector that must lie in its face
+_DECIMALS: Final = 9  # of lengths of means, so that ties are decided alike on every processor
+
+
+@dataclass(frozen=True, eq=False)
+class FaceStrokes:
+    """Face (s,), direction theta (s,) in its frame and reliability w (s,) of each stroke.
+
+    contradictory: faces left without a stroke, because their directions cancel each other, (k,).
+    """
+
+    face: Ints
+    theta: Floats
+    w: Floats
+    contradictory: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """A direction (k, 3) at each of some faces (k,)."""
+
+    face: Ints
+    vector: Floats
+
+
+def feature_edges(mesh: Mesh, *, sharp: float | None, boundary: bool, lines: Ints) -> Ints:
+    """Directed edges with a stroke on the face that has them, (k,).
+
+    sharp: least angle in degrees between the normals of the two faces of an edge, None for none. boundary:
+    whether edges of one face only count. lines: vertices (k, 2) of more edges. Raises MeshError for a line
+    that is no edge of the mesh.
+    """
+    at = np.zeros(0, np.int32) if sharp is None else np.degrees(mesh.dihedral) >= sharp - _EQUAL
+    keys = _edge_keys(mesh, mesh.edge_vertices(np.arange(3 * mesh.size, dtype=np.int32)))
+    of_lines = np.where((lines < len(mesh.vertices)).all(axis=1), _edge_keys(mesh, lines), -1)
+    missing = ~np.isin(of_lines, keys)
+    if missing.any():
+        one, other = lines[int(np.argmax(missing))] + 1
+        raise MeshError(
+            f"a polyline goes from vertex {one} to vertex {other} (from 1), which no edge of a face joins "
+            f"({int(missing.sum())} in all); draw polylines along edges"
+        )
+    of_boundary = keys[mesh.boundary] if boundary else keys[:0]
+    chosen = np.concatenate([keys[mesh.pair_edges[at]], of_boundary, of_lines])
+    return np.nonzero(np.isin(keys, chosen))[0].astype(np.int32)
+
+
+def _edge_keys(mesh: Mesh, ends: NDArray[Any]) -> NDArray[np.int64]:
+    """A number for each undirected edge [vertex, vertex] (k, 2)."""
+    low, high = ends.min(axis=1).astype(np.int64), ends.max(axis=1)
+    return np.asarray(low * len(mesh.vertices) + high)
+
+
+def read_directions(path: Path, mesh: Mesh) -> Directions:
+    """Directions per face from a table `face,x,y,z` (CSV), or the first vectors of a .rawfield.
+
+    A vector of length 0 is no direction. Raises InputError that names a row or a face.
+    """
+    lines = read_bytes(path, MAX_BYTES).decode("utf-8-sig", "replace").splitlines()
+    of_every_face = path.suffix.lower() == ".rawfield"
+    try:
+        if of_every_face:
+            vector = np.loadtxt(lines[1:], usecols=(0, 1, 2), ndmin=2)
+            face = np.arange(len(vector), dtype=np.int32)
+        else:
+            heading = int(bool(lines) and not lines[0].lstrip()[:1].isdigit())
+            table = np.loadtxt(lines[heading:], delimiter=",", usecols=(0, 1, 2, 3), ndmin=2)
+            face, vector = whole_numbers(table[:, 0], "the column of faces", InputError), table[:, 1:]
+    except ValueError as error:
+        raise InputError(f"is no table of face,x,y,z and no .rawfield: {shortened(error)}") from error
+    if of_every_face and len(face) != mesh.size:
+        raise InputError(f"has {len(face)} rows of vectors for {mesh.size} faces; give one row per face")
+    size = np.abs(vector).max(axis=1, initial=0)
+    _refuse((face < 0) | (face >= mesh.size), face, "does not exist")
+    _refuse(~np.isfinite(size), face, "has a vector that is not finite")
+    face, vector = face[size > 0], vector[size > 0] / size[size > 0, None]
+    inside = np.abs(np.einsum("kac,kc->ka", mesh.frames[face], vector)).max(axis=1, initial=0)
+    _refuse(inside < _UPRIGHT, face, "has a vector at right angles to it, which has no direction there")
+    return Directions(face, vector)
+
+
+def _refuse(wrong: Bools, face: Ints, reason: str) -> None:
+    if wrong.any():
+        raise InputError(f"face {face[int(np.argmax(wrong))]}: {reason} ({int(wrong.sum())} such faces)")
+
+
+def combine_strokes(mesh: Mesh, edges: Ints, directions: Directions | None) -> FaceStrokes:
+    """One stroke for each face with directions: of edges (k,), and given ones.
+
+    Directions that differ by a right angle agree. Of several, the stroke has the mean, by the fourfold angle,
+    and the length of this mean as its reliability; below 1/2 there is no stroke. Of the four directions of
+    the mean it has the one nearest to a given direction, or to that of the edge with the lowest vertices.
+    """
+    ends = np.sort(mesh.edge_vertices(edges), axis=1)
+    face = edges // np.int32(3)
+    order = np.lexsort((ends[:, 1], ends[:, 0], face))
+    face = face[order]
+    vector = (mesh.vertices[ends[:, 1]] - mesh.vertices[ends[:, 0]])[order]
+    if directions is not None:
+        face = np.concatenate([directions.face, face])
+        vector = np.concatenate([directions.vector, vector])
+    theta = mesh.angle_in(face, vector)
+    faces, first, count = np.unique(face, return_index=True, return_counts=True)
+    number = np.searchsorted(faces, face)
+    along, across = (
+        np.bincount(number, wave(4 * theta), len(faces)).astype(np.float64) for wave in (cosine, sine)
+    )
+    length = np.round(np.sqrt(along * along + across * across) / count, _DECIMALS)
+    mean = arctangent(across, along) / 4
+    mean = mean + HALF * np.round((theta[first] - mean) / HALF)
+    several = count > 1
+    kept: Bools = ~several | (length >= _LEAST_AGREEMENT)
+    return FaceStrokes(
+        face=faces[kept].astype(np.int32),
+        theta=np.where(several, mean, theta[first])[kept],
+        w=np.where(several, np.minimum(length, 1.0), 1.0)[kept],
+        contradictory=faces[~kept].astype(np.int32),
+    )
