@@ -1,28 +1,28 @@
-"""A reader of scalar GAMS models, after the GAMS User's Guide.
+"""A reader of scalar GAMS models, after the GAMS User's Guide, and their comparison with a problem.
 
 It knows scalar variables and equations, options, definitions, assignments to attributes, one model and one
-solve; the dollar control options `$offListing` and `$ifThen set`; and nothing else.
+solve; the dollar control options `$offListing` and `$ifThen set`; and nothing else. It knows nothing of our
+writer, and refuses every text whose meaning is in doubt.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
-from typing import Any
+from functools import cache, reduce
+from typing import Any, NamedTuple
 
 import numpy as np
-from algebraic import (
-    ARITHMETIC,
-    Arithmetic,
-    Column,
-    Expression,
-    Model,
-    Row,
-    WrongTextError,
-    parse_text,
-    power,
-)
-from lark import Lark, Token
+from cases import names_of, points_of
+from crossfield.models.formulations.names import column_names, row_names
+from crossfield.models.formulations.problem import Problem
+from crossfield.models.instance.domain import Floats
+from lark import Lark, Token, Transformer
+from lark.exceptions import UnexpectedInput, VisitError
+
+ACCURACY = 1e-12
+"""Largest difference of values, relative to the largest one of the same expression at the points."""
+Values = Mapping[str, Any]
 
 GRAMMAR = r"""
 start: (statement ";")*
@@ -51,7 +51,18 @@ MINIMIZING.2: /minimizing\b/i
 INF.2: /inf\b/i
 RELATION: /=[gle]=/i
 NAME: /[a-z][a-z0-9_]*/i
+expression: [PLUS] term ((PLUS | MINUS) term)* | MINUS lead ((PLUS | MINUS) term)*
+term: factor (TIMES factor)*
+?factor: power
+names: NAME ("," NAME)*
+PLUS: "+"
+MINUS: "-"
+TIMES: "*" | "/"
+NUMBER: /(\d+\.?\d*|\.\d+)(e[+-]?\d+)?/i
+%import common.WS
+%ignore WS
 """
+"""No operator follows another; a minus may begin an expression, before a term."""
 
 BOUNDS = {
     None: ("continuous", -np.inf, np.inf),
@@ -76,24 +87,126 @@ TYPES = {
 """The largest degree of a model of each type, and whether it may have discrete variables."""
 
 
+class WrongTextError(Exception):
+    """The text is not in the language, or its meaning is in doubt."""
+
+
+class Expression(NamedTuple):
+    """An expression: its value at points, its degree as written (inf if not a polynomial), its names."""
+
+    value: Callable[[Values], Any]
+    degree: float
+    names: frozenset[str]
+
+    @property
+    def constant(self) -> float:
+        """Its value where it has no names."""
+        if self.names:
+            raise WrongTextError(f"{min(self.names)} where a number belongs")
+        return float(self.value({}))
+
+
+def number_of(number: float) -> Expression:
+    """A number."""
+    return Expression(lambda _: number, 0, frozenset())
+
+
+def power(base: Expression, exponent: int) -> Expression:
+    """A whole power, as a product."""
+    factors = [base.value] * exponent
+    return Expression(
+        lambda values: reduce(np.multiply, (factor(values) for factor in factors)),
+        base.degree * exponent,
+        base.names,
+    )
+
+
 @dataclass
-class GamsModel(Model):
-    """A model with its type and its options.
+class Column:
+    """A column: kind, bounds, and the start if there is one. Bounds that depend on a version are NaN."""
+
+    kind: str
+    lower: float
+    upper: float
+    level: float | None = None
+
+
+@dataclass
+class Row:
+    """A row: two sides and a relation, one of `>=`, `<=` and `==`."""
+
+    left: Expression
+    sense: str
+    right: Expression
+
+
+@dataclass
+class Model:
+    """A model that is to be minimized, with its type and its options.
 
     start: the level of the objective variable. unstated: bounds that are the defaults of GAMS.
     """
 
+    columns: dict[str, Column] = field(default_factory=dict)
+    rows: dict[str, Row] = field(default_factory=dict)
+    objective: Expression | None = None
     type: str = ""
     start: float | None = None
     unstated: set[str] = field(default_factory=set)
     options: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def degree(self) -> float:
+        """The largest degree of its expressions."""
+        sides = [side for row in self.rows.values() for side in (row.left, row.right)]
+        return max(side.degree for side in [*sides, self.objective])
 
-class _Statements(Arithmetic):
+    @property
+    def is_discrete(self) -> bool:
+        """Whether columns are whole numbers."""
+        return any(column.kind != "continuous" for column in self.columns.values())
+
+    def check_names(self, expression: Expression, place: str) -> Expression:
+        """Return the expression; raises WrongTextError for a name that is no column."""
+        for name in sorted(expression.names - set(self.columns)):
+            raise WrongTextError(f"{place}: {name} is not declared")
+        return expression
+
+
+class _Statements(Transformer):
     """Each statement as its name and its parts; names in lower case: GAMS ignores case."""
 
+    def number(self, items: list[Token]) -> Expression:
+        return number_of(float(items[0]))
+
+    def expression(self, items: list[Any]) -> Expression:
+        terms = list(zip(items[::2], items[1::2], strict=True))
+        parts = [(-1.0 if sign == "-" else 1.0, term.value) for sign, term in terms]
+        return Expression(
+            lambda values: sum(sign * part(values) for sign, part in parts),
+            max(term.degree for _, term in terms),
+            frozenset().union(*(term.names for _, term in terms)),
+        )
+
+    def names(self, items: list[Token]) -> list[str]:
+        return [str(name) for name in items]
+
+    def term(self, items: list[Any]) -> Expression:
+        return reduce(self._multiplied, zip(items[1::2], items[2::2], strict=True), items[0])
+
+    lead = term
+
+    def _multiplied(self, left: Expression, step: tuple[Token, Expression]) -> Expression:
+        operator, right = step
+        names = left.names | right.names
+        if operator == "*":
+            return Expression(lambda v: left.value(v) * right.value(v), left.degree + right.degree, names)
+        degree = np.inf if right.degree else left.degree
+        return Expression(lambda v: left.value(v) / right.value(v), degree, names)
+
     def symbol(self, items: list[Token]) -> Expression:
-        return super().symbol([items[0].lower()])
+        name = items[0].lower()
+        return Expression(lambda values: values[name], 1, frozenset([name]))
 
     def power(self, items: list[Expression]) -> Expression:
         """Powers from left to right, defined for positive bases only."""
@@ -138,12 +251,24 @@ def _bent(expression: Expression) -> float:
 
 @cache
 def _parser() -> Lark:
-    return Lark(GRAMMAR + ARITHMETIC, parser="lalr")
+    return Lark(GRAMMAR, parser="lalr")
 
 
-def read(text: str) -> GamsModel:
+def _parse(text: str) -> Any:
+    """The statements of a text; raises WrongTextError."""
+    try:
+        return _Statements().transform(_parser().parse(text))
+    except UnexpectedInput as error:
+        raise WrongTextError(f"line {error.line}: {error.get_context(text)}") from error
+    except VisitError as error:
+        if isinstance(error.orig_exc, WrongTextError):
+            raise error.orig_exc from error
+        raise
+
+
+def read(text: str) -> Model:
     """The model that a text hands to the solver."""
-    return _Reader().run(parse_text(_parser(), _Statements(), _without_controls(text)))
+    return _Reader().run(_parse(_without_controls(text)))
 
 
 def _without_controls(text: str) -> str:
@@ -167,12 +292,12 @@ class _Reader:
     """The symbols of a program, in the order in which its statements are executed."""
 
     def __init__(self) -> None:
-        self.model = GamsModel()
+        self.model = Model()
         self.symbols: dict[str, str] = {}
         self.undefined: set[str] = set()
-        self.solved: GamsModel | None = None
+        self.solved: Model | None = None
 
-    def run(self, statements: list[tuple[str, list[Any]]]) -> GamsModel:
+    def run(self, statements: list[tuple[str, list[Any]]]) -> Model:
         for name, parts in statements:
             getattr(self, f"_{name}")(*parts)
         if self.solved is None:
@@ -258,3 +383,52 @@ class _Reader:
             raise WrongTextError(f"the model is not of the type {kind}")
         self.model.start = goal.level
         self.solved = self.model
+
+
+def difference(model: Model, problem: Problem, start: Floats | None = None) -> str:
+    """The first difference between a model and a problem; empty if there is none."""
+    columns = names_of(column_names(problem.instance, problem.blocks))
+    rows = names_of(row_names(problem.rows)) if problem.rows else []
+    for kind, names, expected in (("column", model.columns, columns), ("row", model.rows, rows)):
+        for name in sorted(set(names) ^ set(expected)):
+            return f"a {kind} {name} too {'many' if name in names else 'few'}"
+    read = [model.columns[name] for name in columns]
+    levels = [] if start is None else [("start", [column.level for column in read], start)]
+    for kind, mine, expected in [
+        ("whole", [column.kind != "continuous" for column in read], problem.integer),
+        ("lower", [column.lower for column in read], problem.lower),
+        ("upper", [column.upper for column in read], problem.upper),
+        *levels,
+    ]:
+        for name, value, right in zip(columns, mine, expected.tolist(), strict=True):
+            if value != right:
+                return f"{kind} of {name} is {value} instead of {right}"
+    points = points_of(problem, 4)
+    values = dict(zip(columns, points.T, strict=True))
+    objective = [problem.objective_value(point) for point in points]
+    return _value_difference("objective", model.objective.value(values), objective) or _row_difference(
+        model, problem, points, values
+    )
+
+
+def _row_difference(model: Model, problem: Problem, points: Floats, values: Values) -> str:
+    """The first row that differs, both turned to say `>=` or `==`."""
+    names = iter(names_of(row_names(problem.rows)) if problem.rows else [])
+    for family in problem.rows:
+        sense = family.family.sense
+        for expected in np.array([family.values(point) for point in points]).T:
+            name = next(names)
+            row = model.rows[name]
+            if (row.sense == "==") != (sense == "=="):
+                return f"{name} says {row.sense} instead of {sense}"
+            mine = row.left.value(values) - row.right.value(values)
+            turns = [-1.0 if relation == "<=" else 1.0 for relation in (row.sense, sense)]
+            if wrong := _value_difference(name, turns[0] * mine, turns[1] * expected):
+                return wrong
+    return ""
+
+
+def _value_difference(place: str, values: Any, expected: Any) -> str:
+    values, expected = np.broadcast_to(values, np.shape(expected)), np.asarray(expected)
+    wrong = ~(np.abs(values - expected) <= ACCURACY * np.abs(expected).max())
+    return f"{place} is {values[wrong][0]!r} instead of {expected[wrong][0]!r}" if wrong.any() else ""

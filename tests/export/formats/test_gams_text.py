@@ -12,7 +12,6 @@ from typing import Any
 import gams_reader
 import numpy as np
 import pytest
-from algebraic import difference
 from cases import CASES, make_field, make_instance, make_problem, problem_of
 from crossfield.export.formats.gams import MODEL_TYPES
 from crossfield.export.formats.registry import write
@@ -81,7 +80,7 @@ def assert_text(problem: Problem, folder: Path, start: CrossField | None = None)
     point = None if start is None else problem.point(start)
     write(problem, folder / "model.gms", start=start)
     model = gams_reader.read((folder / "model.gms").read_text("ascii"))
-    assert difference(model, problem, point) == ""
+    assert gams_reader.difference(model, problem, point) == ""
     assert model.type == MODEL_TYPES[problem.problem_class]
     assert model.unstated == set()
     assert model.start == (None if point is None else problem.objective_value(point))
