@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, Final
@@ -10,13 +11,14 @@ import numpy as np
 
 from ...models.field.field import CrossField
 from ...models.field.triangles import vectors_of
-from ...models.instance.domain import Bools, Floats
+from ...models.instance.domain import Bools, Floats, Ints
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
 from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE
 
 SHARP: Final = np.radians(30)  # angle between two faces from which their edge is drawn dark
 MOST_CROSSES: Final = 4000  # faces in view with a cross each; of more, one in several has one
+MOST_TURNED: Final = 6000  # faces of a model that a page turns: more would exceed 200 kB
 _LIGHT: Final = np.array([0.35, 0.45, 0.82])  # towards the lamp, in the viewer's frame
 _PAPER: Final = 0.97  # brightness of a face towards the lamp
 _SHADE: Final = 0.30  # of which a face away from it loses this much
@@ -125,10 +127,8 @@ def _line_marks(
     """Segments (k, 2, 3) of lines, their colour, width, and by how much they lie above the faces."""
     size = np.sqrt(mesh.areas)
     marks: list[tuple[Floats, str, float, float]] = []
-    sharp = np.nonzero(mesh.dihedral > SHARP)[0]
-    edges = np.concatenate([mesh.pair_vertices[sharp], mesh.edge_vertices(mesh.boundary)])
     typical = float(np.median(size))
-    marks.append((mesh.vertices[edges], _DARK, 0.6 * _WIDTH * typical, 2e-3))
+    marks.append((mesh.vertices[_dark_edges(mesh)], _DARK, 0.6 * _WIDTH * typical, 2e-3))
     if field is not None:
         every = -(-int(shown.sum()) // MOST_CROSSES)
         faces = np.nonzero(shown)[0][:: max(every, 1)].astype(np.int32)
@@ -144,6 +144,12 @@ def _line_marks(
         ends = np.stack([mesh.centres[faces] - reach, mesh.centres[faces] + reach], axis=1)
         marks.append((ends, STROKE, 1.5 * _WIDTH * typical, 1e-3))
     return marks
+
+
+def _dark_edges(mesh: Mesh) -> Ints:
+    """Both vertices of each sharp edge and of each edge of the boundary, (k, 2)."""
+    sharp = mesh.dihedral > SHARP
+    return np.concatenate([mesh.pair_vertices[sharp], mesh.edge_vertices(mesh.boundary)])
 
 
 def _vertex_normals(mesh: Mesh) -> Floats:
@@ -175,3 +181,35 @@ def _rgba(colour: str) -> tuple[float, ...]:
     from matplotlib.colors import to_rgba
 
     return tuple(to_rgba(colour))
+
+
+def model_data(field: CrossField) -> dict[str, Any] | None:
+    """A field on a mesh for the page that turns it (templates/run/model.html.j2); None if it is too large.
+
+    Arrays are base64 of little-endian numbers: positions of vertices as 16 bits, directions as 8 bits.
+    """
+    mesh, singular = field.instance.mesh, field.singularities
+    if mesh.size > MOST_TURNED:
+        return None
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    reach = np.linalg.norm(mesh.vertices - (low + high) / 2, axis=1).max()
+    wide = len(mesh.vertices) > 2**16
+    number = "<u4" if wide else "<u2"
+    arrays = {
+        "vertices": np.round((mesh.vertices - (low + high) / 2) / reach * 32767).astype("<i2"),
+        "faces": mesh.faces.astype(number),
+        "lines": np.round(127 * vectors_of(field)).astype("i1"),
+        "edges": _dark_edges(mesh).astype(number),
+        "dots": singular.vertex.astype(number),
+        "turns": np.round(4 * singular.index).astype("i1"),
+    }
+    view = View.of(mesh, _vertex_normals(mesh)[singular.vertex])
+    return {name: b64encode(array.tobytes()).decode() for name, array in arrays.items()} | {
+        "wide": wide,
+        "closed": not len(mesh.boundary),
+        "axes": np.round(view.axes, 6).tolist(),
+        "u": FAMILIES[0],
+        "v": FAMILIES[1],
+        "positive": POSITIVE,
+        "negative": NEGATIVE,
+    }
