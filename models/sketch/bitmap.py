@@ -37,6 +37,7 @@ _EVEN: Final = 1.05  # light that differs by less counts as even, and the pictur
 _MOST_INK: Final = 0.5  # of the picture; strokes leave more paper
 _FAINTEST: Final = 0.08  # contrast below which a picture is empty paper
 _NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and compression, above it full
+_WHITE: Final = 65535.0  # of greys with 16 bits
 _BAND: Final = 1 << 20  # pixels of a picture that are processed together
 _BLUR: Final = 1.0  # pixels, of the gradient
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
@@ -191,21 +192,10 @@ def _split_into_bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
     width, height = image.size
     rows = max(1, _BAND // (width * multiple)) * multiple
     bands = [(0, top, width, min(top + rows, height)) for top in range(0, height, rows)]
-    white = _value_of_white(image, bands)
+    if image.mode == "F":
+        raise InputError("holds greys in floating point; save it with 8 or 16 bits")
+    white = _WHITE if image.mode.startswith("I") else None
     return (_as_eight_bit(image.crop(band), white) for band in bands)
-
-
-def _value_of_white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
-    """The value of white in pictures of 16 bit and floating point greys, None for other pictures."""
-    if image.mode.startswith("I;16") or image.mode == "I":
-        return 65535.0
-    if image.mode != "F":
-        return None
-    most = [float(np.asarray(image.crop(band)).max()) for band in bands]
-    least = [float(np.asarray(image.crop(band)).min()) for band in bands]
-    if not np.isfinite(most + least).all():
-        raise InputError("holds pixels that are no finite numbers; save it with 8 or 16 bits")
-    return next((top for top in (1.0, 255.0) if max(most) <= top), 65535.0)
 
 
 def _as_eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:

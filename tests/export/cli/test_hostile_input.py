@@ -227,14 +227,10 @@ def test_numbers_of_thousands_of_digits_in_a_specification_are_refused(tmp_path)
         assert len(str(caught.value)) < 500
 
 
-def test_floating_point_pictures_without_numbers_are_refused(tmp_path):
-    for value in (np.nan, np.inf):
-        values = np.ones((40, 60), dtype=np.float32)
-        values[20] = 0
-        values[3, 3] = value
-        Image.fromarray(values).save(tmp_path / "a.tiff")
-        with pytest.raises(InputError, match="no finite numbers"):
-            cf.read_sketch(tmp_path / "a.tiff")
+def test_floating_point_pictures_are_refused(tmp_path):
+    Image.fromarray(np.ones((40, 60), dtype=np.float32)).save(tmp_path / "a.tiff")
+    with pytest.raises(InputError, match="floating point; save it with 8 or 16 bits"):
+        cf.read_sketch(tmp_path / "a.tiff")
 
 
 def test_damaged_tiffs_are_refused(tmp_path):
