@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ...models.errors import InputError, naming
-from ...models.instance.domain import Bools, Floats
+from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.bitmap import Bitmap
-from ...models.sketch.cover import Box, Frame, curve_pixels
+from ...models.sketch.cover import Box, Frame
 from ...models.sketch.curves import Curves, are_straight, run_numbers
 from ...models.sketch.drawing_file import parse_drawing, read_file
 from ...models.sketch.read import DEFAULT_SIZE
@@ -32,7 +32,6 @@ INK: Final = {"black": "#4a4a4a", "red": "#c23b33"}
 _LEVELS: Final = 16  # of ink
 _LENGTH: Final = re.compile(r"(\d{1,9}(?:\.\d{1,12})?)(px|pt|pc|mm|cm|in|Q)?")
 _LOOKS_RED: Final = 0.5
-_INK: Final = 0.2  # of a pixel that belongs to a stroke
 _SAME: Final = 0.8  # least share of the stroke pixels of a field that lie on its drawing
 
 
@@ -63,11 +62,7 @@ def read_underlay(source: str | Path, *, on: Instance) -> Underlay:
     data = sample_svg(str(source)).encode() if sampled else read_file(path)
     with naming(path):
         content = parse_drawing(data, path.suffix, DEFAULT_SIZE, view=on.view)
-        frame = Frame(*on.origin, on.pixel_size, *on.mask.shape)
-        if isinstance(content, Bitmap):
-            drawing, drawn = _underlay_of_ink(content), _pixels_with_ink(content, frame)
-        else:
-            drawing, drawn = _underlay_of_curves(content, data), _pixels_under_curves(content, frame)
+        drawn = content.covers(Frame(*on.origin, on.pixel_size, *on.mask.shape)).walls
         near = ndimage.binary_dilation(drawn, np.ones((3, 3), dtype=bool))
         share = near[tuple(on.stroke_pixels.T)].mean()
         if share < _SAME:
@@ -75,26 +70,7 @@ def read_underlay(source: str | Path, *, on: Instance) -> Underlay:
                 f"the drawing lies elsewhere than the field of {on.name}: {share:.0%} of the stroke pixels "
                 "are on its strokes; give the drawing that its instance was read from, from the same side"
             )
-    return drawing
-
-
-def _pixels_under_curves(curves: Curves, frame: Frame) -> Bools:
-    """The pixels of a grid that a curve touches, shape (h, w)."""
-    segments, curve, _ = curves.segments(frame)
-    _, row, column = curve_pixels(segments, curve, frame, 0.0)
-    drawn = np.zeros(frame.shape, dtype=bool)
-    drawn[row, column] = True
-    return drawn
-
-
-def _pixels_with_ink(picture: Bitmap, frame: Frame) -> Bools:
-    """The pixels of a grid with ink, shape (h, w)."""
-    at = (np.argwhere(picture.ink > _INK)[:, ::-1] + 0.5) * picture.reduction
-    column, row = np.floor((at - (frame.x, frame.y)) / frame.pixel).astype(int).T
-    on = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
-    drawn = np.zeros(frame.shape, dtype=bool)
-    drawn[row[on], column[on]] = True
-    return drawn
+    return _underlay_of_ink(content) if isinstance(content, Bitmap) else _underlay_of_curves(content, data)
 
 
 def _underlay_of_curves(curves: Curves, data: bytes) -> Underlay:
