@@ -70,7 +70,7 @@ def _field_view(document: Document, drawn: DrawnInstance, field: CrossField) -> 
             "energy": field.energy(2).total,
             "singularities": count_singularities(field),
         },
-        **equivalent_commands(document, drawn),
+        "commands": equivalent_commands(document, drawn),
     }
 
 
@@ -133,8 +133,8 @@ def _surface_view(drawn: DrawnInstance, lifted: Surface) -> dict[str, Any]:
     }
 
 
-def equivalent_commands(document: Document, drawn: DrawnInstance) -> dict[str, list[str]]:
-    """Commands and Python lines that compute the same from the downloaded instance and drawing."""
+def equivalent_commands(document: Document, drawn: DrawnInstance) -> list[str]:
+    """Commands that compute the same from the downloaded instance and drawing."""
     from .session import hints_on_mask
 
     name, hints = document.name, hints_on_mask(document, drawn.instance)
@@ -145,26 +145,10 @@ def equivalent_commands(document: Document, drawn: DrawnInstance) -> dict[str, l
     options = "".join(f" --hint={row},{column},{slant:g},{tilt:g}" for row, column, slant, tilt in angles)
     flip = " --flip" if document.flip else ""
     field = f"field/{name}.bend.field.npz"
-    listed = ", ".join(
-        f"cf.Hint({row}, {column}, math.radians({slant:g}), math.radians({tilt:g}))"
-        for row, column, slant, tilt in angles
-    )
-    return {
-        "commands": [
-            f"crossfield solve {name}.json --method bend -o field",
-            f"crossfield draw {field} --underlay {name}.svg -o {name}.layers.svg",
-            f"crossfield shade {field} --underlay {name}.svg{options}{flip} -o surface",
-            f"crossfield export {name}.json -f milp-mccormick -F mps -o files",
-            f"crossfield prove {name}.json -o proof",
-        ],
-        "python": [
-            *(["import math", ""] if hints else []),
-            "import crossfield as cf",
-            "",
-            f'instance = cf.read_instance("{name}.json")',
-            "field = cf.bend_field(cf.polyvector_field(instance, hold=100))",
-            f"surface = cf.surface(field, [{listed}], flip={document.flip})",
-            f'cf.draw(field, "{name}.layers.svg", underlay="{name}.svg")',
-            f'cf.write_surface(surface, "surface", drawing="{name}.svg")',
-        ],
-    }
+    return [
+        f"crossfield solve {name}.json --method bend -o field",
+        f"crossfield draw {field} --underlay {name}.svg -o {name}.layers.svg",
+        f"crossfield shade {field} --underlay {name}.svg{options}{flip} -o surface",
+        f"crossfield export {name}.json -f milp-mccormick -F mps -o files",
+        f"crossfield prove {name}.json -o proof",
+    ]

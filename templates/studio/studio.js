@@ -382,7 +382,7 @@ const actions = {
   empty: () => { if (mayReplace()) start({ ...emptyDocument(), size: state.doc.size }); },
   help: () => dialog("Help", $("#help").content.cloneNode(true)),
   elsewhere: () => state.field ? dialog("The same without the page", element("p", "Download the drawing and the instance, then run in their folder:"),
-    element("pre", state.field.commands.join("\n").replace("milp-mccormick -F mps", `${$("#formulation").value} -F ${$("#format").value}`)), element("p", "Or in Python:"), element("pre", state.field.python.join("\n"))) : status("There is no field yet."),
+    element("pre", state.field.commands.join("\n").replace("milp-mccormick -F mps", `${$("#formulation").value} -F ${$("#format").value}`))) : status("There is no field yet."),
 };
 const closeMenus = () => all(".menu[open]").forEach(each => { each.open = false; });
 document.addEventListener("click", event => {

@@ -176,18 +176,6 @@ def test_the_commands_of_the_menu_compute_the_same(tmp_path, monkeypatch, capsys
         assert archive.read(name) == (tmp_path / "surface" / name).read_bytes(), name
 
 
-@pytest.mark.slow
-def test_the_python_lines_of_the_menu_compute_the_same(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    data = changed(hints=[{"x": 30, "y": 25, "slant": 40, "tilt": -90}])
-    for kind in ("drawing", "instance", "surface"):
-        name, content = download(data, kind)
-        (tmp_path / name).write_bytes(content)
-    exec("\n".join(field_step(data)[0]["python"]), {})
-    archive = zipfile.ZipFile(tmp_path / "pebble.surface.zip")
-    assert archive.read("surface.obj") == (tmp_path / "surface" / "surface.obj").read_bytes()
-
-
 def picture():
     """A red line and a black circle on paper, as PNG."""
     image = Image.new("RGB", (200, 160), "white")
