@@ -50,13 +50,6 @@ def set_options(highs: Any, **options: str | float) -> None:
         highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - otherwise the old number is kept
 
 
-def solve_loaded(highs: Any, path: Path) -> Any:
-    """Solve the model of a file and return it. Raises RefusedError if HiGHS reports an error."""
-    if highs.run() == highspy.HighsStatus.kError:
-        raise RefusedError("HiGHS answers with an error (model status Not Set)", file=path)
-    return highs
-
-
 def write_solution(highs: Any, solution: Path) -> None:
     """Write the solution file. Raises OutputError."""
     with write_in_full(solution) as part:

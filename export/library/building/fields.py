@@ -14,7 +14,6 @@ from typing import Final
 
 import numpy as np
 
-from ....models.errors import SolutionError
 from ....models.field.field import CrossField, Norm
 from ....models.formulations.problem import Problem, formulate, with_integers_fixed
 from ....models.instance.angles import HALF
@@ -24,9 +23,6 @@ from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
 from ....models.search.reproducible_angles import reproducible_field
 from ....models.search.search import search
-from ...bundle.starts import write_start
-from ...formats.registry import write
-from ...solutions.solution import read_solution
 from ..ledger.known_points import InstancePoints
 from ..ledger.points import (
     METHOD,
@@ -114,22 +110,20 @@ def improve_in_1norm(start: CrossField, rung: str) -> list[KnownField]:
 
 def _solve_by_highs(problem: Problem, start: CrossField | None = None, **options: int) -> CrossField | None:
     """The field that HiGHS finds under options, or None."""
-    from ...programs.highs import load_model, set_options, solve_loaded, write_solution
+    import highspy
 
-    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-        model, first, answer = (Path(folder) / name for name in ("model.mps", "start.sol", "answer.sol"))
-        write(problem, model)
-        highs = load_model(model, threads=1, parallel="off", mip_rel_gap=1e-6, mip_abs_gap=1e-9)
-        set_options(highs, **options)
-        if start is not None:
-            write_start(problem, start, first, "highs")
-            highs.readSolution(str(first), 0)
-        write_solution(solve_loaded(highs, model), answer)
-        try:
-            solution = read_solution(answer, problem)
-        except SolutionError:
-            return None
-    return None if solution.point is None else clipped_field(problem, solution.point)
+    from ...programs.highs import set_options
+
+    highs = problem.to_highs()
+    set_options(highs, threads=1, parallel="off", mip_rel_gap=1e-6, mip_abs_gap=1e-9, **options)
+    if start is not None:
+        first = highspy.HighsSolution()
+        first.col_value = problem.point(start).tolist()
+        highs.setSolution(first)
+    highs.run()
+    if highs.getInfo().primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
+        return None
+    return clipped_field(problem, np.array(highs.getSolution().col_value))
 
 
 def _prove(start: CrossField, file: str, norm: Norm = 2) -> tuple[KnownField, CheckedCertificate | None]:
