@@ -24,7 +24,7 @@ DOMAINS: Final = {
     "solve": BOTH,
     "prove": SKETCHES,
     "read": BOTH,
-    "draw": SKETCHES,
+    "draw": BOTH,
     "shade": SKETCHES,
     "studio": SKETCHES,
     "verify": BOTH,

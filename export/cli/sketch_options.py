@@ -108,11 +108,16 @@ class SketchOptions:
         return instance
 
     def _read_drawing(self, path: Path) -> Instance:
+        from ...models.mesh.shapes import MESHES
         from ...models.sketch.read import DEFAULT_SIZE, read_sketch
-        from ...models.sketch.samples import SAMPLES
+        from ...models.sketch.samples import SAMPLES, sample
 
         if not path.is_file() and str(path) in SAMPLES:
             return self._make_sample(str(path))
+        if not path.is_file() and str(path) in MESHES:
+            if replace(self, stroke_weight=None) != SketchOptions():
+                raise InputError("is a mesh; leave out the options that read a sketch", file=path)
+            return sample(str(path))
         if not path.exists():
             raise InputError(
                 "there is no such file and no such sample; `crossfield list` lists the samples", file=path

@@ -9,16 +9,18 @@ from typing import Final, Literal
 from ..arguments import check_arguments
 from ..errors import InputError
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
+from ..mesh.samples import mesh_sample
+from ..mesh.shapes import MESHES
 from .read import DEFAULT_SIZE, Silhouette, check_silhouette, check_size, instance_of_drawing
 from .surfaces import analytic
 from .svg import read_svg
 
-SampleKind = Literal["sketch", "analytic"]
+SampleKind = Literal["sketch", "analytic", "mesh"]
 
 
 @dataclass(frozen=True)
 class Sample:
-    """A built-in sample: name, whether a drawing (`sketch`) or a surface (`analytic`), one line."""
+    """A built-in sample: name, whether a drawing, a surface (`analytic`) or a mesh, one line."""
 
     name: str
     kind: SampleKind
@@ -50,14 +52,14 @@ SAMPLES: Final[dict[str, Sample]] = {
 
 
 def samples() -> list[Sample]:
-    """Names, kinds and descriptions of the built-in samples, in the order of the table."""
-    return list(SAMPLES.values())
+    """Names, kinds and descriptions of the built-in samples: drawings, surfaces, meshes."""
+    return [*SAMPLES.values(), *(Sample(name, "mesh", text) for name, (text, _) in MESHES.items())]
 
 
 @check_arguments
 def sample(
     name: str,
-    size: int = DEFAULT_SIZE,
+    size: int | None = None,
     *,
     gauge: Gauge = "strokes",
     stroke_weight: float = STROKE_WEIGHT,
@@ -71,7 +73,7 @@ def sample(
     name
         A name in `samples()`.
     size
-        Pixels on the longer side of the grid, 1 to 4096.
+        Pixels on the longer side of the grid, 1 to 4096; 24 by default. A mesh has none.
     gauge
         Window of alpha, as in `Instance`.
     stroke_weight, skew_weight
@@ -92,6 +94,11 @@ def sample(
         For a weight out of range.
 
     """
+    if name in MESHES:
+        if size is not None or silhouette != "none":
+            raise InputError(f"{name} is a mesh with its own faces; leave size and silhouette out")
+        return mesh_sample(name, gauge=gauge, stroke_weight=stroke_weight)
+    size = DEFAULT_SIZE if size is None else size
     check_size(size)
     check_silhouette(silhouette)
     if _find_sample(name).kind == "analytic":
@@ -116,5 +123,5 @@ def sample_svg(name: str) -> str:
 
 def _find_sample(name: str) -> Sample:
     if name not in SAMPLES:
-        raise InputError(f"there is no sample {name!r}; choose one of {', '.join(SAMPLES)}")
+        raise InputError(f"there is no sample {name!r}; choose one of {', '.join([*SAMPLES, *MESHES])}")
     return SAMPLES[name]
