@@ -39,6 +39,15 @@ class Rings:
             return np.zeros(len(self.defect))
         return np.asarray(np.add.reduceat(self.sign * values[self.pair], self.start[:-1]), dtype=np.float64)
 
+    def select(self, number: Ints) -> Rings:
+        """The rings whose pairs all have a new number, not -1, in `number` (m,), renumbered."""
+        length = np.diff(self.start)
+        known = np.bincount(np.repeat(np.arange(len(length)), length), number[self.pair] >= 0, len(length))
+        kept = known == length
+        steps = np.repeat(kept, length)
+        start = np.append(0, np.cumsum(length[kept])).astype(np.int32)
+        return Rings(start, number[self.pair[steps]], self.sign[steps], self.defect[kept])
+
 
 class Domain(ABC):
     """Points 0 to n - 1, ordered pairs (i, j) of neighbours, and the turns between their frames.

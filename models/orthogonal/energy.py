@@ -24,6 +24,7 @@ from ..field.jumps import step_labels
 from ..instance.angles import HALF
 from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
+from ..instance.mesh import Mesh
 from ..processes.deadline import Over, never
 from ..smooth.sparse_systems import Solve, factor_matrix
 
@@ -32,6 +33,11 @@ MOST_DENSE: Final = 6000
 LOWER: Final = 1e-9
 """Fall of the energy that counts: less may be rounding."""
 _MOST_STEPS: Final = 100_000  # of a descent; a tenth of the rows are usual
+
+
+def takes_integers(instance: Instance) -> bool:
+    """Whether fields of an instance begin with these integers: its crosses are orthogonal, or on a mesh."""
+    return instance.orthogonal or isinstance(instance.domain, Mesh)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,21 +76,33 @@ class OrthogonalEnergy:
         return sparse.csr_array((values, (row, ends)), shape=(count, self.size + 1))[:, : self.size]
 
     @cached_property
-    def part(self) -> Ints:
-        """Number of the connected part of each point and, at last, of the ground, (n + 1,)."""
-        used = self.weight > 0
-        links = sparse.coo_array(
-            (np.ones(used.sum()), (self.first[used], self.second[used])), shape=(self.size + 1,) * 2
-        )
-        number: Ints = connected_components(links.tocsr(), directed=False)[1]
-        return number
+    def links(self) -> Any:
+        """Sparse matrix (n, n) with an entry where a row of weight joins two points."""
+        used = (np.maximum(self.first, self.second) < self.size) & (self.weight > 0)
+        ends = (self.first[used], self.second[used])
+        return sparse.coo_array((np.ones(used.sum()), ends), shape=(self.size, self.size)).tocsr()
 
     @cached_property
     def pins(self) -> Ints:
         """First point of each part that no row of weight ties to the ground: its angle is 0."""
-        numbers, points = np.unique(self.part[:-1], return_index=True)
-        pins: Ints = points[numbers != self.part[-1]].astype(np.int32)
+        part = connected_components(self.links, directed=False)[1]
+        ties = (np.maximum(self.first, self.second) == self.size) & (self.weight > 0)
+        parts, points = np.unique(part, return_index=True)
+        tied = part[np.minimum(self.first, self.second)[ties]]
+        pins: Ints = points[~np.isin(parts, tied)].astype(np.int32)
         return pins
+
+    def restrict(self, points: Ints, alpha: Floats) -> tuple[OrthogonalEnergy, Ints]:
+        """The energy of the rows at some points, the angles of all others fixed; and these rows' numbers."""
+        number = np.full(self.size + 1, len(points), dtype=np.int32)
+        number[points] = np.arange(len(points), dtype=np.int32)
+        near = np.minimum(number[self.first], number[self.second]) < len(points)
+        rows = np.nonzero(near)[0].astype(np.int32)
+        fixed = alpha.copy()
+        fixed[points] = 0.0
+        first, second = number[self.first[rows]], number[self.second[rows]]
+        offset = (self.offset + self.differences(fixed))[rows]
+        return OrthogonalEnergy(len(points), first, second, offset, self.weight[rows]), rows
 
     def matrix_of(self, weight: Floats) -> Any:
         """The matrix M' diag(weight) M, sparse (n, n); definite if its rows join what these rows join."""
@@ -99,7 +117,11 @@ class OrthogonalEnergy:
 
     def fit_angles(self, z: Ints) -> Floats:
         """The angles of least energy for integers z, (n,)."""
-        return np.asarray(-self.solve_system(self.rows.T @ (self.weight * (self.offset + HALF * z))))
+        return np.asarray(-self.solve_system(self.force(self.weight, z)))
+
+    def force(self, weight: Floats, z: Ints) -> Floats:
+        """M' diag(weight) (c + pi/2 z), (n,)."""
+        return np.asarray(self.rows.T @ (weight * (self.offset + HALF * z)))
 
     def residuals(self, alpha: Floats, z: Ints) -> Floats:
         """The residual of each row in radians, (r,)."""
@@ -114,10 +136,17 @@ class OrthogonalEnergy:
         """The sum of omega r^2."""
         return float(self.weight @ (residual * residual))
 
+    def least_total(self, z: Ints) -> float:
+        """The energy of integers z at their best angles."""
+        return self.total(self.residuals(self.fit_angles(z), z))
+
+    def turns(self, alpha: Floats) -> Floats:
+        """The real z at which each residual is 0, (r,); rounded, because errors must not decide ties."""
+        return np.asarray(np.round(-(self.differences(alpha) + self.offset) / HALF, 9))
+
     def nearest(self, alpha: Floats) -> Ints:
-        """The integers of least energy at given angles, (r,); of two equal ones the lower."""
-        turns = np.round(-(self.differences(alpha) + self.offset) / HALF, 9)  # rounding must not decide ties
-        return np.ceil(turns - 0.5).astype(np.int32)
+        """The integers of least energy at given angles, (r,)."""
+        return np.round(self.turns(alpha)).astype(np.int32)
 
     @cached_property
     def _inverse(self) -> Floats:
@@ -152,31 +181,30 @@ class OrthogonalEnergy:
         even, odd = HALF * HALF * self.stiffness, 2 * HALF * self.weight * residual
         return even + odd, even - odd
 
-    def step_residuals(self, residual: Floats, row: int, step: int) -> Floats:
-        """The residuals of the best angles after a step of one integer, from those before it, (r,)."""
-        column = self._inverse[self.first[row]] - self._inverse[self.second[row]]
-        force = HALF * step * self.weight[row]
-        changed: Floats = residual - force * (column[self.first] - column[self.second])
-        changed[row] += HALF * step
+    def step_residuals(self, residual: Floats, rows: Ints, steps: Ints) -> Floats:
+        """The residuals of the best angles after steps of some integers, from those before them, (r,).
+
+        rows: numbers of the rows, each once, (k,). steps: what is added to their integers, (k,).
+        """
+        force = HALF * steps * self.weight[rows]
+        drop = force @ self._inverse[self.first[rows]] - force @ self._inverse[self.second[rows]]
+        changed: Floats = residual - drop[self.first] + drop[self.second]
+        changed[rows] += HALF * steps
         return changed
 
-    def descend(self, z: Ints, over: Over = never) -> tuple[Ints, Floats]:
+    def descend(self, z: Ints, residual: Floats | None = None, over: Over = never) -> tuple[Ints, Floats]:
         """Change single integers, the one of greatest gain first, until none lowers the energy.
 
-        Returns the integers and the residuals at their best angles. Needs the inverse.
+        residual: that of the best angles for z, if it is known. Returns the integers and their residuals.
         """
-        return self.descend_from(z, self.residuals(self.fit_angles(z), z), over)
-
-    def descend_from(self, z: Ints, residual: Floats, over: Over = never) -> tuple[Ints, Floats]:
-        """As `descend`, from known residuals."""
-        z = z.copy()
-        even, odd = HALF * HALF * self.stiffness, 2 * HALF * self.weight
+        residual = self.residuals(self.fit_angles(z), z) if residual is None else residual
+        z, (even, odd) = z.copy(), (HALF * HALF * self.stiffness, 2 * HALF * self.weight)
         for _ in range(_MOST_STEPS):
             change = even - odd * np.abs(residual)
-            row = int(np.argmin(change))
-            if change[row] > -LOWER or over():
+            row = np.argmin(change, keepdims=True).astype(np.int32)
+            if change[row[0]] > -LOWER or over():
                 break
-            step = -1 if residual[row] > 0 else 1
+            step = np.where(residual[row] > 0, -1, 1).astype(np.int32)
             z[row] += step
             residual = self.step_residuals(residual, row, step)
         return z, residual

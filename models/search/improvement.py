@@ -20,6 +20,7 @@ from ..instance.angles import HALF, QUARTER, line_difference
 from ..instance.domain import Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
+from ..orthogonal.energy import takes_integers
 from ..processes.deadline import Over, Stop, never, stop_function
 from ..smooth.sparse_systems import one_thread
 from .box_qp import FreeField, minimise_in_box, stroke_bounds
@@ -40,7 +41,8 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
     """Field that neither best jumps, nor best angles, nor the turn of a curve improve further.
 
     At most 40 curves are turned, the worst first. Under the gauge `box` none is turned: there u must carry
-    every stroke at the price of the box, and turning seldom pays. Deterministic unless `stop` ends it.
+    every stroke at the price of the box, and turning seldom pays. None is turned on meshes or where crosses
+    are orthogonal. Deterministic unless `stop` ends it.
 
     Parameters
     ----------
@@ -57,7 +59,7 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
     """
     state, solver, over = FreeField.of(field), LinearSolver(), stop_function(stop)
     settle(state, solver, over)
-    if field.instance.gauge == "strokes":
+    if field.instance.gauge == "strokes" and not takes_integers(field.instance):
         _exchange_families(state, solver, over)
     improved = state.fit_in_bounds(over)
     return improved if improved.energy().total < field.energy().total else field

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -18,6 +18,8 @@ from ..arguments import check_arguments, check_count
 from ..field.field import CrossField
 from ..instance.domain import Bools
 from ..instance.instance import Instance
+from ..orthogonal.energy import OrthogonalEnergy, takes_integers
+from ..orthogonal.search import IntegerSearch
 from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
 from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
@@ -28,6 +30,7 @@ from ..smooth.sparse_systems import one_thread
 from .box_qp import FreeField, stroke_bounds
 from .energy import LinearSolver
 from .improvement import pixel_curves, settle
+from .integer_fields import finish_field, starting_integers
 from .landscape import FieldPoint
 from .nearest_stroke import nearest_strokes
 from .starts import polyvector_start, rounded_energy, start_fields
@@ -88,6 +91,9 @@ def search(
     The result has at most the energy of `start` and, if time allows, of the first field. On up to 400 pixels,
     the first three rounds explore from all starts, and the later ones from the best field.
 
+    Orthogonal crosses, and all crosses on meshes, are searched as integers, in one process: 500 perturbations
+    per round, each followed by a descent over single jumps. A search with beta free then fits it once.
+
     Without a time limit the same instance, seed and rounds give the same field on the same kind of processor,
     for any number of jobs. Ctrl-C ends the search with the best field so far.
 
@@ -136,6 +142,8 @@ def search(
         deadline = (limits or Limits(math.inf)).deadline()
         ends = _Ends(deadline, rounds, lambda: pressed() or asked())
         closing = _closing_limit(deadline)
+        if takes_integers(instance):
+            return _search_integers(instance, seed, start, ends, progress)
         hunt = _Hunt(instance, seed, _starts(instance, start, ends))
         alone = instance.grid.size <= _ALONE or deadline.left() < _HURRY
         try:
@@ -144,6 +152,26 @@ def search(
         except KeyboardInterrupt:
             ended = "interrupted"
         return Search(hunt.best(closing()), hunt.round, tuple(hunt.energies), ended)
+
+
+def _search_integers(
+    instance: Instance, seed: int, start: CrossField | None, ends: _Ends, progress: Progress
+) -> Search:
+    """Search over the integers of orthogonal crosses, from the power field, the greedy field and `start`."""
+    closing, energy = _closing_limit(ends.deadline), OrthogonalEnergy.of(instance)
+    starts = starting_integers(instance, energy, start, ends.sooner().over)
+    hunt = IntegerSearch(energy, instance.domain.rings, starts, seed)
+    energies = [(0, hunt.best.total)]
+    while not (ended := ends.reason_to_end(hunt.round)):
+        if hunt.fruitless > _PATIENCE * energy.size:
+            ended = "patience"
+            break
+        hunt.explore(ends.over)
+        if hunt.best.total < energies[-1][1]:
+            energies.append((hunt.round, hunt.best.total))
+        progress(f"energy {hunt.best.total:.5g} after {hunt.round} rounds")
+    field = finish_field(instance, energy, hunt.best.z, closing())
+    return Search(min(field, start or field, key=rounded_energy), hunt.round, tuple(energies), ended)
 
 
 def _closing_limit(deadline: Deadline) -> Callable[[], Over]:
@@ -168,6 +196,10 @@ class _Ends:
         if rounds == self.rounds:
             return "rounds"
         return "time" if self.deadline.passed() else ""
+
+    def sooner(self) -> _Ends:
+        """The limits of starts, which leave half of the time."""
+        return replace(self, deadline=self.deadline.share(0.5))
 
     def over(self) -> bool:
         """Whether work has to end now, even in the middle of a round."""

@@ -18,6 +18,7 @@ from ..field.field import CrossField
 from ..field.fusion import fuse_fields
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
+from ..orthogonal.energy import takes_integers
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
 from ..smooth.sparse_systems import one_thread, solve_locally
@@ -26,6 +27,7 @@ from .coarse_grid import copy_to_fine_grid, halve_resolution
 from .energy import LinearSolver, energy_at
 from .greedy import greedy_field, rough_greedy
 from .improvement import improved_field, settle
+from .integer_fields import first_integer_field
 
 _Strategy = Callable[[Instance, Over], FreeField]
 
@@ -44,7 +46,10 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
 
     Up to 1024 pixels it is the improved greedy field. On larger grids it fuses fast approximate fields of up
     to ten strategies, fewer on larger grids, and a field grown from the grid of half the resolution.
+    Orthogonal crosses and meshes: see `first_integer_field`.
     """
+    if takes_integers(instance):
+        return first_integer_field(instance, over)
     if instance.grid.size <= _SMALL:
         return improved_field(greedy_field(instance, stop=over), stop=over)
     return _fuse_many(instance, over)[0].fit_in_bounds(over)

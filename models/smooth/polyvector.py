@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from ..arguments import check_arguments, check_positive
 from ..field.field import CrossField, field_in_windows
@@ -19,12 +20,13 @@ from ..field.jumps import free_jumps, label_of
 from ..instance.angles import HALF
 from ..instance.domain import Floats
 from ..instance.instance import Instance
-from .sparse_systems import factor_matrix, one_thread, smoothness, solve_locally, stroke_weight
+from .sparse_systems import Solve, factor_matrix, one_thread, smoothness, solve_locally, stroke_weight
 
 _Complex = NDArray[np.complex128]
 
 HOLDS: Final = (0.1, 1.0, 100.0)  # factors of the stroke weights worth trying: loose, as in the energy, hard
 _HARDEST: Final = 1e4  # weight of a stroke, far above the 2 of a pair; `PULL` still counts in 16 digits
+_ITERATIONS: Final = 100  # of inverse iteration: the next eigenvalues are close, and their vectors good, too
 _DECIMALS: Final = 9  # of line angles in quarter turns: rounding errors must not decide jumps
 
 
@@ -114,9 +116,10 @@ def roots(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
 def power_field(instance: Instance) -> CrossField:
     """Field of orthogonal crosses from the harmonic extension of exp(4 i theta), with the best jumps.
 
-    The complex numbers z minimise the sum of 2 abs(z_i - z_j)^2 over pairs and of w abs(z - exp(4 i theta))^2
-    over strokes. Then alpha = arg(z) / 4 and beta = 0; parts without a stroke get alpha = 0. Labels are moved
-    into the windows of the instance (docs/mathematics.md, 10).
+    The complex numbers z minimise the sum of 2 abs(z_i exp(4 i kappa) - z_j)^2 over pairs and of
+    w abs(z - exp(4 i theta))^2 over strokes. Parts of a mesh without strokes get the eigenvector of the least
+    eigenvalue of that sum. Then alpha = arg(z) / 4 and beta = 0. Labels are moved into the windows of the
+    instance (docs/mathematics.md, 10).
 
     Parameters
     ----------
@@ -129,12 +132,30 @@ def power_field(instance: Instance) -> CrossField:
         The field.
 
     """
-    grid = instance.grid
-    strokes, theta = instance.stroke_terms, instance.theta
+    strokes, size = instance.stroke_terms, instance.domain.size
     goal = np.stack(
-        [strokes.at_points(strokes.weight * f(4 * theta), grid.size) for f in (np.cos, np.sin)], axis=-1
+        [strokes.at_points(strokes.weight * f(4 * instance.theta), size) for f in (np.cos, np.sin)], axis=-1
     )
-    z = factor_matrix(smoothness(instance) + sparse.diags_array(stroke_weight(instance)))(goal)
-    alpha, beta = np.arctan2(z[:, 1], z[:, 0]) / 4, np.zeros(grid.size)
+    matrix = smoothness(instance, power=4) + sparse.diags_array(stroke_weight(instance))
+    solve = factor_matrix(matrix)
+    if np.iscomplexobj(matrix):
+        z = solve(goal @ np.array([1, 1j]))
+        free = np.abs(z) == 0
+        z = np.where(free, _least_eigenvector(matrix, solve), z) if free.any() else z
+    else:
+        z = solve(goal) @ np.array([1, 1j])
+    alpha, beta = np.angle(z) / 4, np.zeros(size)
     start = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
     return start.with_best_jumps()
+
+
+def _least_eigenvector(matrix: Any, solve: Solve) -> _Complex:
+    """The eigenvector of least eigenvalue of each part of a Hermitian matrix, by inverse iteration, (n,)."""
+    parts, part = connected_components(abs(matrix), directed=False)
+    random = np.random.default_rng(0).normal(size=(2, len(part)))
+    z: _Complex = random[0] + 1j * random[1]
+    for _ in range(_ITERATIONS):
+        z, most = solve(z), np.zeros(parts)
+        np.maximum.at(most, part, np.abs(z))
+        z = z / most[part]
+    return z

@@ -33,18 +33,23 @@ def stroke_weight(instance: Instance) -> Floats:
     return instance.stroke_terms.at_points(instance.stroke_terms.weight, instance.domain.size)
 
 
-def smoothness(instance: Instance) -> Any:
-    """The sparse matrix (n, n) of 2 |z_i - z_j|^2 over the pairs: twice the Laplacian of the grid."""
-    grid = instance.grid
-    degree = instance.pair_terms.degree(grid.size)
-    beside = np.full(len(grid.first), -2.0)
-    return symmetric_matrix(grid.first, grid.second, beside, 2 * degree.astype(np.float64))
+def smoothness(instance: Instance, power: int = 0) -> Any:
+    """The sparse matrix (n, n) of 2 |z_i exp(i power kappa) - z_j|^2 over the pairs, times their weights.
+
+    Real where all frames are alike or power is 0: twice the Laplacian of the domain. Otherwise Hermitian.
+    """
+    pairs, n = instance.pair_terms, instance.domain.size
+    weight = pairs.weighted(np.full(len(pairs.first), 2.0))
+    degree = np.bincount(pairs.first, weight, n).astype(np.float64) + np.bincount(pairs.second, weight, n)
+    is_real = pairs.kappa is None or power == 0
+    beside = -weight if is_real else -weight * np.exp(-1j * power * pairs.offset(0))
+    return symmetric_matrix(pairs.first, pairs.second, beside, degree)
 
 
-def symmetric_matrix(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
-    """The sparse symmetric matrix with those entries on one side of the diagonal, each place once."""
+def symmetric_matrix(row: Ints, column: Ints, beside: np.ndarray[Any, Any], diagonal: Floats) -> Any:
+    """The sparse Hermitian matrix with those entries on one side of the diagonal, each place once."""
     every = np.arange(len(diagonal), dtype=np.int32)
-    values = np.concatenate([beside, beside, diagonal])
+    values = np.concatenate([beside, np.conj(beside), diagonal])
     place = (np.concatenate([row, column, every]), np.concatenate([column, row, every]))
     return sparse.csr_array((values, place), shape=(len(diagonal), len(diagonal)))
 

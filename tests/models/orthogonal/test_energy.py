@@ -32,7 +32,8 @@ def test_gains_and_residuals_are_those_of_solving_again(case):
             moved[row] += step
             again = energy.residuals(energy.fit_angles(moved), moved)
             assert energy.total(again) - energy.total(residual) == pytest.approx(gain, abs=1e-8)
-            np.testing.assert_allclose(energy.step_residuals(residual, row, step), again, atol=1e-9)
+            stepped = energy.step_residuals(residual, np.array([row]), np.array([step]))
+            np.testing.assert_allclose(stepped, again, atol=1e-9)
 
 
 def test_the_inverse_and_the_slope_at_the_best_angles(case):

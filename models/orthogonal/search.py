@@ -1,0 +1,159 @@
+"""Search for integers of low energy: perturb, descend over single integers, keep what is lower.
+
+A perturbation changes what a field is made of: a singularity walks to another ring, a pair of opposite ones
+appears, or integers of neighbouring rows change. Where perturbations fail for long, the search begins again:
+at the next start, and after the last one at the best integers after many perturbations.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.sparse.csgraph import breadth_first_order
+
+from ..instance.angles import HALF
+from ..instance.domain import Floats, Ints, Rings
+from ..processes.deadline import Over
+from .energy import LOWER, MOST_DENSE, OrthogonalEnergy
+
+_KICKS: Final = 500  # perturbations per round
+_TIRED: Final = 3  # perturbations per point without success after which the search begins again
+_STRONG: Final = 50  # points per perturbation where it begins again
+_PATCH: Final = 1500  # points; a change of one integer costs 30 microseconds
+_ROWS: Final = 0.3  # share of the perturbations that change neighbouring rows
+_NEIGHBOURS: Final = 5  # such rows, at most
+_LONGEST: Final = 24  # rings of a walk
+_SINGULAR: Final = 0.7  # share of the walks that begin at a singularity
+
+
+class Point(NamedTuple):
+    """Integers (r,), the residuals (r,) of their best angles, and the energy."""
+
+    z: Ints
+    residual: Floats
+    total: float
+
+    @classmethod
+    def of(cls, energy: OrthogonalEnergy, z: Ints) -> Point:
+        """The point of these integers."""
+        residual = energy.residuals(energy.fit_angles(z), z)
+        return cls(z, residual, energy.total(residual))
+
+
+class IntegerSearch:
+    """A search from several starts: `best` so far, number of complete rounds, and perturbations in vain."""
+
+    def __init__(self, energy: OrthogonalEnergy, rings: Rings, starts: list[Ints], seed: int) -> None:
+        """Begin at the lowest of the starts, which are integers (r,)."""
+        self._energy, self._rings, self._seed = energy, rings, seed
+        self._starts = sorted((Point.of(energy, z) for z in starts), key=lambda point: -point.total)
+        self.best = self._present = self._starts.pop()
+        self._moves = _Moves(energy, rings) if energy.size <= MOST_DENSE else None
+        self.round = self.fruitless = self._tired = 0
+
+    def explore(self, over: Over) -> None:
+        """Try 500 perturbations, with more than 6,000 points within 1,500 of them; return early if over."""
+        rng = np.random.default_rng((self._seed, self.round))
+        if self._moves is None:
+            point = self._explore_patch(rng, over)
+        else:
+            if self._tired > _TIRED * self._energy.size:
+                self._present, self._tired = self._begin_again(rng, self._moves, over), 0
+            point = _lower(self._energy, self._moves, self._present, rng, over)
+        better = point.total < self._present.total - LOWER
+        self._tired, self.fruitless = 0 if better else self._tired + _KICKS, self.fruitless + _KICKS
+        self._present = point
+        if point.total < self.best.total - LOWER:
+            self.best, self.fruitless = point, 0
+        self.round += not over()
+
+    def _begin_again(self, rng: np.random.Generator, moves: _Moves, over: Over) -> Point:
+        if self._starts:
+            return self._starts.pop()
+        z, residual, _ = self.best
+        for _ in range(1 + self._energy.size // _STRONG):
+            z, residual = moves.perturb(rng, z, residual)
+        return Point.of(self._energy, self._energy.descend(z, residual, over)[0])
+
+    def _explore_patch(self, rng: np.random.Generator, over: Over) -> Point:
+        """Explore the points nearest to a row, alternately a random one and one of high energy."""
+        energy, (z, residual, total) = self._energy, self._present
+        share = energy.weight * residual**2 / total if self.round % 2 and total > LOWER else None
+        row = rng.choice(len(z), p=share)
+        near = breadth_first_order(energy.links, energy.first[row], directed=False)[0][:_PATCH]
+        patch, rows = energy.restrict(near, energy.fit_angles(z))
+        inside = np.maximum(patch.first, patch.second) < patch.size
+        local = np.full(len(z), -1, dtype=np.int32)
+        local[rows[inside]] = np.nonzero(inside)[0]
+        moves = _Moves(patch, self._rings.select(local))
+        z = z.copy()
+        z[rows] = _lower(patch, moves, Point.of(patch, z[rows]), rng, over).z
+        return Point.of(energy, z)
+
+
+def _lower(
+    energy: OrthogonalEnergy, moves: _Moves, point: Point, rng: np.random.Generator, over: Over
+) -> Point:
+    """The lowest point of a descent from this one, and of descents from the perturbed lowest one."""
+    for kick in range(_KICKS + 1):
+        if over():
+            break
+        z, residual = moves.perturb(rng, point.z, point.residual) if kick else (point.z, point.residual)
+        z, residual = energy.descend(z, residual, over)
+        total = energy.total(residual)
+        if total < point.total - LOWER:
+            point = Point(z, residual, total)
+    return Point.of(energy, point.z)  # rounding of many steps must not accumulate
+
+
+class _Moves:
+    """Random changes of several integers at once, to leave a valley that single steps do not leave."""
+
+    def __init__(self, energy: OrthogonalEnergy, rings: Rings) -> None:
+        """Prepare an energy; rings: of its rows."""
+        self._energy, self._rings = energy, rings
+        number = np.repeat(np.arange(len(rings.defect)), np.diff(rings.start))
+        # The ring that goes along a row from its first point to its second one [0], and back [1], or -1.
+        self._beside = np.full((len(energy.first), 2), -1)
+        self._beside[rings.pair, (rings.sign < 0).astype(int)] = number
+        by_point = abs(energy.rows).tocsc()
+        self._start, self._at_point = by_point.indptr, by_point.indices
+
+    def perturb(self, rng: np.random.Generator, z: Ints, residual: Floats) -> tuple[Ints, Floats]:
+        """Integers after a random change, and the residuals of their best angles."""
+        steps: Counter[int] = Counter()
+        if not len(self._rings.defect) or rng.random() < _ROWS:
+            self._change_neighbours(rng, steps)
+        else:
+            self._walk(rng, z, steps)
+        rows, change = np.array(list(steps), dtype=np.int32), np.array(list(steps.values()), dtype=np.int32)
+        z = z.copy()
+        z[rows] += change
+        return z, self._energy.step_residuals(residual, rows, change)
+
+    def _change_neighbours(self, rng: np.random.Generator, steps: Counter[int]) -> None:
+        """Change up to five rows by 1, each one at a point of the last one."""
+        ends, row = (self._energy.first, self._energy.second), int(rng.integers(len(self._energy.first)))
+        for _ in range(int(rng.integers(1, _NEIGHBOURS + 1))):
+            steps[row] += int(rng.choice((-1, 1)))
+            points = [int(end[row]) for end in ends if end[row] < self._energy.size]
+            point = points[int(rng.integers(len(points)))]
+            row = int(self._at_point[rng.integers(self._start[point], self._start[point + 1])])
+
+    def _walk(self, rng: np.random.Generator, z: Ints, steps: Counter[int]) -> None:
+        """Move a quarter of a turn from a ring, a singular one or any, along a random path of rings."""
+        rings = self._rings
+        ring, quarter = int(rng.integers(len(rings.defect))), int(rng.choice((-1, 1)))
+        turn = np.round((rings.defect - rings.sums(self._energy.offset + HALF * z)) / HALF)
+        if len(singular := np.nonzero(turn)[0]) and rng.random() < _SINGULAR:
+            ring = int(rng.choice(singular))
+            quarter = int(np.sign(turn[ring]))
+        for _ in range(int(_LONGEST ** rng.random())):
+            at = int(rng.integers(rings.start[ring], rings.start[ring + 1]))
+            row, sign = int(rings.pair[at]), int(rings.sign[at])
+            steps[row] += quarter * sign
+            ring = int(self._beside[row, int(sign > 0)])
+            if ring < 0:
+                break

@@ -1,0 +1,56 @@
+"""Fields by greedy rounding and descent over integers: of orthogonal crosses, and of all on meshes.
+
+Where crosses on a mesh may have any angles, the integers of orthogonal ones give the jumps to begin with.
+Then angles and best jumps alternate.
+"""
+
+from __future__ import annotations
+
+from ..field.field import CrossField
+from ..instance.domain import Ints
+from ..instance.instance import Instance
+from ..orthogonal.energy import MOST_DENSE, OrthogonalEnergy, field_of, integers_of
+from ..orthogonal.greedy import round_greedily
+from ..processes.deadline import Over
+from ..smooth.polyvector import power_field
+from .box_qp import FreeField, fit_in_box
+from .energy import LinearSolver
+from .improvement import settle
+
+
+def greedy_integer_field(instance: Instance, over: Over) -> CrossField:
+    """The field of greedy rounding."""
+    energy = OrthogonalEnergy.of(instance)
+    return finish_field(instance, energy, round_greedily(energy, over), over)
+
+
+def first_integer_field(instance: Instance, over: Over) -> CrossField:
+    """The lower of the greedy and the power field after descent; of over 6,000 points, the power field."""
+    energy = OrthogonalEnergy.of(instance)
+    if energy.size > MOST_DENSE:
+        z = energy.nearest(power_field(instance).alpha)
+    else:
+        z = min(starting_integers(instance, energy, None, over), key=energy.least_total)
+    return finish_field(instance, energy, z, over)
+
+
+def starting_integers(
+    instance: Instance, energy: OrthogonalEnergy, start: CrossField | None, over: Over
+) -> list[Ints]:
+    """Integers of the power field, the greedy field and a given one, after descent up to 6,000 points."""
+    starts = [energy.nearest(power_field(instance).alpha), round_greedily(energy, over)]
+    if start is not None:
+        starts.append(integers_of(start))
+    return starts if energy.size > MOST_DENSE else [energy.descend(z, over=over)[0] for z in starts]
+
+
+def finish_field(instance: Instance, energy: OrthogonalEnergy, z: Ints, over: Over) -> CrossField:
+    """The field of integers z (r,) in the windows; where beta is free or windows bind, best angles and jumps
+    in turn.
+    """
+    field = field_of(instance, z, energy)
+    if instance.orthogonal and instance.gauge == "strokes":
+        return fit_in_box(field, over)
+    state = FreeField.of(field)
+    settle(state, LinearSolver(), over)
+    return state.fit_in_bounds(over)
