@@ -42,12 +42,11 @@ class Reading:
     """How an instance was read from a drawing; not part of its content, files or hash.
 
     page: x, y, width and height of the page in the drawing's units, y down, None without one. warnings:
-    possible misreadings, one line each. openings: both ends of each gap in the outline that was bridged.
+    possible misreadings, one line each.
     """
 
     page: tuple[float, float, float, float] | None
     warnings: tuple[str, ...] = ()
-    openings: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
 
 
 def whole_numbers(values: Any, name: str, error: type[CrossfieldError] = InstanceError) -> Ints:

@@ -116,7 +116,3 @@ class StrokeTerms:
     def at_points(self, values: Floats, size: int) -> Floats:
         """Sums of the terms' values at each of `size` points, shape (size,)."""
         return np.bincount(self.point, values, size).astype(np.float64, copy=False)
-
-    def select(self, terms: Ints, number: Ints) -> StrokeTerms:
-        """Some of the terms, by their numbers, at points renumbered by `number` (n,)."""
-        return StrokeTerms(number[self.point[terms]], self.goal[terms], self.weight[terms])
