@@ -275,6 +275,8 @@ def _is_square(summand: sp.Expr, unknowns: list[sp.Symbol]) -> bool:
     factors = [factor for factor in sp.Mul.make_args(rest) if factor.free_symbols & set(unknowns)]
     if len(factors) != 1 or number < 0:
         return False
+    if factors[0].is_Add:  # times a weight
+        return _is_sum_of_squares(factors[0], unknowns)
     return bool(factors[0].is_Pow and factors[0].exp == 2 and _degree(factors[0].base, unknowns) == 1)
 
 

@@ -12,6 +12,7 @@ from crossfield.models.formulations.problem import Problem, formulate, with_inte
 from crossfield.models.instance.angles import QUARTER
 from crossfield.models.instance.domain import Floats
 from crossfield.models.instance.instance import Instance
+from meshes import box, tetrahedron
 
 MASKS = {
     "hole": ["###", "#.#", "###"],
@@ -25,6 +26,9 @@ MASKS = {
 """Shapes by name: with a hole, of several parts (one of them a single pixel), lines, one pixel,
 three-digit columns, 3 x 4.
 """
+
+MESHES = {"tetrahedron": tetrahedron, "box": box}
+"""Closed meshes of 4 and 12 faces."""
 
 _VARIANTS: list[tuple[str, dict[str, Any]]] = [
     *(
@@ -50,6 +54,14 @@ _VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("miqcp-bilinear-l1", {"beta_norm": 2}),
     ("miqp-mccormick", {"beta_norm": 1}),
     ("milp-mccormick", {"stroke_norm": 2, "beta_norm": 2}),
+    *(
+        (name, {"shape": "tetrahedron", "orthogonal": orthogonal})
+        for name in FORMULATIONS
+        for orthogonal in (True, False)
+    ),
+    ("milp-mccormick", {"shape": "box", "gauge": "box"}),
+    ("miqp-exact", {"orthogonal": True}),
+    ("milp-mccormick", {"orthogonal": True}),
     *((name, {"pinned": True}) for name in FORMULATIONS if name != "qp-fixed"),
 ]
 
@@ -62,34 +74,37 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """Every formulation in both gauges, and the variants: formulation and what differs from the default."""
 
-LOW_DEGREE = [label for label, (name, _) in CASES.items() if name != "minlp-parity"]
+LOW_DEGREE = [
+    label for label, (name, changes) in CASES.items() if name != "minlp-parity" or changes.get("orthogonal")
+]
 """The cases that LP and MPS can hold."""
 
 
-def make_instance(shape: str = "hole", gauge: str = "strokes", seed: int = 1, **weights: Any) -> Instance:
-    """A random instance on a mask by name, some 40 % of its pixels with a stroke."""
+def make_instance(shape: str = "hole", gauge: str = "strokes", seed: int = 1, **more: Any) -> Instance:
+    """A random instance on a mask or a mesh by name, some 40 % of its points with a stroke.
+
+    Pairs on meshes have random weights.
+    """
     rng = np.random.default_rng(seed)
-    mask = np.array([[pixel == "#" for pixel in row] for row in MASKS[shape]])
-    pixels = np.argwhere(mask)
-    chosen = rng.random(len(pixels)) < 0.4
-    chosen[rng.integers(len(pixels))] = True
-    pixels = pixels[chosen]
-    theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.1, 1, len(pixels))
-    return Instance.on_pixels(
-        "tiny",
-        mask,
-        pixels,
-        theta,
-        w,
-        **{"stroke_coefficient": 1.5, "skew_coefficient": 1e-3, "gauge": gauge} | weights,
-    )
+    values: dict[str, Any] = {"stroke_coefficient": 1.5, "skew_coefficient": 1e-3, "gauge": gauge}
+    mesh = MESHES[shape]() if shape in MESHES else None
+    mask = None if mesh else np.array([[pixel == "#" for pixel in row] for row in MASKS[shape]])
+    places = np.arange(mesh.size) if mesh else np.argwhere(mask)
+    chosen = rng.random(len(places)) < 0.4
+    chosen[rng.integers(len(places))] = True
+    places = places[chosen]
+    strokes = places, rng.uniform(0, np.pi, len(places)), rng.uniform(0.1, 1, len(places))
+    if mesh is None:
+        return Instance.on_pixels("tiny", mask, *strokes, **values | more)
+    values["pair_weights"] = rng.uniform(0.5, 2, len(mesh.first))
+    return Instance.on_faces("tiny", mesh, *strokes, **values | more)
 
 
 def make_field(instance: Instance, seed: int = 2) -> CrossField:
     """A random field: angles anywhere within their bounds, any jump within its bounds."""
     rng = np.random.default_rng(seed)
     alpha = rng.uniform(instance.alpha_lower, instance.alpha_upper)
-    beta = rng.uniform(-QUARTER, QUARTER, instance.grid.size)
+    beta = rng.uniform(-QUARTER, QUARTER, instance.domain.size) * (not instance.orthogonal)
     return CrossField(instance, alpha, beta, rng.integers(instance.p_min, instance.p_max + 1))
 
 
@@ -104,7 +119,8 @@ def problem_of(label: str) -> Problem:
     name, options = CASES[label]
     options = dict(options)
     pinned = options.pop("pinned", False)
-    instance = make_instance(**{key: options.pop(key) for key in ("shape", "gauge") if key in options})
+    keys = [key for key in ("shape", "gauge", "orthogonal") if key in options]
+    instance = make_instance(**{key: options.pop(key) for key in keys})
     problem = make_problem(name, instance, **options)
     return with_integers_fixed(problem, make_field(instance)) if pinned else problem
 

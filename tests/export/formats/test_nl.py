@@ -105,9 +105,9 @@ def pyomo_text(problem: Problem) -> list[str]:
 def test_header_agrees_with_the_writer_of_pyomo(label: str):
     """Pyomo counts on its own; it leaves out alpha of a pixel without stroke and neighbour."""
     problem = problem_of(label)
-    grid = problem.instance.grid
-    alone = grid.size - len(
-        {*grid.first.tolist(), *grid.second.tolist(), *problem.instance.stroke_index.tolist()}
+    domain = problem.instance.domain
+    alone = domain.size - len(
+        {*domain.first.tolist(), *domain.second.tolist(), *problem.instance.stroke_index.tolist()}
     )
     ours = b"".join(nl.generate(CanonicalForm(problem))).decode().splitlines()
     theirs = [line.partition("#")[0].split() for line in pyomo_text(problem)[:10]]

@@ -138,7 +138,7 @@ def test_convex_problems_have_positive_semidefinite_hessians():
         least = np.linalg.eigvalsh(hessian + hessian.T)[0] if len(coefficient) else 0.0
         if problem.is_convex:
             assert least > -1e-12
-        elif len(problem.instance.grid.first):
+        elif len(problem.instance.domain.first):
             assert least < -1e-3
 
 
