@@ -89,7 +89,7 @@ def root(
 
 @command("run")
 def run_command(
-    source: options.SketchInput,
+    source: options.Input,
     output: options.Folder,
     *,
     sketch: SketchOptions,
@@ -97,7 +97,7 @@ def run_command(
     threads: options.Threads = 0,
     printing: options.PrintOptions,
 ) -> None:
-    """Do all steps for one sketch: write the solver files, try the methods, keep a field and draw it.
+    """Do all steps for one sketch or mesh: write the solver files, try the methods, keep a field and draw it.
 
     The methods are {methods}. The field of bend is kept; the field of minimum 2-norm energy is written too.
     report.json contains all facts. Ctrl-C ends the run with the fields so far; a second Ctrl-C ends it now.
@@ -110,7 +110,7 @@ def run_command(
         show("reading the sketch")
         instance = sketch.read(source, "run", quiet=printing.quiet)
     if not (printing.quiet or printing.as_json):
-        print_line(plan_sentence(limits))
+        print_line(plan_sentence(limits, instance))
     with show_progress(quiet=printing.quiet) as show:
         report = run(instance, output, limits=limits, drawing=find_drawing(source), progress=show)
     printing.show(report.document(), lambda: show_report(report, output))

@@ -18,7 +18,7 @@ SKETCHES: Final = ("pixel",)
 BOTH: Final = ("pixel", "face")
 
 DOMAINS: Final = {
-    "run": SKETCHES,
+    "run": BOTH,
     "instance": BOTH,
     "export": BOTH,
     "solve": BOTH,

@@ -197,11 +197,11 @@ def show_report(report: Report, folder: Path) -> None:
     print_line(f"* kept: {folder / 'field.npz'} (.json, .rawfield)")
     quantile = f"{kept_facts['stroke_deviation_90_percent_degrees']:.1f}°"
     far = f"{kept_facts['strokes_beyond_10_degrees']:.0%}"
-    print_line(f"  90% of its stroke pixels are at most {quantile} off, and {far} more than 10°")
+    print_line(f"  90% of its strokes are at most {quantile} off, and {far} more than 10°")
     words = ", proven optimal" if best_facts.get("proven_optimal") else ""
     print_line(f"  least 2-norm energy{words}: {report.best.method}, {folder / 'lowest.npz'}")
     _print_proof(report, best_facts)
-    if report.interrupted in ("", "surface"):
+    if report.interrupted in ("", "surface") and report.instance.domain.kind == "pixel":
         print_line(f"  pictures: {folder / 'overview.png'} and others in the same folder")
         print_line(f"  layers in the coordinates of the drawing: {folder / 'overlay.svg'}")
     if report.surface is not None:

@@ -93,10 +93,11 @@ def _solve_by_method(name: str, request: Request) -> tuple[Candidate, Path]:
     """Final field of a method, and its file."""
     from ...models.field.file import write_field
     from ...models.storage import make_folder
-    from ..solving.methods import METHODS
+    from ..solving.methods import find_method
 
+    method = find_method(name, request.instance)
     target = make_folder(request.folder) / f"{request.instance.name}.{name}.field.npz"
-    *_, candidate = METHODS[name].find(request)
+    *_, candidate = method.find(request)
     write_field(candidate.field, target)
     return candidate, target
 

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from ...models.errors import DomainError
 from ...models.field.field import CrossField, field_in_windows
 from ...models.formulations.problem import formulate
 from ...models.instance.instance import Instance
+from ...models.orthogonal.energy import takes_integers
 from ...models.processes.deadline import Clock, Deadline, Over, Progress, never, silent
 from ...models.processes.job_counts import cores
 from ...models.processes.limits import Limits
@@ -112,13 +114,15 @@ class Request:
 class Method:
     """A method. find: yields its fields one by one, because a later one may fail.
 
-    The last one is its answer. timed: whether it runs up to the time limit, or ends when it is done.
+    The last one is its answer. timed: whether it runs up to the time limit, or ends when it is done. skewed:
+    whether it finds crosses at any angle on pixels only, and neither orthogonal ones nor any on meshes.
     """
 
     name: str
     summary: str
     find: Callable[[Request], Iterator[Candidate]]
     timed: bool = True
+    skewed: bool = False
 
 
 def _find_greedy(request: Request) -> Iterator[Candidate]:
@@ -242,7 +246,8 @@ METHODS: Final = {
     for method in (
         Method(
             "greedy",
-            "the greedy strategy of BendFields, then the best angles: the baseline",
+            "the greedy strategy of BendFields, on meshes of mixed-integer quadrangulation, then the best"
+            " angles: the baseline",
             _find_greedy,
             timed=False,
         ),
@@ -259,6 +264,7 @@ METHODS: Final = {
             " no limit cuts off the first factorisation",
             _find_polyvector,
             timed=False,
+            skewed=True,
         ),
         Method(
             "bend",
@@ -266,6 +272,7 @@ METHODS: Final = {
             " limit cuts off the factorisation of that field",
             _find_bend,
             timed=False,
+            skewed=True,
         ),
         Method(
             "search",
@@ -281,10 +288,27 @@ METHODS: Final = {
             "prove",
             "lower bounds on lattices of crosses, and fields from them, until one is proven optimal",
             _find_by_proof,
+            skewed=True,
         ),
     )
 }
 """The table of methods; command line, runs, docs and tests are generated from it."""
+
+
+def methods_of(instance: Instance) -> list[Method]:
+    """The methods that find fields of an instance."""
+    return [method for method in METHODS.values() if not (method.skewed and takes_integers(instance))]
+
+
+def find_method(name: str, instance: Instance) -> Method:
+    """The method of that name. Raises DomainError if it finds no fields of the instance."""
+    names = [method.name for method in methods_of(instance)]
+    if name not in names:
+        raise DomainError(
+            f"{name} takes pixels with crosses at any angle only, and {instance.name} has other ones; use "
+            f"{', '.join(names)}"
+        )
+    return METHODS[name]
 
 
 def _time_candidate(method: str, find: Callable[[], CrossField]) -> Candidate:

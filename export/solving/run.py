@@ -12,6 +12,7 @@ from ...models.errors import CrossfieldError, SolverError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
+from ...models.instance.mesh import Mesh
 from ...models.processes.deadline import Deadline, Over, Progress, Stop, silent, stop_function
 from ...models.processes.limits import Limits
 from ...models.processes.process_groups import catch_interrupts
@@ -23,7 +24,7 @@ from ..bundle.problem_files import write_all
 from ..pictures.mask import has_mask, write_mask
 from ..pictures.underlay import Underlay, read_underlay
 from ..surfaces.files import SHADED, write_shaded
-from .methods import METHODS, Candidate, Request
+from .methods import METHODS, Candidate, Request, methods_of
 from .proven import ProvenBound
 from .report import Report, Stopwatch
 from .run_page import REPORT, write_page
@@ -42,9 +43,9 @@ START: Final = "start"
 COMPILING: Final = "compiling"
 
 
-def plan_sentence(limits: Limits) -> str:
+def plan_sentence(limits: Limits, instance: Instance) -> str:
     """A sentence on the time limit of a run's searches, in all and each."""
-    timed = [method.name for method in METHODS.values() if method.timed]
+    timed = [method.name for method in methods_of(instance) if method.timed]
     limits_of_methods = ", ".join(f"{name} {limits.time_limit:g}" for name in timed)
     return f"at most {len(timed) * limits.time_limit:g} s: {limits_of_methods}; files and pictures on top"
 
@@ -76,6 +77,9 @@ def run(
     - DIR/report.json: written last
 
     Files of an earlier run stay until the new ones of their kind are complete, also when the run is killed.
+
+    Orthogonal crosses, and instances on meshes, get the methods that find such fields. Meshes have no
+    pictures and no surface.
 
     The report names methods that failed and what interrupted the run. Ctrl-C ends the current method with its
     best field; then no further method is tried and nothing is drawn. Before the solver files are written,
@@ -114,7 +118,7 @@ def run(
     should_stop = stop_function(stop)
     underlay = None if drawing is None else read_underlay(drawing, on=instance)
     limits, folder = Limits.finite_or_default(limits), make_folder(folder)
-    progress(plan_sentence(limits))
+    progress(plan_sentence(limits, instance))
     watch = Stopwatch()
     progress("greedy field")
     start = first_field(instance)
@@ -181,6 +185,8 @@ class _Results:
 
 def _compile_functions(request: Request) -> str:
     """Compile what methods need, so that a first run finds what later ones find; the stage if interrupted."""
+    if METHODS["prove"] not in methods_of(request.instance):
+        return ""
     from ...models.proof.compiling import compile_proofs
 
     try:
@@ -194,7 +200,7 @@ def _compile_functions(request: Request) -> str:
 
 def _find_fields(results: _Results, request: Request, watch: Stopwatch) -> None:
     """Add the fields that the methods of a run find in turn, until one is interrupted."""
-    for method in METHODS.values():
+    for method in methods_of(request.instance):
         try:
             for candidate in method.find(request):
                 results.candidates.append(candidate)
@@ -231,6 +237,8 @@ def _draw_all(
 
     The report says whether Ctrl-C or the caller ended that.
     """
+    if isinstance(report.instance.domain, Mesh):
+        return report, set()
     # An exception at Ctrl-C could be raised in a callback, where Python discards it.
     with catch_interrupts() as pressed, replacing_files(folder) as new:
 

@@ -53,6 +53,7 @@ def write_page(
     overlay = _read_svg(folder / "overlay.svg") if "overlay.svg" in names else ""
     text = ENVIRONMENT.get_template("run/index.html.j2").render(
         report=report,
+        on_mesh="faces" in report["instance"],
         seconds=f"{report['seconds']:.0f}",
         bound=report["proof"] and f"{report['proof']['bound_2_norm']:.6g}",
         layers=[entry for entry in _LAYERS if entry[0] != "drawing" or 'id="drawing"' in overlay],

@@ -307,7 +307,7 @@ class CrossField(Pictured):
     @property
     def shape(self) -> Shape:
         """Distances of the lines from the strokes, and the share of narrow crosses."""
-        deviation = self.stroke_deviation
+        deviation = self.stroke_deviation if len(self.instance.theta) else np.zeros(1)
         return Shape(
             mean_deviation=float(deviation.mean()),
             most_deviation=float(np.quantile(deviation, MOST)),

@@ -1,0 +1,50 @@
+"""Runs and methods on meshes, and of orthogonal crosses on pixels."""
+
+import json
+
+import crossfield as cf
+import pytest
+from cases import make_instance
+from crossfield.export.solving.methods import METHODS, Request, find_method, methods_of
+from crossfield.models.errors import DomainError
+from meshes import box, on_edges
+
+INSTANCES = {
+    "mesh": lambda: on_edges(box(1)),
+    "skewed mesh": lambda: on_edges(box(1), orthogonal=False, skew_coefficient=0.01),
+    "orthogonal pixels": lambda: make_instance(orthogonal=True),
+}
+
+
+@pytest.mark.parametrize("name", INSTANCES)
+def test_every_method_of_an_instance_finds_a_field(name, tmp_path):
+    instance = INSTANCES[name]()
+    for method in methods_of(instance):
+        *_, last = method.find(Request(instance, tmp_path, cf.Limits(5.0)))
+        last.field.check_instance(instance)
+        assert last.field.beta.any() <= (not instance.orthogonal)
+
+
+@pytest.mark.parametrize("name", INSTANCES)
+def test_other_methods_name_those_that_work(name):
+    instance = INSTANCES[name]()
+    for method in set(METHODS) - {method.name for method in methods_of(instance)}:
+        with pytest.raises(DomainError, match=f"^{method} takes pixels .*; use greedy, power, search"):
+            find_method(method, instance)
+
+
+def test_pixels_with_free_angles_have_every_method():
+    assert methods_of(make_instance()) == list(METHODS.values())
+
+
+def test_a_run_on_a_mesh_writes_fields_and_a_report(tmp_path):
+    instance = on_edges(box(1))
+    report = cf.run(instance, tmp_path, limits=cf.Limits(2.0))
+    assert report.best.field.energy().total == pytest.approx(0.0, abs=1e-9)
+    assert {candidate.method for candidate in report.candidates} >= {"greedy", "power", "search"}
+    assert not report.failures
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written >= {"field.rawfield", "field.obj", "lowest.npz", "models", "report.json", "index.html"}
+    facts = json.loads((tmp_path / "report.json").read_text())
+    assert facts["methods"][0]["singularities"] == 8
+    assert "12 faces of a mesh" in (tmp_path / "index.html").read_text()
