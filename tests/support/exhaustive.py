@@ -45,9 +45,9 @@ def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
 def random_field(instance, seed, beyond=-1e-3):
     """Crosses anywhere inside their windows, with the best jumps; beyond: share of those at either end."""
     rng = np.random.default_rng(seed)
-    at_alpha, at_beta = np.clip(rng.uniform(-beyond, 1 + beyond, (2, instance.grid.size)), 0, 1)
+    at_alpha, at_beta = np.clip(rng.uniform(-beyond, 1 + beyond, (2, instance.domain.size)), 0, 1)
     alpha = np.clip(instance.alpha_lower + HALF * at_alpha, instance.alpha_lower, instance.alpha_upper)
-    beta = HALF * at_beta - QUARTER
+    beta = (HALF * at_beta - QUARTER) * (not instance.orthogonal)
     return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
 

@@ -19,15 +19,29 @@ from exhaustive import random_field
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from loops import for_each
+from meshes import box, flat_sheet, on_edges
 
 # The file is written anew in every example, so sharing the folder is harmless.
 settings.register_profile("files", suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 files = settings.get_profile("files")
 
 
+@pytest.fixture(params=["pixels", "faces"])
+def domain(request):
+    return request.param
+
+
 @pytest.fixture
 def instance():
     return full_instance()
+
+
+@pytest.fixture
+def on_either(domain, instance):
+    """A field on pixels, or on a mesh with a weight for each pair."""
+    if domain == "pixels":
+        return random_field(instance, 1)
+    return random_field(on_edges(box(), orthogonal=False, pair_weights=np.linspace(0.5, 2, 18)), 1)
 
 
 @pytest.fixture
@@ -41,10 +55,10 @@ def same_field(one, other):
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])
-def test_field_comes_back_and_gives_the_same_bytes(field, tmp_path, suffix):
-    first = write_field(field, tmp_path / f"one.{suffix}")
+def test_field_comes_back_and_gives_the_same_bytes(on_either, tmp_path, suffix):
+    first = write_field(on_either, tmp_path / f"one.{suffix}")
     back = read_field(first)
-    assert same_field(field, back)
+    assert same_field(on_either, back)
     second = write_field(back, tmp_path / f"two.{suffix}")
     assert first.read_bytes() == second.read_bytes()
 
@@ -58,6 +72,23 @@ def test_json_states_each_jump_beside_its_pixel(tmp_path):
         [0, 1, 0.2, 0.5, None, None],
         [1, 0, 0.3, 0.0, 2, None],
     ]
+
+
+def test_json_of_a_mesh_states_each_jump_with_its_faces(tmp_path):
+    instance = on_edges(flat_sheet(1, 1), boundary=False)
+    field = CrossField(instance, [0.1, 0.2], [0, 0], [-1])
+    path = write_field(field, tmp_path / "small.json")
+    document = json.loads(path.read_text())
+    assert (document["faces"], document["jumps"]) == ([[0.1, 0], [0.2, 0]], [[1, 0, -1]])
+    for key, value, message in (
+        ("jumps", [[0, 1, -1]], "$.jumps: lists other pairs of faces than the mesh has"),
+        ("jumps", [[1, 0, 0.5]], "$.jumps[0][2]: 0.5 is not of type 'integer'"),
+        ("faces", [[0.1, 0]], "alpha has shape (1,)"),
+        ("faces", [[0.1, 0.1], [0.2, 0]], "beta is not 0 everywhere"),
+        ("pixels", [], "$: False schema does not allow []"),
+    ):
+        path.write_text(json.dumps(document | {key: value}))
+        refused(read_field, path, message)
 
 
 def test_unknown_ending_is_refused_before_anything_is_written(field, tmp_path):
@@ -209,8 +240,11 @@ def only_named_errors(read, path):
 @pytest.mark.parametrize("suffix", ["json", "npz"])
 @given(data=st.data())
 @settings(files, max_examples=120)
-def test_mutated_files_give_named_errors(instance, field, tmp_path, suffix, data):
-    for write, read, thing in ((write_instance, read_instance, instance), (write_field, read_field, field)):
+def test_mutated_files_give_named_errors(on_either, tmp_path, suffix, data):
+    for write, read, thing in (
+        (write_instance, read_instance, on_either.instance),
+        (write_field, read_field, on_either),
+    ):
         path = write(thing, tmp_path / f"mutated.{suffix}")
         content = bytearray(path.read_bytes())
         for _ in range(data.draw(st.integers(1, 4))):

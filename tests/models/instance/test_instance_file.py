@@ -4,6 +4,7 @@ import io
 import json
 import pickle
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from crossfield.models.errors import InputError
 from crossfield.models.instance.file import instance_arrays, instance_to_json, read_instance, write_instance
 from damage import change, full_instance, refused, same_instance, without
 from loops import for_each
+from meshes import box, on_edges, torus
 
 
 @pytest.fixture
@@ -199,3 +201,57 @@ def test_npz_that_breaks_the_rules_is_named(instance, tmp_path, name, array, mes
     entries = dict(np.load(path)) | {name: array}
     path.write_bytes(pack_arrays({key: value for key, value in entries.items() if value is not None}))
     refused(read_instance, path, message)
+
+
+@pytest.fixture
+def on_mesh():
+    weights = np.linspace(0.5, 2, 18)
+    return on_edges(box(), orthogonal=False, gauge="box", source="a box.obj", pair_weights=weights)
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_instances_on_meshes_and_of_right_angles_come_back(on_mesh, instance, tmp_path, suffix):
+    for number, whole in enumerate((on_mesh, on_edges(torus(3, 3)), replace(instance, orthogonal=True))):
+        first = write_instance(whole, tmp_path / f"{number}.{suffix}")
+        back = read_instance(first)
+        assert back.sha256 == whole.sha256
+        assert back.orthogonal == whole.orthogonal
+        assert write_instance(back, tmp_path / f"again.{suffix}").read_bytes() == first.read_bytes()
+        assert (b"orthogonal" in first.read_bytes()) == whole.orthogonal or suffix == "npz"
+
+
+@for_each(
+    "edit,message",
+    [
+        (without("faces"), "'faces' is a required property"),
+        (without("vertices"), "$: 'mask' is a required property"),
+        (change("mask", ["#"]), "False schema does not allow ['#']"),
+        (change("faces", [[0, 1, 99]]), "a vertex does not exist in face 0"),
+        (change("faces", [[0, 1]]), "$.faces[0]: [0, 1] is too short"),
+        (change("faces", [[0, 1, 1.5]]), "$.faces[0][2]: 1.5 is not of type 'integer'"),
+        (change("vertices", [[0, 0, float("nan")]]), "has a coordinate that is not a number"),
+        (change("strokes", [[0, 1, 0]]), "$.strokes[0][2]: 0 is less than or equal to the minimum of 0"),
+        (change("strokes", [[99, 1, 1]]), "there is no face 99 for a stroke"),
+        (change("pair_weights", [1]), "pair_weights has shape (1,); give one for each of 18 pairs"),
+        (change("pair_weights", [0] * 18), "$.pair_weights[0]: 0 is less than or equal to the minimum of 0"),
+        (change("orthogonal", 1), "$.orthogonal: 1 is not of type 'boolean'"),
+    ],
+)
+def test_meshes_that_break_the_rules_are_named_with_their_place(on_mesh, tmp_path, edit, message):
+    path = tmp_path / "broken.json"
+    path.write_text(json.dumps(edit(json.loads(instance_to_json(on_mesh)))))
+    refused(read_instance, path, message)
+
+
+def test_arrays_of_a_mesh_are_checked(on_mesh, tmp_path):
+    path = tmp_path / "broken.npz"
+    arrays = instance_arrays(on_mesh)
+    for name, other, message in (
+        ("faces", arrays["faces"].astype(float), "not numbers of the kind that belongs there"),
+        ("faces", arrays["faces"] + 7, "a vertex does not exist in face"),
+        ("vertices", arrays["vertices"][:, :2].copy(), "give vertices as (v, 3)"),
+        ("stroke_faces", arrays["stroke_faces"][:2], "need as many theta and w"),
+        ("mask", np.ones((1, 1), bool), "holds an array 'mask' that does not belong in it"),
+    ):
+        path.write_bytes(pack_arrays(arrays | {name: other}))
+        refused(read_instance, path, message)
