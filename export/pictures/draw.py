@@ -99,7 +99,7 @@ _LINE: Final = 13.0  # height of a line of text
 _CHARACTER: Final = 4.0  # width of a character of the caption, at most
 _NARROWEST: Final = 52.0  # room for a heading
 _MESH_SIDE: Final = 400.0  # points of the side of a picture of a mesh
-_ON_MESHES: Final = ("instance", "crosses")  # kinds of pictures of instances and fields on meshes
+ON_MESHES: Final = ("instance", "crosses")  # kinds of pictures of instances and fields on meshes
 
 
 @check_arguments
@@ -230,10 +230,10 @@ def _find_kind(kind: str, subject: Subject) -> PictureKind:
             f"{subject.name} is an instance without a field, which kind {kind} needs; solve it first, "
             "or use kind instance"
         )
-    if isinstance(_instance_of(subject).domain, Mesh) and kind not in _ON_MESHES:
+    if isinstance(_instance_of(subject).domain, Mesh) and kind not in ON_MESHES:
         raise DomainError(
             f"a picture of kind {kind} shows pixels, and {_instance_of(subject).name} is on a mesh; "
-            f"choose one of {', '.join(_ON_MESHES)}"
+            f"choose one of {', '.join(ON_MESHES)}"
         )
     return KINDS[kind]
 

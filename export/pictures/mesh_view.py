@@ -57,7 +57,7 @@ class View:
             front = np.clip(mesh.normals @ direction, 0, None)
             seen = (marked @ direction > 0.25).mean() if len(marked) else 0.0
             return float(
-                2 * seen + np.minimum(front, 0.6) @ mesh.areas / mesh.areas.sum() + 0.05 * direction[2]
+                0.5 * seen + np.minimum(front, 0.6) @ mesh.areas / mesh.areas.sum() + 0.05 * direction[2]
             )
 
         return cls.from_side(max(sides, key=lambda side: round(score(side), 9)))
@@ -133,7 +133,7 @@ def _line_marks(
         every = -(-int(shown.sum()) // MOST_CROSSES)
         faces = np.nonzero(shown)[0][:: max(every, 1)].astype(np.int32)
         arm = _ARM * size[faces, None] * np.sqrt(every)
-        for line, colour in enumerate(FAMILIES):
+        for line, colour in enumerate(_colours_of_lines(instance)):
             reach = arm * vectors_of(field)[faces, line]
             ends = np.stack([mesh.centres[faces] - reach, mesh.centres[faces] + reach], axis=1)
             marks.append((ends, colour, _WIDTH * typical * np.sqrt(every), 1e-3))
@@ -144,6 +144,11 @@ def _line_marks(
         ends = np.stack([mesh.centres[faces] - reach, mesh.centres[faces] + reach], axis=1)
         marks.append((ends, STROKE, 1.5 * _WIDTH * typical, 1e-3))
     return marks
+
+
+def _colours_of_lines(instance: Instance) -> tuple[str, str]:
+    """The colours of u and v: one where crosses are orthogonal, for then their lines are alike."""
+    return (FAMILIES[0], FAMILIES[0]) if instance.orthogonal else FAMILIES
 
 
 def _dark_edges(mesh: Mesh) -> Ints:
@@ -193,7 +198,7 @@ def model_data(field: CrossField) -> dict[str, Any] | None:
         return None
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     reach = np.linalg.norm(mesh.vertices - (low + high) / 2, axis=1).max()
-    wide = len(mesh.vertices) > 2**16
+    wide, (u, v) = len(mesh.vertices) > 2**16, _colours_of_lines(field.instance)
     number = "<u4" if wide else "<u2"
     arrays = {
         "vertices": np.round((mesh.vertices - (low + high) / 2) / reach * 32767).astype("<i2"),
@@ -208,8 +213,8 @@ def model_data(field: CrossField) -> dict[str, Any] | None:
         "wide": wide,
         "closed": not len(mesh.boundary),
         "axes": np.round(view.axes, 6).tolist(),
-        "u": FAMILIES[0],
-        "v": FAMILIES[1],
+        "u": u,
+        "v": v,
         "positive": POSITIVE,
         "negative": NEGATIVE,
     }

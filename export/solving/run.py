@@ -11,6 +11,7 @@ from ...models.arguments import check_arguments
 from ...models.errors import CrossfieldError, SolverError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
+from ...models.instance.grid import Grid
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
 from ...models.processes.deadline import Deadline, Over, Progress, Stop, silent, stop_function
@@ -78,8 +79,8 @@ def run(
 
     Files of an earlier run stay until the new ones of their kind are complete, also when the run is killed.
 
-    Orthogonal crosses, and instances on meshes, get the methods that find such fields. Meshes have no
-    pictures and no surface.
+    Orthogonal crosses, and instances on meshes, get the methods that find such fields. On a mesh there are
+    two pictures, `instance` and `crosses`, and the page turns the model.
 
     The report names methods that failed and what interrupted the run. Ctrl-C ends the current method with its
     best field; then no further method is tried and nothing is drawn. Before the solver files are written,
@@ -237,8 +238,6 @@ def _draw_all(
 
     The report says whether Ctrl-C or the caller ended that.
     """
-    if isinstance(report.instance.domain, Mesh):
-        return report, set()
     # An exception at Ctrl-C could be raised in a callback, where Python discards it.
     with catch_interrupts() as pressed, replacing_files(folder) as new:
 
@@ -248,7 +247,7 @@ def _draw_all(
         if not report.interrupted:
             report = _draw_field(report, new, underlay, request.progress, stop)
             watch.lap("pictures")
-        if not report.interrupted:
+        if not report.interrupted and isinstance(report.instance.domain, Grid):
             report = _draw_surface(report, new, request.progress, stop)
             watch.lap("surface")
         return report, {path.name for path in new.iterdir()}
@@ -258,17 +257,18 @@ def _draw_field(
     report: Report, folder: Path, underlay: Underlay | None, progress: Progress, stop: Over
 ) -> Report:
     """Draw the kept field; return the report, marked where Ctrl-C or the caller ended that."""
-    from ..pictures.draw import LAYERS, draw
+    from ..pictures.draw import LAYERS, ON_MESHES, draw
 
     ended = replace(report, interrupted="drawing")
+    on_mesh = isinstance(report.instance.domain, Mesh)
     try:
-        for kind in PICTURES:
+        for kind in ON_MESHES if on_mesh else PICTURES:
             if stop():
                 return ended
             progress(f"drawing {kind}")
             subject = report.instance if kind == "instance" else report.kept.field
             draw(subject, folder / picture_name(kind), kind=kind)
-        for name in OVERLAY:
+        for name in () if on_mesh else OVERLAY:
             if stop():
                 return ended
             progress(f"drawing {name}")
@@ -297,7 +297,7 @@ def _draw_surface(report: Report, folder: Path, progress: Progress, stop: Over) 
 def _write_report(report: Report, folder: Path, names: set[str]) -> None:
     """Write page and report, and remove files of an earlier run that this one did not replace."""
     document = report.document()
-    write_page(folder, document, report.manifests, names)
+    write_page(folder, document, report.manifests, names, report.kept.field)
     for name in {CERTIFICATE, MASK, SHADED, *OVERLAY, *map(picture_name, PICTURES)} - names:
         remove_file(folder / name)
     write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())

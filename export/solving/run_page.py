@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from base64 import b64encode
 from pathlib import Path
 from typing import Any, Final
 
+from ...models.field.field import CrossField
 from ...models.formulations.catalogue import declare
+from ...models.instance.mesh import Mesh
 from ...models.storage import read_bytes, write_bytes
 from ...templates import ENVIRONMENT
 from ..bundle.manifest import Manifest
 from ..formats.registry import FORMATS
+from ..pictures.mesh_view import model_data
 from ..solvers_table import BUNDLED, smallest_problem, suitability
 from .methods import table_cells
 
@@ -36,7 +40,7 @@ _FILES: Final = {
     "field.png": "streamlines",
     "crosses.png": "crosses",
     "angle.png": "angle between the lines",
-    "instance.png": "strokes and mask",
+    "instance.png": "strokes, on the mask or the mesh",
     "shaded.png": "the surface",
     "mask.png": "the pixels that are solved for; paint it and give it back with --mask",
     "report.json": "all facts",
@@ -44,16 +48,23 @@ _FILES: Final = {
 
 
 def write_page(
-    folder: Path, report: dict[str, Any], manifests: tuple[Manifest, ...], names: set[str]
+    folder: Path,
+    report: dict[str, Any],
+    manifests: tuple[Manifest, ...],
+    names: set[str],
+    field: CrossField,
 ) -> None:
-    """Write the page of a run. report: the document of report.json. names: the files that the run wrote.
+    """Write the page of a run.
 
-    Raises InputError, OutputError.
+    report: the document of report.json. names: the files that the run wrote. field: the kept one. Raises
+    InputError, OutputError.
     """
     overlay = _read_svg(folder / "overlay.svg") if "overlay.svg" in names else ""
     text = ENVIRONMENT.get_template("run/index.html.j2").render(
         report=report,
         on_mesh="faces" in report["instance"],
+        model=_model_of(field),
+        crosses=_embed_picture(folder / "crosses.png") if "crosses.png" in names else "",
         seconds=f"{report['seconds']:.0f}",
         bound=report["proof"] and f"{report['proof']['bound_2_norm']:.6g}",
         layers=[entry for entry in _LAYERS if entry[0] != "drawing" or 'id="drawing"' in overlay],
@@ -69,6 +80,12 @@ def write_page(
         files=[(name, meaning) for name, meaning in _FILES.items() if name in names | {REPORT}],
     )
     write_bytes(folder / PAGE, text.encode())
+
+
+def _model_of(field: CrossField) -> str:
+    """The data of the model that the page turns; empty without one."""
+    data = model_data(field) if isinstance(field.instance.domain, Mesh) else None
+    return "" if data is None else json.dumps(data)
 
 
 def _read_svg(path: Path) -> str:

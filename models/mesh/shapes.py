@@ -119,6 +119,24 @@ def extrude(flat: Mesh, height: float, layers: int) -> Mesh:
     return _mesh(points[used], place.reshape(-1, 3))
 
 
+def twist(mesh: Mesh, turn: float) -> Mesh:
+    """The mesh turned about the z axis, by so many radians per unit of height."""
+    angle = turn * mesh.vertices[:, 2]
+    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    x, y = (mesh.vertices - middle)[:, :2].T
+    points = [x * cosine(angle) - y * sine(angle), x * sine(angle) + y * cosine(angle), mesh.vertices[:, 2]]
+    return _mesh(np.stack(points, axis=1), mesh.faces.astype(np.int64))
+
+
+def taper(mesh: Mesh, share: float) -> Mesh:
+    """The mesh narrowed towards its top in both directions, by this share of its width."""
+    low, high = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
+    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    scale = 1 - share * (mesh.vertices[:, 2:] - low) / (high - low)
+    points = np.concatenate([(mesh.vertices - middle)[:, :2] * scale, mesh.vertices[:, 2:]], axis=1)
+    return _mesh(points, mesh.faces.astype(np.int64))
+
+
 def side_by_side(meshes: list[Mesh]) -> Mesh:
     """Meshes next to each other along x, as parts of one."""
     points, faces, right, count = [], [], 0.0, 0
@@ -152,8 +170,11 @@ MESHES: Final[dict[str, tuple[str, Callable[[], Mesh]]]] = {
         lambda: plate(30, 20, ((9.0, 11.0, 3.5), (21.0, 8.0, 3.0))),
     ),
     "cube": ("a cube", lambda: blocks(np.ones((6, 6, 6), dtype=bool))),
-    "bracket": ("two plates at a right angle, one with a window", lambda: blocks(_bracket())),
-    "stairs": ("four steps", lambda: blocks(_stairs())),
+    "bracket": (
+        "two plates at an angle, one with a window, twisted",
+        lambda: twist(blocks(_bracket()), 0.03),
+    ),
+    "stairs": ("four steps, narrower at the top", lambda: taper(blocks(_stairs()), 0.5)),
     "pin": ("a cylinder with two caps", lambda: extrude(disc(5), 2.0, 8)),
     "flange": ("a thick ring with sharp edges", lambda: extrude(annulus(32, 5), 0.8, 4)),
     "gear": ("a thick star with sharp edges", lambda: extrude(star(10), 0.5, 5)),
