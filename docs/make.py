@@ -97,7 +97,19 @@ The window $[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is data. Under the
 $[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0, \pi/2]$ elsewhere. Under `box` it is $[0, \pi/2]$
 everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$ follow from the windows. With the facet
 `printed`, the row (26) is replaced by the bound $z \ge -\pi/4$, as in the paper. Sections and numbers in
-brackets refer to the paper."""
+brackets refer to the paper.
+
+Four formulations are for orthogonal crosses only ($\beta = 0$). `crossfield export` leaves them out of an
+instance whose crosses may be skewed. `miqp-cycle` and `milp-cycle` have no windows and no $\alpha$: $C$ is a
+basis of the cycles of pairs and strokes, in which a stroke joins its pixel to one further point. Their
+integers are the quarter turns along a cycle, and $H_c$ is the sum of $\pm\kappa_{ij}$ along it, plus
+$\theta_i - \theta_j$ for a walk from the stroke $i$ to the stroke $j$.
+
+Residuals have the bounds $d^{\max} = q^{\max} = \pi/4$, which every optimum keeps. The option `limits` of the
+2-norm replaces them by $\pi/4 \, (1 - r)$, where $r$ is the effective resistance between the ends of the pair
+or stroke times its conductance $2 \omega_{ij}$ or $w_{\mathrm{strokes}} w_i$. Exactly those fields are cut
+off in which one jump can change by one, all angles follow, and the energy falls. No optimum is among them,
+so the optimum stays; a field of low energy may be cut off."""
 
 
 def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes") -> Instance:

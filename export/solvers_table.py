@@ -335,7 +335,8 @@ def suitabilities(problem: Problem) -> dict[str, Suitability]:
 
 
 def smallest_problem(formulation: Formulation) -> Problem:
-    """The formulation on two pixels: enough to determine what a format carries and a solver takes."""
+    """The formulation on four pixels: enough to determine what a format carries and a solver takes."""
     pixels, ones = np.zeros((1, 2), dtype=np.int32), np.ones(1)
-    instance = Instance.on_pixels("smallest", np.ones((1, 2), dtype=bool), pixels, ones, ones)
-    return Problem(instance, formulation, np.zeros(1, dtype=np.int32) if formulation.fixed else None)
+    mask, orthogonal = np.ones((2, 2), dtype=bool), formulation.declaration.orthogonal
+    instance = Instance.on_pixels("smallest", mask, pixels, ones, ones, orthogonal=orthogonal)
+    return Problem(instance, formulation, np.zeros(4, dtype=np.int32) if formulation.fixed else None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -172,11 +172,11 @@ def narrow_windows(problem: Problem, windows: Windows | None) -> Problem:
 
 def manifest_document(problem: Problem, written: list[Written], refused: dict[str, str]) -> dict[str, Any]:
     """The document of a problem's files. refused: reasons by format."""
-    instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
+    instance, formulation = problem.instance, problem.formulation
     form = CanonicalForm(problem)
-    tightening = {}
+    tightening: dict[str, Any] = {"limited": problem.limited} if problem.limited else {}
     if problem.windows is not None:  # and the sentence about it in the files' headers
-        tightening = {"tightened": problem.tightened, "windows": problem.windows.document()}
+        tightening |= {"tightened": problem.tightened, "windows": problem.windows.document()}
     files = [
         {"name": name, "format": entry.format, "dialect": entry.dialect, "lifted": entry.lifted, **facts}
         for entry in written
@@ -194,7 +194,7 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
         },
         "formulation": formulation.name,
         "paper": formulation.paper,
-        "options": asdict(options),
+        "options": formulation.options.document,
         "class": problem.problem_class,
         "convex": problem.is_convex,
         "counts": {

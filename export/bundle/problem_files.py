@@ -18,7 +18,7 @@ from typing import Any
 from ...models.arguments import check_arguments
 from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
-from ...models.formulations.catalogue import FORMULATIONS, declaration_of, declare
+from ...models.formulations.catalogue import declaration_of, declare, list_formulations
 from ...models.formulations.declaration import Declaration, Formulation, Options
 from ...models.formulations.problem import Problem, formulate
 from ...models.formulations.windows import Windows
@@ -86,7 +86,7 @@ def write_all(
     instance: Instance,
     folder: str | Path,
     *,
-    formulations: Iterable[str] = tuple(FORMULATIONS),
+    formulations: Iterable[str] | None = None,
     formats: Iterable[str] = DEFAULTS,
     start: CrossField | None = None,
     jumps_of: CrossField | None = None,
@@ -105,7 +105,7 @@ def write_all(
     folder
         Folder to write to; created if it does not exist.
     formulations
-        Names of formulations; all by default.
+        Names of formulations; by default all that the instance can have.
     formats
         Names of formats; nl, gms, lp and mps by default.
     start
@@ -115,7 +115,7 @@ def write_all(
     windows
         Narrower windows of alpha and beta and ranges of jumps, for all formulations.
     options
-        `facet`, `stroke_norm`, `beta_norm` and `relax`, each used where a formulation has it.
+        `facet`, `stroke_norm`, `beta_norm`, `relax` and `limits`, each used where a formulation has it.
     dialects
         By format: `text` or `binary` for nl.
     compress
@@ -135,7 +135,7 @@ def write_all(
     InputError
         For an unknown format.
     FormulationError
-        For an unknown formulation.
+        For an unknown formulation, and for one that the instance cannot have.
     InstanceError
         For a start on another instance.
     OutputError
@@ -143,6 +143,8 @@ def write_all(
 
     """
     options = options or {}
+    if formulations is None:
+        formulations = list_formulations(instance, narrowed=windows is not None)
     declarations = [declaration_of(name) for name in formulations]
 
     def chosen(declaration: Declaration) -> dict[str, Any]:

@@ -162,6 +162,7 @@ def export_command(
     stroke_norm: options.StrokeNorm = None,
     beta_norm: options.BetaNorm = None,
     relax: options.Relax = False,
+    limits: options.ResidualLimits = False,
     start: options.Start = None,
     tightened: options.Tightened = None,
     nl_form: options.NlForm = None,
@@ -170,12 +171,13 @@ def export_command(
 ) -> None:
     """Write an instance as files for solvers, in every formulation and format.
 
-    Each formulation also has a manifest (.manifest.json), which `crossfield read` needs.
+    By default, formulations that the instance cannot have are left out. Each formulation also has a manifest
+    (.manifest.json), which `crossfield read` needs.
     """
     from ..bundle.problem_files import write_all
     from ..formats.registry import DEFAULTS, FORMATS
 
-    formulations = full_formulation_names(formulation)
+    formulations = full_formulation_names(formulation) if formulation else None
     formats = check_names(file_format or list(DEFAULTS), FORMATS, "format")
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
@@ -201,13 +203,14 @@ def export_command(
                 "stroke_norm": stroke_norm,
                 "beta_norm": beta_norm,
                 "relax": relax or None,
+                "limits": limits or None,
             },
             dialects={"nl": nl_form} if nl_form else {},
             compress=compress,
             progress=show,
         )
     documents = [manifest.document for manifest in manifests]
-    printing.show(documents, lambda: show_manifests(instance, documents, output))
+    printing.show(documents, lambda: show_manifests(instance, documents, output, complete=not formulation))
 
 
 command("solve")(solve_command)

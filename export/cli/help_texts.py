@@ -65,7 +65,7 @@ PANELS: Final = {
     "Sketch": "size mask silhouette curvature view",
     "Mesh": "sharp directions weights",
     "Instance": "crosses gauge stroke-weight skew-weight",
-    "Formulation": "formulation facet stroke-norm beta-norm relax norm tightened",
+    "Formulation": "formulation facet stroke-norm beta-norm relax limits norm tightened",
     "Method and solver": "method solver start program solve search",
     "Entries": "rung",
     "Files": "format nl-form gzip manifest solution check on underlay",

@@ -150,6 +150,14 @@ Relax = Annotated[
         "--relax", help="Let integers take any value within their bounds, which gives a lower bound."
     ),
 ]
+ResidualLimits = Annotated[
+    bool,
+    typer.Option(
+        "--limits",
+        help="Limit residuals of orthogonal crosses to what no change of one jump improves; the optimum "
+        "stays.",
+    ),
+]
 FormulationName = Annotated[
     str | None, _formulation(help="Solve this formulation: {formulations}; in short {short names}.")
 ]

@@ -258,8 +258,15 @@ def _describe_gap(facts: dict[str, Any]) -> str:
     return f"{how or 'did not close its gap'}: {words}, gap {facts['gap']:.0%}"
 
 
-def show_manifests(instance: Instance, documents: list[dict[str, Any]], folder: Path) -> None:
-    """Print the files of an export by their manifests, and the reasons for files that were refused."""
+def show_manifests(
+    instance: Instance, documents: list[dict[str, Any]], folder: Path, *, complete: bool = False
+) -> None:
+    """Print the files of an export by their manifests, and the reasons for files that were refused.
+
+    complete: whether all formulations were asked for, so that those left out are named.
+    """
+    from ...models.formulations.catalogue import FORMULATIONS, declare, reason_against
+
     names = list(dict.fromkeys(name for document in documents for name in _sizes_of_models(document)))
     columns = ("formulation", "class", "columns", "rows", *names)
     rows = []
@@ -272,6 +279,10 @@ def show_manifests(instance: Instance, documents: list[dict[str, Any]], folder: 
     for document in documents:
         for reason in document["refused"].values():
             print_line(f"not written: {reason}")
+    present = {document["formulation"] for document in documents}
+    left_out = [name for name in FORMULATIONS if complete and name not in present]
+    for reason in dict.fromkeys(reason_against(declare(name), instance) for name in left_out):
+        print_line(f"not written: {', '.join(left_out)}, which {reason}")
     print_line(f"files: {folder}")
 
 

@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 
 from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.families import Block, PlacedFamily
-from ...models.formulations.names import number_width
+from ...models.formulations.names import element_numbers, is_numbered, number_width
 from ...models.formulations.problem import Problem
-from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet, Variable, point_of
+from ...models.formulations.symbols import SCALARS, SLOTS, IndexMap, IndexSet, Variable, point_of
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
 from ...templates import stream
@@ -55,7 +55,10 @@ WIDTH: Final = 110
 
 @dataclass(frozen=True)
 class _Indices:
-    """Indices of a model: by index set its domain and its index, and the points i and j of a pair."""
+    """Indices of a model: by index set its domain and its index, and the points i and j of a pair.
+
+    A cycle l has sets of tuples that begin with it: its steps, and the strokes at its start and its end.
+    """
 
     domains: dict[IndexSet, str]
     index: dict[IndexSet, str]
@@ -64,14 +67,19 @@ class _Indices:
 
 
 _OF_PIXELS: Final = _Indices(
-    {"pixels": "{(r,c) in I}", "strokes": "{(r,c) in S_c}", "pairs": "{(r,c,h) in E}"},
-    {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,h"},
+    {
+        "pixels": "{(r,c) in I}",
+        "strokes": "{(r,c) in S_c}",
+        "pairs": "{(r,c,h) in E}",
+        "cycles": "{l in C}",
+    },
+    {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,h", "cycles": "l"},
     "r,c",
     "r - north[h], c + east[h]",
 )
 _OF_FACES: Final = _Indices(
-    {"pixels": "{i in I}", "strokes": "{i in S_c}", "pairs": "{e in E}"},
-    {"pixels": "i", "strokes": "i", "pairs": "e"},
+    {"pixels": "{i in I}", "strokes": "{i in S_c}", "pairs": "{e in E}", "cycles": "{l in C}"},
+    {"pixels": "i", "strokes": "i", "pairs": "e", "cycles": "l"},
     "first[e]",
     "second[e]",
 )
@@ -81,6 +89,12 @@ def _indices(instance: Instance) -> _Indices:
     return _OF_FACES if isinstance(instance.domain, Mesh) else _OF_PIXELS
 
 
+_SUMS: Final[dict[IndexMap, tuple[IndexSet, str, str]]] = {
+    "round": ("pairs", "STEPS", "sign[l,{}]*"),
+    "start": ("strokes", "STARTS", ""),
+    "end": ("strokes", "ENDS", ""),
+}
+"""Ways from a cycle that are sums: over which index set, by which tuples, with which factor."""
 SENSES: Final = {">=": b" >= ", "<=": b" <= ", "==": b" = "}
 
 
@@ -104,6 +118,9 @@ def generate(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
         "point": "i" if indices is _OF_FACES else "(r,c)",
         "turn": " + kappa[e]" if indices is _OF_FACES else "",
         "windows": problem.windows is not None,
+        "has_alpha": "alpha" in problem.blocks,
+        "cycles": _has_columns(problem, "k"),
+        "limited": {f"{name}_max": indices.domains[over] for name, over in _limited(problem).items()},
         "jumps": problem.jumps is not None and len(problem.jumps) > 0,
         "variables": [
             _variable_text(problem.variable(block.name), block, indices)
@@ -138,6 +155,7 @@ def generate_data(problem: Problem, header: list[str]) -> Iterator[bytes]:
         yield from _element_lines(instance, "pairs", [words(problem.jumps[at].astype(np.float64))], at)
         yield b";\n"
     yield from _windows(problem)
+    yield from _limits_and_cycles(problem)
     yield b"end;\n"
 
 
@@ -149,6 +167,43 @@ def _windows(problem: Problem) -> Iterator[bytes]:
         parts = [part for value in values for part in (b" ", value)][1:]
         yield from _element_lines(problem.instance, over, parts)
         yield b";\n"
+
+
+def _limits_and_cycles(problem: Problem) -> Iterator[bytes]:
+    """Limits of residuals; cycles with their data, the pairs of their steps, and strokes at their ends."""
+    instance, data = problem.instance, problem.data
+    for name, over in _limited(problem).items() if problem.formulation.options.limits else ():
+        yield f"param {name}_max :=\n".encode()
+        yield from _element_lines(instance, over, [words(data[f"{name}_max"])])
+        yield b";\n"
+    if not _has_columns(problem, "k"):
+        return
+    cycles = instance.cycles
+    steps = np.diff(cycles.start)
+    names = ("holonomy", "k_min", "k_max", "is_open")
+    yield f"param: C: steps {' '.join(names)} :=\n".encode()
+    values = (words(data[name].astype(np.float64)) for name in names)
+    parts = [part for value in values for part in (b" ", value)]
+    yield from _element_lines(instance, "cycles", [Decimals(steps), *parts])
+    yield b";\nparam: STEPS: sign :=\n"
+    number = Decimals(np.repeat(np.arange(len(steps)), steps))
+    yield from _element_lines(instance, "pairs", [words(data["sign"])], cycles.pair, [number, b" "])
+    at = np.nonzero(data["is_open"])[0]
+    for members, strokes in zip((b"STARTS", b"ENDS"), cycles.ends[at].T, strict=True):
+        yield b";\nset %b :=\n" % members
+        yield from _element_lines(instance, "strokes", [], strokes, [Decimals(at), b" "])
+    yield b";\n"
+
+
+def _limited(problem: Problem) -> dict[str, IndexSet]:
+    """The residuals that are columns with limits, and their index sets."""
+    if not problem.formulation.declaration.orthogonal:
+        return {}
+    return {name: problem.blocks[name].over for name in ("d", "q") if _has_columns(problem, name)}
+
+
+def _has_columns(problem: Problem, name: str) -> bool:
+    return name in problem.blocks and problem.blocks[name].count > 0
 
 
 def _points(instance: Instance) -> Iterator[bytes]:
@@ -177,20 +232,24 @@ def _pairs_of_faces(instance: Instance) -> Iterator[bytes]:
 
 
 def _element_lines(
-    instance: Instance, over: IndexSet, values: Pieces, at: NDArray[Any] | None = None
+    instance: Instance, over: IndexSet, values: Pieces, at: NDArray[Any] | None = None, before: Pieces = ()
 ) -> Iterator[bytes]:
-    """One element per line, its index and values: `1 2 u 0.3`; only the elements `at`, if given."""
-    if isinstance(instance.domain, Mesh):
-        numbers = np.arange(len(instance.domain.first)) if over == "pairs" else point_of(instance, over)
+    """One element per line, its index and values: `1 2 u 0.3`; only the elements `at`, if given.
+
+    before: pieces in front of the index.
+    """
+    if is_numbered(instance, over):
+        numbers = element_numbers(instance, over)
         numbers = numbers if at is None else numbers[at]
-        yield from render([Decimals(numbers), b" ", *values, b"\n"], len(numbers))
+        yield from render([*before, Decimals(numbers), b" ", *values, b"\n"], len(numbers))
         return
     rows, columns = instance.grid.places(point_of(instance, over)).T
     sides = instance.grid.upward.view(np.uint8)
     if at is not None:
         rows, columns, sides = rows[at], columns[at], sides[at]
     side: Pieces = [b" ", Words(word_table([b"r", b"u"]), sides)] if over == "pairs" else []
-    yield from render([Decimals(rows), b" ", Decimals(columns), *side, b" ", *values, b"\n"], len(rows))
+    index: Pieces = [*before, Decimals(rows), b" ", Decimals(columns), *side]
+    yield from render([*index, b" ", *values, b"\n"], len(rows))
 
 
 def _variable_text(variable: Variable, block: Block, indices: _Indices) -> dict[str, str]:
@@ -212,14 +271,14 @@ def _variable_text(variable: Variable, block: Block, indices: _Indices) -> dict[
 def _label(instance: Instance, block: Block) -> str:
     """Print format of a block's names: `alpha_%02d_%02d`."""
     number = f"_%0{number_width(instance, block.over)}d"
-    if isinstance(instance.domain, Mesh):
+    if is_numbered(instance, block.over):
         return block.name + number
     return block.name + 2 * number + "_%s" * (block.over == "pairs")
 
 
 def _family_text(family: PlacedFamily) -> dict[str, str]:
     """A family as the template prints it: its tag, its place in the paper, its set, and its text."""
-    declared, indices = family.family, _indices(family.instance)
+    declared, indices = family.family.rolled or family.family, _indices(family.instance)
     words = _AmplExpressions(declared.over, indices)
     if declared.is_row:
         left, right = (words.expression(side) for side in (declared.expression.lhs, declared.expression.rhs))
@@ -228,7 +287,7 @@ def _family_text(family: PlacedFamily) -> dict[str, str]:
         pieces = wrap_lines(words.summands(declared.expression), WIDTH, b"  ")
     paper = f"section {declared.paper}" if declared.paper[0].isdigit() else declared.paper
     return {
-        "tag": declared.tag,
+        "tag": family.family.tag,
         "paper": paper,
         "text": _literal_text(pieces),
         "domain": _domain(family, indices),
@@ -240,7 +299,9 @@ def _domain(family: PlacedFamily, indices: _Indices) -> str:
     over, only = family.family.over, family.family.only
     if only is None:
         return indices.domains[over]
-    return f"{indices.domains[over][:-1]}: abs({only[0]}[{indices.index[over]}]) mod 2 = {only[1]}}}"
+    index = indices.index[over]
+    length = f" and steps[{index}] = {family.family.steps}" if family.family.steps else ""
+    return f"{indices.domains[over][:-1]}: abs({only[0]}[{index}]) mod 2 = {only[1]}{length}}}"
 
 
 class _AmplExpressions(InfixLanguage):
@@ -256,7 +317,11 @@ class _AmplExpressions(InfixLanguage):
         if symbol in SCALARS:
             return str(symbol.name).encode()
         name, kind = SLOTS[self._over][symbol]
-        ends = {"first": self._indices.first, "second": self._indices.second}
+        if kind in _SUMS:
+            over, members, factor = _SUMS[kind]
+            index = self._indices.index[over]
+            return f"(sum{{(l,{index}) in {members}}} {factor.format(index)}{name}[{index}])".encode()
+        ends: dict[IndexMap, str] = {"first": self._indices.first, "second": self._indices.second}
         index = ends.get(kind, self._indices.index[self._over])
         return f"{name}[{index}]".encode()
 

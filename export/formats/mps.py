@@ -24,7 +24,6 @@ import numpy as np
 
 from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
-from ...models.formulations.symbols import SLOTS
 from ...models.instance.domain import Ints
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
@@ -112,7 +111,7 @@ def _incident_rows(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints
 
     None where row and column have the same number.
     """
-    instance, kind = family.instance, SLOTS[family.family.over][term.symbols[0]][1]
+    instance, kind = family.instance, family.family.slots[term.symbols[0]][1]
     if kind == "itself":
         row = (
             None
@@ -120,11 +119,25 @@ def _incident_rows(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints
             else _inverse_index(family.elements, family.block(term.symbols[0]).count)
         )
         return [(0, row, term)]
+    if family.family.over == "cycles":
+        at = family.column_of(term.symbols[0]) - family.block(term.symbols[0]).offset
+        return [(0, row, term) for row in _rows_by_turn(at, family.block(term.symbols[0]).count)]
     assert family.covers_index_set  # families on a part of the pairs have terms of only those pairs
     if kind == "stroke":
         return [(0, _inverse_index(instance.stroke_index, instance.domain.size), term)]
     of_points = _pairs_of_faces if isinstance(instance.domain, Mesh) else _pairs_of_pixels
     return [(rank, row, term) for rank, end, row in of_points(instance) if end == kind]
+
+
+def _rows_by_turn(index: Ints, count: int) -> Iterator[Ints]:
+    """The first place in `index` of each number below `count`, then the second, ...; -1 beyond the last."""
+    order = np.argsort(index, kind="stable")
+    turn = np.arange(len(order)) - np.searchsorted(index[order], index[order])
+    for number in range(int(turn.max(initial=-1)) + 1):
+        chosen = order[turn == number]
+        place = np.full(count, -1, dtype=np.int32)
+        place[index[chosen]] = chosen
+        yield place
 
 
 def _inverse_index(index: Ints, count: int) -> Ints:

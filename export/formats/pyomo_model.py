@@ -20,11 +20,11 @@ import sympy as sp
 from ...models.arguments import check_arguments
 from ...models.field.field import CrossField
 from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.names import element_numbers, is_numbered
 from ...models.formulations.problem import Problem
-from ...models.formulations.symbols import IndexSet, count_elements, point_of
+from ...models.formulations.symbols import IndexSet, point_of
 from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
-from ...models.instance.mesh import Mesh
 from ..writing.canonical import CanonicalForm
 
 ElementIndex = tuple[Any, ...]
@@ -82,12 +82,10 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
 def element_indices(instance: Instance, over: IndexSet) -> list[ElementIndex]:
     """Positions of an index set's elements: (row, column), for a pair of its first pixel, and its side.
 
-    On a mesh they are numbers of faces or of pairs.
+    On a mesh they are numbers of faces or of pairs, and of cycles on any domain.
     """
-    if isinstance(instance.domain, Mesh):
-        points = over != "pairs"
-        numbers = point_of(instance, over) if points else np.arange(count_elements(instance, over))
-        return list(zip(numbers.tolist(), strict=True))
+    if is_numbered(instance, over):
+        return list(zip(element_numbers(instance, over).tolist(), strict=True))
     grid = instance.grid
     at = point_of(instance, over)
     coordinates = [grid.rows[at].tolist(), grid.columns[at].tolist()]

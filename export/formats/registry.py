@@ -187,7 +187,7 @@ def header_lines(problem: Problem) -> list[str]:
         f"instance {problem.instance.name}, gauge {problem.instance.gauge}, sha256 {problem.instance.sha256}",
         f"facet {options.facet}, {norms}, integrality {integrality}",
     ]
-    changes = {"tightened": problem.tightened, "lifted": formulation.lifted}
+    changes = {"tightened": problem.tightened, "limited": problem.limited, "lifted": formulation.lifted}
     return lines + [f"{how}: {text}" for how, text in changes.items() if text]
 
 

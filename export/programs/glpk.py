@@ -111,15 +111,20 @@ def _without_objective(model: Algebra, path: Path) -> Algebra:
 
 
 def _our_names(names: list[str], path: Path) -> list[str]:
-    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with the printed number of digits."""
-    printed = re.search(r"_%0(\d+)d", path.read_text("utf-8"))
-    assert printed
-    return [_our_name(name, int(printed[1])) for name in names]
+    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with the printed number of digits.
+
+    Names with one number may have more digits than those with a row and a column.
+    """
+    printed = re.findall(r'"\w+?((?:_%0\d+d)+)', path.read_text("utf-8"))
+    digits = {label.count("%"): int(label[3:-1].split("d")[0]) for label in printed}
+    return [_our_name(name, digits) for name in names]
 
 
-def _our_name(name: str, digits: int) -> str:
+def _our_name(name: str, digits: dict[int, int]) -> str:
     stem, index = name.removesuffix("]").split("[")
-    return "_".join([stem, *(part.zfill(digits) if part.isdigit() else part for part in index.split(","))])
+    parts = index.split(",")
+    width = digits[sum(map(str.isdigit, parts))]
+    return "_".join([stem, *(part.zfill(width) if part.isdigit() else part for part in parts)])
 
 
 def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any, Any]:

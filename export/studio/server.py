@@ -25,7 +25,7 @@ from starlette.routing import Mount, Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ...models.errors import CrossfieldError, InputError, NoStrokeError, shortened
-from ...models.formulations.catalogue import FORMULATIONS
+from ...models.formulations.catalogue import list_formulations
 from ...models.input_limits import MAX_BYTES
 from ...models.processes.deadline import Over
 from ...models.sketch.samples import SAMPLES, sample_svg
@@ -127,7 +127,7 @@ class Page:
         text = ENVIRONMENT.get_template("studio/index.html.j2").render(
             samples=[sample for sample in SAMPLES.values() if sample.kind == "sketch"],
             downloads={name: entry.title for name, entry in DOWNLOADS.items() if name != "solver"},
-            formulations=list(FORMULATIONS),
+            formulations=list_formulations(),
             formats=list(FORMATS),
             sizes=SIZES,
         )

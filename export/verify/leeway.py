@@ -16,7 +16,7 @@ from ...models.formulations.families import Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Floats
 
-_CHOSEN: Final = frozenset({"alpha", "beta", "p", "p1", "p2"})
+_CHOSEN: Final = frozenset({"alpha", "beta", "p", "p1", "p2", "k"})
 """Blocks of columns that determine the field of a point."""
 
 

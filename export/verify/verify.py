@@ -25,6 +25,7 @@ from ...models.errors import CrossfieldError, InputError, UnsupportedBySolverErr
 from ...models.field.field import CrossField
 from ...models.formulations.names import column_names
 from ...models.formulations.problem import Problem
+from ...models.orthogonal.energy import OrthogonalEnergy, field_of, integers_of
 from ...models.processes.deadline import Deadline
 from ...models.processes.limits import Limits
 from ...models.storage import read_bytes, sha256_of, write_bytes
@@ -177,7 +178,13 @@ def random_field(problem: Problem, seed: int) -> CrossField:
     alpha = rng.uniform(data["alpha_lo"], data["alpha_up"])
     beta = rng.uniform(data["beta_lo"], data["beta_up"]) * (not problem.instance.orthogonal)
     jumps = rng.integers(data["p_min"], data["p_max"] + 1).astype(np.int32)
-    return CrossField(problem.instance, alpha, beta, jumps if problem.jumps is None else problem.jumps)
+    field = CrossField(problem.instance, alpha, beta, jumps if problem.jumps is None else problem.jumps)
+    if "d_max" not in data:
+        return field
+    if not problem.formulation.options.limits:
+        return field.with_best_jumps()  # |A| is at most pi/4
+    energy = OrthogonalEnergy.of(problem.instance)
+    return field_of(problem.instance, energy.descend(integers_of(field))[0], energy)
 
 
 @dataclass(frozen=True, eq=False)

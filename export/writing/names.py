@@ -10,7 +10,7 @@ import sympy as sp
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.names import column_names, element_names
 from ...models.formulations.problem import Problem
-from ...models.formulations.symbols import SLOTS, IndexSet
+from ...models.formulations.symbols import IndexSet
 from .records import TaggedWords, Words
 
 OBJECTIVE: Final = b"obj"
@@ -47,8 +47,8 @@ class Names:
 
     def at(self, family: PlacedFamily, symbol: sp.Symbol) -> TaggedWords:
         """Name of the symbol's column at each element of a family."""
-        block, (_, way) = family.block(symbol), SLOTS[family.family.over][symbol]
-        key = (family.family.over, way, family.family.only)
+        block, (_, way), declared = family.block(symbol), family.family.slots[symbol], family.family
+        key = (declared.over, way, declared.only, declared.steps)
         if key not in self._reached:
             words, inside = self._of(block.over), family.inside(symbol)
             self._reached[key] = words if inside is None else words.at(inside)

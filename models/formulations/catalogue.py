@@ -1,4 +1,4 @@
-"""The nine formulations, each one function that reads from top to bottom like the paper.
+"""The formulations, each one function that reads from top to bottom like the paper.
 
 Each yields the terms of its objective and its rows as SymPy expressions over the pixels I, the stroke pixels
 S_c or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the docs are all
@@ -20,6 +20,7 @@ from ..instance.instance import Instance
 from .declaration import (
     FORMULATIONS,
     S_C,
+    C,
     E,
     Facet,
     Family,
@@ -42,7 +43,10 @@ from .symbols import (
     beta_j,
     constants_of,
     d,
+    d_round,
     gamma,
+    holonomy,
+    k,
     omega,
     p,
     p1,
@@ -51,6 +55,9 @@ from .symbols import (
     p_min,
     pi,
     psi,
+    q,
+    q_end,
+    q_start,
     s,
     t,
     u,
@@ -64,11 +71,15 @@ TWO_NORM: Final = "the 2-norm energy"
 MIXED_NORM: Final = "the 1-norm of the smoothness with squares of stroke and skew terms"
 ONE_NORM: Final = "the 1-norm energy"
 AT_JUMPS: Final = "the 2-norm energy at given jumps"
+RIGHT_TWO_NORM: Final = "the 2-norm energy of orthogonal crosses"
+RIGHT_ONE_NORM: Final = "the 1-norm energy of orthogonal crosses"
 
 BY_HULL: Final = "z = p1 beta_i at every point with binary p1, by the four facets of its hull"
 BY_ROWS: Final = "the products p1 beta_i stand in the rows"
 
-PARITY: Final = omega * (2 * ((A.subs(p1 + 2 * p2, p)) ** 2 + (sp.cos(pi * p) * beta_i - beta_j) ** 2))
+A_WHOLE: Final = A.subs(p1 + 2 * p2, p)
+"""Change of direction across a pair, with one integer jump."""
+PARITY: Final = omega * (2 * (A_WHOLE**2 + (sp.cos(pi * p) * beta_i - beta_j) ** 2))
 """The smoothness of a pair with one integer jump, (1)-(4)."""
 QUARTIC: Final = omega * (2 * (A**2 + B**2))
 """The smoothness of a pair, (8)."""
@@ -197,17 +208,80 @@ def miqp_exact() -> Families:
     yield from skew(norm=2)
 
 
+BY_WINDOWS: Final = "beta is 0, and the windows of alpha hold every cross"
+BY_CYCLES: Final = "jumps matter only through their sums along a basis of the cycles"
+
+
+@formulation(
+    "miqp-orthogonal", paper="ours", kind="convex MIQP", short="ortho",
+    minimises=RIGHT_TWO_NORM, how=BY_WINDOWS, orthogonal=True,
+)  # fmt: skip
+def miqp_orthogonal(limits: bool = False) -> Families:  # noqa: ARG001 - the bounds of d depend on it
+    """Orthogonal crosses as in mixed-integer quadrangulation: one integer per pair."""
+    yield term("smooth", E, omega * (2 * d**2))
+    yield row("cd", E, sp.Eq(d, A_WHOLE), "residual of (1)")
+    yield from strokes(norm=2)
+
+
+@formulation(
+    "milp-orthogonal", paper="ours", kind="MILP", short="ortho1",
+    minimises=RIGHT_ONE_NORM, how=BY_WINDOWS, orthogonal=True,
+)  # fmt: skip
+def milp_orthogonal(stroke_norm: int = 1) -> Families:
+    """Orthogonal crosses in the 1-norm: one integer per pair."""
+    yield term("smooth", E, omega * (2 * s))
+    yield row(14, E, s >= A_WHOLE)
+    yield row(15, E, s >= -A_WHOLE)
+    yield from strokes(stroke_norm)
+
+
+@formulation(
+    "miqp-cycle", paper="ours", kind="convex MIQP", short="cycle",
+    minimises=RIGHT_TWO_NORM, how=BY_CYCLES, orthogonal=True,
+)  # fmt: skip
+def miqp_cycle(limits: bool = False) -> Families:  # noqa: ARG001 - the bounds of d and q depend on it
+    """Orthogonal crosses without windows and alpha: one integer per cycle."""
+    yield term("smooth", E, omega * (2 * d**2))
+    yield from strokes(2, q)
+    yield from cycles()
+
+
+@formulation(
+    "milp-cycle", paper="ours", kind="MILP", short="cycle1",
+    minimises=RIGHT_ONE_NORM, how=BY_CYCLES, orthogonal=True,
+)  # fmt: skip
+def milp_cycle(stroke_norm: int = 1) -> Families:
+    """Orthogonal crosses in the 1-norm without windows and alpha: one integer per cycle."""
+    yield term("smooth", E, omega * (2 * s))
+    yield row(14, E, s >= d)
+    yield row(15, E, s >= -d)
+    yield from strokes(stroke_norm, q)
+    yield from cycles()
+
+
 # Parts that several formulations share.
 
 
-def strokes(norm: int) -> Families:
+def cycles() -> Families:
+    """Residuals add up to the holonomy and whole quarter turns, along closed walks and from stroke to stroke.
+
+    They are residuals of a field exactly then.
+    """
+    turns = holonomy + pi / 2 * k
+    yield row("cyc", C, sp.Eq(d_round, turns), "closed", only=("is_open", 0))
+    yield row(
+        "path", C, sp.Eq(d_round + q_end - q_start, turns), "from stroke to stroke", only=("is_open", 1)
+    )
+
+
+def strokes(norm: int, residual: sp.Expr = R) -> Families:
     """The stroke term, (5) or (20), and for the 1-norm its rows (22), (23)."""
     if norm == 2:
-        yield term("strokes", S_C, w_strokes * w * R**2, "(5)")
+        yield term("strokes", S_C, w_strokes * w * residual**2, "(5)")
         return
     yield term("strokes", S_C, w_strokes * w * gamma, "(20)")
-    yield row(22, S_C, gamma >= R)
-    yield row(23, S_C, gamma >= -R)
+    yield row(22, S_C, gamma >= residual)
+    yield row(23, S_C, gamma >= -residual)
 
 
 def skew(norm: int) -> Families:
@@ -236,13 +310,37 @@ def facets_of_z(facet: Facet) -> Families:
 
 
 def declare(name: str, on: Instance | None = None, **chosen: Any) -> Formulation:
-    """The formulation of a name, full or short, with options: facet, stroke_norm, beta_norm, relax.
+    """The formulation of a name, full or short, with options (`Options`).
 
     on: the instance whose domain it is written for, None for the pixels of a sketch. An option that is None
     keeps its default. Raises FormulationError for an unknown name, option or value.
     """
     options = {key: value for key, value in chosen.items() if value is not None}
-    return _with_constants(declaration_of(name).with_options(options), tuple(constants_of(on).items()))
+    declaration = declaration_of(name)
+    constants = constants_of(on, orthogonal=declaration.orthogonal)
+    return _with_constants(declaration.with_options(options), tuple(constants.items()))
+
+
+def reason_against(formulation: Formulation, instance: Instance | None, *, narrowed: bool = False) -> str:
+    """Why an instance, None for the pixels of a sketch, cannot have a formulation; empty if it can.
+
+    narrowed: whether its windows are narrower than those of its gauge.
+    """
+    has_windows = "alpha" in formulation.variables
+    if not formulation.declaration.orthogonal:
+        return ""
+    if instance is None or not instance.orthogonal:
+        return "is for orthogonal crosses only; make the instance with orthogonal=True"
+    if instance.gauge == "box" and (formulation.options.limits or not has_windows):
+        return (
+            "lets crosses have every label, and the gauge box does not at strokes; choose the gauge strokes"
+        )
+    return "has no windows to narrow; choose miqp-orthogonal" if narrowed and not has_windows else ""
+
+
+def list_formulations(instance: Instance | None = None, *, narrowed: bool = False) -> list[str]:
+    """The names of all formulations that an instance can have."""
+    return [name for name in FORMULATIONS if not reason_against(declare(name), instance, narrowed=narrowed)]
 
 
 @cache
@@ -264,9 +362,11 @@ def _with_constants(formulation: Formulation, constants: tuple[tuple[sp.Symbol, 
 
 def norm_of(formulation: Formulation) -> Norm | None:
     """The norm whose energy a formulation minimises with its options; None for another objective."""
-    if formulation.declaration.minimises in {TWO_NORM, AT_JUMPS}:
+    if formulation.declaration.minimises in {TWO_NORM, AT_JUMPS, RIGHT_TWO_NORM}:
         return 2
     options = formulation.options
+    if formulation.declaration.orthogonal:
+        return 1 if options.stroke_norm == 1 else "mixed"
     norms: dict[tuple[int, int], Norm] = {(1, 1): 1, (2, 2): "mixed"}
     return norms.get((options.stroke_norm, options.beta_norm)) if options.facet == "hull" else None
 

@@ -19,7 +19,16 @@ import sympy as sp
 
 from ..arguments import check_fields
 from ..errors import FormulationError, shortened
-from .symbols import SLOTS, VARIABLES, IndexSet
+from .symbols import (
+    BOUNDED,
+    SLOTS,
+    VARIABLES,
+    IndexMap,
+    IndexSet,
+    Variable,
+    d_round,
+    step_slots,
+)
 
 Facet = Literal["hull", "printed"]
 FACETS: Final[tuple[str, ...]] = get_args(Facet)
@@ -28,6 +37,7 @@ TERM_NORMS: Final = (1, 2)
 I: Final[IndexSet] = "pixels"  # noqa: E741 - the paper's letter
 S_C: Final[IndexSet] = "strokes"
 E: Final[IndexSet] = "pairs"
+C: Final[IndexSet] = "cycles"
 
 
 @dataclass(frozen=True)
@@ -35,7 +45,8 @@ class Family:
     """One expression over one index set: a term of the objective, or a row.
 
     tag: short name, the stem of row names; a row's expression is a relation. paper: its place in the paper.
-    only: (`p_min` or `p_max`, parity) for rows that are needed only where it has this parity, else None.
+    only: (`p_min`, `p_max` or `is_open`, parity) for rows that are needed only where it has this parity, else
+    None. steps, rolled: for cycles of so many steps, as `unrolled` returns it, and the family before.
     """
 
     tag: str
@@ -43,6 +54,20 @@ class Family:
     expression: sp.Expr
     paper: str
     only: tuple[str, int] | None = None
+    steps: int = 0
+    rolled: Family | None = None
+
+    def unrolled(self, steps: int) -> Family:
+        """The family for cycles of so many steps alone, with a term for each step."""
+        symbols = list(step_slots(steps))
+        total = sp.Add(*(d * sign for d, sign in zip(symbols[:steps], symbols[steps:], strict=True)))
+        expression = self.expression.subs(d_round, total)
+        return replace(self, tag=f"{self.tag}{steps}", expression=expression, steps=steps, rolled=self)
+
+    @property
+    def slots(self) -> dict[sp.Symbol, tuple[str, IndexMap]]:
+        """What its symbols mean: quantity and way to it."""
+        return step_slots(self.steps) | SLOTS[self.over] if self.steps else SLOTS[self.over]
 
     @property
     def is_row(self) -> bool:
@@ -65,14 +90,14 @@ class Family:
     def symbols(self) -> list[sp.Symbol]:
         """Its symbols that are quantities on the grid, in the order of the notation."""
         present = self.expression.free_symbols
-        return [symbol for symbol in SLOTS[self.over] if symbol in present]
+        return [symbol for symbol in self.slots if symbol in present]
 
     def unknowns(self, fixed: tuple[str, ...] = ()) -> list[sp.Symbol]:
         """Its symbols that denote variables, without the fixed ones."""
         return [
             symbol
             for symbol in self.symbols
-            if (quantity := SLOTS[self.over][symbol][0]) in VARIABLES and quantity not in fixed
+            if (quantity := self.slots[symbol][0]) in VARIABLES and quantity not in fixed
         ]
 
 
@@ -96,12 +121,25 @@ def row(
 
 @dataclass(frozen=True)
 class Options:
-    """Choices that a formulation leaves open: facet of z, norms of the two terms, integrality dropped."""
+    """Choices that a formulation leaves open.
+
+    facet of z; norms of the two terms; relax: integrality dropped; limits: whether residuals are limited to
+    what no change of one jump improves (`limit_residuals`).
+    """
 
     facet: Facet = "hull"
     stroke_norm: int = 2
     beta_norm: int = 2
     relax: bool = False
+    limits: bool = False
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The options as files record them: limits only where they are chosen, as older files have none."""
+        return {name: value for name, value in vars(self).items() if name != "limits" or value}
+
+    def __repr__(self) -> str:
+        return f"Options({', '.join(f'{name}={value!r}' for name, value in self.document.items())})"
 
 
 @dataclass(frozen=True)
@@ -111,7 +149,8 @@ class Declaration:
     name; paper: its section, or `ours`; kind: the usual name of its class; short: its name in identifiers of
     library entries; minimises: its objective, in the same words for formulations with the same optimum;
     how: why it is equivalent to the others with these words; families: function that yields terms, rows for
-    the options that it takes; fixed: variables that are data.
+    the options that it takes; fixed: variables that are data; orthogonal: whether it is for orthogonal
+    crosses only.
     """
 
     name: str
@@ -122,6 +161,7 @@ class Declaration:
     how: str
     families: Callable[..., Iterator[Family]]
     fixed: tuple[str, ...] = ()
+    orthogonal: bool = False
 
     @property
     def source(self) -> str:
@@ -185,7 +225,8 @@ class Declaration:
             if getattr(options, name) not in TERM_NORMS:
                 raise FormulationError(f"{name} is {getattr(options, name)}; give 1 or 2")
         # NumPy's numbers are written differently, and the options are a part of the problem's hash.
-        return Options(options.facet, int(options.stroke_norm), int(options.beta_norm), bool(options.relax))
+        norms = int(options.stroke_norm), int(options.beta_norm)
+        return Options(options.facet, *norms, bool(options.relax), bool(options.limits))
 
 
 @dataclass(frozen=True)
@@ -225,11 +266,13 @@ class Formulation:
     def variables(self) -> tuple[str, ...]:
         """Names of the blocks of columns, in the order of VARIABLES."""
         used = {
-            SLOTS[family.over][symbol][0]
-            for family in (*self.objective, *self.rows)
-            for symbol in family.symbols
+            family.slots[symbol][0] for family in (*self.objective, *self.rows) for symbol in family.symbols
         }
         return tuple(name for name in VARIABLES if name in used and name not in self.fixed)
+
+    def variable(self, name: str) -> Variable:
+        """The declaration of a block of columns."""
+        return (BOUNDED if self.declaration.orthogonal else VARIABLES)[name]
 
     @property
     def equivalent(self) -> str:
@@ -316,13 +359,21 @@ def short_names() -> list[str]:
 
 
 def formulation(
-    name: str, *, paper: str, kind: str, short: str, minimises: str, how: str, fixed: tuple[str, ...] = ()
+    name: str,
+    *,
+    paper: str,
+    kind: str,
+    short: str,
+    minimises: str,
+    how: str,
+    fixed: tuple[str, ...] = (),
+    orthogonal: bool = False,
 ) -> Callable[[Callable[..., Iterator[Family]]], Declaration]:
     """Return a decorator that enters a function that yields families into the table, as its `Declaration`."""
 
     def enter(families: Callable[..., Iterator[Family]]) -> Declaration:
         assert not {name, short} & {*_TABLE, *short_names()}, f"there are two formulations {name} or {short}"
-        _TABLE[name] = Declaration(name, paper, kind, short, minimises, how, families, fixed)
+        _TABLE[name] = Declaration(name, paper, kind, short, minimises, how, families, fixed, orthogonal)
         return _TABLE[name]
 
     return enter

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from .declaration import Family
-from .symbols import SCALARS, SLOTS, IndexSet, index_map, numpy_function
+from .symbols import SCALARS, IndexSet, index_map, numpy_function, values_at
 
 Coefficient = float | Floats
 Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]
@@ -90,7 +90,7 @@ class PlacedFamily:
     @cached_property
     def variables(self) -> tuple[sp.Symbol, ...]:
         """Symbols that mean columns."""
-        slots = SLOTS[self.family.over]
+        slots = self.family.slots
         return tuple(symbol for symbol in self.family.symbols if slots[symbol][0] in self.blocks)
 
     def column_of(self, symbol: sp.Symbol) -> Ints:
@@ -101,11 +101,11 @@ class PlacedFamily:
 
     def block(self, symbol: sp.Symbol) -> Block:
         """The block of columns that a symbol means."""
-        return self.blocks[SLOTS[self.family.over][symbol][0]]
+        return self.blocks[self.family.slots[symbol][0]]
 
     def inside(self, symbol: sp.Symbol) -> Ints | None:
         """The symbol's place in its block at each element, (count,); None: the element's own."""
-        index = index_map(self.instance, SLOTS[self.family.over][symbol][1])
+        index = index_map(self.instance, self.family.slots[symbol][1])
         if isinstance(index, slice):
             return None if self.covers_index_set else self.elements
         return index if self.covers_index_set else index[self.elements]
@@ -126,8 +126,8 @@ class PlacedFamily:
     def _datum(self, symbol: sp.Symbol) -> Any:
         if symbol in SCALARS:
             return getattr(self.instance, SCALARS[symbol])
-        name, kind = SLOTS[self.family.over][symbol]
-        values = self.quantities[name][index_map(self.instance, kind)]
+        name, kind = self.family.slots[symbol]
+        values = values_at(self.instance, kind, self.quantities[name])
         return values if self.covers_index_set else values[self.elements]
 
     @cached_property
@@ -191,6 +191,9 @@ def monomials(family: Family, variables: tuple[sp.Symbol, ...]) -> Monomials | N
     """
     if not variables:
         return (((), family.body),)
+    if family.steps:  # linear, in more variables than a dense polynomial should have
+        split = sp.expand(family.body).as_coefficients_dict(*variables)
+        return (((), split[sp.S.One]), *(((symbol,), split[symbol]) for symbol in variables))
     try:
         terms = sp.Poly(family.body, *variables).terms()
     except sp.PolynomialError:

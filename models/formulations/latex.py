@@ -7,17 +7,19 @@ from typing import Final
 import sympy as sp
 
 from .declaration import Family, Formulation
-from .symbols import LATEX, SLOTS, VARIABLES, IndexSet, Variable, w, w_beta, w_strokes
+from .symbols import LATEX, SLOTS, IndexSet, Variable, w, w_beta, w_strokes
 
 _SUM: Final[dict[IndexSet, str]] = {
     "pixels": r"\sum_{i \in I}",
     "strokes": r"\sum_{i \in S_c}",
     "pairs": r"\sum_{(i,j) \in E}",
+    "cycles": r"\sum_{c \in C}",
 }
 _FOR: Final[dict[IndexSet, str]] = {
     "pixels": r"i \in I",
     "strokes": r"i \in S_c",
     "pairs": r"(i,j) \in E",
+    "cycles": r"c \in C",
 }
 _WEIGHTS: Final = (w_strokes, w_beta, w)
 _SENSE: Final = {">=": r"\ge", "<=": r"\le", "==": "="}
@@ -36,7 +38,7 @@ def latex(formulation: Formulation) -> str:
     ]
     lines = [r"\min\ " + terms[0], *(rf"\quad {term}" for term in terms[1:])]
     lines += [_row(family) for family in formulation.rows]
-    lines += [_domain(VARIABLES[name], formulation) for name in formulation.variables]
+    lines += [_domain(formulation.variable(name), formulation) for name in formulation.variables]
     return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
 

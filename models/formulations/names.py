@@ -2,7 +2,8 @@
 
 A name consists of the block or row tag, and of the row and the column of the pixel (of a pair: of its first
 pixel). A pair adds `u` for the upper or `r` for the right neighbour. On a mesh, the number of the face or of
-the pair follows the tag. Numbers are zero-padded to the width of the largest. Names have at most 15
+the pair follows the tag, and so does the number of a cycle on any domain. Numbers are zero-padded to the
+width of the largest. Names have at most 15
 characters and no leading e, i or n, and they are unique without regard to case (docs/format-rules.md, W6). So
 a solver's log can be read, and every solution file maps back without the model.
 """
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..instance.domain import Ints
 from ..instance.instance import Instance
 from ..instance.mesh import Mesh
 from .symbols import IndexSet, count_elements, point_of
@@ -44,7 +46,7 @@ def digits(values: NDArray[Any], width: int) -> Bytes:
 
 def element_names(instance: Instance, tag: str, over: IndexSet) -> Bytes:
     """Names of all elements of an index set, shape (count, width), no padding."""
-    place = _numbered if isinstance(instance.domain, Mesh) else _row_and_column
+    place = _numbered if is_numbered(instance, over) else _row_and_column
     parts: dict[str, Any] = {"tag": np.bytes_(f"{tag}_")} | place(instance, over)
     names = np.empty(count_elements(instance, over), [(name, part.dtype) for name, part in parts.items()])
     for name, part in parts.items():
@@ -67,9 +69,8 @@ def _row_and_column(instance: Instance, over: IndexSet) -> dict[str, Any]:
 
 
 def _numbered(instance: Instance, over: IndexSet) -> dict[str, Any]:
-    """The number of the face or pair in names on a mesh."""
-    at = np.arange(len(instance.domain.first)) if over == "pairs" else point_of(instance, over)
-    return {"number": _items(digits(at, number_width(instance, over)))}
+    """The number of the face or pair in names on a mesh, and of a cycle."""
+    return {"number": _items(digits(element_numbers(instance, over), number_width(instance, over)))}
 
 
 def _items(texts: Bytes) -> NDArray[np.void]:
@@ -80,17 +81,29 @@ def _items(texts: Bytes) -> NDArray[np.void]:
 def name_length(instance: Instance, tag: str, over: IndexSet) -> int:
     """Length of each of these names."""
     width = number_width(instance, over)
-    if isinstance(instance.domain, Mesh):
+    if is_numbered(instance, over):
         return len(tag) + 1 + width
     return len(tag) + 2 * (1 + width) + (2 if over == "pairs" else 0)
 
 
 def number_width(instance: Instance, over: IndexSet) -> int:
-    """Digits of a number in a name: as many as the largest has, at least two."""
+    """Digits of a number in a name: as many as the largest of its kind may have, at least two."""
     domain = instance.domain
-    if isinstance(domain, Mesh):
-        return max(2, len(str((len(domain.first) if over == "pairs" else domain.size) - 1)))
+    if is_numbered(instance, over):  # cycles are fewer than pairs
+        return max(2, len(str(max(len(domain.first), domain.size) - 1)))
     return max(2, len(str(domain.side - 1)))
+
+
+def element_numbers(instance: Instance, over: IndexSet) -> Ints:
+    """The number of each element in names that have one number: of its face, or its own."""
+    if over in {"pixels", "strokes"}:
+        return point_of(instance, over)
+    return np.arange(count_elements(instance, over), dtype=np.int32)
+
+
+def is_numbered(instance: Instance, over: IndexSet) -> bool:
+    """Whether names have one number, not the row and the column of a pixel."""
+    return over == "cycles" or isinstance(instance.domain, Mesh)
 
 
 def stack_names(matrices: list[Bytes]) -> Bytes:

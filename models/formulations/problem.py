@@ -9,6 +9,7 @@ declaration: SymPy splits an expression into monomials once per family, index ar
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
@@ -23,9 +24,10 @@ from ..instance.angles import QUARTER
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance, whole_numbers
 from ..previews import table_of
-from .catalogue import declare, lift_products, norm_of
+from .catalogue import declare, lift_products, norm_of, reason_against
 from .declaration import Family, Formulation
 from .families import ANY_DEGREE, Block, PlacedFamily, merge_terms
+from .residuals import angles_and_jumps, cycle_data, limit_residuals
 from .symbols import (
     NARROWED,
     SLOTS,
@@ -33,8 +35,8 @@ from .symbols import (
     Variable,
     constants_of,
     count_elements,
-    index_map,
     numpy_function,
+    values_at,
 )
 from .windows import Windows
 
@@ -82,7 +84,8 @@ class Problem:
     Raises
     ------
     FormulationError
-        For jumps that are missing, or that are given to a formulation in which they are variables.
+        For jumps that are missing, or that are given to a formulation in which they are variables; for a
+        formulation of orthogonal crosses on another instance, or without windows on one of the gauge `box`.
 
     """
 
@@ -94,6 +97,8 @@ class Problem:
 
     def __post_init__(self) -> None:
         """Check that jumps are given exactly where they are data, and that fixed values fit the instance."""
+        if reason := reason_against(self.formulation, self.instance, narrowed=self.windows is not None):
+            raise FormulationError(f"{self.name} {reason}")
         if (self.jumps is None) == bool(self.formulation.fixed):
             raise FormulationError(
                 f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
@@ -156,16 +161,29 @@ class Problem:
             "kappa": self._of_pairs(self.instance.domain.kappa, 0.0),
             "omega": self._of_pairs(self.instance.pair_weights, 1.0),
         }
+        if self.formulation.declaration.orthogonal:
+            data |= self._residual_data
         if self.jumps is not None:
             data |= {"p1": self.jumps & 1, "p2": self.jumps >> 1}
         return data if self.windows is None else data | self.windows.data
+
+    @cached_property
+    def _residual_data(self) -> dict[str, Any]:
+        """Limits of residuals, and for cycles the signs of steps, holonomies, and ranges of quarter turns."""
+        instance = self.instance
+        d_max = np.full(count_elements(instance, "pairs"), QUARTER)
+        q_max = np.full(count_elements(instance, "strokes"), QUARTER)
+        if self.formulation.options.limits:
+            d_max, q_max = limit_residuals(instance)
+        data = {"d_max": d_max, "q_max": q_max}
+        return data | (cycle_data(instance, d_max, q_max) if "k" in self.formulation.variables else {})
 
     def _of_pairs(self, values: Floats | None, default: float) -> Floats:
         return np.full(count_elements(self.instance, "pairs"), default) if values is None else values
 
     def variable(self, name: str) -> Variable:
         """The declaration of a block of columns, with bounds in `data`."""
-        return (VARIABLES if self.windows is None else NARROWED)[name]
+        return NARROWED[name] if name == "beta" and self.windows else self.formulation.variable(name)
 
     @property
     def tightened(self) -> str:
@@ -175,6 +193,16 @@ class Problem:
         if norm_of(self.formulation) == self.windows.norm:
             return f"{self.windows.summary}; the optimum stays"
         return f"{self.windows.summary}; in another norm the optimum may rise"
+
+    @property
+    def limited(self) -> str:
+        """What the limits of residuals cut off, one line; empty without them."""
+        if not self.formulation.options.limits:
+            return ""
+        return (
+            "|A| and |R| at most pi/4 (1 - r), r the effective resistance of the pair or stroke times its "
+            "conductance; this cuts off fields that a change of one jump improves, and the optimum stays"
+        )
 
     @cached_property
     def blocks(self) -> dict[str, Block]:
@@ -234,10 +262,21 @@ class Problem:
 
     def _place_families(self, families: tuple[Family, ...]) -> tuple[PlacedFamily, ...]:
         placed = (
-            PlacedFamily(family, self._elements(family), self.instance, self.blocks, self.data)
-            for family in families
+            PlacedFamily(family, elements, self.instance, self.blocks, self.data)
+            for family, elements in self._list_elements(families)
         )
         return tuple(family for family in placed if family.count)
+
+    def _list_elements(self, families: tuple[Family, ...]) -> Iterator[tuple[Family, Ints]]:
+        """The families with their elements; one family for each length of cycles."""
+        for family in families:
+            elements = self._elements(family)
+            if family.over != "cycles":
+                yield family, elements
+                continue
+            steps = np.diff(self.instance.cycles.start)[elements]
+            for count in np.unique(steps).tolist():
+                yield family.unrolled(count), elements[steps == count]
 
     def _elements(self, family: Family) -> Ints:
         if family.only is None:
@@ -372,6 +411,10 @@ class Problem:
         Raises InputError for another shape, and InstanceError for jumps beyond 32 bits.
         """
         point = self._check_point(point)
+        if "k" in self.blocks:
+            residuals = (point[self.blocks[name].slice] for name in ("d", "q"))
+            alpha, turns = angles_and_jumps(self.instance, *residuals)
+            return CrossField(self.instance, alpha, np.zeros(len(alpha)), whole_numbers(turns, "p"))
         if self.jumps is not None:
             jumps = self.jumps
         elif "p" in self.blocks:
@@ -427,7 +470,7 @@ def _at_field(problem: Problem, name: str, quantities: dict[str, Any]) -> Floats
     sources, value = problem.data | quantities, variable.value.subs(constants_of(problem.instance))
     symbols = sorted(value.free_symbols, key=str)
     slots = (SLOTS[variable.over][symbol] for symbol in symbols)
-    arguments = (sources[quantity][index_map(problem.instance, kind)] for quantity, kind in slots)
+    arguments = (values_at(problem.instance, kind, sources[quantity]) for quantity, kind in slots)
     return np.asarray(numpy_function(symbols, value)(*arguments), dtype=np.float64)
 
 
@@ -450,7 +493,8 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
         Jumps of the pairs, shape (m,), for `qp-fixed` only.
     options
         Where the formulation has them: `facet` (`hull` or `printed`), `stroke_norm` and `beta_norm` (1 or 2),
-        and `relax` (True makes integers continuous).
+        `relax` (True makes integers continuous), and `limits` (True cuts off fields that a change of one
+        jump improves).
 
     Returns
     -------
@@ -460,7 +504,7 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
     Raises
     ------
     FormulationError
-        For an unknown name, option or value.
+        For an unknown name, option or value, and for a formulation that the instance cannot have.
 
     """
     return Problem(instance, declare(name, instance, **options), p)

@@ -1,9 +1,10 @@
 """The symbols of the formulations: the quantity that each denotes, and its place on the grid.
 
 A *quantity* (alpha, s, theta, ...) has one value per element of an index set: the pixels I, the stroke pixels
-S_c, or the neighbour pairs E. A *slot* is a symbol in an expression over such a set. It names a quantity and
-the way to it: over the pairs, alpha_i is alpha at the first pixel, alpha_j at the second. The size of a
-sketch changes the length of the index arrays, never an expression.
+S_c, the neighbour pairs E, or the cycles C of pairs and strokes. A *slot* is a symbol in an expression over
+such a set. It names a quantity and the way to it: over the pairs, alpha_i is alpha at the first pixel,
+alpha_j at the second. The size of a sketch changes the length of the index arrays, never an expression. Over
+the cycles, d_round is the sum of d along a cycle: `Family.unrolled` writes it as as many terms as it has.
 """
 
 from __future__ import annotations
@@ -19,8 +20,11 @@ import sympy as sp
 from ..instance.domain import Ints
 from ..instance.instance import Instance
 
-IndexSet = Literal["pixels", "strokes", "pairs"]
-IndexMap = Literal["itself", "first", "second", "stroke"]
+IndexSet = Literal["pixels", "strokes", "pairs", "cycles"]
+IndexMap = Literal["itself", "first", "second", "stroke", "round", "start", "end"] | tuple[str, int]
+"""The way from an element to a quantity: the same number, an end of a pair, the pixel of a stroke; of a cycle
+the sum along it, the stroke at its start or end, and (`pair` or `place`, step).
+"""
 
 
 def _symbol(name: str) -> sp.Symbol:
@@ -30,6 +34,12 @@ def _symbol(name: str) -> sp.Symbol:
 alpha, beta, gamma, psi = (_symbol(name) for name in ("alpha", "beta", "gamma", "psi"))
 alpha_i, alpha_j, beta_i, beta_j = (_symbol(name) for name in ("alpha_i", "alpha_j", "beta_i", "beta_j"))
 p, p1, p2, s, t, z, d, u = (_symbol(name) for name in ("p", "p1", "p2", "s", "t", "z", "d", "u"))
+q, k, d_round, p_round, q_start, q_end = (
+    _symbol(name) for name in ("q", "k", "d_round", "p_round", "q_start", "q_end")
+)
+d_max, q_max, k_min, k_max, holonomy = (
+    _symbol(name) for name in ("d_max", "q_max", "k_min", "k_max", "holonomy")
+)
 p_min, p_max, theta, w = (_symbol(name) for name in ("p_min", "p_max", "theta", "w"))
 alpha_lo, alpha_up, beta_lo, beta_up = (
     _symbol(name) for name in ("alpha_lo", "alpha_up", "beta_lo", "beta_up")
@@ -84,6 +94,8 @@ VARIABLES: Final = {
                  "the product of p1 and beta of the first pixel"),
         Variable("d", "pairs", -_FREE, _FREE, A, "change of direction"),
         Variable("u", "pairs", -_FREE, _FREE, B, "change of skew"),
+        Variable("q", "strokes", -q_max, q_max, R, "deviation from a stroke"),
+        Variable("k", "cycles", k_min, k_max, p_round, "quarter turns along a cycle", integer=True),
         Variable("gamma", "strokes", _ZERO, _FREE, sp.Abs(R), "absolute deviation from a stroke"),
         Variable("psi", "pixels", _ZERO, _FREE, sp.Abs(beta), "absolute skew"),
     )
@@ -93,6 +105,9 @@ VARIABLES: Final = {
 NARROWED: Final = VARIABLES | {"beta": replace(VARIABLES["beta"], lower=beta_lo, upper=beta_up)}
 """`VARIABLES` for windows that a proof has narrowed, so that bounds of beta are data too."""
 
+BOUNDED: Final = VARIABLES | {"d": replace(VARIABLES["d"], lower=-d_max, upper=d_max)}
+"""`VARIABLES` for orthogonal crosses, whose residuals have bounds in every optimum."""
+
 SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, IndexMap]]]] = {
     "pixels": {
         symbol: (symbol.name, "itself") for symbol in (alpha, beta, psi, alpha_lo, alpha_up, beta_lo, beta_up)
@@ -101,6 +116,8 @@ SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, IndexMap]]]] = {
         alpha: ("alpha", "stroke"),
         beta: ("beta", "stroke"),
         gamma: ("gamma", "itself"),
+        q: ("q", "itself"),
+        q_max: ("q_max", "itself"),
         theta: ("theta", "itself"),
         w: ("w", "itself"),
     },
@@ -111,11 +128,30 @@ SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, IndexMap]]]] = {
         beta_j: ("beta", "second"),
         **{
             symbol: (symbol.name, "itself")
-            for symbol in (p, p1, p2, s, t, z, d, u, p_min, p_max, kappa, omega)
+            for symbol in (p, p1, p2, s, t, z, d, u, p_min, p_max, kappa, omega, d_max)
         },
+    },
+    "cycles": {
+        d_round: ("d", "round"),
+        p_round: ("p", "round"),
+        q_start: ("q", "start"),
+        q_end: ("q", "end"),
+        **{symbol: (symbol.name, "itself") for symbol in (k, k_min, k_max, holonomy)},
     },
 }
 """For each index set: symbol -> (quantity, way to it)."""
+
+
+@cache
+def step_slots(count: int) -> dict[sp.Symbol, tuple[str, IndexMap]]:
+    """The slots of d at each of some steps of a cycle, and then of the signs of these steps."""
+    numbers = range(count)
+    return {
+        _symbol(f"{name}_{step:04d}"): (name, (way, step))
+        for name, way in (("d", "pair"), ("sign", "place"))
+        for step in numbers
+    }
+
 
 OF_SKEW: Final = (z, t, u, psi)
 """Variables that measure beta and nothing else: rows with one of them hold where beta is 0."""
@@ -125,6 +161,16 @@ SCALARS: Final = {w_strokes: "stroke_coefficient", w_beta: "skew_coefficient"}
 
 LATEX: Final = {
     **{symbol: f"{symbol.name}_{{ij}}" for symbol in (p, s, t, z, d, u)},
+    d_round: r"\sum_{(i,j) \in c} \pm d_{ij}",
+    d_max: r"d^{\max}_{ij}",
+    q: "q_i",
+    q_max: r"q^{\max}_i",
+    q_start: "q_i",
+    q_end: "q_j",
+    k: "k_c",
+    k_min: r"k^{\min}_c",
+    k_max: r"k^{\max}_c",
+    holonomy: "H_c",
     kappa: r"\kappa_{ij}",
     omega: r"\omega_{ij}",
     alpha: r"\alpha_i",
@@ -150,6 +196,8 @@ LATEX: Final = {
 
 def count_elements(instance: Instance, over: IndexSet) -> int:
     """Number of elements of an index set."""
+    if over == "cycles":
+        return len(instance.cycles.ends)
     sizes = {
         "pixels": instance.domain.size,
         "strokes": len(instance.theta),
@@ -158,29 +206,41 @@ def count_elements(instance: Instance, over: IndexSet) -> int:
     return sizes[over]
 
 
-def constants_of(instance: Instance | None) -> dict[sp.Symbol, int]:
+def constants_of(instance: Instance | None, *, orthogonal: bool = False) -> dict[sp.Symbol, int]:
     """Symbols that are numbers on this instance's domain, and these numbers.
 
     On a grid, and without an instance, kappa is 0; without weights of pairs omega is 1. Where crosses are
-    orthogonal, beta is 0, and so are the variables that only measure it.
+    orthogonal, beta is 0, and so are the variables that only measure it. orthogonal: whether they are without
+    an instance.
     """
     constants: dict[sp.Symbol, int] = {}
     if instance is None or instance.domain.kappa is None:
         constants[kappa] = 0
     if instance is None or instance.pair_weights is None:
         constants[omega] = 1
-    if instance is not None and instance.orthogonal:
+    if orthogonal or (instance is not None and instance.orthogonal):
         constants |= dict.fromkeys((beta, beta_i, beta_j, *OF_SKEW), 0)
     return constants
 
 
 def index_map(instance: Instance, kind: IndexMap) -> Ints | slice:
     """Index array from the elements of a family to the elements of a quantity."""
+    if isinstance(kind, tuple):
+        way, step = kind
+        places = instance.cycles.places(step)
+        return instance.cycles.pair[places] if way == "pair" else places
+    if kind in {"start", "end"}:
+        return instance.cycles.ends[:, ("start", "end").index(kind)]
     if kind == "first":
         return instance.domain.first
     if kind == "second":
         return instance.domain.second
     return instance.stroke_index if kind == "stroke" else slice(None)
+
+
+def values_at(instance: Instance, kind: IndexMap, values: Any) -> Any:
+    """The values of a quantity at the elements of a family."""
+    return instance.cycles.sums(values) if kind == "round" else values[index_map(instance, kind)]
 
 
 def point_of(instance: Instance, over: IndexSet) -> Ints:

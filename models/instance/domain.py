@@ -20,24 +20,33 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Rings:
-    """Closed counter-clockwise walks over pairs: around every inner corner of a domain, one after the other.
+class Walks:
+    """Walks over pairs, one after the other.
 
-    start: first step of each ring, and the number of all steps, shape (r + 1,). pair: pair of each step,
+    start: first step of each walk, and the number of all steps, shape (c + 1,). pair: pair of each step,
     shape (k,). sign: 1 where the step goes from the pair's first point to its second one, else -1, shape
-    (k,). defect: 2 pi less the angles around each corner, in radians, shape (r,); 0 where it is flat.
+    (k,).
     """
 
     start: Ints
     pair: Ints
     sign: Ints
-    defect: Floats
 
     def sums(self, values: NDArray[Any]) -> Floats:
-        """The sum of the values (m,) of the pairs along each ring, those of reversed pairs negative, (r,)."""
+        """The sum of the values (m,) of the pairs along each walk, those of reversed pairs negative, (c,)."""
         if not len(self.pair):
-            return np.zeros(len(self.defect))
+            return np.zeros(len(self.start) - 1)
         return np.asarray(np.add.reduceat(self.sign * values[self.pair], self.start[:-1]), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Rings(Walks):
+    """Closed counter-clockwise walks: around every inner corner of a domain, one after the other.
+
+    defect: 2 pi less the angles around each corner, in radians, shape (r,); 0 where it is flat.
+    """
+
+    defect: Floats
 
     def select(self, number: Ints) -> Rings:
         """The rings whose pairs all have a new number, not -1, in `number` (m,), renumbered."""

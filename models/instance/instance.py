@@ -14,6 +14,7 @@ from ..arguments import check_fields, check_kind, float_array
 from ..errors import CrossfieldError, DomainError, InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import HALF, MOST_ANGLE, QUARTER, wrap
+from .cycles import Cycles, find_cycles
 from .domain import Bools, Floats, Ints
 from .grid import Grid
 from .mesh import Mesh
@@ -355,6 +356,11 @@ class Instance(Pictured):
     def stroke_terms(self) -> StrokeTerms:
         """The residuals of all strokes."""
         return StrokeTerms(self.stroke_index, self.target, self.stroke_coefficient * self.w)
+
+    @cached_property
+    def cycles(self) -> Cycles:
+        """A basis of the cycles of pairs and strokes, along which alone jumps matter."""
+        return find_cycles(self.domain, self.stroke_index)
 
     @cached_property
     def alpha_lower(self) -> Floats:

@@ -7,12 +7,18 @@ from typing import Any
 
 import numpy as np
 from crossfield.models.field.field import CrossField
-from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.catalogue import FORMULATIONS, list_formulations
 from crossfield.models.formulations.problem import Problem, formulate, with_integers_fixed
 from crossfield.models.instance.angles import QUARTER
 from crossfield.models.instance.domain import Floats
 from crossfield.models.instance.instance import Instance
+from crossfield.models.orthogonal.energy import OrthogonalEnergy, field_of, integers_of
 from meshes import box, tetrahedron
+
+SKEWED = list_formulations()
+"""The formulations of crosses that may be skewed."""
+RIGHT = [name for name in FORMULATIONS if name not in SKEWED]
+"""Those of orthogonal crosses only."""
 
 MASKS = {
     "hole": ["###", "#.#", "###"],
@@ -58,17 +64,27 @@ _VARIANTS: list[tuple[str, dict[str, Any]]] = [
         (name, {"shape": "tetrahedron", "orthogonal": orthogonal})
         for name in FORMULATIONS
         for orthogonal in (True, False)
+        if orthogonal or name in SKEWED
     ),
     ("milp-mccormick", {"shape": "box", "gauge": "box"}),
     ("miqp-exact", {"orthogonal": True}),
     ("milp-mccormick", {"orthogonal": True}),
+    *((name, {"limits": True}) for name in ("miqp-orthogonal", "miqp-cycle")),
+    *(("milp-cycle", {"shape": shape}) for shape in MASKS if shape != "hole"),
+    ("miqp-cycle", {"relax": True}),
+    ("milp-cycle", {"stroke_norm": 2}),
     *((name, {"pinned": True}) for name in FORMULATIONS if name != "qp-fixed"),
 ]
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     " ".join([name, *(f"{key}={value}" for key, value in changes.items())]): (name, changes)
     for name, changes in [
-        *((name, {"gauge": gauge}) for name in FORMULATIONS for gauge in ("strokes", "box")),
+        *(
+            (name, {"gauge": gauge})
+            for name in FORMULATIONS
+            for gauge in ("strokes", "box")
+            if gauge == "strokes" or "cycle" not in name
+        ),
         *_VARIANTS,
     ]
 }
@@ -101,11 +117,21 @@ def make_instance(shape: str = "hole", gauge: str = "strokes", seed: int = 1, **
 
 
 def make_field(instance: Instance, seed: int = 2) -> CrossField:
-    """A random field: angles anywhere within their bounds, any jump within its bounds."""
+    """A random field: angles anywhere within their bounds, any jump within its bounds.
+
+    Orthogonal crosses have jumps that no single change improves, because their residuals have limits.
+    """
     rng = np.random.default_rng(seed)
     alpha = rng.uniform(instance.alpha_lower, instance.alpha_upper)
     beta = rng.uniform(-QUARTER, QUARTER, instance.domain.size) * (not instance.orthogonal)
-    return CrossField(instance, alpha, beta, rng.integers(instance.p_min, instance.p_max + 1))
+    field = CrossField(instance, alpha, beta, rng.integers(instance.p_min, instance.p_max + 1))
+    if not instance.orthogonal:
+        return field
+    energy = OrthogonalEnergy.of(instance)
+    best = field.with_best_jumps()
+    return (
+        best if instance.gauge == "box" else field_of(instance, energy.descend(integers_of(best))[0], energy)
+    )
 
 
 def make_problem(name: str, instance: Instance, **options: Any) -> Problem:
@@ -117,7 +143,7 @@ def make_problem(name: str, instance: Instance, **options: Any) -> Problem:
 def problem_of(label: str) -> Problem:
     """The problem of a case; it is the same object every time, so that its arrays are made once."""
     name, options = CASES[label]
-    options = dict(options)
+    options = ({"orthogonal": True} if name in RIGHT else {}) | options
     pinned = options.pop("pinned", False)
     keys = [key for key in ("shape", "gauge", "orthogonal") if key in options]
     instance = make_instance(**{key: options.pop(key) for key in keys})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 from ....models.formulations.problem import Problem
@@ -44,7 +43,7 @@ def sidecar_of(
         **inherited,
         "formulation": problem.name,
         "paper": problem.formulation.paper,
-        "options": asdict(problem.formulation.options),
+        "options": problem.formulation.options.document,
         "jumps": nonzero_jumps(problem),
         **_tightening(task, problem),
         "problem_sha256": problem.sha256,

@@ -14,7 +14,14 @@ from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
 from ....models.errors import InputError, UnsupportedByFormatError, naming, shortened
-from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, declaration_of, declare, short_names
+from ....models.formulations.catalogue import (
+    AT_JUMPS,
+    FORMULATIONS,
+    declaration_of,
+    declare,
+    list_formulations,
+    short_names,
+)
 from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
@@ -244,7 +251,7 @@ def _read_document(document: dict[str, Any], folder: Path) -> Spec:
         "gauges": _read_words(document, "gauges", GAUGES, ("strokes",)),
         "facets": _read_words(document, "facets", FACETS, ("hull",)),
     }
-    formulations = _read_formulations(document, "formulations", tuple(FORMULATIONS))
+    formulations = _read_formulations(document, "formulations", tuple(list_formulations()))
     rungs = tuple(
         _read_rung(name, document["rungs"][name], defaults, formulations)
         for name in RUNGS

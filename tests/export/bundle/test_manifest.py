@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import make_field, make_instance, make_problem
+from cases import SKEWED, make_field, make_instance, make_problem
 from crossfield.export.bundle.manifest import read_manifest
 from crossfield.export.bundle.problem_files import write_all, write_problem
 from crossfield.export.formats.registry import FORMATS, write
@@ -17,7 +17,6 @@ from crossfield.models.errors import (
     InstanceError,
     UnsupportedByFormatError,
 )
-from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import with_integers_fixed, with_products_lifted
 from crossfield.models.instance.file import read_instance, write_instance
 from loops import for_each
@@ -25,7 +24,7 @@ from loops import for_each
 OPTIONS = [
     ("milp-mccormick", {"facet": "printed", "stroke_norm": 2, "relax": True}),
     ("miqcp-bilinear", {"beta_norm": 1}),
-    *((name, {}) for name in FORMULATIONS),
+    *((name, {}) for name in SKEWED),
 ]
 
 
@@ -78,7 +77,7 @@ def test_options_apply_where_a_formulation_has_them(tmp_path):
         options={"facet": "printed", "relax": True},
         progress=messages.append,
     )
-    assert messages == list(FORMULATIONS)
+    assert messages == SKEWED
     options = {manifest.formulation: manifest.document["options"] for manifest in manifests}
     assert options["milp-mccormick"]["facet"] == "printed"
     assert options["miqp-exact"] == {"facet": "hull", "stroke_norm": 2, "beta_norm": 2, "relax": True}

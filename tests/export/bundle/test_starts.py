@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from cases import make_field, make_instance
+from cases import SKEWED, make_field, make_instance
 from crossfield.export.bundle.starts import STARTS, complete_start, write_start, write_starts
 from crossfield.export.formats.registry import write
 from crossfield.models.errors import InputError, UnsupportedBySolverError
-from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import Problem, formulate
 from loops import for_each
 
 pytestmark = pytest.mark.oracles
 
-MIXED = [name for name in FORMULATIONS if name not in {"qp-fixed", "minlp-parity"}]
+MIXED = [name for name in SKEWED if name not in {"qp-fixed", "minlp-parity"}]
 CONVEX = ["minlp-quartic", "miqp-mccormick", "milp-mccormick", "miqp-exact"]
 """Those whose LP and MPS files are convex: (8) is, with its products lifted."""
 BOTH = ("lp", "mps")

@@ -13,6 +13,7 @@ from pathlib import Path
 import crossfield as cf
 import numpy as np
 import pytest
+from cases import SKEWED
 from children import complaints as without_progress
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
@@ -129,7 +130,7 @@ def test_a_run_writes_all_files_and_reports_separate_parts(two_parts):
     assert bool(shaded) == (not report["surface"]["doubts"])
     assert {path.name for path in folder.iterdir() if path.is_file()} == RUN_FILES | proven | shaded
     models = {path.name for path in (folder / "models").iterdir()}
-    assert {name.split(".")[1] for name in models} == {"instance", *FORMULATIONS}
+    assert {name.split(".")[1] for name in models} == {"instance", *SKEWED}
     assert report["files"] == sum(Path(name).suffix[1:] in FORMATS for name in models)
     assert not [path for path in folder.rglob("*") if path.suffix == ".part"]
 

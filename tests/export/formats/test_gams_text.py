@@ -12,7 +12,7 @@ from typing import Any
 import gams_reader
 import numpy as np
 import pytest
-from cases import CASES, make_field, make_instance, make_problem, problem_of
+from cases import CASES, SKEWED, make_field, make_instance, make_problem, problem_of
 from crossfield.export.formats.gams import MODEL_TYPES
 from crossfield.export.formats.registry import write
 from crossfield.models.field.field import CrossField
@@ -50,8 +50,8 @@ def combinations() -> list[tuple[str, str, dict[str, Any]]]:
     """Every formulation in both gauges with every value of its options."""
     return [
         (name, gauge, dict(zip(options, values, strict=True)))
-        for name, declaration in FORMULATIONS.items()
-        for options in [[option for option in OPTIONS if option in declaration.option_names]]
+        for name in SKEWED
+        for options in [[option for option in OPTIONS if option in FORMULATIONS[name].option_names]]
         for gauge in ("strokes", "box")
         for values in product(*(OPTIONS[option] for option in options))
     ]
@@ -96,7 +96,7 @@ def test_text_says_what_the_problem_is(number: int, tmp_path: Path):
     assert_text(problem, tmp_path, field if number % 2 else None)
 
 
-@for_each("name", FORMULATIONS)
+@for_each("name", SKEWED)
 @for_each("instance", INSTANCES.values())
 def test_text_of_odd_instances_says_what_the_problem_is(name: str, instance: Instance, tmp_path: Path):
     field = make_field(instance)

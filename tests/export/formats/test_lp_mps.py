@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import places
 import pytest
-from cases import CASES, LOW_DEGREE, make_instance, make_problem, names_of, points_of, problem_of
+from cases import CASES, LOW_DEGREE, SKEWED, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.formats import lp, mps
 from crossfield.export.formats.registry import FORMATS, header_lines, problem_in_format, write
 from crossfield.export.verify.comparison import algebra_difference
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.errors import UnsupportedByFormatError
-from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
@@ -123,7 +122,7 @@ def test_names_suit_every_reader(label: str):
         assert re.fullmatch(r"ONE_[0-9a-f]{11}", CanonicalForm(form).one.decode())
 
 
-@for_each("name", FORMULATIONS)
+@for_each("name", SKEWED)
 def test_names_on_the_largest_grid_are_15_long_at_most(name: str):
     mask = np.zeros((2, 9999), dtype=bool)
     mask[:, -2:] = True

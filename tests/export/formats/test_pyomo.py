@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pyomo.environ as pyo
 import pytest
-from cases import CASES, make_field, make_instance, make_problem, names_of, points_of, problem_of
+from cases import CASES, SKEWED, make_field, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.formats.pyomo_model import to_pyomo
 from crossfield.models.errors import InstanceError
-from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
 from loops import for_each
@@ -84,7 +83,7 @@ def test_start_is_the_point_of_the_field(label: str):
         to_pyomo(problem, start=make_field(make_instance("row")))
 
 
-@for_each("name", FORMULATIONS)
+@for_each("name", SKEWED)
 def test_one_pixel_has_empty_components(name: str):
     problem = make_problem(name, make_instance("pixel"))
     model = to_pyomo(problem)

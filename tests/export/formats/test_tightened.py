@@ -6,6 +6,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
+from cases import SKEWED
 from crossfield.export.bundle.manifest import read_manifest
 from crossfield.export.bundle.problem_files import is_recordable, write_all
 from crossfield.export.cli.app import invoke
@@ -48,7 +49,7 @@ def problems(proof, name):
 def test_windows_are_narrower_and_hold_the_optimum(proof):
     certificate, _ = proof
     assert certificate.status == "optimal"
-    for name in FORMULATIONS:
+    for name in SKEWED:
         plain, narrow = problems(certificate, name)
         assert (narrow.lower >= plain.lower - 1e-9).all()
         assert (narrow.upper <= plain.upper + 1e-9).all()
@@ -80,7 +81,7 @@ def test_the_optimum_is_that_of_the_whole_problem(proof):
 def test_windows_of_another_norm_keep_the_optimum_of_its_formulations(norm, formulations, tmp_path):
     result = cf.prove(random_instance(103, (2, 3), 9), norm=norm, jobs=1)
     windows = remaining_windows(write_certificate(result, tmp_path / "it.npz"))
-    for name in FORMULATIONS:
+    for name in SKEWED:
         problem = formulate(
             result.field.instance, name, p=result.field.p if FORMULATIONS[name].fixed else None
         )

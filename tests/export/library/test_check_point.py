@@ -15,12 +15,11 @@ import highspy
 import numpy as np
 import places
 import pytest
-from cases import LOW_DEGREE, make_field, make_instance, names_of, points_of, problem_of
+from cases import LOW_DEGREE, SKEWED, make_field, make_instance, names_of, points_of, problem_of
 from crossfield.export.formats.registry import FORMATS, problem_in_format, write
 from crossfield.export.library.documents import check_point
 from crossfield.export.library.documents.check_point import BadInputError, check
 from crossfield.export.library.documents.standalone import standalone_program
-from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.instance import Instance
@@ -70,7 +69,7 @@ def test_objective_and_violations_are_those_of_the_problem(case, tmp_path):
             assert float(verdict.violations[kind][0]) == pytest.approx(value, rel=1e-11, abs=1e-11)
 
 
-@for_each("name", [name for name in FORMULATIONS if name != "minlp-parity"])
+@for_each("name", [name for name in SKEWED if name != "minlp-parity"])
 def test_the_complete_point_of_a_field_is_feasible_also_without_its_zeros(name, tmp_path):
     field = make_field(make_instance("full"))
     whole = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import make_field, make_instance
+from cases import SKEWED, make_field, make_instance
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.solution import ROUND, read_solution
 from crossfield.export.statuses import Status
@@ -43,7 +43,7 @@ def by_position(path, problem, point):
     return write_ampl_sol(path, "solved", point[NlOrder(problem).order], problem.n_rows, 0)
 
 
-@for_each("name", FORMULATIONS)
+@for_each("name", SKEWED)
 @for_each("kind", ["names", "positions"])
 def test_a_point_comes_back_as_it_was(tmp_path, field, name, kind):
     problem = problem_of(field, name)

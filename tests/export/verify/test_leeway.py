@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from cases import SKEWED
 from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.export.verify.leeway import objective_leeway
 from crossfield.export.verify.verify import random_field
-from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.sketch.samples import sample
 
 CHOSEN = {"alpha", "beta", "p", "p1", "p2"}
-NAMES = [name for name in FORMULATIONS if name != "qp-fixed"]
+NAMES = [name for name in SKEWED if name != "qp-fixed"]
 
 
 def following(problem: Problem) -> np.ndarray:

@@ -8,11 +8,20 @@ from itertools import product
 
 import numpy as np
 import pytest
-from cases import CASES, LOW_DEGREE, MASKS, make_field, make_instance, make_problem, points_of, problem_of
+from cases import (
+    CASES,
+    LOW_DEGREE,
+    MASKS,
+    SKEWED,
+    make_field,
+    make_instance,
+    make_problem,
+    points_of,
+    problem_of,
+)
 from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import CrossField
-from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate, with_integers_fixed, with_products_lifted
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
@@ -95,8 +104,9 @@ def test_a_field_is_a_feasible_point_and_comes_back(label):
         point = form.point(field)
         assert form.violation(point).worst < 1e-12
         back = form.field(point)
-        for name in ("alpha", "beta", "p"):
+        for name in ("alpha", "beta", "p") if "alpha" in problem.blocks else ():
             np.testing.assert_array_equal(getattr(back, name), getattr(field, name))
+        np.testing.assert_allclose(form.point(back), point, atol=1e-12)
         assert form.objective_value(point) == pytest.approx(
             problem.objective_value(problem.point(field)), rel=1e-12
         )
@@ -179,7 +189,7 @@ def test_fractional_jumps_of_an_answer_are_rounded():
 # fixed integers and data
 
 
-@for_each("name", [name for name in FORMULATIONS if name != "qp-fixed"])
+@for_each("name", [name for name in SKEWED if name != "qp-fixed"])
 def test_fixed_integers_are_continuous_columns_with_equal_bounds(name):
     field = make_field(make_instance("parts"))
     problem = formulate(field.instance, name)
