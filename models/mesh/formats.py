@@ -59,6 +59,7 @@ def _read_obj(data: bytes) -> tuple[Mesh, Ints]:
                     raise MeshError(f"line {number}: has a face of {len(corners)} corners; triangulate it")
         except (ValueError, IndexError) as error:
             raise InputError(f"line {number}: is {_quoted(line)}, which is no OBJ; write it again") from error
+        _check_size(max(len(vertices), len(edges)), len(faces))
     try:
         positions = np.array(vertices, dtype=np.float64).reshape(-1, 3)
     except ValueError as error:
@@ -94,11 +95,7 @@ def _read_stated(suffix: str, data: bytes, vertices: bytes | None, faces: bytes 
     """The mesh of a file that states the numbers of its vertices and faces, which must be triangles."""
     if vertices is None or faces is None:
         raise InputError(f"does not begin as {suffix}, with the numbers of its vertices and faces")
-    if int(vertices) > _MOST_VERTICES or int(faces) > MOST_FACES:
-        raise MeshError(
-            f"has {int(vertices)} vertices and {int(faces)} faces; at most {_MOST_VERTICES} and "
-            f"{MOST_FACES} are allowed, simplify it"
-        )
+    _check_size(int(vertices), int(faces))
     if not int(faces):
         return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)), _NONE
     mesh = _mesh(*_load_by_trimesh(suffix, data))
@@ -107,9 +104,19 @@ def _read_stated(suffix: str, data: bytes, vertices: bytes | None, faces: bytes 
     return mesh, _NONE
 
 
+def _check_size(vertices: int, faces: int) -> None:
+    """Raise MeshError for too many vertices or faces, before their memory is spent."""
+    if vertices > _MOST_VERTICES or faces > MOST_FACES:
+        raise MeshError(
+            f"has more than {_MOST_VERTICES} vertices or {MOST_FACES} faces, the most that are allowed; "
+            "simplify it"
+        )
+
+
 def _read_stl(data: bytes) -> tuple[Mesh, Ints]:
     """Triangles that share a corner where their coordinates are equal, vertices in order of appearance."""
     corners, faces = _load_by_trimesh(".stl", data)
+    _check_size(0, len(faces))
     vertices, first, number = np.unique(corners + 0.0, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty(len(order), dtype=np.int64)
