@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from .models.instance.file import read_instance as read_instance
     from .models.instance.file import write_instance as write_instance
     from .models.instance.instance import Instance as Instance
+    from .models.instance.mesh import Mesh as Mesh
     from .models.mesh.read import read_mesh as read_mesh
     from .models.processes.limits import Limits as Limits
     from .models.proof.certificate import Certificate as Certificate
@@ -96,6 +97,7 @@ _HOME: Final = {
     "InputError": ".models.errors",
     "Instance": ".models.instance.instance",
     "InstanceError": ".models.errors",
+    "Mesh": ".models.instance.mesh",
     "MeshError": ".models.errors",
     "LibraryEntry": ".export.library.building.shipped_entries",
     "Light": ".export.shading.colours",

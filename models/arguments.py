@@ -15,7 +15,7 @@ from typing import Any, Final, ParamSpec, TypeVar
 
 import numpy as np
 
-from .errors import CrossfieldError, InputError, shortened
+from .errors import CrossfieldError, InputError, InstanceError, shortened
 
 _P = ParamSpec("_P")
 _Result = TypeVar("_Result")
@@ -94,9 +94,19 @@ def float_array(
         array = np.asarray(values)
         if array.dtype.kind in "biufO":
             return array.astype(np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         pass
     raise error(f"{name} holds something other than numbers; give an array of numbers")
+
+
+def whole_numbers(
+    values: Any, name: str, error: _ErrorClass = InstanceError
+) -> np.ndarray[Any, np.dtype[np.int32]]:
+    """The values as a new array of int32. Raises the error, with their name, for other numbers."""
+    array = values if getattr(values, "dtype", None) == np.int32 else float_array(values, name, error)
+    if not ((array >= -(2**31)) & (array < 2**31)).all() or (array != np.floor(array)).any():
+        raise error(f"{name} holds something other than whole numbers of 32 bits")
+    return array.astype(np.int32)
 
 
 def _kind(annotation: str) -> tuple[str, Callable[[Any], bool]]:

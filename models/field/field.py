@@ -8,11 +8,11 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from ..arguments import check_fields, float_array
+from ..arguments import check_fields, float_array, whole_numbers
 from ..errors import InputError, InstanceError
 from ..instance.angles import HALF, MOST_ANGLE, QUARTER, line_difference
 from ..instance.domain import Bools, Floats, Ints
-from ..instance.instance import Instance, whole_numbers
+from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..previews import Pictured
 from .jumps import best_jumps, label_of, step_labels

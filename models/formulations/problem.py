@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import sympy as sp
 
-from ..arguments import check_arguments, check_kind, float_array
+from ..arguments import check_arguments, check_kind, float_array, whole_numbers
 from ..errors import FormulationError, InputError
 from ..field.field import CrossField
 from ..instance.angles import QUARTER
 from ..instance.domain import Bools, Floats, Ints
-from ..instance.instance import Instance, whole_numbers
+from ..instance.instance import Instance
 from ..previews import table_of
 from .catalogue import declare, lift_products, norm_of, reason_against
 from .declaration import Family, Formulation

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import whole_numbers
 from ..errors import InstanceError
 from ..field.field import Norm
 from ..instance.angles import QUARTER
 from ..instance.domain import Bools, Floats, Ints
-from ..instance.instance import Instance, whole_numbers
+from ..instance.instance import Instance
 
 _SLACK = 1e-9
 _ARRAYS = ("alpha_lower", "alpha_upper", "beta_lower", "beta_upper", "p_min", "p_max")

@@ -10,8 +10,8 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from ..arguments import check_fields, check_kind, float_array
-from ..errors import CrossfieldError, DomainError, InstanceError, NoStrokeError
+from ..arguments import check_fields, check_kind, float_array, whole_numbers
+from ..errors import DomainError, InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import HALF, MOST_ANGLE, QUARTER, wrap
 from .cycles import Cycles, find_cycles
@@ -48,14 +48,6 @@ class Reading:
 
     page: tuple[float, float, float, float] | None
     warnings: tuple[str, ...] = ()
-
-
-def whole_numbers(values: Any, name: str, error: type[CrossfieldError] = InstanceError) -> Ints:
-    """The values as int32. Raises the error, with their name, for fractions and for numbers beyond int32."""
-    array = values if getattr(values, "dtype", None) == np.int32 else float_array(values, name, error)
-    if not ((array >= -(2**31)) & (array < 2**31)).all() or (array != np.floor(array)).any():
-        raise error(f"{name} holds something other than whole numbers of 32 bits")
-    return array.astype(np.int32)
 
 
 def _boolean_array(values: Any) -> Bools:

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import float_array, whole_numbers
 from ..errors import MeshError
 from .angles import arctangent, wrap
 from .domain import Bools, Domain, Floats, Ints, Rings
@@ -38,6 +39,11 @@ class Mesh(Domain):
     faces
         Numbers of the three vertices of each face, counter-clockwise seen from outside, int (n, 3).
 
+    Raises
+    ------
+    MeshError
+        For values that are no numbers. An `Instance` checks that they are a mesh.
+
     """
 
     vertices: Floats
@@ -46,6 +52,15 @@ class Mesh(Domain):
     kind: ClassVar[str] = "face"
     side: ClassVar[int] = 1
     reference: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        """Store read-only copies in the documented types."""
+        for name, array in (
+            ("vertices", float_array(self.vertices, "vertices", MeshError)),
+            ("faces", whole_numbers(self.faces, "faces", MeshError)),
+        ):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
 
     def check(self) -> None:
         """Raise MeshError, with numbers of faces, unless the mesh is an oriented manifold of triangles."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..array_archive import ExpectedArray
 from .domain import Floats
-from .instance import Instance, whole_numbers
+from .instance import Instance
 from .mesh import MOST_FACES, Mesh
 
 _MOST_VERTICES: Final = 3 * MOST_FACES
@@ -40,14 +40,9 @@ def mesh_arrays(instance: Instance) -> dict[str, NDArray[Any]]:
 def mesh_arguments(document: dict[str, Any]) -> dict[str, Any]:
     """Arguments of `Instance.on_faces` from the rows of a document or the arrays of an archive.
 
-    Raises InstanceError for numbers that are not whole, and MeshError for arrays of another shape.
+    Raises MeshError for arrays of another kind or shape.
     """
-    arguments: dict[str, Any] = {
-        "mesh": Mesh(
-            np.array(document["vertices"], dtype=np.float64),
-            whole_numbers(np.asarray(document["faces"]), "faces"),
-        )
-    }
+    arguments: dict[str, Any] = {"mesh": Mesh(document["vertices"], document["faces"])}
     if "strokes" in document:
         strokes = np.array(document["strokes"], dtype=np.float64).reshape(-1, 3)
         return arguments | dict(zip(("stroke_faces", "theta", "w"), strokes.T, strict=True))

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ..arguments import whole_numbers
 from ..errors import InputError, MeshError, shortened
 from ..input_limits import MAX_BYTES
 from ..instance.domain import Floats, Ints
@@ -64,7 +65,8 @@ def _read_obj(data: bytes) -> tuple[Mesh, Ints]:
         positions = np.array(vertices, dtype=np.float64).reshape(-1, 3)
     except ValueError as error:
         raise InputError(f"has a vertex that is no number: {shortened(error)}") from error
-    return _mesh(positions, np.array(faces).reshape(-1, 3)), _whole(np.array(edges).reshape(-1, 2))
+    lines = whole_numbers(np.array(edges).reshape(-1, 2), "polylines", MeshError)
+    return Mesh(positions, np.array(faces).reshape(-1, 3)), lines
 
 
 def _vertex_of(corner: bytes, vertices: int) -> int:
@@ -98,7 +100,7 @@ def _read_stated(suffix: str, data: bytes, vertices: bytes | None, faces: bytes 
     _check_size(int(vertices), int(faces))
     if not int(faces):
         return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)), _NONE
-    mesh = _mesh(*_load_by_trimesh(suffix, data))
+    mesh = Mesh(*_load_by_trimesh(suffix, data))
     if len(mesh.faces) != int(faces):
         raise MeshError(f"has {int(faces)} faces, which are {len(mesh.faces)} triangles; triangulate it")
     return mesh, _NONE
@@ -121,7 +123,7 @@ def _read_stl(data: bytes) -> tuple[Mesh, Ints]:
     order = np.argsort(first)
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
-    return _mesh(vertices[order], rank[number.ravel()][faces]), _NONE
+    return Mesh(vertices[order], rank[number.ravel()][faces]), _NONE
 
 
 def _load_by_trimesh(suffix: str, data: bytes) -> tuple[Floats, Any]:
@@ -140,15 +142,6 @@ def _load_by_trimesh(suffix: str, data: bytes) -> tuple[Floats, Any]:
         return np.array(loaded.vertices, dtype=np.float64), np.array(loaded.faces)
     except Exception as error:  # trimesh raises what its parsers meet, also for damaged files
         raise InputError(f"is not read as {suffix}: {shortened(error)}; write it again") from error
-
-
-def _mesh(vertices: Floats, faces: Any) -> Mesh:
-    return Mesh(vertices, _whole(faces))
-
-
-def _whole(numbers: Any) -> Ints:
-    """Numbers of vertices; those beyond 32 bits become one that no mesh has."""
-    return np.asarray(np.clip(numbers, -1, np.iinfo(np.int32).max).astype(np.int32))
 
 
 MESH_READERS: Final[dict[str, Callable[[bytes], tuple[Mesh, Ints]]]] = {

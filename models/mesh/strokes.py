@@ -9,11 +9,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import whole_numbers
 from ..errors import InputError, MeshError, shortened
 from ..input_limits import MAX_BYTES
 from ..instance.angles import HALF, arctangent, cosine, sine
 from ..instance.domain import Bools, Floats, Ints
-from ..instance.instance import whole_numbers
 from ..instance.mesh import Mesh
 from ..storage import read_bytes
 
