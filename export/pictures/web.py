@@ -1,7 +1,11 @@
-"""Pictures for a web site, in the reader's light or dark mode; same input, same bytes."""
+"""Pictures for a web site; same input, same bytes.
+
+Those of pixels are SVG in the reader's light or dark mode, those of meshes PNG without a background.
+"""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable
 from typing import Final
 
@@ -9,7 +13,10 @@ import numpy as np
 
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
+from ...models.instance.mesh import Mesh
+from .draw import fixed_settings
 from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE, Area, GridFrame, Layer, Lines, Mark, Sheet
+from .mesh_view import draw_mesh
 from .svg import web_sheet_svg
 
 _SIDE: Final = 320.0
@@ -33,10 +40,13 @@ _NIGHT: Final = {  # colours in dark mode by those in light mode
 _MARGIN: Final = 7.0
 _SPACING: Final = 10.0  # between streamlines of one family
 _CELLS_FROM: Final = 9.0  # units of a pixel from which on its sides are drawn
+_MESH_SIDES: Final = (640, 56)  # dots per side of a picture of a mesh, and of a thumbnail
 
 
 def instance_picture(instance: Instance) -> bytes:
     """Mask, pixels and strokes: the more reliable a stroke, the stronger its line."""
+    if isinstance(instance.domain, Mesh):
+        return _mesh_picture(instance, _MESH_SIDES[0])
     frame = _web_frame(instance)
     width = float(np.clip(0.2 * frame.pixel, 2.0, 6.0))
     return _page_around_mask(frame, [*_mask_marks(frame), *frame.strokes(STROKE, width)])
@@ -44,12 +54,16 @@ def instance_picture(instance: Instance) -> bytes:
 
 def thumbnail(instance: Instance) -> bytes:
     """Silhouette and strokes with lines that are visible at the height of a line of text."""
+    if isinstance(instance.domain, Mesh):
+        return _mesh_picture(instance, _MESH_SIDES[1])
     frame = _web_frame(instance)
     return _page_around_mask(frame, [frame.area(_SHADE, instance.mask), *frame.strokes(STROKE, 12.0)])
 
 
 def field_picture(field: CrossField) -> bytes:
     """Crosses or, on a larger grid, streamlines over faint strokes; singularities red (+) and blue (-)."""
+    if isinstance(field.instance.domain, Mesh):
+        return _mesh_picture(field, _MESH_SIDES[0])
     frame = _web_frame(field.instance)
     few = max(field.instance.mask.shape) <= CROSSES_UP_TO
     lines = (
@@ -57,6 +71,17 @@ def field_picture(field: CrossField) -> bytes:
     )
     strokes = frame.strokes(_FAINT, float(np.clip(0.3 * frame.pixel, 2.6, 9.0)))
     return _page_around_mask(frame, [*_mask_marks(frame), *strokes, *lines, *frame.singularities(field, 4.6)])
+
+
+def _mesh_picture(subject: CrossField | Instance, side: int) -> bytes:
+    from matplotlib.figure import Figure
+
+    stream, inches = io.BytesIO(), 4.0
+    with fixed_settings():
+        figure = Figure(figsize=(inches, inches))
+        draw_mesh(figure.add_axes((0.0, 0.0, 1.0, 1.0)), subject)
+        figure.savefig(stream, format="png", dpi=side / inches, transparent=True, metadata={"Software": None})
+    return stream.getvalue()
 
 
 def _web_frame(instance: Instance) -> GridFrame:

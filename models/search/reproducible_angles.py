@@ -15,6 +15,8 @@ import numpy as np
 
 from ..field.field import CrossField
 from ..instance.domain import Floats
+from ..instance.grid import Grid
+from ..orthogonal.energy import OrthogonalEnergy
 from ..smooth.sparse_systems import one_thread
 from .box_qp import angle_bounds, field_at, fit_in_box
 from .energy import LinearSolver, QuadraticForm, energy_at
@@ -49,7 +51,11 @@ def reproducible_field(field: CrossField) -> CrossField:
     instance, start = field.instance, fit_in_box(field)
     lower, upper = angle_bounds(instance)
     energy, solver = energy_at(instance, field.p), LinearSolver()
-    unreached = np.tile(nearest_strokes(instance) < 0, 2)
+    unreached = np.zeros(len(lower), dtype=bool)
+    if isinstance(instance.domain, Grid):
+        unreached = np.tile(nearest_strokes(instance) < 0, 2)
+    else:  # a part without strokes may turn as a whole
+        unreached[OrthogonalEnergy.of(instance).pins] = True
     x, rest = np.concatenate([start.alpha, start.beta]), np.zeros(len(lower))
     for _ in range(_MOST_STEPS):
         slope = _slope(energy, x, rest)

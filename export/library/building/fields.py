@@ -14,11 +14,12 @@ from typing import Final
 
 import numpy as np
 
-from ....models.field.field import CrossField, Norm
+from ....models.field.field import AbsoluteNorm, CrossField, Norm
 from ....models.formulations.problem import Problem, formulate, with_integers_fixed
 from ....models.instance.angles import HALF
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import write_certificate
+from ....models.search.angle_program import alternate_absolute
 from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
 from ....models.search.reproducible_angles import reproducible_field
@@ -61,6 +62,11 @@ def search_fields(
         return baseline, [baseline, *low], proven
     searched = _search_in_2norm(instance)
     low, proven = _prove_norms(searched, recipe, sent)
+    if instance.orthogonal:
+        best = min([searched, *low], key=lambda known: known.field.energy().total).field
+        norms: tuple[AbsoluteNorm, ...] = (1, "mixed")
+        fits = [KnownField(alternate_absolute(best, norm), provenance_by("best angles")) for norm in norms]
+        return baseline, [searched, *low, *fits], proven
     fitted = improve_in_1norm(searched.field, recipe.rung)
     staged = [KnownField(reproducible_field(known.field), provenance_by("two stages")) for known in fitted]
     return baseline, [searched, *low, *fitted, *staged], proven
@@ -97,7 +103,7 @@ def _search_in_2norm(instance: Instance) -> KnownField:
 
 def improve_in_1norm(start: CrossField, rung: str) -> list[KnownField]:
     """Find fields of lower 1-norm energy by HiGHS: best angles for the jumps, and on low rungs a search."""
-    if start.instance.grid.size > _LP_UP_TO:
+    if start.instance.domain.size > _LP_UP_TO:
         return []
     problem = formulate(start.instance, "milp-mccormick")  # whose objective is the 1-norm energy
     fitted = _solve_by_highs(with_integers_fixed(problem, start))

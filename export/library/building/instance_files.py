@@ -27,6 +27,7 @@ SUFFIXES: Final = {
     "least_2": ".field.json",
 }
 """Suffixes of the files of fields by role; equal fields share the last file."""
+_SIDES: Final = ("height", "width", "vertices", "euler_characteristic")  # of a grid; of a mesh
 
 
 def make_instance_files(task: InstanceTask) -> Files | NoStrokeError:
@@ -117,13 +118,13 @@ def _source_facts(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
         share = drawn.get("share", STROKE_SHARE)
         parameters |= {"generator": "NumPy PCG64", "mask": recipe.sketch.what, "stroke_share": share}
         parameters |= {"ragged_share": drawn["mask_share"]} if recipe.sketch.what == "ragged" else {}
+    sizes = instance.domain.facts
     return {
         "sketch": recipe.sketch.what,
         "kind": kind_of(recipe),
         "description": recipe.sketch.title,
         "size": recipe.size,
-        "height": instance.grid.height,
-        "width": instance.grid.width,
+        **{key: sizes[key] for key in _SIDES if key in sizes},
         "gauge": recipe.gauge,
         "seed": recipe.seed,
         "parameters": parameters,

@@ -83,6 +83,7 @@ COLUMNS: Final[Mapping[str, TableColumn]] = {
     "seed": TableColumn(int, _fact("source", "seed")),
     "size": TableColumn(int, _fact("source", "size")),
     "pixels": TableColumn(int, _fact("instance", "pixels")),
+    "faces": TableColumn(int, _fact("instance", "faces")),
     "strokes": TableColumn(int, _fact("instance", "strokes")),
     "pairs": TableColumn(int, _fact("instance", "pairs")),
     "density": TableColumn(float, _fact("density")),

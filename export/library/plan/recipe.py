@@ -1,6 +1,7 @@
 """Plan of a library: all instances and entries (an instance in one formulation), with names.
 
 cf_SHORT_nSSS[_sK][_box]              an instance: sketch, size, seed, gauge
+cf_SHORT_fSSSS[_box]                  an instance: mesh, number of faces, gauge
 instance[_printed]_TOKEN[_tight]      an entry: facet, formulation, windows that a certificate leaves
 """
 
@@ -15,7 +16,7 @@ from typing import Any, Final
 from ....models.errors import InputError
 from ....models.field.field import Norm
 from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, declare, norm_of
-from .spec import Rung, Sketch, Spec, facets_of
+from .spec import Rung, Sketch, Spec
 
 LONGEST: Final = 32  # characters of a name before its suffix
 NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
@@ -137,13 +138,14 @@ def norms_of(formulations: Iterable[str]) -> tuple[Norm, ...]:
 def _instances(sketch: Sketch, rung: Rung, norms: tuple[Norm, ...]) -> list[InstanceRecipe]:
     return [
         InstanceRecipe(
-            _instance_name(sketch.name, size, seed, gauge),
+            _instance_name(sketch, size, seed, gauge),
             sketch,
             rung.name,
             size,
             seed,
             gauge,
-            prove=norms if gauge == "strokes" else (),  # bounds are weak under the gauge `box`
+            # Bounds are weak under the gauge `box`. Orthogonal crosses have proofs in the 2-norm alone.
+            prove=tuple(norm for norm in norms if gauge == "strokes" and (norm == 2 or not rung.orthogonal)),
             added=max(sketch.added, rung.added),
         )
         for size in sketch.sizes_on(rung)
@@ -152,15 +154,14 @@ def _instances(sketch: Sketch, rung: Rung, norms: tuple[Norm, ...]) -> list[Inst
     ]
 
 
-def _instance_name(short: str, size: int, seed: int | None, gauge: str) -> str:
+def _instance_name(sketch: Sketch, size: int, seed: int | None, gauge: str) -> str:
+    sized = f"f{size:04}" if sketch.kind == "mesh" else f"n{size:03}"
     seeded = "" if seed is None else f"_s{seed}"
-    return f"cf_{short}_n{size:03}{seeded}{'_box' if gauge == 'box' else ''}"
+    return f"cf_{sketch.name}_{sized}{seeded}{'_box' if gauge == 'box' else ''}"
 
 
 def _entries(recipe: InstanceRecipe, rung: Rung, formulations: tuple[str, ...]) -> tuple[EntryRecipe, ...]:
-    chosen = [
-        (name, facet, False) for facet in rung.facets for name in formulations if facet in facets_of(name)
-    ]
+    chosen = [(name, facet, False) for name, facet in rung.entries(formulations, recipe.gauge)]
     if recipe.gauge == "strokes":  # certificates are of this gauge
         chosen += [(name, "hull", True) for name in rung.tightened]
     return tuple(

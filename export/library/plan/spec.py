@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import date
+from functools import cache
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, cast, get_args
 
 from ....models.errors import InputError, UnsupportedByFormatError, naming, shortened
 from ....models.formulations.catalogue import (
@@ -19,13 +20,14 @@ from ....models.formulations.catalogue import (
     FORMULATIONS,
     declaration_of,
     declare,
-    list_formulations,
+    reason_against,
     short_names,
 )
 from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
-from ....models.instance.instance import GAUGES
+from ....models.instance.instance import GAUGES, Gauge
+from ....models.mesh.shapes import MESHES
 from ....models.sketch.drawing_file import suffix_of_picture
 from ....models.sketch.publication import publishable_sketch
 from ....models.sketch.random_strokes import RAGGED_SHARE
@@ -37,9 +39,9 @@ from .seeds import seeds_document, seeds_of
 
 FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
-RUNGS: Final = ("tiny", "small", "medium", "large")
+RUNGS: Final = ("tiny", "small", "medium", "large", "mesh")  # the last one of meshes, the others of sizes
 PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by default: most take a second
-SketchKind = Literal["sample", "file", "random"]
+SketchKind = Literal["sample", "file", "random", "mesh"]
 Effort = Literal["search", "none", "greedy", "proven"]
 """Work for the points of a sketch."""
 RANDOM: Final = ("share", "mask_share")
@@ -95,7 +97,8 @@ def check_day(text: str, place: str) -> str:
 class Rung:
     """A step of the ladder: its sizes, and the formats, gauges and facets of its entries.
 
-    tightened: formulations with a second entry in the windows that a certificate leaves.
+    sizes: none on the rung of meshes. tightened: formulations with a second entry in the windows that a
+    certificate leaves. formulations: of its entries, if not all of the library's.
     """
 
     name: str
@@ -107,6 +110,22 @@ class Rung:
     prove: bool
     added: str = ""
     tightened: tuple[str, ...] = ()
+    formulations: tuple[str, ...] = ()
+
+    @property
+    def orthogonal(self) -> bool:
+        """Whether the crosses of its instances are orthogonal."""
+        return self.name == "mesh"
+
+    def entries(self, formulations: tuple[str, ...], gauge: str) -> list[tuple[str, str]]:
+        """Return formulation and facet of the entries of an instance. formulations: those of the library."""
+        chosen, orthogonal = self.formulations or formulations, self.orthogonal
+        return [
+            (name, facet)
+            for facet in self.facets
+            for name in chosen
+            if facet in facets_of(name, gauge, orthogonal=orthogonal)
+        ]
 
     def document(self) -> dict[str, Any]:
         """Return the rung as a table of a specification."""
@@ -117,11 +136,11 @@ class Rung:
 
 @dataclass(frozen=True)
 class Sketch:
-    """Source of instances: a sample, a file with its mask, or random strokes of some seeds.
+    """Source of instances: a sample, a file with its mask, random strokes of some seeds, or a built-in mesh.
 
-    what: the sample, the file's own name, or the shape of a random mask. sizes: by rung, if they differ from
-    the rung's. points: a word of Effort. random: options of `random_instance`. drawing, mask: published
-    bytes.
+    what: the sample, the file's own name, the shape of a random mask, or the mesh. sizes: by rung, if they
+    differ from the rung's. points: a word of Effort. random: options of `random_instance`. drawing, mask:
+    published bytes.
     """
 
     name: str
@@ -141,7 +160,9 @@ class Sketch:
     added: str = ""
 
     def sizes_on(self, rung: Rung) -> tuple[int, ...]:
-        """Return its sizes on a rung."""
+        """Return its sizes on a rung: pixels, or the faces of a mesh."""
+        if self.kind == "mesh":
+            return (MESHES[self.what][1]().size,)
         return dict(self.sizes).get(rung.name, rung.sizes)
 
     def proves(self, rung: Rung) -> bool:
@@ -169,11 +190,11 @@ class Sketch:
     def document(self) -> dict[str, Any]:
         """Return the sketch as a table of a specification, with its file names in a library."""
         head: dict[str, Any] = {"name": self.name, "title": self.title, "rungs": list(self.rungs)}
-        head["sizes"] = {rung: list(sizes) for rung, sizes in self.sizes}
+        head |= {} if self.kind == "mesh" else {"sizes": {rung: list(sizes) for rung, sizes in self.sizes}}
         head |= self.origin.document() | ({"added": self.added} if self.added else {})
         head |= self.settings()
-        if self.kind == "sample":
-            return head | {"sample": self.what}
+        if self.kind in ("sample", "mesh"):
+            return head | {self.kind: self.what}
         if self.kind == "random":
             return head | {"random": self.what, "seeds": seeds_document(self.seeds)}
         drawing, *mask = self.files
@@ -251,7 +272,9 @@ def _read_document(document: dict[str, Any], folder: Path) -> Spec:
         "gauges": _read_words(document, "gauges", GAUGES, ("strokes",)),
         "facets": _read_words(document, "facets", FACETS, ("hull",)),
     }
-    formulations = _read_formulations(document, "formulations", tuple(list_formulations()))
+    kinds = {name == "mesh" for name in document["rungs"]}
+    taken = [name for name in FORMULATIONS if any(facets_of(name, orthogonal=right) for right in kinds)]
+    formulations = _read_formulations(document, "formulations", tuple(taken))
     rungs = tuple(
         _read_rung(name, document["rungs"][name], defaults, formulations)
         for name in RUNGS
@@ -282,25 +305,38 @@ def _read_document(document: dict[str, Any], folder: Path) -> Spec:
     return Spec(document["title"], formulations, rungs, sketches, ledger, points, release)
 
 
-def facets_of(formulation: str) -> tuple[str, ...]:
-    """Return the facets of which a formulation has entries: hull alone, unless it has the option."""
-    return FACETS if "facet" in FORMULATIONS[formulation].option_names else ("hull",)
+@cache
+def facets_of(formulation: str, gauge: str = "strokes", *, orthogonal: bool = False) -> tuple[str, ...]:
+    """Return the facets of which a formulation has entries: none on instances that it refuses.
+
+    Only hull, unless it has the option and crosses may have any angle.
+    """
+    smallest = smallest_problem(declare(formulation)).instance
+    instance = replace(smallest, gauge=cast("Gauge", gauge), orthogonal=orthogonal)
+    if reason_against(declare(formulation, instance), instance):
+        return ()
+    return FACETS if "facet" in FORMULATIONS[formulation].option_names and not orthogonal else ("hull",)
 
 
 def _check_entries(formulations: tuple[str, ...], rungs: Sequence[Rung]) -> None:
     """Check that every formulation and every rung has entries, and every entry a model file."""
+    present = {
+        rung.name: list(
+            dict.fromkeys(name for gauge in rung.gauges for name, _ in rung.entries(formulations, gauge))
+        )
+        for rung in rungs
+    }
     for name in formulations:
-        if all(set(rung.facets).isdisjoint(facets_of(name)) for rung in rungs):
-            raise InputError(
-                f"formulations: {name} has no facet 'printed'; add hull to facets, or omit {name}"
-            )
+        if not any(name in names for names in present.values()):
+            hull = any("hull" in rung.facets for rung in rungs)
+            why = f"no rung has {name}" if hull else f"{name} has no facet 'printed'; add hull to facets"
+            raise InputError(f"formulations: {why}{';' if hull else ', or'} omit {name}")
     for rung in rungs:
-        present = [name for name in formulations if not set(rung.facets).isdisjoint(facets_of(name))]
-        if not present:
+        if not present[rung.name]:
             raise InputError(
                 f"rungs.{rung.name}.facets: none of the formulations has the facet 'printed'; add hull"
             )
-        for name in present:
+        for name in present[rung.name]:
             if not any(_can_hold(file_format, name) for file_format in rung.formats):
                 raise InputError(
                     f"rungs.{rung.name}.formats: none of {', '.join(rung.formats)} holds {name}; "
@@ -363,8 +399,19 @@ def _read_rung(
                 f"rungs.{name}.tightened: {formulation} has fixed jumps, and no certificate is about it; "
                 "omit it"
             )
-    sizes = _whole_numbers(table["sizes"])
-    return Rung(name, sizes, compress=compress, prove=prove, added=added, tightened=tightened, **words)
+    own = _read_formulations(table, "formulations", (), f"rungs.{name}.")
+    if unknown := [formulation for formulation in own if formulation not in formulations]:
+        raise InputError(f"rungs.{name}.formulations: {unknown[0]!r} is not in formulations; add it there")
+    return Rung(
+        name,
+        _whole_numbers(table.get("sizes", [])),
+        compress=compress,
+        prove=prove,
+        added=added,
+        tightened=tightened,
+        formulations=own,
+        **words,
+    )
 
 
 def _whole_numbers(numbers: list[float]) -> tuple[int, ...]:
@@ -373,12 +420,16 @@ def _whole_numbers(numbers: list[float]) -> tuple[int, ...]:
 
 
 def _read_sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
-    name, names = table["name"], tuple(rung.name for rung in rungs)
+    name, kind = table["name"], next(kind for kind in get_args(SketchKind) if kind in table)
+    names = tuple(rung.name for rung in rungs if (rung.name == "mesh") == (kind == "mesh"))
+    if not names:
+        raise InputError(
+            f"{place}{kind}: no rung takes it; add {'mesh' if kind == 'mesh' else 'tiny'} to rungs"
+        )
     wanted = _read_words(table, "rungs", names, names, place)
     sizes = table.get("sizes", {})
     if unknown := [rung for rung in sizes if rung not in wanted]:
         raise InputError(f"{place}sizes.{unknown[0]}: is unknown; the keys here are {', '.join(wanted)}")
-    kind = next(kind for kind in get_args(SketchKind) if kind in table)
     word = table[kind]
     if kind == "file":
         drawn = _read_drawing(table, place, folder)
@@ -387,6 +438,9 @@ def _read_sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[R
         title = f"random strokes on a {shape}"
         drawn = {"what": word, "title": title, "seeds": seeds_of(table["seeds"], f"{place}seeds")}
         drawn["random"] = _read_random(table, word, place)
+    elif kind == "mesh":
+        _check_known(word, MESHES, f"{place}mesh", "mesh ")
+        drawn = {"what": word, "title": MESHES[word][0]}
     else:
         _check_known(word, SAMPLES, f"{place}sample", "sample ")
         drawn = {"what": word, "title": SAMPLES[word].description}

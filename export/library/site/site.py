@@ -70,6 +70,11 @@ class InstancePages:
         """Its name."""
         return str(self.about["name"])
 
+    @property
+    def suffix(self) -> str:
+        """Suffix of its pictures."""
+        return "png" if "faces" in self.about["instance"] else "svg"
+
     def picture_of(self, entry: dict[str, Any]) -> FieldPicture:
         """Return the field shown with an entry: the best in its norm, or the field with its jumps."""
         return next(picture for picture in self.pictures if role_of(entry) in picture.roles)
@@ -142,14 +147,14 @@ def _copy_files(folder: Path, sums: dict[str, str], target: Path) -> None:
 def _draw_pictures(folder: Path, shown: InstancePages, target: Path) -> None:
     """Write the pictures of an instance and of each of its different fields."""
     instance = read_instance(folder / shown.about["instance"]["file"])
-    write_bytes(target / f"{shown.name}.svg", instance_picture(instance))
-    write_bytes(target / f"{shown.name}.thumb.svg", thumbnail(instance))
+    write_bytes(target / f"{shown.name}.{shown.suffix}", instance_picture(instance))
+    write_bytes(target / f"{shown.name}.thumb.{shown.suffix}", thumbnail(instance))
     roles_of: dict[str, list[str]] = {}
     for role in _ROLES:
         roles_of.setdefault(shown.about["fields"][role]["file"], []).append(role)
     for file, roles in roles_of.items():
         field = read_field(folder / file)
-        name = f"{file.removesuffix('.json')}.svg"
+        name = f"{file.removesuffix('.json')}.{shown.suffix}"
         write_bytes(target / name, field_picture(field))
         caption, facts = "; ".join(_ROLES[role] for role in roles), shown.about["fields"][roles[0]]
         shown.pictures.append(FieldPicture(tuple(roles), caption, facts, name, count_singularities(field)))

@@ -172,7 +172,7 @@ def test_the_answer_to_a_file_of_the_command_is_read_back(name, tmp_path, monkey
 BAD = {
     "nothing": ([], "name entries, or select them with --rung"),
     "unknown": (["cf_cyl_n005_mlip"], "or cf_cyl_n005_milp"),
-    "rung": (["--rung", "huge"], "there is no rung 'huge'; choose one of tiny, small, medium, large"),
+    "rung": (["--rung", "huge"], "there is no rung 'huge'; choose one of tiny, small, medium, large, mesh"),
     "none": (["cf_cyl_n005_milp", "--rung", "large"], "no entry of the library that ships is selected"),
 }
 

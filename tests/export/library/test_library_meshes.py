@@ -1,0 +1,142 @@
+"""Meshes in a library: next to a drawing, built, verified, shown, and answers to their files read back."""
+
+import gzip
+import shutil
+
+import crossfield as cf
+import highspy
+import pytest
+from crossfield.export.library.building.table import read_table
+from crossfield.export.library.building.verification import verify_library
+from crossfield.export.library.contributions.submit import submit
+from crossfield.export.library.documents import check_point
+from crossfield.export.library.plan.recipe import plan_library
+from crossfield.export.library.plan.spec import spec_of as spec_of_document
+from crossfield.export.library.site.site import write_site
+from crossfield.models.errors import InputError
+from libraries import library_of, spec_of
+
+pytestmark = pytest.mark.usefixtures("short_searches")
+
+SPEC = """formulations = ["exact", "milp", "qp"]
+[rungs.medium]
+sizes = [4]
+formats = ["mps"]
+[rungs.mesh]
+formats = ["mps", "nl"]
+compress = true
+gauges = ["strokes", "box"]
+[[sketches]]
+name = "rand"
+random = "full"
+seeds = [6]
+[[sketches]]
+name = "disc"
+mesh = "disc"
+"""
+DISC = "cf_disc_f0054"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    return library_of(tmp_path_factory.mktemp("meshes"), SPEC)
+
+
+def test_a_mesh_has_one_instance_per_gauge_named_after_its_faces(built):
+    names = [planned.recipe.name for planned in plan_library(built.spec)]
+    assert names == ["cf_rand_n004_s6", DISC, f"{DISC}_box"]
+    assert built.document["entries"][3:6] == [f"{DISC}_{short}" for short in ("exact", "milp", "qp")]
+    instance, sample = cf.read_instance(built.folder / f"{DISC}.instance.json"), cf.sample("disc")
+    assert instance.orthogonal
+    assert instance.mesh.faces.tolist() == sample.mesh.faces.tolist()
+    assert (instance.stroke_coefficient, instance.theta.tolist()) == (
+        sample.stroke_coefficient,
+        sample.theta.tolist(),
+    )
+
+
+def test_sidecar_and_table_state_faces_for_meshes_and_pixels_for_grids(built):
+    sidecar = built.entry(f"{DISC}_exact")
+    assert sidecar["instance"]["faces"] == sidecar["source"]["size"] == 54
+    assert sidecar["source"]["euler_characteristic"] == 1
+    assert "height" not in sidecar["source"]
+    rows = {row["name"]: row for row in read_table(built.folder / "entries.csv")}
+    sizes = [(row["pixels"], row["faces"]) for row in rows.values()]
+    assert sizes == [(16, None)] * 3 + [(None, 54)] * 6
+
+
+def test_a_library_of_meshes_is_what_a_build_makes_again(built):
+    assert verify_library(built.folder) == []
+    assert spec_of_document(built.document["spec"], built.folder / "library.json") == built.spec
+
+
+def test_an_optimum_of_a_mesh_comes_back_as_a_better_point(built, tmp_path):
+    lib = shutil.copytree(built.folder, tmp_path / "lib")
+    name = f"{DISC}_qp"
+    model = tmp_path / f"{name}.mps"
+    model.write_bytes(gzip.decompress((lib / f"{name}.mps.gz").read_bytes()))
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.readModel(str(model))
+    highs.run()
+    answer = tmp_path / f"{name}.sol"
+    highs.writeSolution(str(answer), 0)
+    assert check_point.check(str(model), str(answer)).worst < 1e-8
+    (result,) = submit(lib, [answer])
+    assert (result.outcome, result.entries) == ("not better", (name,))
+    assert result.objective == pytest.approx(result.known, rel=1e-6)
+    field = cf.search(cf.read_instance(lib / f"{DISC}_box.instance.json"), rounds=4, jobs=1).field
+    path = tmp_path / "better.json"
+    cf.write_field(field, path)
+    (result,) = submit(lib, [path])
+    assert result.error is None
+    assert result.entries
+
+
+def test_a_site_shows_meshes_with_faces_and_pictures(built, tmp_path):
+    write_site(built.folder, tmp_path / "site")
+    page = (tmp_path / "site" / "entry" / f"{DISC}_exact.html").read_text()
+    assert "The mesh <b>disc</b>, a flat disc, on 54 faces" in page
+    assert f"pictures/{DISC}.png" in page
+    for picture in (tmp_path / "site" / "pictures").glob(f"{DISC}*"):
+        assert picture.read_bytes()[:4] == b"\x89PNG"
+    index = (tmp_path / "site" / "index.html").read_text()
+    assert "<option>mesh</option>" in index
+    assert f"{DISC}.thumb.png" in index
+    assert "cf_rand_n004_s6.thumb.svg" in index
+
+
+MESH = '[[sketches]]\nname = "a"\nmesh = "disc"\n'
+WRONG = {
+    "a size": (
+        f"[rungs.mesh]\n{MESH}sizes = {{ mesh = [4] }}\n",
+        "sketches[0].sizes: .*meshes have their own",
+    ),
+    "sizes of the rung": (f"[rungs.mesh]\nsizes = [4]\n{MESH}", "rungs.mesh.sizes: .*meshes have their own"),
+    "no rung": (
+        f"[rungs.tiny]\nsizes = [4]\n{MESH}",
+        "sketches[0].mesh: no rung takes it; add mesh to rungs",
+    ),
+    "no rung of pixels": (f"[rungs.mesh]\n{MESH.replace('mesh', 'sample', 1)}", "no rung takes it; add tiny"),
+    "another rung": (
+        f'[rungs.tiny]\nsizes = [4]\n[rungs.mesh]\n{MESH}rungs = ["tiny"]\n',
+        "there is no 'tiny'; choose from mesh",
+    ),
+    "an unknown mesh": (f"[rungs.mesh]\n{MESH.replace('disc', 'dish')}", "there is no mesh 'dish'; choose"),
+    "strokes nearby": (f'[rungs.mesh]\n{MESH}points = "none"\n', "search, greedy or proven"),
+    "a formulation that the library lacks": (
+        f'formulations = ["milp"]\n[rungs.mesh]\nformulations = ["qp"]\n{MESH}',
+        "rungs.mesh.formulations: 'qp-fixed' is not in formulations",
+    ),
+    "a formulation on no rung": (
+        f'formulations = ["milp", "qp"]\n[rungs.mesh]\nformulations = ["qp"]\n{MESH}',
+        "no rung has milp-mccormick; omit milp-mccormick",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_specification_of_meshes_is_refused(tmp_path, case):
+    text, words = WRONG[case]
+    with pytest.raises(InputError, match=words.replace("[0]", r"\[0\]")):
+        spec_of(tmp_path, text)
