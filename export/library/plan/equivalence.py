@@ -10,7 +10,7 @@ from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem
 from ...formats.registry import FORMATS, problem_in_format
 from ...writing.canonical import CanonicalForm
-from .recipe import EntryRecipe, entry_name
+from .recipe import EntryRecipe, entry_name, norm_minimised
 
 
 def equivalent_entries(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
@@ -18,14 +18,16 @@ def equivalent_entries(recipe: EntryRecipe, names: Collection[str]) -> list[dict
     if recipe.facet == "printed":
         return []
     entries: list[dict[str, Any]] = []
-    mine = FORMULATIONS[recipe.formulation].minimises
+    mine, norm = FORMULATIONS[recipe.formulation].minimises, norm_minimised(recipe.formulation)
     if recipe.tightened:
         plain = entry_name(recipe.instance, recipe.formulation, recipe.facet)
         why = "the windows of the certificate contain every field of at most its energy; points transfer"
         entries.append({"formulation": recipe.formulation, "entry": plain, "why": why})
     for formulation, declared in FORMULATIONS.items():
-        if formulation != recipe.formulation and declared.minimises == mine:
-            name = entry_name(recipe.instance, formulation, "hull")
+        name = entry_name(recipe.instance, formulation, "hull")
+        # Where an instance has entries for orthogonal crosses, so are the crosses of all its entries.
+        is_same = declared.minimises == mine or (name in names and norm_minimised(formulation) == norm)
+        if formulation != recipe.formulation and norm is not None and is_same:
             why = f"both minimise {mine}; {declared.how}; points transfer by alpha, beta and the jumps"
             entries.append({"formulation": formulation, "entry": name if name in names else None, "why": why})
     return entries

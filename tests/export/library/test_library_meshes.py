@@ -18,7 +18,7 @@ from libraries import library_of, spec_of
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
-SPEC = """formulations = ["exact", "milp", "qp"]
+SPEC = """formulations = ["exact", "milp", "qp", "cycle"]
 [rungs.medium]
 sizes = [4]
 formats = ["mps"]
@@ -45,7 +45,11 @@ def built(tmp_path_factory):
 def test_a_mesh_has_one_instance_per_gauge_named_after_its_faces(built):
     names = [planned.recipe.name for planned in plan_library(built.spec)]
     assert names == ["cf_rand_n004_s6", DISC, f"{DISC}_box"]
-    assert built.document["entries"][3:6] == [f"{DISC}_{short}" for short in ("exact", "milp", "qp")]
+    shorts = [name.rpartition("_")[2] for name in built.document["entries"]]
+    # Cycles are for orthogonal crosses, in a gauge with all labels.
+    assert shorts == ["exact", "milp", "qp", *("exact", "milp", "qp", "cycle"), "exact", "milp", "qp"]
+    related = {each["entry"] for each in built.entry(f"{DISC}_cycle")["equivalent"]}
+    assert f"{DISC}_exact" in related
     instance, sample = cf.read_instance(built.folder / f"{DISC}.instance.json"), cf.sample("disc")
     assert instance.orthogonal
     assert instance.mesh.faces.tolist() == sample.mesh.faces.tolist()
@@ -62,7 +66,7 @@ def test_sidecar_and_table_state_faces_for_meshes_and_pixels_for_grids(built):
     assert "height" not in sidecar["source"]
     rows = {row["name"]: row for row in read_table(built.folder / "entries.csv")}
     sizes = [(row["pixels"], row["faces"]) for row in rows.values()]
-    assert sizes == [(16, None)] * 3 + [(None, 54)] * 6
+    assert sizes == [(16, None)] * 3 + [(None, 54)] * 7
 
 
 def test_a_library_of_meshes_is_what_a_build_makes_again(built):
