@@ -1,12 +1,10 @@
 """The energy of orthogonal crosses as a function of their jumps, and its change by one jump.
 
-Every pair and every stroke is a row with the residual r = M alpha + c + pi/2 z and an integer z: the jump of
-a pair, or the quarter turns between a stroke and the label of its cross. M is the incidence matrix of a graph
-whose edges are the rows. Strokes lead to one further vertex, the ground, whose angle is 0.
-
-At the best angles the energy is sum omega r^2. A step of z_k by 1 or -1 then changes it by
-omega_k (pi^2/4 (1 - omega_k R_k) + pi r_k) or the same with -pi r_k, where R_k is the effective resistance
-between the ends of row k.
+Every pair and stroke is a row with the residual r = M alpha + c + pi/2 z and an integer z: the jump of a
+pair, or the quarter turns between a stroke and the label of its cross. M is the incidence matrix of a graph
+whose edges are the rows. Strokes lead to one further vertex, the ground, whose angle is 0. At the best angles
+the energy is sum omega r^2. A step of z_k by 1 or -1 changes it by omega_k (pi^2/4 (1 - omega_k R_k) + x)
+with x = pi r_k or -pi r_k, where R_k is the effective resistance between the ends of row k.
 """
 
 from __future__ import annotations
@@ -32,7 +30,6 @@ MOST_DENSE: Final = 6000
 """Points up to which the inverse of the matrix is kept: 288 MB."""
 LOWER: Final = 1e-9
 """Fall of the energy that counts: less may be rounding."""
-_MOST_STEPS: Final = 100_000  # of a descent; a tenth of the rows are usual
 
 
 def takes_integers(instance: Instance) -> bool:
@@ -67,6 +64,16 @@ class OrthogonalEnergy:
             np.concatenate([pairs.weighted(np.full(m, 2.0)), strokes.weight]),
         )
 
+    def restrict(self, points: Ints, alpha: Floats) -> tuple[OrthogonalEnergy, Ints]:
+        """The energy of the rows at some points, the angles of all others fixed; and these rows' numbers."""
+        number = np.full(self.size + 1, len(points), dtype=np.int32)
+        number[points] = np.arange(len(points), dtype=np.int32)
+        first, second, fixed = number[self.first], number[self.second], alpha.copy()
+        fixed[points] = 0.0
+        rows = np.nonzero(np.minimum(first, second) < len(points))[0].astype(np.int32)
+        offset = self.residuals(fixed, 0)[rows]
+        return OrthogonalEnergy(len(points), first[rows], second[rows], offset, self.weight[rows]), rows
+
     @cached_property
     def rows(self) -> Any:
         """The matrix M, sparse (r, n)."""
@@ -80,7 +87,7 @@ class OrthogonalEnergy:
         """Sparse matrix (n, n) with an entry where a row of weight joins two points."""
         used = (np.maximum(self.first, self.second) < self.size) & (self.weight > 0)
         ends = (self.first[used], self.second[used])
-        return sparse.coo_array((np.ones(used.sum()), ends), shape=(self.size, self.size)).tocsr()
+        return sparse.csr_array((np.ones(len(ends[0])), ends), shape=(self.size, self.size))
 
     @cached_property
     def pins(self) -> Ints:
@@ -89,20 +96,7 @@ class OrthogonalEnergy:
         ties = (np.maximum(self.first, self.second) == self.size) & (self.weight > 0)
         parts, points = np.unique(part, return_index=True)
         tied = part[np.minimum(self.first, self.second)[ties]]
-        pins: Ints = points[~np.isin(parts, tied)].astype(np.int32)
-        return pins
-
-    def restrict(self, points: Ints, alpha: Floats) -> tuple[OrthogonalEnergy, Ints]:
-        """The energy of the rows at some points, the angles of all others fixed; and these rows' numbers."""
-        number = np.full(self.size + 1, len(points), dtype=np.int32)
-        number[points] = np.arange(len(points), dtype=np.int32)
-        near = np.minimum(number[self.first], number[self.second]) < len(points)
-        rows = np.nonzero(near)[0].astype(np.int32)
-        fixed = alpha.copy()
-        fixed[points] = 0.0
-        first, second = number[self.first[rows]], number[self.second[rows]]
-        offset = (self.offset + self.differences(fixed))[rows]
-        return OrthogonalEnergy(len(points), first, second, offset, self.weight[rows]), rows
+        return np.asarray(points[~np.isin(parts, tied)], dtype=np.int32)
 
     def matrix_of(self, weight: Floats) -> Any:
         """The matrix M' diag(weight) M, sparse (n, n); definite if its rows join what these rows join."""
@@ -112,25 +106,21 @@ class OrthogonalEnergy:
 
     @cached_property
     def solve_system(self) -> Solve:
-        """The solution of systems with the matrix M' diag(omega) M, by its factors."""
+        """The solver of M' diag(omega) M."""
         return factor_matrix(self.matrix_of(self.weight), pull=0.0)
-
-    def fit_angles(self, z: Ints) -> Floats:
-        """The angles of least energy for integers z, (n,)."""
-        return np.asarray(-self.solve_system(self.force(self.weight, z)))
 
     def force(self, weight: Floats, z: Ints) -> Floats:
         """M' diag(weight) (c + pi/2 z), (n,)."""
         return np.asarray(self.rows.T @ (weight * (self.offset + HALF * z)))
 
-    def residuals(self, alpha: Floats, z: Ints) -> Floats:
-        """The residual of each row in radians, (r,)."""
-        return self.differences(alpha) + self.offset + HALF * z
+    def fit_angles(self, z: Ints) -> Floats:
+        """The angles of least energy for integers z, (n,)."""
+        return np.asarray(-self.solve_system(self.force(self.weight, z)))
 
-    def differences(self, alpha: Floats) -> Floats:
-        """M alpha, (r,)."""
+    def residuals(self, alpha: Floats, z: Ints | int) -> Floats:
+        """The residual of each row in radians, (r,), of the angles alpha (n,)."""
         grounded = np.append(alpha, 0.0)
-        return np.asarray(grounded[self.first] - grounded[self.second])
+        return np.asarray(grounded[self.first] - grounded[self.second] + self.offset + HALF * z)
 
     def total(self, residual: Floats) -> float:
         """The sum of omega r^2."""
@@ -142,7 +132,8 @@ class OrthogonalEnergy:
 
     def turns(self, alpha: Floats) -> Floats:
         """The real z at which each residual is 0, (r,); rounded, because errors must not decide ties."""
-        return np.asarray(np.round(-(self.differences(alpha) + self.offset) / HALF, 9))
+        turns: Floats = np.round(-self.residuals(alpha, 0) / HALF, 9)
+        return turns
 
     def nearest(self, alpha: Floats) -> Ints:
         """The integers of least energy at given angles, (r,)."""
@@ -151,35 +142,24 @@ class OrthogonalEnergy:
     @cached_property
     def _inverse(self) -> Floats:
         """The inverse of the matrix with a row and a column of zeros for the ground."""
-        n = self.size
-        inverse = np.zeros((n + 1, n + 1))
-        inverse[:n, :n] = self.solve_system(np.eye(n))
+        inverse = np.zeros((self.size + 1, self.size + 1))
+        inverse[:-1, :-1] = self.solve_system(np.eye(self.size))
         return inverse
-
-    @property
-    def inverse(self) -> Floats:
-        """The inverse G of the matrix M' diag(omega) M, dense (n, n)."""
-        return self._inverse[:-1, :-1]
-
-    @cached_property
-    def resistance(self) -> Floats:
-        """The effective resistance m_k G m_k' between the ends of each row, (r,)."""
-        diagonal = np.diagonal(self._inverse)
-        between = self._inverse[self.first, self.second]
-        return np.asarray(diagonal[self.first] + diagonal[self.second] - 2 * between)
 
     @cached_property
     def stiffness(self) -> Floats:
-        """Energy of a quarter turn forced upon each row alone, over (pi/2)^2: omega (1 - omega R) >= 0."""
-        return np.maximum(self.weight * (1 - self.weight * self.resistance), 0.0)
+        """Energy of a quarter turn in each row alone, over pi^2/4: omega (1 - omega R), (r,)."""
+        diagonal, between = np.diagonal(self._inverse), self._inverse[self.first, self.second]
+        resistance = diagonal[self.first] + diagonal[self.second] - 2 * between
+        return np.maximum(self.weight * (1 - self.weight * resistance), 0.0)
 
-    def gains(self, residual: Floats) -> tuple[Floats, Floats]:
-        """Change of the energy when each integer grows by 1, and when it falls by 1, each (r,).
+    def gains(self, residual: Floats) -> Floats:
+        """Change of the energy by the better step of each integer, against the sign of its residual, (r,).
 
-        residual: that of the best angles for the present integers; angles follow in each case.
+        residual: that of the best angles for the present integers; angles follow the step.
         """
-        even, odd = HALF * HALF * self.stiffness, 2 * HALF * self.weight * residual
-        return even + odd, even - odd
+        change: Floats = HALF * HALF * self.stiffness - 2 * HALF * self.weight * np.abs(residual)
+        return change
 
     def step_residuals(self, residual: Floats, rows: Ints, steps: Ints) -> Floats:
         """The residuals of the best angles after steps of some integers, from those before them, (r,).
@@ -192,21 +172,26 @@ class OrthogonalEnergy:
         changed[rows] += HALF * steps
         return changed
 
-    def descend(self, z: Ints, residual: Floats | None = None, over: Over = never) -> tuple[Ints, Floats]:
+    def descend(self, z: Ints, over: Over = never, residual: Floats | None = None) -> tuple[Ints, Floats]:
         """Change single integers, the one of greatest gain first, until none lowers the energy.
 
-        residual: that of the best angles for z, if it is known. Returns the integers and their residuals.
+        With more than 6,000 points, round all to the best angles in turn. residual: that of the best angles
+        for z, if it is known. Returns the integers and their residuals.
         """
-        residual = self.residuals(self.fit_angles(z), z) if residual is None else residual
-        z, (even, odd) = z.copy(), (HALF * HALF * self.stiffness, 2 * HALF * self.weight)
-        for _ in range(_MOST_STEPS):
-            change = even - odd * np.abs(residual)
+        z, residual = z.copy(), self.residuals(self.fit_angles(z), z) if residual is None else residual
+        while self.size <= MOST_DENSE and not over():
+            change = self.gains(residual)
             row = np.argmin(change, keepdims=True).astype(np.int32)
-            if change[row[0]] > -LOWER or over():
+            if change[row[0]] > -LOWER:
                 break
             step = np.where(residual[row] > 0, -1, 1).astype(np.int32)
             z[row] += step
             residual = self.step_residuals(residual, row, step)
+        while self.size > MOST_DENSE and not over():
+            nearest = z - np.round(np.round(residual / HALF, 9)).astype(np.int32)
+            if (nearest == z).all():
+                break
+            z, residual = nearest, self.residuals(self.fit_angles(nearest), nearest)
         return z, residual
 
 

@@ -11,31 +11,46 @@ from typing import Final
 import numpy as np
 
 from ..instance.angles import HALF
-from ..instance.domain import Bools, Floats, Ints
+from ..instance.domain import Bools, Ints
 from ..processes.deadline import Over, never
 from ..smooth.sparse_systems import factor_matrix, one_thread
 from .energy import MOST_DENSE, OrthogonalEnergy
 
 _UPDATES: Final = 40  # of rank one between two factorisations
-_SHARE: Final = 0.1  # of the open integers, rounded per factorisation where there are many points
+_SHARE: Final = 0.2  # of the open integers, rounded per factorisation where there are many points
 
 
 @one_thread()
 def round_greedily(energy: OrthogonalEnergy, over: Over = never) -> Ints:
     """Integers by greedy rounding, (r,), one after the other with the best angles in between.
 
-    With more than 6,000 points a tenth of the open integers are rounded per factorisation, those nearest to
+    With more than 6,000 points a fifth of the open integers are rounded per factorisation, those nearest to
     whole numbers. Once time is over, all that are open are rounded.
     """
     z, known = np.zeros(len(energy.first), dtype=np.int32), grow_forest(energy)
     while not known.all():
-        if energy.size <= MOST_DENSE and not over():
-            _round_one_by_one(energy, z, known, over)
-            continue
         weight = np.where(known, energy.weight, 0.0)
-        alpha = -factor_matrix(energy.matrix_of(weight), pull=0.0)(energy.force(weight, z))
-        many = np.sum(~known) if over() else np.ceil(_SHARE * np.sum(~known))
-        _round_nearest(energy.turns(alpha), int(many), z, known)
+        solve = factor_matrix(energy.matrix_of(weight), pull=0.0)
+        alpha = np.append(-solve(energy.force(weight, z)), 0.0)
+        # A row that is known from now on changes the inverse by a matrix factor column column' of rank one.
+        columns, factors = np.zeros((energy.size + 1, _UPDATES)), np.zeros(_UPDATES)
+        for number in range(_UPDATES):
+            open_ = np.nonzero(~known)[0]
+            many = len(open_) if over() else np.ceil(_SHARE * len(open_)) if energy.size > MOST_DENSE else 1
+            turns = energy.turns(alpha[:-1])[open_]
+            distance = np.round(np.abs(turns - np.round(turns)), 9)  # rounding errors must not decide ties
+            chosen = np.argsort(distance, kind="stable")[: int(many)]
+            z[open_[chosen]], known[open_[chosen]] = np.round(turns[chosen]), True
+            if many != 1 or known.all():
+                break
+            row = open_[chosen[0]]
+            i, j, omega = energy.first[row], energy.second[row], energy.weight[row]
+            ends = np.zeros(energy.size)
+            ends[i], ends[j] = 1.0, -1.0
+            column = np.append(solve(ends), 0.0) - columns @ (factors * (columns[i] - columns[j]))
+            factors[number] = omega / (1 + omega * (column[i] - column[j]))
+            alpha -= factors[number] * (alpha[i] - alpha[j] + energy.offset[row] + HALF * z[row]) * column
+            columns[:, number] = column
     return z
 
 
@@ -50,36 +65,3 @@ def grow_forest(energy: OrthogonalEnergy) -> Bools:
         points, at = np.unique(ends, return_index=True)
         chosen[rows[at]] = reached[points] = True
     return chosen
-
-
-def _round_nearest(turns: Floats, many: int, z: Ints, known: Bools) -> list[int]:
-    """Round that many of the open rows, those nearest to whole numbers, and return their numbers."""
-    rows = np.nonzero(~known)[0]
-    nearest = np.round(turns[rows])
-    distance = np.round(np.abs(turns[rows] - nearest), 9)  # rounding errors must not decide ties
-    order = np.argsort(distance, kind="stable")[:many]
-    z[rows[order]], known[rows[order]] = nearest[order], True
-    numbers: list[int] = rows[order].tolist()
-    return numbers
-
-
-def _round_one_by_one(energy: OrthogonalEnergy, z: Ints, known: Bools, over: Over) -> None:
-    """Round 40 open integers in place, with the best angles after each, from one factorisation.
-
-    A row that is known from now on changes the inverse by a matrix of rank one, factor * column column'.
-    """
-    weight = np.where(known, energy.weight, 0.0)
-    solve = factor_matrix(energy.matrix_of(weight), pull=0.0)
-    alpha = np.append(-solve(energy.force(weight, z)), 0.0)
-    columns, factors = np.zeros((energy.size + 1, _UPDATES)), np.zeros(_UPDATES)
-    for number in range(_UPDATES):
-        if known.all() or over():
-            return
-        (row,) = _round_nearest(energy.turns(alpha[:-1]), 1, z, known)
-        i, j, omega = energy.first[row], energy.second[row], energy.weight[row]
-        ends = np.zeros(energy.size)
-        ends[i], ends[j] = 1.0, -1.0
-        column = np.append(solve(ends), 0.0) - columns @ (factors * (columns[i] - columns[j]))
-        factors[number] = omega / (1 + omega * (column[i] - column[j]))
-        alpha -= factors[number] * (alpha[i] - alpha[j] + energy.offset[row] + HALF * z[row]) * column
-        columns[:, number] = column

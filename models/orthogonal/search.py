@@ -61,12 +61,11 @@ class IntegerSearch:
         else:
             if self._tired > _TIRED * self._energy.size:
                 self._present, self._tired = self._begin_again(rng, self._moves, over), 0
-            point = _lower(self._energy, self._moves, self._present, rng, over)
-        better = point.total < self._present.total - LOWER
-        self._tired, self.fruitless = 0 if better else self._tired + _KICKS, self.fruitless + _KICKS
+            point = self._moves.lower(self._present, rng, over)
+        self._tired = 0 if point.total < self._present.total - LOWER else self._tired + _KICKS
+        self.fruitless = 0 if point.total < self.best.total - LOWER else self.fruitless + _KICKS
         self._present = point
-        if point.total < self.best.total - LOWER:
-            self.best, self.fruitless = point, 0
+        self.best = self.best if self.fruitless else point
         self.round += not over()
 
     def _begin_again(self, rng: np.random.Generator, moves: _Moves, over: Over) -> Point:
@@ -75,7 +74,7 @@ class IntegerSearch:
         z, residual, _ = self.best
         for _ in range(1 + self._energy.size // _STRONG):
             z, residual = moves.perturb(rng, z, residual)
-        return Point.of(self._energy, self._energy.descend(z, residual, over)[0])
+        return Point.of(self._energy, self._energy.descend(z, over, residual)[0])
 
     def _explore_patch(self, rng: np.random.Generator, over: Over) -> Point:
         """Explore the points nearest to a row, alternately a random one and one of high energy."""
@@ -87,39 +86,35 @@ class IntegerSearch:
         inside = np.maximum(patch.first, patch.second) < patch.size
         local = np.full(len(z), -1, dtype=np.int32)
         local[rows[inside]] = np.nonzero(inside)[0]
-        moves = _Moves(patch, self._rings.select(local))
         z = z.copy()
-        z[rows] = _lower(patch, moves, Point.of(patch, z[rows]), rng, over).z
+        z[rows] = _Moves(patch, self._rings.select(local)).lower(Point.of(patch, z[rows]), rng, over).z
         return Point.of(energy, z)
 
 
-def _lower(
-    energy: OrthogonalEnergy, moves: _Moves, point: Point, rng: np.random.Generator, over: Over
-) -> Point:
-    """The lowest point of a descent from this one, and of descents from the perturbed lowest one."""
-    for kick in range(_KICKS + 1):
-        if over():
-            break
-        z, residual = moves.perturb(rng, point.z, point.residual) if kick else (point.z, point.residual)
-        z, residual = energy.descend(z, residual, over)
-        total = energy.total(residual)
-        if total < point.total - LOWER:
-            point = Point(z, residual, total)
-    return Point.of(energy, point.z)  # rounding of many steps must not accumulate
-
-
 class _Moves:
-    """Random changes of several integers at once, to leave a valley that single steps do not leave."""
+    """Descents, and random changes of several integers to leave a valley that single steps do not leave."""
 
     def __init__(self, energy: OrthogonalEnergy, rings: Rings) -> None:
         """Prepare an energy; rings: of its rows."""
         self._energy, self._rings = energy, rings
-        number = np.repeat(np.arange(len(rings.defect)), np.diff(rings.start))
         # The ring that goes along a row from its first point to its second one [0], and back [1], or -1.
         self._beside = np.full((len(energy.first), 2), -1)
-        self._beside[rings.pair, (rings.sign < 0).astype(int)] = number
+        ring = np.repeat(np.arange(len(rings.defect)), np.diff(rings.start))
+        self._beside[rings.pair, (rings.sign < 0).astype(int)] = ring
         by_point = abs(energy.rows).tocsc()
         self._start, self._at_point = by_point.indptr, by_point.indices
+
+    def lower(self, point: Point, rng: np.random.Generator, over: Over) -> Point:
+        """The lowest point of a descent from this one, and of descents from the perturbed lowest one."""
+        for kick in range(_KICKS + 1):
+            if over():
+                break
+            start = self.perturb(rng, point.z, point.residual) if kick else point[:2]
+            z, residual = self._energy.descend(start[0], over, start[1])
+            total = self._energy.total(residual)
+            if total < point.total - LOWER:
+                point = Point(z, residual, total)
+        return Point.of(self._energy, point.z)  # rounding of many steps must not accumulate
 
     def perturb(self, rng: np.random.Generator, z: Ints, residual: Floats) -> tuple[Ints, Floats]:
         """Integers after a random change, and the residuals of their best angles."""
@@ -138,8 +133,7 @@ class _Moves:
         ends, row = (self._energy.first, self._energy.second), int(rng.integers(len(self._energy.first)))
         for _ in range(int(rng.integers(1, _NEIGHBOURS + 1))):
             steps[row] += int(rng.choice((-1, 1)))
-            points = [int(end[row]) for end in ends if end[row] < self._energy.size]
-            point = points[int(rng.integers(len(points)))]
+            point = rng.choice([end[row] for end in ends if end[row] < self._energy.size])
             row = int(self._at_point[rng.integers(self._start[point], self._start[point + 1])])
 
     def _walk(self, rng: np.random.Generator, z: Ints, steps: Counter[int]) -> None:

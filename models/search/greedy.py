@@ -53,7 +53,7 @@ def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop 
 
     Orthogonal crosses, and all crosses on meshes, get the integers of mixed-integer quadrangulation: those on
     a forest are 0, and of the others the one nearest to a whole number is rounded first. With more than 6,000
-    points a tenth of them are rounded at a time.
+    points a fifth of them are rounded at a time.
 
     Parameters
     ----------

@@ -37,11 +37,11 @@ def first_integer_field(instance: Instance, over: Over) -> CrossField:
 def starting_integers(
     instance: Instance, energy: OrthogonalEnergy, start: CrossField | None, over: Over
 ) -> list[Ints]:
-    """Integers of the power field, the greedy field and a given one, after descent up to 6,000 points."""
+    """Integers of the power field, the greedy field and a given one, after descent."""
     starts = [energy.nearest(power_field(instance).alpha), round_greedily(energy, over)]
     if start is not None:
         starts.append(integers_of(start))
-    return starts if energy.size > MOST_DENSE else [energy.descend(z, over=over)[0] for z in starts]
+    return [energy.descend(z, over)[0] for z in starts]
 
 
 def finish_field(instance: Instance, energy: OrthogonalEnergy, z: Ints, over: Over) -> CrossField:

@@ -25,23 +25,25 @@ def case(request):
 def test_gains_and_residuals_are_those_of_solving_again(case):
     _, energy, z = case
     residual = energy.residuals(energy.fit_angles(z), z)
-    grows, falls = energy.gains(residual)
+    gains = energy.gains(residual)
     for row in range(0, len(z), 3):
-        for step, gain in ((1, grows[row]), (-1, falls[row])):
+        changes = []
+        for step in (1, -1):
             moved = z.copy()
             moved[row] += step
             again = energy.residuals(energy.fit_angles(moved), moved)
-            assert energy.total(again) - energy.total(residual) == pytest.approx(gain, abs=1e-8)
+            changes.append(energy.total(again) - energy.total(residual))
             stepped = energy.step_residuals(residual, np.array([row]), np.array([step]))
             np.testing.assert_allclose(stepped, again, atol=1e-9)
+        assert min(changes) == pytest.approx(gains[row], abs=1e-8)
 
 
-def test_the_inverse_and_the_slope_at_the_best_angles(case):
+def test_the_best_angles_have_no_slope(case):
     _, energy, z = case
-    matrix = energy.matrix_of(energy.weight)
-    np.testing.assert_allclose(matrix @ energy.inverse, np.eye(energy.size), atol=1e-9)
     alpha = energy.fit_angles(z)
-    np.testing.assert_allclose(energy.rows @ alpha, energy.differences(alpha), atol=1e-12)
+    np.testing.assert_allclose(
+        energy.rows @ alpha + energy.offset + z * np.pi / 2, energy.residuals(alpha, z), atol=1e-9
+    )
     np.testing.assert_allclose(energy.rows.T @ (energy.weight * energy.residuals(alpha, z)), 0.0, atol=1e-9)
 
 
@@ -61,7 +63,7 @@ def test_descent_never_raises_the_energy_and_ends_where_no_step_gains(case):
     low, residual = energy.descend(z)
     np.testing.assert_allclose(residual, energy.residuals(energy.fit_angles(low), low), atol=1e-8)
     assert energy.total(residual) <= energy.total(before)
-    assert min(map(np.min, energy.gains(residual))) >= -2 * LOWER
+    assert energy.gains(residual).min() >= -2 * LOWER
 
 
 def test_parts_without_strokes_are_pinned():

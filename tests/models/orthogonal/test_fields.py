@@ -69,14 +69,14 @@ def least_energy(energy):
     ends = np.zeros((energy.size + 1,) * 2)
     ends[energy.first[tree], energy.second[tree]] = 1
     length = shortest_path(ends, directed=False)[energy.first, energy.second] + 1
-    exact = -(energy.differences(alpha) + energy.offset) / HALF
+    exact = -energy.residuals(alpha, 0) / HALF
     lowest = np.where(tree, 0, np.ceil(exact - length / 2)).astype(int)
     highest = np.where(tree, 0, np.floor(exact + length / 2)).astype(int)
     ranges = [range(low, high + 1) for low, high in zip(lowest, highest, strict=True)]
     rows = energy.rows.toarray()
-    reduced = np.diag(energy.weight) - (energy.weight[:, None] * rows) @ energy.inverse @ (
-        rows.T * energy.weight
-    )
+    reduced = np.diag(energy.weight) - (energy.weight[:, None] * rows) @ energy.solve_system(
+        np.eye(energy.size)
+    ) @ (rows.T * energy.weight)
     z = np.array(list(product(*ranges)))
     shifted = energy.offset + HALF * z
     return float(np.einsum("kr,rs,ks->k", shifted, reduced, shifted, optimize=True).min())
