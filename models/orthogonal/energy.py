@@ -179,7 +179,7 @@ class OrthogonalEnergy:
         for z, if it is known. Returns the integers and their residuals.
         """
         z, residual = z.copy(), self.residuals(self.fit_angles(z), z) if residual is None else residual
-        while self.size <= MOST_DENSE and not over():
+        while len(z) and self.size <= MOST_DENSE and not over():
             change = self.gains(residual)
             row = np.argmin(change, keepdims=True).astype(np.int32)
             if change[row[0]] > -LOWER:

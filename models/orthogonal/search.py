@@ -119,6 +119,8 @@ class _Moves:
     def perturb(self, rng: np.random.Generator, z: Ints, residual: Floats) -> tuple[Ints, Floats]:
         """Integers after a random change, and the residuals of their best angles."""
         steps: Counter[int] = Counter()
+        if not len(z):
+            return z, residual
         if not len(self._rings.defect) or rng.random() < _ROWS:
             self._change_neighbours(rng, steps)
         else:

@@ -156,6 +156,21 @@ def test_each_part_without_strokes_gets_a_power_field():
     assert cf.power_field(on_edges(both, sharp=9)).energy().total == pytest.approx(sum(parts))
 
 
+@pytest.mark.parametrize("orthogonal", [True, False])
+@pytest.mark.parametrize("faces", [[[0, 1, 2]], [[0, 1, 2], [3, 4, 5]], [[0, 1, 2], [0, 2, 1]]])
+def test_single_faces_have_fields(faces, orthogonal):
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 0, 0], [6, 0, 0], [5, 1, 0]]
+    mesh = mesh_of(corners[: 1 + np.max(faces)], faces)
+    for boundary in (True, False):
+        instance = on_edges(mesh, sharp=9, boundary=boundary, orthogonal=orthogonal)
+        for field in (
+            cf.greedy_field(instance),
+            cf.power_field(instance),
+            cf.search(instance, rounds=2).field,
+        ):
+            assert field.energy().total == pytest.approx(0.0, abs=1e-9)
+
+
 def test_greedy_is_one_solution_of_exact_rounds_and_one_of_many_at_once(monkeypatch):
     energy = OrthogonalEnergy.of(on_edges(shaken(torus(12, 6), 1, 0.05), sharp=9))
     exact = round_greedily(energy)
