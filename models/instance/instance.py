@@ -23,7 +23,7 @@ from .terms import PairTerms, StrokeTerms
 Gauge = Literal["strokes", "box"]
 GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
 
-_FLAT = 1e-8  # directions closer to the horizontal than this are horizontal
+_FLAT = 1e-8  # directions closer than this to the horizontal or to 45 degrees are these
 _DECIMALS = 12  # of theta and w
 _FINE = 1e-3  # reliabilities up to here would lose digits that count
 _SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds and at the ends of ranges
@@ -98,9 +98,8 @@ class Instance(Pictured):
         Number of each point with a stroke, int (s,), ascending, each once.
     theta
         Stroke directions, float (s,), in radians counter-clockwise from the x axis of the point's frame (of
-        a pixel: to the right, y up). Stored modulo pi, rounded to 12 decimals, and as 0 within 1e-8 of the
-        axis, because readers of files drop such small costs; pi/4 has all its digits, so that a window
-        begins at 0.
+        a pixel: to the right, y up). Stored modulo pi, rounded to 12 decimals, and as 0 or pi/4 within 1e-8
+        of them, because readers of files drop such small costs and ends of windows.
     w
         Reliability of each direction, float (s,), in (0, 1]; above 1e-3 rounded to 12 decimals.
     stroke_coefficient, skew_coefficient
@@ -229,7 +228,7 @@ class Instance(Pictured):
         self._check_pair_weights()
         theta = np.round(wrap(self.theta, 0.0, np.pi), _DECIMALS)
         theta = np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta)
-        self._freeze("theta", np.where(theta == np.round(QUARTER, _DECIMALS), QUARTER, theta))
+        self._freeze("theta", np.where(np.abs(theta - QUARTER) < _FLAT, QUARTER, theta))
         self._freeze("w", np.where(self.w > _FINE, np.round(self.w, _DECIMALS), self.w))
 
     def __repr__(self) -> str:

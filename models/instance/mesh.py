@@ -22,6 +22,7 @@ MOST_FACES: Final = 2_000_000
 _FARTHEST: Final = 1e30  # coordinates whose products are finite numbers
 _THINNEST: Final = 1e-12  # height of a face relative to its longest edge, below which it has no normal
 _DECIMALS: Final = 12  # of kappa
+_PARALLEL: Final = 1e-8  # turns between frames up to here are 0: readers of files drop so small numbers
 _SHOWN: Final = 8  # faces that an error lists
 
 
@@ -216,6 +217,7 @@ class Mesh(Domain):
         edge = self.vertices[high] - self.vertices[low]
         turn = self.angle_in(self.second, edge) - self.angle_in(self.first, edge)
         rounded = np.round(wrap(turn, -np.pi, 2 * np.pi), _DECIMALS)
+        rounded = np.where(np.abs(rounded) < _PARALLEL, 0.0, rounded)
         return np.where(rounded <= -np.pi, rounded + 2 * np.pi, rounded)
 
     @cached_property

@@ -290,3 +290,13 @@ def test_parts_are_counted_and_solved_together(tmp_path):
 def test_wrong_options_are_refused(tmp_path, options):
     with pytest.raises(cf.CrossfieldError, match=next(iter(options))):
         cf.read_mesh(write_obj(tmp_path / "a.obj", tetrahedron()), **options)
+
+
+def test_numbers_that_programs_take_as_zero_are_zero(tmp_path):
+    """A flat sheet whose corners are off by 1e-9: diagonals are at 45 degrees, and parallel frames equal."""
+    sheet = flat_sheet(3, 3)
+    noise = 1e-9 * np.random.default_rng(0).normal(size=sheet.vertices.shape)
+    instance = cf.read_mesh(write_obj(tmp_path / "a.obj", Mesh(sheet.vertices + noise, sheet.faces)))
+    for numbers in (instance.mesh.kappa, instance.alpha_lower, instance.theta):
+        assert not ((numbers != 0) & (np.abs(numbers) < 1e-7)).any()
+    assert (instance.theta == np.pi / 4).any()
