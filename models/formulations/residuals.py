@@ -12,7 +12,7 @@ from ..instance.domain import Floats
 from ..instance.instance import Instance
 
 _SLACK: Final = 1e-9  # quarter turns, as in the ranges of jumps
-_ROUNDING: Final = 1e-9  # radians by which a limit is greater than computed, much more than its error
+_ROUNDING: Final = 1e-8  # radians added to a limit: more than its error, and than SCIP takes for 0
 _ZERO: Final = 2e-9  # radians of a right side that SCIP reads as 0: rounding of angles or of coordinates
 _BLOCK: Final = 256  # right sides that are solved at once, which bounds memory
 
