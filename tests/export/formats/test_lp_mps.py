@@ -256,3 +256,25 @@ def test_small_models_have_the_bytes_of_their_golden_files(file: str, pixels: in
     assert text == (GOLDEN / file).read_bytes()
     expected = problem_algebra(problem)
     assert_same(by_scip(GOLDEN / file).reordered(expected.columns, expected.rows), expected)
+
+
+@both
+def test_rows_of_a_mesh_have_numbers_of_faces_and_pairs(suffix: str, tmp_path: Path):
+    """(14): s - alpha_i + alpha_j - pi/2 p1 - pi p2 >= kappa."""
+    problem = problem_of("milp-mccormick shape=tetrahedron orthogonal=True")
+    mesh = problem.instance.mesh
+    write(problem, tmp_path / f"model.{suffix}")
+    model = by_highs(tmp_path / f"model.{suffix}")
+    for pair, (i, j) in enumerate(zip(mesh.first.tolist(), mesh.second.tolist(), strict=True)):
+        row = model.rows.index(f"c14_{pair:02}")
+        at = model.matrix_at[:, 0] == row
+        names = [model.columns[column] for column in model.matrix_at[at, 1]]
+        assert dict(zip(names, model.matrix[at].tolist(), strict=True)) == {
+            f"s_{pair:02}": 1,
+            f"alpha_{i:02}": -1,
+            f"alpha_{j:02}": 1,
+            f"p1_{pair:02}": -np.pi / 2,
+            f"p2_{pair:02}": -np.pi,
+        }
+        assert model.row_lower[row] == mesh.kappa[pair]
+        assert model.costs[model.columns.index(f"s_{pair:02}")] == 2 * problem.instance.pair_weights[pair]
