@@ -28,6 +28,7 @@ Texts = NDArray[np.bytes_]
 
 BLOCK: Final = 8192
 """Records per block: their bytes stay in the processor's cache."""
+_BITS: Final = 16  # optional pieces whose patterns are numbered without renumbering
 
 LEAST_COEFFICIENT: Final = 1e-9
 COEFFICIENT_LIMIT: Final = 1e15
@@ -217,18 +218,23 @@ class _Template:
         Few patterns of presence occur: adjacent bytes of one pattern are moved for all of its
         records at once.
         """
-        pattern = sum(where.astype(np.intp) << bit for bit, where in enumerate(present))
+        pattern = np.zeros(len(present[0]), dtype=np.intp)
+        for number, where in enumerate(present):
+            pattern = 2 * pattern + where
+            if number >= _BITS:  # a column may be in rows of fifty kinds, as with long cycles
+                pattern = np.unique(pattern, return_inverse=True)[1]
         there = np.bincount(pattern)
+        records = {number: np.flatnonzero(pattern == number) for number in np.flatnonzero(there).tolist()}
         found = {
-            number: self._stretches([bool(number >> bit & 1) for bit in range(len(present))])
-            for number in np.flatnonzero(there).tolist()
+            number: self._stretches([bool(where[at[0]]) for where in present])
+            for number, at in records.items()
         }
         lengths = np.zeros(len(there), dtype=np.intp)
         lengths[list(found)] = [sum(last - first for first, last in runs) for runs in found.values()]
         ends = np.cumsum(lengths[pattern])
         line = np.empty(ends[-1], dtype=np.uint8)
         for number, runs in found.items():
-            at = np.flatnonzero(pattern == number)
+            at = records[number]
             to = ends[at] - lengths[number]
             for first, last in runs:
                 kind = f"V{last - first}"

@@ -143,6 +143,16 @@ def test_any_records_lack_any_pieces(present, whole):
     assert text(parts, count) == expected
 
 
+@pytest.mark.parametrize("pieces", [15, 17, 70])
+def test_records_lack_any_of_many_pieces(pieces):
+    """Columns on long cycles are in rows of many kinds: patterns of presence are no small numbers."""
+    present = np.random.default_rng(1).random((pieces, 300)) < 0.3
+    present[:, 0], present[-1, 1] = False, True
+    parts = [OptionalPieces(where, [b"%d," % number]) for number, where in enumerate(present)]
+    expected = "".join(f"{number}," for row in present.T for number in np.flatnonzero(row))
+    assert text(parts, 300).decode() == expected
+
+
 @pytest.mark.parametrize("first", [0, 7, 95, 9_990, 99_999_990])
 def test_numbers_grow_a_digit_within_a_block_and_between_blocks(first, monkeypatch):
     values = np.arange(first, first + 20, dtype=np.int32)
