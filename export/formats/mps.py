@@ -23,16 +23,19 @@ from typing import Final
 import numpy as np
 
 from ...models.formulations.families import Block, Monomial, PlacedFamily
+from ...models.formulations.names import row_names, stack_names
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Ints
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
 from ..writing.canonical import BlockBounds, CanonicalForm, coefficient
-from ..writing.names import Names, problem_name
+from ..writing.names import OBJECTIVE, Names, problem_name
 from ..writing.records import (
     OptionalPieces,
     Piece,
     TaggedWords,
+    Words,
+    check_coefficients,
     number_text,
     render,
     words,
@@ -76,6 +79,9 @@ def _columns(form: CanonicalForm) -> Iterator[bytes]:
         if integer:
             yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
         for block in blocks:
+            if any(family.family.steps for family in problem.rows):
+                yield from _single_entries(form, block)
+                continue
             name, cost = names.of(block), words(form.costs[block.slice])
             entries = [
                 entry
@@ -89,6 +95,22 @@ def _columns(form: CanonicalForm) -> Iterator[bytes]:
     yield b" %b obj %b\n" % (form.one, number_text(form.constant).encode())
     if not problem.rows:
         yield b" %b c_ONE 1\n" % form.one
+
+
+def _single_entries(form: CanonicalForm, block: Block) -> Iterator[bytes]:
+    """Matrix entries of a block whose columns may stand in any number of rows; a record is an entry."""
+    from ...models.formulations.arrays import row_terms  # it loads SciPy, as cycles do
+
+    rows, (at, value) = form.problem.rows, row_terms(form.problem.rows, 1)
+    check_coefficients(value, "a row of cycles")
+    mine = (at[:, 1] >= block.offset) & (at[:, 1] < block.offset + block.count)
+    column = np.concatenate([np.arange(block.count), at[mine, 1] - block.offset])
+    row = np.concatenate([np.zeros(block.count, dtype=np.int64), at[mine, 0] + 1])  # costs first
+    order = np.lexsort((row, column))
+    names = Words(stack_names([np.array([list(OBJECTIVE)], dtype=np.uint8), row_names(rows)]), row[order])
+    values = words(np.concatenate([form.costs[block.slice], value[mine]])[order])
+    parts = [b" ", form.names.of(block).at(column[order]), b" ", names, b" ", values, b"\n"]
+    yield from render(parts, len(order))
 
 
 def _entries(
@@ -119,25 +141,11 @@ def _incident_rows(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints
             else _inverse_index(family.elements, family.block(term.symbols[0]).count)
         )
         return [(0, row, term)]
-    if family.family.over == "cycles":
-        at = family.column_of(term.symbols[0]) - family.block(term.symbols[0]).offset
-        return [(0, row, term) for row in _rows_by_turn(at, family.block(term.symbols[0]).count)]
     assert family.covers_index_set  # families on a part of the pairs have terms of only those pairs
     if kind == "stroke":
         return [(0, _inverse_index(instance.stroke_index, instance.domain.size), term)]
     of_points = _pairs_of_faces if isinstance(instance.domain, Mesh) else _pairs_of_pixels
     return [(rank, row, term) for rank, end, row in of_points(instance) if end == kind]
-
-
-def _rows_by_turn(index: Ints, count: int) -> Iterator[Ints]:
-    """The first place in `index` of each number below `count`, then the second, ...; -1 beyond the last."""
-    order = np.argsort(index, kind="stable")
-    turn = np.arange(len(order)) - np.searchsorted(index[order], index[order])
-    for number in range(int(turn.max(initial=-1)) + 1):
-        chosen = order[turn == number]
-        place = np.full(count, -1, dtype=np.int32)
-        place[index[chosen]] = chosen
-        yield place
 
 
 def _inverse_index(index: Ints, count: int) -> Ints:

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.formats.registry import write
+from crossfield.export.programs import highs
 from crossfield.export.verify.checks import Verdict
+from crossfield.export.verify.comparison import algebra_difference
 from crossfield.export.verify.verify import verify
 from crossfield.models.errors import FormulationError
 from crossfield.models.formulations.problem import formulate
@@ -301,6 +303,15 @@ def test_the_file_of_a_tetrahedron_is_as_by_hand(tmp_path):
     text = "".join(line for line in lines if not line.startswith("\\"))
     expected = TETRAHEDRON.replace("STAMP", problem.stamp.removeprefix("sha256_")).replace("LIMITS", LIMITS)
     assert text == expected
+
+
+@pytest.mark.parametrize("suffix", ["lp", "mps"])
+def test_highs_reads_rows_of_many_steps(suffix, tmp_path):
+    problem = formulate(part(torus(40, 3), []), "milp-cycle")
+    assert max(family.family.steps for family in problem.rows) == 80
+    write(problem, tmp_path / f"it.{suffix}")
+    points = np.random.default_rng(0).normal(size=(2, problem.n_columns))
+    assert algebra_difference(highs.read(tmp_path / f"it.{suffix}"), problem, 0.0, points) == ""
 
 
 @pytest.mark.oracles
