@@ -37,7 +37,7 @@ DOMAINS: Final = {
 def check_domain(instance: Instance, command: str) -> None:
     """Raise DomainError for an instance on a domain that the command does not take."""
     if instance.domain.kind not in DOMAINS[command]:
-        assert instance.grid.size  # raises the error: there is no command for meshes only
+        instance.grid.check()  # `grid` raises the error: there is no command for meshes only
 
 
 def is_mesh_file(path: Path, command: str) -> bool:

@@ -77,15 +77,17 @@ def read_directions(path: Path, mesh: Mesh) -> Directions:
 
     A vector of length 0 is no direction. Raises InputError that names a row or a face.
     """
-    lines = read_bytes(path, MAX_BYTES).decode("utf-8-sig", "replace").splitlines()
+    lines = read_bytes(path, MAX_BYTES).decode("utf-8-sig", "replace").splitlines() or [""]
     of_every_face = path.suffix.lower() == ".rawfield"
+    rows = lines[of_every_face or not lines[0].lstrip()[:1].isdigit() :]
+    if not "".join(rows).strip():
+        raise InputError("has no row of numbers; give face,x,y,z, or leave it out")
     try:
         if of_every_face:
-            vector = np.loadtxt(lines[1:], usecols=(0, 1, 2), ndmin=2)
+            vector = np.loadtxt(rows, usecols=(0, 1, 2), ndmin=2)
             face = np.arange(len(vector), dtype=np.int32)
         else:
-            heading = int(bool(lines) and not lines[0].lstrip()[:1].isdigit())
-            table = np.loadtxt(lines[heading:], delimiter=",", usecols=(0, 1, 2, 3), ndmin=2)
+            table = np.loadtxt(rows, delimiter=",", usecols=(0, 1, 2, 3), ndmin=2)
             face, vector = whole_numbers(table[:, 0], "the column of faces", InputError), table[:, 1:]
     except ValueError as error:
         raise InputError(f"is no table of face,x,y,z and no .rawfield: {shortened(error)}") from error

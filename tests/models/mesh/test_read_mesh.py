@@ -98,7 +98,10 @@ def test_the_first_vectors_of_a_rawfield_are_directions(tmp_path):
 @for_each(
     "text,message",
     [
+        ("", "has no row of numbers"),
+        ("face,x,y,z\n\n", "has no row of numbers"),
         ("0,1,0\n", "is no table of face,x,y,z"),
+        ("face,x,y,z\n1;1;0;0\n", "is no table of face,x,y,z"),
         ("0,1,0,up\n", "is no table of face,x,y,z"),
         ("0.5,1,0,0\n", "whole numbers"),
         ("2,1,0,0\n", "face 2: does not exist"),
