@@ -109,7 +109,7 @@ def _single_entries(form: CanonicalForm, block: Block) -> Iterator[bytes]:
     order = np.lexsort((row, column))
     names = Words(stack_names([np.array([list(OBJECTIVE)], dtype=np.uint8), row_names(rows)]), row[order])
     values = words(np.concatenate([form.costs[block.slice], value[mine]])[order])
-    parts = [b" ", form.names.of(block).at(column[order]), b" ", names, b" ", values, b"\n"]
+    parts: list[Piece] = [b" ", form.names.of(block).at(column[order]), b" ", names, b" ", values, b"\n"]
     yield from render(parts, len(order))
 
 
