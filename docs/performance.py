@@ -24,7 +24,7 @@ from typing import Any, Final
 
 import numpy as np
 from crossfield.export.formats.registry import FORMATS, problem_in_format, write
-from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.catalogue import FORMULATIONS, list_formulations
 from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.instance import Instance
 from machine import processor_name
@@ -311,7 +311,7 @@ def main() -> None:
     elif options.smoke:
         options.output.write_text(page(here, (4, 8), ["minlp-quartic"], 8), encoding="utf-8")
     else:
-        options.output.write_text(page(in_child, SIZES, list(FORMULATIONS), 128), encoding="utf-8")
+        options.output.write_text(page(in_child, SIZES, list_formulations(), 128), encoding="utf-8")
 
 
 if __name__ == "__main__":

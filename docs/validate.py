@@ -24,7 +24,8 @@ from crossfield.export.cli.tables import smallest_problems
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, suitability
 from crossfield.export.verify.checks import Check, Verdict, Verification
 from crossfield.export.verify.verify import verify
-from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.catalogue import list_formulations
+from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from make import generated_line, markdown
 
@@ -103,10 +104,15 @@ def route_row(check: Check) -> list[str]:
     ]
 
 
+def verified_problems() -> list[Problem]:
+    """The smallest problem of each formulation that the sketch of this page can have."""
+    return [problem for problem in smallest_problems() if problem.name in list_formulations()]
+
+
 def route_tables(main: Run) -> list[str]:
     """A table for each formulation, of the solvers that take it."""
     parts = []
-    for problem in smallest_problems():
+    for problem in verified_problems():
         checks = [f for f in main.solves(problem.name) if suitability(problem, f.program).answer == "yes"]
         proven = "No route proves the optimum in time."
         if proofs := len(main.proven(problem.name)):
@@ -139,12 +145,12 @@ def same_problem(main: Run) -> str:
 def short_summary(main: Run, runs: list[Run]) -> str:
     """Numbers of files that were read as intended or not, and of formulations with a proven optimum."""
     verdicts = [f.verdict for run in runs for f in run.result.checks if f.step == "read"]
-    proven = [name for name in FORMULATIONS if main.proven(name)]
+    proven = [name for name in list_formulations() if main.proven(name)]
     counts = [len(main.proven(name)) for name in proven]
     return (
         f"{len(main.result.versions)} programs read {verdicts.count(Verdict.AGREES)} files correctly and "
         f"{verdicts.count(Verdict.DIFFERS) + verdicts.count(Verdict.FAILED)} wrongly. "
-        f"{len(proven)} of the {len(FORMULATIONS)} formulations are proven optimal, "
+        f"{len(proven)} of the {len(list_formulations())} formulations are proven optimal, "
         f"each by {min(counts)} to {max(counts)} routes. "
         f"The proven optima of a formulation differ by at most {max(map(main.apart, proven)):.1e}."
     )
@@ -194,7 +200,7 @@ def update_record(runs: list[Run]) -> dict[str, dict[str, Any]]:
                 "files": [read.count(Verdict.AGREES), *map(read.count, (Verdict.DIFFERS, Verdict.FAILED))],
                 "routes": [
                     [f"`{problem.name}`", *route_row(check)]
-                    for problem in smallest_problems()
+                    for problem in verified_problems()
                     for check in main.solves(problem.name)
                     if check.program in entry.solvers and check.verdict != Verdict.NOT_TRIED
                     if suitability(problem, check.program).answer == "yes"
@@ -250,7 +256,7 @@ def main() -> None:
     """Run everything and write the page."""
     ArgumentParser(description=__doc__).parse_args()
     begin = time.perf_counter()
-    main_run = verify_instance("strokes", "hull", tuple(FORMULATIONS))
+    main_run = verify_instance("strokes", "hull", tuple(list_formulations()))
     others = [(gauge, facet) for gauge in GAUGES for facet in ("hull", "printed")][1:]
     runs = [main_run, *(verify_instance(gauge, facet, VARIANTS) for gauge, facet in others)]
     parts = [

@@ -27,7 +27,7 @@ from ..previews import table_of
 from .catalogue import declare, lift_products, norm_of, reason_against
 from .declaration import Family, Formulation
 from .families import ANY_DEGREE, Block, PlacedFamily, merge_terms
-from .residuals import angles_and_jumps, cycle_data, limit_residuals
+from .residuals import angles_and_jumps, residual_data
 from .symbols import (
     NARROWED,
     SLOTS,
@@ -162,21 +162,11 @@ class Problem:
             "omega": self._of_pairs(self.instance.pair_weights, 1.0),
         }
         if self.formulation.declaration.orthogonal:
-            data |= self._residual_data
+            has_cycles = "k" in self.formulation.variables
+            data |= residual_data(self.instance, self.formulation.options.limits, cycles=has_cycles)
         if self.jumps is not None:
             data |= {"p1": self.jumps & 1, "p2": self.jumps >> 1}
         return data if self.windows is None else data | self.windows.data
-
-    @cached_property
-    def _residual_data(self) -> dict[str, Any]:
-        """Limits of residuals, and for cycles the signs of steps, holonomies, and ranges of quarter turns."""
-        instance = self.instance
-        d_max = np.full(count_elements(instance, "pairs"), QUARTER)
-        q_max = np.full(count_elements(instance, "strokes"), QUARTER)
-        if self.formulation.options.limits:
-            d_max, q_max = limit_residuals(instance)
-        data = {"d_max": d_max, "q_max": q_max}
-        return data | (cycle_data(instance, d_max, q_max) if "k" in self.formulation.variables else {})
 
     def _of_pairs(self, values: Floats | None, default: float) -> Floats:
         return np.full(count_elements(self.instance, "pairs"), default) if values is None else values

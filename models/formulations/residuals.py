@@ -38,8 +38,16 @@ def limit_residuals(instance: Instance) -> tuple[Floats, Floats]:
     return limits[:pairs], limits[pairs:]
 
 
-def cycle_data(instance: Instance, d_max: Floats, q_max: Floats) -> dict[str, Any]:
-    """The arrays over steps and cycles that symbols denote, where residuals have these limits."""
+def residual_data(instance: Instance, limited: bool, *, cycles: bool) -> dict[str, Any]:
+    """The arrays that symbols denote: limits of residuals, and what they need of cycles if there are any."""
+    sizes = len(instance.domain.first), len(instance.theta)
+    d_max, q_max = limit_residuals(instance) if limited else [np.full(size, QUARTER) for size in sizes]
+    limits = {"d_max": d_max, "q_max": q_max}
+    return limits | (_cycle_data(instance, d_max, q_max) if cycles else {})
+
+
+def _cycle_data(instance: Instance, d_max: Floats, q_max: Floats) -> dict[str, Any]:
+    """Signs of steps, holonomies, and ranges of the quarter turns along each cycle."""
     cycles, kappa, theta = instance.cycles, instance.domain.kappa, instance.target
     is_open = cycles.ends[:, 0] >= 0
     start, end = cycles.ends[is_open].T
