@@ -11,11 +11,6 @@ and passes gamma (theta_i - min theta_i) to its pairs to later pixels, with gamm
 of pairs to earlier or to later pixels. A backward pass does the same with earlier and later exchanged. After
 a pass min (c - shares) is 0 at every pair, and the bound, the sum of min theta_i, has not fallen.
 
-Passes alone are slow on large grids. So before each pair of passes the shares are extrapolated along their
-last change, by a factor that grows as in Nesterov's method (Soviet Math. Dokl. 27, 1983) and restarts
-where the bound falls (O'Donoghue and Candes, Found. Comput. Math. 15, 2015). This halves the number of
-passes, and any shares prove a bound.
-
 The compiled code for one pixel and one pair is models/proof/passes.py.
 """
 
@@ -27,7 +22,6 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..array_archive import Arrays
 from ..field.field import CrossField
@@ -50,11 +44,9 @@ from .clusters import (
 from .combs import comb_excesses
 from .encoding import share_arrays, table_arrays
 from .lattice import Lattice, nearest_labels
-from .passes import pair_minimum, reparametrised_costs, row_ends, shares_at, visit_pixel
+from .passes import pair_minimum, reparametrised_costs, visit_pixel
 from .pruning import RemainingCells, bound_by_boxes, interpolate_shares, surviving_cells
-from .state import Clusters, Indices, RowEnds, State, state_on
-
-Singles = NDArray[np.float32]
+from .state import Clusters, Indices, State, state_on
 
 _TOLERANCE: Final = 1e-7  # excess over the energy with which labels still survive, relative to 1 + it
 _LOST: Final = 0.1  # share of the gap that rounding may cost at most; a fifth of it is usual
@@ -71,7 +63,6 @@ class Dual:
 
     lattice: Lattice
     state: State
-    _before: list[Singles]  # the direction of a change needs no more digits
 
     def __init__(self, lattice: Lattice, crew: Crew) -> None:
         """Start from zero shares and without clusters."""
@@ -87,12 +78,10 @@ class Dual:
         self.lattice, self.state = lattice, state_on(lattice, shares, clusters)
         self._parts = [self._crew.parts(lattice.count[front]) for front in self._fronts]
         self._adopt_clusters(clusters)
-        self._times, self._reached = 0, -math.inf
 
     def _adopt_clusters(self, clusters: Clusters) -> None:
         self.state = self.state._replace(clusters=clusters)
         self._cluster_fronts = independent_clusters(self.lattice.instance.grid, clusters)
-        self._before = []
         self._least_of_clusters = self._find_least_of_clusters()
 
     @property
@@ -103,7 +92,6 @@ class Dual:
     def move(self, lattice: Lattice) -> None:
         """Go on, with interpolated shares and tables, on a finer or smaller lattice with the same centres."""
         self._pass_seconds, self._table_seconds = self.expected_seconds(lattice)
-        self._before = []  # first of all, for memory
         old, state = self.lattice, self.state
         shares = interpolate_shares(old, (state.shares_first, state.shares_second), lattice)
         clusters = interpolate_clusters(old, state.clusters, lattice)
@@ -119,22 +107,18 @@ class Dual:
         return self._pass(2, over)
 
     def ascend(self, times: int, over: Over = never, closing: Over = never) -> float:
-        """The bound after that many passes forwards and backwards; -inf if time cut a pass off.
+        """The bound after that many passes forwards and backwards; -inf if time cut one off or left none.
 
         over: returns whether to cut a pass off. closing: returns whether not to begin another two.
         """
-        bound = self._reached
+        bound = -math.inf
         for _ in range(times):
             if closing():
                 break
-            self._extrapolate()
             self.update_clusters(1)
             self.forward(over)
             self.update_clusters(-1)
             bound = self.backward(over)
-            if bound < self._reached:
-                self._times = 0
-            self._reached = bound
             if over():
                 break
         return bound
@@ -155,24 +139,6 @@ class Dual:
                 self._crew.run(visit, [front[part] for part in parts])
         self._pass_seconds = time.monotonic() - began
         return math.fsum([*self.state.least, *self._least_of_clusters])
-
-    def _extrapolate(self) -> None:
-        """Move shares and tables along their last change, further the longer the bound has not fallen."""
-        part = self._times / (self._times + 3)
-        self._times += 1
-        if not self._before:
-            self._before = [values.astype(np.float32) for values in self._values]
-            return
-        first, second, old_tables = self._before
-        state, tables = self.state, self.state.clusters.tables
-        self._crew.run(
-            lambda pairs: _extrapolate_shares(pairs, state, (first, second), part),
-            [(at.start, at.stop) for at in self._crew.equal_parts(len(state.first))],
-        )
-        self._crew.run(
-            lambda at: _extrapolate_values(tables[at], old_tables[at], part),
-            self._crew.equal_parts(len(tables)),
-        )
 
     @property
     def _values(self) -> tuple[Floats, Floats, Floats]:
@@ -228,7 +194,6 @@ class Dual:
         Multiples of a greater power take less space in a certificate. gap: of the level's bound, of which
         the rounding costs a small part at most.
         """
-        self._before = []  # a level is recorded next, which takes memory
         most = max(self._greatest_sizes()[0], 2.0**-16)
         least = 2.0 ** (math.ceil(math.log2(most)) - 30)
         # Shares and tables, wrong by half a quantum, enter the minima of pixels and pairs, or of clusters.
@@ -324,36 +289,6 @@ def _pass_pixels(pixels: Indices, earlier: int, state: State) -> None:
     """Do a pass over some pixels, one after the other; earlier: 0 forwards, 2 backwards."""
     for i in pixels:
         visit_pixel(i, earlier, state)
-
-
-@compiled
-def _extrapolate_shares(
-    pairs: tuple[int, int], state: State, before: tuple[Singles, Singles], part: float
-) -> None:
-    """Extrapolate the shares of consecutive pairs. before: those at their first and their second pixels."""
-    for pair in range(pairs[0], pairs[1]):
-        i, j = state.first[pair], state.second[pair]
-        was = before[0][state.start_first[pair] : state.start_first[pair + 1]]
-        _extrapolate_used(shares_at(pair, i, state), was, row_ends(i, state), state.beta_count[i], part)
-        was = before[1][state.start_second[pair] : state.start_second[pair + 1]]
-        _extrapolate_used(shares_at(pair, j, state), was, row_ends(j, state), state.beta_count[j], part)
-
-
-@compiled
-def _extrapolate_used(values: Floats, before: Singles, ends: RowEnds, columns: int, part: float) -> None:
-    """Extrapolate the used part of the shares of a pair at one pixel."""
-    for row in range(ends[0].size):
-        begin, end = row * columns + ends[0][row], row * columns + ends[1][row]
-        _extrapolate_values(values[begin:end], before[begin:end], part)
-
-
-@compiled
-def _extrapolate_values(values: Floats, before: Singles, part: float) -> None:
-    """Extrapolate numbers by a part of their last change, and store them as they were."""
-    for x in range(values.size):
-        now = values[x]
-        values[x] = now + part * (now - before[x])
-        before[x] = now
 
 
 @compiled

@@ -3,26 +3,10 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.processes.compilation import crew
 from crossfield.models.proof import descent
 from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.proof.dual import Dual
-from crossfield.models.proof.lattice import Lattice
-from crossfield.models.search.starts import first_field
 
 pytestmark = pytest.mark.numeric
-
-
-def test_shares_that_are_carried_on_rise_faster():
-    """Half as many passes lead further than passes alone."""
-    lattice = Lattice.whole(first_field(cf.sample("ring", 24, stroke_weight=1.0)), 16)
-    with crew(1) as hands:
-        carried, plain = Dual(lattice, hands), Dual(lattice, hands)
-        for _ in range(30):
-            plain.forward()
-            alone = plain.backward()
-        assert carried.ascend(15) > alone
-        assert carried.bound() <= first_field(lattice.instance).energy().total
 
 
 @pytest.mark.slow
