@@ -302,7 +302,8 @@ app.add_typer(library, name="library")
 def main() -> NoReturn:
     """Run the command line and exit with its exit code; SIGTERM too removes files that are not complete."""
     escape_unencodable()
-    logging.getLogger("PIL").addHandler(logging.NullHandler())  # every error is one line, printed by `invoke`
+    for library in ("PIL", "trimesh"):  # every error is one line, printed by `invoke`
+        logging.getLogger(library).addHandler(logging.NullHandler())
     gc.set_threshold(_OBJECTS)
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     if sys.argv[1:2] in (["export"], ["read"]):

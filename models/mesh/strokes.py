@@ -84,10 +84,10 @@ def read_directions(path: Path, mesh: Mesh) -> Directions:
         raise InputError("has no row of numbers; give face,x,y,z, or leave it out")
     try:
         if of_every_face:
-            vector = np.loadtxt(rows, usecols=(0, 1, 2), ndmin=2)
+            vector = np.loadtxt(rows, comments=None, usecols=(0, 1, 2), ndmin=2)
             face = np.arange(len(vector), dtype=np.int32)
         else:
-            table = np.loadtxt(rows, delimiter=",", usecols=(0, 1, 2, 3), ndmin=2)
+            table = np.loadtxt(rows, comments=None, delimiter=",", usecols=(0, 1, 2, 3), ndmin=2)
             face, vector = whole_numbers(table[:, 0], "the column of faces", InputError), table[:, 1:]
     except ValueError as error:
         raise InputError(f"is no table of face,x,y,z and no .rawfield: {shortened(error)}") from error

@@ -1,6 +1,7 @@
 """Mesh files as instances: strokes, weights, frames, formats, and every fault with its faces."""
 
 import sys
+from contextlib import suppress
 
 import crossfield as cf
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 from crossfield.models.errors import InputError, MeshError
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.mesh import Mesh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from loops import for_each
 from meshes import box, flat_sheet, icosahedron, tetrahedron, turn_corners
 
@@ -287,6 +290,30 @@ def test_parts_are_counted_and_solved_together(tmp_path):
     )
     instance = cf.read_mesh(write_obj(tmp_path / "a.obj", mesh))
     assert "8 faces in 2 separate parts" in instance.summary
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "off", "stl", "csv"])
+@given(data=st.data())
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=50)
+def test_mutated_files_give_named_errors(tmp_path, suffix, data):
+    trimesh = pytest.importorskip("trimesh")
+    path, mesh = tmp_path / f"mutated.{suffix}", tetrahedron()
+    if suffix == "csv":
+        path.write_text("face,x,y,z\n0,1,0,0\n1,2,2,3\n")
+    else:
+        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(path)
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(content) - 1))
+        content[at : at + data.draw(st.integers(0, 8))] = data.draw(
+            st.one_of(st.binary(max_size=8), st.sampled_from([b"-1", b"9" * 30, b"nan", b"\n", b" "]))
+        )
+    path.write_bytes(content)
+    with suppress(cf.CrossfieldError):
+        if suffix == "csv":
+            cf.read_mesh(write_obj(tmp_path / "a.obj", mesh), directions=path)
+        else:
+            cf.read_mesh(path, sharp=35)
 
 
 @for_each("options", [{"sharp": 0}, {"sharp": "x"}, {"weights": "cotan"}, {"boundary": 3}, {"gauge": "x"}])
