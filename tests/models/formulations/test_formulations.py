@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 import pytest
 import sympy as sp
-from cases import MASKS, make_field, make_instance
+from cases import MASKS, RIGHT, make_field, make_instance
 from crossfield.export.solving.local import solve
 from crossfield.models.errors import FormulationError
 from crossfield.models.field.field import CrossField
@@ -99,13 +99,17 @@ CLASSES = {
     "milp-mccormick": ("MILP", True, 1, 1),
     "qp-fixed": ("QP", True, 2, 0),
     "miqp-exact": ("MIQP", True, 2, 1),
+    "miqp-orthogonal": ("MIQP", True, 2, 1),
+    "milp-orthogonal": ("MILP", True, 1, 1),
+    "miqp-cycle": ("MIQP", True, 2, 1),
+    "milp-cycle": ("MILP", True, 1, 1),
 }
 """Class, convexity, degree of the objective and of the rows."""
 
 
 @for_each("name, expected", CLASSES.items())
 def test_every_formulation_has_its_class(name, expected):
-    field = make_field(make_instance())
+    field = make_field(make_instance(orthogonal=name in RIGHT))
     problem = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
     assert (
         problem.problem_class,
