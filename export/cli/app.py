@@ -302,8 +302,8 @@ app.add_typer(library, name="library")
 def main() -> NoReturn:
     """Run the command line and exit with its exit code; SIGTERM too removes files that are not complete."""
     escape_unencodable()
-    for library in ("PIL", "trimesh"):  # every error is one line, printed by `invoke`
-        logging.getLogger(library).addHandler(logging.NullHandler())
+    for reader in ("PIL", "trimesh"):  # every error is one line, printed by `invoke`
+        logging.getLogger(reader).addHandler(logging.NullHandler())
     gc.set_threshold(_OBJECTS)
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     if sys.argv[1:2] in (["export"], ["read"]):
