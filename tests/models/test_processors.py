@@ -13,17 +13,32 @@ from crossfield.models.instance.angles import arctangent, cosine, sine
 from processors import PROCESSORS
 
 HASHES = """
-import json
+import json, sys
 import crossfield as cf
 from crossfield.models.sketch.samples import SAMPLES
 names = [name for name in SAMPLES if name not in {"skew", "saddle", "singular"}]
-print(json.dumps({name: cf.sample(name, 10).sha256 for name in names}))
+hashes = {name: cf.sample(name, 10).sha256 for name in names}
+part = cf.read_mesh(sys.argv[1], sharp=20, weights="dual")
+print(json.dumps(hashes | {"part": [part.sha256, part.mesh.kappa.tolist(), part.mesh.dihedral.tolist()]}))
+"""
+PART = """
+v 0 0 0
+v 1.1 0.3 0.2
+v 0.2 0.9 -0.4
+v 0.3 0.2 1.7
+v 1.3 1.2 1.6
+f 1 3 2
+f 1 2 4
+f 3 1 4
+f 2 3 5
+f 4 2 5
+f 3 4 5
 """
 
 
-def hashes_on(processor):
+def hashes_on(processor, mesh):
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", HASHES],
+        [sys.executable, "-W", "ignore", "-c", HASHES, str(mesh)],
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1"} | processor,
         stdout=subprocess.PIPE,
         check=True,
@@ -31,9 +46,10 @@ def hashes_on(processor):
     return json.loads(done.stdout)
 
 
-def test_samples_are_the_same_on_every_processor():
-    first, *others = (hashes_on(processor) for processor in PROCESSORS)
-    assert len(first) == 11
+def test_samples_and_meshes_are_the_same_on_every_processor(tmp_path):
+    (tmp_path / "part.obj").write_text(PART)
+    first, *others = (hashes_on(processor, tmp_path / "part.obj") for processor in PROCESSORS)
+    assert len(first) == 12
     for processor, other in zip(PROCESSORS[1:], others, strict=True):
         assert other == first, processor
 
