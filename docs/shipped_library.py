@@ -32,6 +32,7 @@ PURPOSES: Final = {
     "small": "proofs of optimality",
     "medium": "`crossfield prove` closes most of them in minutes",
     "large": "reading, presolve, relaxations, heuristics",
+    "mesh": "orthogonal crosses on surfaces",
 }
 Facts = list[dict[str, Any]]
 
@@ -54,17 +55,18 @@ def rungs(entries: Facts) -> str:
     for rung in RUNGS:
         mine = [facts for facts in entries if facts["rung"] == rung]
         instances = {facts["instance"]: facts for facts in mine}.values()
-        sizes, pixels = ([facts[key] for facts in instances] for key in ("size", "pixels"))
+        sizes = "-" if rung == "mesh" else span([facts["size"] for facts in instances])
+        points = span([facts["pixels"] or facts["faces"] for facts in instances])
         density = mean(facts["density"] for facts in instances)
         rows.append(
             [
-                rung, span(sizes), span(pixels), f"{density:.2f}", str(len(instances)), str(len(mine)),
+                rung, sizes, points, f"{density:.2f}", str(len(instances)), str(len(mine)),
                 PURPOSES[rung],
             ]
         )  # fmt: skip
     heads = (
-        "rung", "pixels on the longer side", "pixels in the mask", "mean density", "instances", "entries",
-        "purpose",
+        "rung", "pixels on the longer side", "pixels in the mask, or faces", "mean density", "instances",
+        "entries", "purpose",
     )  # fmt: skip
     return markdown(heads, rows)
 

@@ -39,6 +39,13 @@ def test_a_surface_is_measured(docs_module, part, arguments):
     assert docs_module("surface").MEASURES[part](*arguments, 12)
 
 
+def test_the_fields_of_a_mesh_are_measured(docs_module):
+    meshes = docs_module("mesh_fields")
+    row = meshes.measure("disc", 0.0, rounds=1)
+    assert 0 < meshes.excess(row) < 10
+    assert len(meshes.table({"disc": row}).splitlines()) == 3
+
+
 def test_a_run_of_the_study_is_measured(docs_module):
     rows, work = docs_module("studying.rows"), docs_module("studying.work")
     row = work.perform((rows.Run("practice", "skew", 8, "greedy"), None))
