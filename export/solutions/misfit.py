@@ -11,13 +11,13 @@ from typing import Final
 import numpy as np
 
 from ...models.errors import SolutionError
-from ...models.formulations.catalogue import FORMULATIONS, declare
+from ...models.formulations.catalogue import declare, list_formulations
 from ...models.instance.domain import Floats
 from ..writing.canonical import CanonicalForm
 from .readers.grammar import spellings
 from .readers.text import NamedValues, RawSolution, unknown_names
 
-_OURS: Final = re.compile(rb"([a-z]\w*?)_\d{2,4}_\d{2,4}(?:_[ur])?")
+_OURS: Final = re.compile(rb"([a-z]\w*?)_(?:\d{2,4}_\d{2,4}(?:_[ur])?|\d{2,7})")
 _NUMBERED: Final = re.compile(rb"(?:x|c|v|r|col|var|column|_C)_?\[?\(?\d+\)?\]?", re.IGNORECASE)
 _LIFTED: Final = "z"
 
@@ -80,7 +80,9 @@ class _Misfit:
         yield bool(formulations), f"it is probably of {formulations}; give the manifest of that formulation"
         foreign = bool(_tags(unknown) - ours) or (bool(unknown) and not _tags(unknown))
         yield foreign, "it is of another formulation or model; give the manifest of its model"
-        yield bool(unknown), "it is of another instance, at other pixels; give the manifest of its model"
+        kind = self.form.problem.instance.domain.kind
+        other = f"it is of another instance, at other {kind}s; give the manifest of its model"
+        yield bool(unknown), other
         yield tail, cut
         yield (
             bool(self.raw.values.all()),
@@ -95,7 +97,8 @@ class _Misfit:
         """The formulations that have the kinds of columns in the answer, if this problem has others."""
         if tags == ours or not tags:
             return ""
-        blocks = {name: set(declare(name).variables) for name in FORMULATIONS}
+        instance = self.form.problem.instance
+        blocks = {name: set(declare(name, instance).variables) for name in list_formulations(instance)}
         fitting = [name for name, variables in blocks.items() if tags in (variables, variables | {_LIFTED})]
         return " or ".join(name for name in fitting if name != self.form.problem.name)
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from .grammar import NUMBER, RESERVED, TextLayout
 
-OUR_NAME = rb"[a-z]\w*_\d{2,4}_\d{2,4}(?:_[ru])?\b"
+OUR_NAME = rb"(?:[a-z]\w*_\d{2,4}_\d{2,4}(?:_[ru])?|(?:alpha|beta|gamma|psi|p[12]?|[stzduqk])_\d{2,7})\b"
+"""A column by row and column of a pixel, or by the number of a face, a pair or a cycle."""
+
 FEW_LINES = rb"(?:[^\n]*\n){0,9}?"
 
 HIGHS = TextLayout(

@@ -73,7 +73,7 @@ SIBLINGS: Final[tuple[tuple[bytes, str], ...]] = (
     ),
     (rb"\A(?:c[^\n]*\n)*p (?:lp|mip) (?:min|max) ", _MODEL.format("GLPK")),
     (
-        rb"\A(?:[a-z]\w*_\d\d+_\d\d+(?:_[ur])?\n){2}",
+        rb"\A(?:[a-z]\w*_\d\d+(?:_\d\d+(?:_[ur])?)?\n){2}",
         "this is a list of the names in an .nl file (.col or .row); give the .sol that the solver writes",
     ),
     (rb'\A\s*\{\s*"format":\s*"crossfield-manifest"', _OURS.format("a manifest")),

@@ -1,8 +1,9 @@
 """Names of answers: spelled differently, or of another problem, with the likely cause."""
 
 import crossfield as cf
+import numpy as np
 import pytest
-from cases import names_of
+from cases import make_field, names_of, problem_of
 from crossfield.export.formats.registry import write
 from crossfield.export.library.documents import check_point
 from crossfield.export.solutions.solution import read_solution
@@ -104,3 +105,37 @@ def test_names_that_do_not_fit_are_shown_with_the_likely_cause(name, tmp_path):
     (tmp_path / "x.sol").write_text(listed(entries))
     with pytest.raises(SolutionError, match=message):
         read_solution(tmp_path / "x.sol", MILP)
+
+
+# On a mesh
+
+
+def entries_on(label):
+    """A problem on a mesh, and names and values of the point of a field."""
+    problem = problem_of(label)
+    point = problem.point(make_field(problem.instance))
+    names = names_of(column_names(problem.instance, problem.blocks))
+    return problem, list(zip(names, point.tolist(), strict=True))
+
+
+@for_each("head", ["", "Some words\nof a program\n"])
+@for_each("text", ["{} {!r}\n", '"{}": {!r},\n', "{} = {!r}\n"])
+def test_numbers_of_faces_and_pairs_are_names_in_any_list(tmp_path, text, head):
+    problem, entries = entries_on("milp-mccormick shape=box gauge=box")
+    path = tmp_path / "list.sol"
+    if not head or text[0] == "{":
+        path.write_text(head + "".join(text.format(*entry) for entry in entries))
+        objective = problem.objective_value(np.array([value for _, value in entries]))
+        assert read_solution(path, problem).objective == pytest.approx(objective)
+
+
+def test_names_alone_and_those_of_another_mesh_are_refused(tmp_path):
+    problem, entries = entries_on("milp-mccormick shape=box gauge=box")
+    _, others = entries_on("milp-mccormick shape=tetrahedron orthogonal=True")
+    for text, message in (
+        ("".join(f"{name}\n" for name, _ in entries), "this is a list of the names in an .nl file"),
+        (listed(others), "it is of another instance, at other faces"),
+    ):
+        (tmp_path / "list.sol").write_text(text)
+        with pytest.raises(SolutionError, match=message):
+            read_solution(tmp_path / "list.sol", problem)
