@@ -113,3 +113,12 @@ def on_directions(mesh, faces, vectors, name="part", **more):
     theta = mesh.angle_in(unique, np.asarray(vectors)[at]) if len(unique) else np.zeros(0)
     weight = {"stroke_coefficient": 20.0} | more
     return Instance.on_faces(name, mesh, unique.astype(np.int32), theta, np.ones(len(unique)), **weight)
+
+
+def write_obj(path, mesh, *more):
+    """An .obj of the mesh, as a program would write it that also has normals and texture."""
+    lines = ["# a mesh", "vt 0 0", "vn 0 0 1", "o part"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
+    lines += [f"f {a + 1}/1/1 {b + 1}//1 {c + 1}" for a, b, c in mesh.faces.tolist()]
+    path.write_text("\n".join([*lines, *more]) + "\n")
+    return path

@@ -1,6 +1,9 @@
 """Meshes on the command line: from a file to an optimum and back, and refused where pixels are needed."""
 
 import json
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import crossfield as cf
@@ -9,7 +12,7 @@ import pytest
 from crossfield.export.cli.app import app, invoke
 from crossfield.export.cli.domains import DOMAINS
 from loops import for_each
-from meshes import box
+from meshes import box, flat_sheet, write_obj
 
 REFUSING = [command for command, kinds in DOMAINS.items() if "face" not in kinds]
 
@@ -18,13 +21,29 @@ REFUSING = [command for command, kinds in DOMAINS.items() if "face" not in kinds
 def files(tmp_path, monkeypatch):
     """The .obj of a cube, its instance, and a field on it, in the current folder."""
     monkeypatch.chdir(tmp_path)
-    mesh = box()
-    lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
-    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces.tolist()]
-    Path("cube.obj").write_text("\n".join(lines))
+    write_obj(Path("cube.obj"), box())
     instance = cf.read_mesh("cube.obj", sharp=35)
     cf.write_instance(instance, "cube.json")
     cf.write_field(cf.CrossField.from_lines(instance, np.zeros(12), np.full(12, np.pi / 2)), "start.json")
+
+
+EXPORT = """
+import resource, sys
+from crossfield.export.cli.app import invoke
+code = invoke(["export", "sheet.obj", "-f", "milp", "-F", "mps", "-o", "out", "-q"])
+print(code, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.slow
+def test_a_mesh_of_100000_faces_is_exported_within_30_seconds_and_2_gigabytes():
+    write_obj(Path("sheet.obj"), flat_sheet(224, 224))
+    begin = time.monotonic()
+    shown = subprocess.run([sys.executable, "-c", EXPORT], capture_output=True, text=True, check=True).stdout
+    code, kilobytes = map(int, shown.split())
+    assert code == 0
+    assert time.monotonic() - begin < 30
+    assert kilobytes < 2e6
 
 
 def line_of(capsys):

@@ -12,18 +12,9 @@ from crossfield.models.instance.mesh import Mesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from loops import for_each
-from meshes import box, flat_sheet, icosahedron, tetrahedron, turn_corners
+from meshes import box, flat_sheet, icosahedron, tetrahedron, turn_corners, write_obj
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-
-
-def write_obj(path, mesh, *more):
-    """An .obj of the mesh, as a program would write it that also has normals and texture."""
-    lines = ["# a mesh", "vt 0 0", "vn 0 0 1", "o part"]
-    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
-    lines += [f"f {a + 1}/1/1 {b + 1}//1 {c + 1}" for a, b, c in mesh.faces.tolist()]
-    path.write_text("\n".join([*lines, *more]) + "\n")
-    return path
 
 
 def write_square(path, *lines):
