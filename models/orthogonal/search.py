@@ -19,8 +19,8 @@ from ..processes.deadline import Over
 from .energy import LOWER, MOST_DENSE, OrthogonalEnergy
 
 _KICKS: Final = 500  # perturbations per round
-_TIRED: Final = 3  # perturbations per point without success after which the search begins again
-_STRONG: Final = 50  # points per perturbation where it begins again
+_TIRED: Final = 1  # perturbations per point without success after which the search begins again
+_STRONG: Final = 20  # points per perturbation where it begins again
 _PATCH: Final = 1500  # points; a change of one integer costs 30 microseconds
 _ROWS: Final = 0.3  # share of the perturbations that change neighbouring rows
 _NEIGHBOURS: Final = 5  # such rows, at most
