@@ -34,8 +34,8 @@ _KINDS: Final[dict[str, tuple[str, Callable[[Any], bool]]]] = {
 """Kinds of arguments by their annotation: words for an error, and whether a value is of the kind."""
 
 _CLASSES: Final = frozenset({
-    "CrossField", "Hint", "Instance", "Light", "Limits", "Problem", "Proof", "Surface", "Underlay",
-    "Windows",
+    "CrossField", "Hint", "Instance", "Light", "Limits", "OrthogonalProof", "Problem", "Proof", "Surface",
+    "Underlay", "Windows",
 })  # fmt: skip
 """Classes of the package, known by their names, because this module can import none of them."""
 

@@ -17,7 +17,8 @@ from .sketch_options import Size, SketchOptions
 if TYPE_CHECKING:
     from ...models.field.field import Norm as NormOfField
     from ...models.proof.certificate import Certificate
-    from ...models.proof.record import Proof
+    from ...models.proof.orthogonal_certificate import LevelFacts, OrthogonalProof
+    from ...models.proof.record import LevelRecord, Proof
 
 NORMS: Final[dict[str, NormOfField]] = {"1": 1, "2": 2, "mixed": "mixed"}
 """Norms by their names on the command line."""
@@ -80,7 +81,9 @@ def prove_command(
         raise failure
 
 
-def _write_proof(proof: Proof, folder: Path) -> tuple[dict[str, Any], CrossfieldError | None]:
+def _write_proof(
+    proof: Proof | OrthogonalProof, folder: Path
+) -> tuple[dict[str, Any], CrossfieldError | None]:
     """Write field, certificate and report of a proof; return the report, and why there is no certificate."""
     from ...models.field.file import write_field
     from ...models.storage import make_folder, remove_file, write_bytes
@@ -95,13 +98,14 @@ def _write_proof(proof: Proof, folder: Path) -> tuple[dict[str, Any], Crossfield
     except CrossfieldError as error:
         failure = error
     proven, bounds = _proven_facts(proof, certificate)
+    levels: tuple[LevelFacts | LevelRecord, ...] = proof.levels
     document = proven | {
         "reason": None if failure is None else str(failure),
         "seconds": proof.seconds,
         "ended": proof.ended,
         "levels": [
-            {"spacing": level.h, "labels": int(level.allowed.sum()), "bound": bound}
-            for level, bound in zip(proof.levels, bounds, strict=False)  # fewer are checked after Ctrl-C
+            {"spacing": level.h, "labels": level.size, "bound": bound}
+            for level, bound in zip(levels, bounds, strict=False)  # fewer are checked after Ctrl-C
         ],
     }
     write_bytes(folder / f"{stem}.json", (json.dumps(document, indent=1) + "\n").encode())
@@ -110,14 +114,16 @@ def _write_proof(proof: Proof, folder: Path) -> tuple[dict[str, Any], Crossfield
     return document, failure
 
 
-def _proven_facts(proof: Proof, certificate: Certificate | None) -> tuple[dict[str, Any], list[float]]:
+def _proven_facts(
+    proof: Proof | OrthogonalProof, certificate: Certificate | None
+) -> tuple[dict[str, Any], list[float]]:
     """Facts that are proven, and the bound of each level, as the checker confirms them."""
     if certificate is not None:
         return proof_facts(certificate), certificate.proven.levels
     return proof_facts(proof) | {"status": UNPROVEN, "bound": 0.0, "gap": 1.0, "forced_jumps": 0}, []
 
 
-def proof_facts(source: Proof | Certificate) -> dict[str, Any]:
+def proof_facts(source: Proof | OrthogonalProof | Certificate) -> dict[str, Any]:
     """Facts of a proof or a certificate, by name."""
     return {
         "instance": source.field.instance.name,
@@ -132,7 +138,7 @@ def proof_facts(source: Proof | Certificate) -> dict[str, Any]:
     }
 
 
-def _show_proof(proof: Proof, document: dict[str, Any], folder: Path) -> None:
+def _show_proof(proof: Proof | OrthogonalProof, document: dict[str, Any], folder: Path) -> None:
     """Print the report without its levels, and the folder of the files."""
     shown = {key: value for key, value in document.items() if key != "levels"}
     show_facts(proof.field.instance.summary, shown)

@@ -26,6 +26,7 @@ from ..solutions.solution import Solution
 from .local import solve
 
 if TYPE_CHECKING:
+    from ...models.proof.orthogonal_certificate import OrthogonalProof
     from ...models.proof.record import Proof
 
 _STARTING: Final = 0.5  # share of the seconds for the field from which solvers start
@@ -46,7 +47,7 @@ class Candidate:
     solution: Solution | None = None
     interrupted: bool = False
     counts: tuple[tuple[str, int], ...] = ()
-    proof: Proof | None = None
+    proof: Proof | OrthogonalProof | None = None
 
     def facts(self) -> dict[str, Any]:
         """Facts for a report: the facts of the field, seconds, and claims with recomputed values."""

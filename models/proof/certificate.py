@@ -22,6 +22,8 @@ from ..instance.instance import Instance
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import ProvenClaim
+from .check_orthogonal import ProvenClaim as OrthogonalClaim
+from .orthogonal_certificate import OrthogonalProof, check_bytes, is_orthogonal
 from .record import Claim, LevelRecord, Proof
 
 REFUSALS: Final = (check_certificate.NotProvenError, check_certificate.UnreadableError)
@@ -47,7 +49,7 @@ class Certificate(Claim):
 
     """
 
-    proven: ProvenClaim
+    proven: ProvenClaim | OrthogonalClaim
 
     @property
     def norm(self) -> Norm:
@@ -62,7 +64,7 @@ class Certificate(Claim):
 
 
 @check_arguments
-def write_certificate(proof: Proof, path: str | Path) -> Certificate:
+def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certificate:
     """Write the certificate of a proof, as far as the checker confirms it.
 
     The certificate may claim less than the proof. The same proof gives the same bytes.
@@ -92,6 +94,11 @@ def write_certificate(proof: Proof, path: str | Path) -> Certificate:
     path = Path(path)
     if not proof.levels:
         raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
+    if isinstance(proof, OrthogonalProof):
+        if proof.proven is None:
+            raise InputError("would hold a proof that is not valid; prove it again", file=path)
+        write_bytes(path, proof.packed())
+        return Certificate(proof.field, proof.energy, proof.bound, proof.proven)
     try:
         checked = proof if proof.proven is not None else check_proof(proof)
     except REFUSALS as error:
@@ -201,10 +208,8 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
     """
     path = Path(path)
     try:
-        arrays = check_certificate.unpack_arrays(read_bytes(path, check_certificate.MOST_BYTES))
-        proven = check_certificate.check_arrays(arrays)
-        with naming(path):
-            field = _field_of(arrays)
+        data = read_bytes(path, check_certificate.MOST_BYTES)
+        field, bound, proven = _check_any(data, path)
         if on is not None and field.instance.sha256 != on.sha256:
             raise InputError(
                 f"is a certificate of another instance ({field.instance.summary}), not of {on.summary}",
@@ -216,8 +221,18 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
         raise InputError(f"is not a certificate: {error}", file=path) from error
     except MemoryError as error:
         raise InputError("takes more memory to check than there is", file=path) from error
-    bound = check_certificate.head_of(arrays)["bound"]
     return Certificate(field, field.energy(proven.norm).total, bound, proven)
+
+
+def _check_any(data: bytes, path: Path) -> tuple[CrossField, float, ProvenClaim | OrthogonalClaim]:
+    """Field, claimed bound and findings of the checker, for either kind of crosses."""
+    if is_orthogonal(data):
+        with naming(path):
+            return check_bytes(data)
+    arrays = check_certificate.unpack_arrays(data)
+    proven = check_certificate.check_arrays(arrays)
+    with naming(path):
+        return _field_of(arrays), check_certificate.head_of(arrays)["bound"], proven
 
 
 def _field_of(arrays: Arrays) -> CrossField:

@@ -9,6 +9,7 @@ import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -24,6 +25,7 @@ from .certificate import write_certificate
 from .descent import Descent, Termination
 from .dual import Dual
 from .lattice import Lattice
+from .orthogonal import prove_orthogonal
 
 
 @contextmanager
@@ -64,7 +66,7 @@ def compile_proofs(progress: Progress, stop: Over = never) -> bool:
 
 
 def compile_all() -> None:
-    """Compile the functions of proofs, by the certificate of a few pixels and by a pass with a cluster."""
+    """Compile the functions of proofs, by certificates of a few pixels and by a pass with a cluster."""
     if is_all_compiled():
         return
     with FileLock(cache_folder() / "compiling.lock"):
@@ -72,6 +74,7 @@ def compile_all() -> None:
             return
         instance = sample("mouse", 4).with_gauge("strokes")
         ends = Termination(Deadline(), never, gap=0.0, work=math.inf)
+        prove_orthogonal(replace(instance, orthogonal=True), None, ends, silent)
         with crew(1) as thread:
             first = Descent.first_field(instance, 2, None, never)
             descent = Descent(2, instance, first, ends, thread, 0, 1, silent)

@@ -7,6 +7,7 @@ import time
 from dataclasses import replace
 
 from ..arguments import check_arguments, check_count
+from ..errors import InputError
 from ..field.field import CrossField, Norm, check_norm, field_in_windows
 from ..instance.instance import Instance
 from ..processes.compilation import crew
@@ -19,6 +20,8 @@ from .absolute_descent import AbsoluteDescent
 from .certificate import REFUSALS, check_proof
 from .compiling import compile_proofs
 from .descent import Descent, Termination
+from .orthogonal import prove_orthogonal
+from .orthogonal_certificate import OrthogonalProof
 from .record import Proof
 from .stroked_parts import extended, restricted, stroked_parts
 
@@ -36,7 +39,7 @@ def prove(
     jobs: int = 2,
     progress: Progress = silent,
     stop: Stop | None = None,
-) -> Proof:
+) -> Proof | OrthogonalProof:
     """Find a field of low energy, and prove a lower bound of the energy of all fields.
 
     The proof of an instance in the gauge `box`, with its field, is that of the same sketch in the gauge
@@ -44,6 +47,8 @@ def prove(
     most its energy. Without a time limit the same arguments give the same proof, for any number of threads.
     Ctrl-C ends the proof with its best field and bound. The first proof on a machine compiles its functions
     before the time limit begins, in up to a minute.
+
+    Orthogonal crosses, on any domain, have a proof of their own, on one thread. It has the same properties.
 
     The checker of certificates checks the levels at the end, after the time limit. Bound, status and forced
     jumps are those that it confirms, and `write_certificate` writes them.
@@ -74,13 +79,14 @@ def prove(
 
     Returns
     -------
-    Proof
+    Proof or OrthogonalProof
         The field, its energy, the bound, and the levels that prove it.
 
     Raises
     ------
     InputError
-        For another norm, and for too few or too many jobs or threads.
+        For another norm, one other than 2 where crosses are orthogonal, and for too few or too many jobs
+        or threads.
     InstanceError
         For a start on another instance.
     SolverError
@@ -88,6 +94,8 @@ def prove(
 
     """
     check_norm(norm)
+    if instance.orthogonal and norm != 2:
+        raise InputError(f"orthogonal crosses have proofs in the norm 2 only, not {norm!r}; leave it out")
     check_count("seed", seed)
     if work is not None:
         check_count("work", work, 1)
@@ -95,8 +103,6 @@ def prove(
         start.check_instance(instance)
         start = field_in_windows(instance.with_gauge("strokes"), start.alpha, start.beta, start.p)
     instance = instance.with_gauge("strokes")
-    part = stroked_parts(instance)
-    start = None if start is None else restricted(start, part)
     check_jobs(jobs)
     chosen, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
     with catch_interrupts() as interrupted, crew(chosen.threads or jobs) as threads:
@@ -109,6 +115,10 @@ def prove(
         compile_proofs(progress, over)
         began = time.monotonic()
         ends = Termination(Deadline.after(seconds, end.clock), over, chosen.gap, work or math.inf)
+        if instance.orthogonal:
+            return prove_orthogonal(instance, start, ends, progress, seed)
+        part = stroked_parts(instance)
+        start = None if start is None else restricted(start, part)
         kind = Descent if norm == 2 else AbsoluteDescent
         first = kind.first_field(part, norm, start, ends.over)
         descent = kind(norm, part, first, ends, threads, seed, jobs, progress)

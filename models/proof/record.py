@@ -52,6 +52,11 @@ class LevelRecord(Lattice):
     bound: float
     energy: float
 
+    @property
+    def size(self) -> int:
+        """Number of allowed labels."""
+        return int(self.allowed.sum())
+
     @classmethod
     def of_dual(cls, dual: Dual, energy: float, least_gap: float = 0.0) -> Self:
         """The record of a dual, whose shares and tables are first rounded, as for that gap at least.

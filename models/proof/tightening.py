@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import InputError
 from ..formulations.windows import Windows
 from ..instance.angles import HALF, QUARTER
 from ..instance.domain import Bools
 from ..instance.terms import parity_sign
 from .certificate import Certificate
+from .check_certificate import ProvenClaim
 
 _MARGIN = 1e-9  # radians by which windows are wider than the boxes, to allow for rounding in solvers
 
@@ -19,9 +21,12 @@ def remaining_windows(certificate: Certificate) -> Windows:
     Each box of the certificate is moved to the label that its field has in the gauge. If it exceeds the
     window of the gauge, crosses in it have labels at both ends. Then alpha keeps its whole window, and beta
     lies between plus and minus its greatest size. A jump that is forced between two boxes within their
-    windows is fixed; other ranges follow from the windows, as in the gauge.
+    windows is fixed; other ranges follow from the windows, as in the gauge. Raises InputError for a
+    certificate of orthogonal crosses.
     """
     field, proven = certificate.field, certificate.proven
+    if not isinstance(proven, ProvenClaim):
+        raise InputError("certificates of orthogonal crosses hold no windows; export without one")
     instance, grid = field.instance, field.instance.grid
     steps = np.round((field.alpha - proven.boxes[:, :2].mean(axis=1)) / HALF).astype(np.int32)
     alpha, beta = (

@@ -1,0 +1,148 @@
+"""Small random instances of orthogonal crosses, and their optima by trying all integers."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+from crossfield.models.instance.instance import Instance
+from crossfield.models.instance.mesh import Mesh
+from crossfield.models.orthogonal.energy import OrthogonalEnergy
+from crossfield.models.processes.deadline import Deadline, never, silent
+from crossfield.models.proof import check_orthogonal as checker
+from crossfield.models.proof.descent import Termination
+from crossfield.models.proof.orthogonal import _Prover
+from crossfield.models.proof.orthogonal_certificate import check_proof
+from scipy.spatial import Delaunay
+
+
+def random_mesh(rng, vertices):
+    """A triangulated sheet over random points, bent in space."""
+    flat = rng.uniform(-1, 1, (vertices, 2))
+    faces = Delaunay(flat).simplices
+    corner = flat[faces]
+    one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    turned = one[:, 0] * other[:, 1] < one[:, 1] * other[:, 0]
+    faces[turned] = faces[turned][:, ::-1]
+    faces = np.array([np.roll(face, rng.integers(3)) for face in faces])
+    return Mesh(np.c_[flat, rng.uniform(-1, 1, vertices)], faces.astype(np.int32))
+
+
+def random_instance(seed, *, grid=False):
+    """An instance on 3 to 12 points, with any strokes and weights; on pixels or on a sheet."""
+    rng = np.random.default_rng(seed)
+    more = {"stroke_coefficient": float(rng.choice([0.3, 1, 20])), "orthogonal": True}
+    if grid:
+        mask = rng.random((3, 3)) < 0.85
+        mask[1, 1] = True
+        points = np.argwhere(mask)
+    else:
+        mesh = random_mesh(rng, int(rng.integers(5, 8)))
+        points = np.arange(mesh.size)
+        if rng.random() < 0.5:
+            more["pair_weights"] = rng.uniform(0.2, 3, len(mesh.first))
+    count = int(rng.integers(1 if grid else 0, 4))
+    chosen = np.sort(rng.choice(len(points), min(count, len(points)), replace=False))
+    strokes = rng.uniform(0, np.pi, len(chosen)), rng.uniform(0.2, 1, len(chosen))
+    if grid:
+        return Instance.on_pixels("small", mask, points[chosen], *strokes, **more)
+    return Instance.on_faces("small", mesh, chosen, *strokes, **more)
+
+
+def try_all_integers(instance, span=2):
+    """The least energy of all integers, and integers that have it.
+
+    Integers on a spanning forest of pairs and strokes can be 0 without loss; the others are tried from -span
+    to span around their best values at the angles of the forest.
+    """
+    energy = OrthogonalEnergy.of(instance)
+    free = beyond_forest(energy)
+    inverse = np.linalg.pinv(energy.matrix_of(energy.weight).toarray())
+    rows = energy.rows.toarray()
+    form = np.diag(energy.weight) - (energy.weight[:, None] * rows) @ inverse @ (rows.T * energy.weight)
+    begin = energy.nearest(_forest_angles(energy, free))
+    steps = np.array([*itertools.product(range(-span, span + 1), repeat=len(free))], int)
+    z = np.repeat(begin[None], len(steps), axis=0)
+    z[:, free] += steps
+    offsets = energy.offset + np.pi / 2 * z
+    totals = np.einsum("kr,rq,kq->k", offsets, form, offsets, optimize=True)
+    best = int(totals.argmin())
+    assert not len(free) or (np.abs(steps[best]) < span).all()
+    return float(totals[best]), z[best]
+
+
+def beyond_forest(energy):
+    root = list(range(energy.size + 1))
+
+    def find(i):
+        while root[i] != i:
+            i = root[i]
+        return i
+
+    free = []
+    for row, (i, j) in enumerate(zip(energy.first.tolist(), energy.second.tolist(), strict=True)):
+        a, b = find(i), find(j)
+        root[a] = b
+        if a == b:
+            free.append(row)
+    return np.array(free, dtype=int)
+
+
+def _forest_angles(energy, free):
+    tree = np.ones(len(energy.first))
+    tree[free] = 0
+    rows = energy.rows.toarray()
+    return np.linalg.lstsq(rows[tree > 0], -energy.offset[tree > 0], rcond=None)[0]
+
+
+def prove_from(instance, z, *, levels=4):
+    """A checked proof round the field of integers z, without a search for a better one."""
+    ends = Termination(Deadline(), never, gap=0.0, work=math.inf)
+    prover = _Prover(instance, OrthogonalEnergy.of(instance), z, ends, silent)
+    next_factor, count = prover._next_factor, itertools.count(1)
+    prover._find_better_field = prover._search = lambda _: False
+    prover._next_factor = lambda *args, **more: next(count) < levels and next_factor(*args, **more)
+    return check_proof(prover.proof(prover.run(), 0.0))
+
+
+def worse_integers(instance, z, seed):
+    """Integers near z: some with a few other ones, and some of these after descent."""
+    rng, energy = np.random.default_rng(seed), OrthogonalEnergy.of(instance)
+    for _ in range(2):
+        worse = z.copy()
+        for _ in range(rng.integers(1, 4)):
+            worse[rng.integers(len(z))] += rng.choice([-1, 1])
+        yield worse
+        yield energy.descend(worse)[0]
+
+
+def keeps_optimum(instance, best, proof):
+    """Whether all levels of a proof keep the cells and squares that hold an optimal field's crosses.
+
+    best: integers of an optimal field, all of whose points are joined to strokes.
+    """
+    energy, arrays = OrthogonalEnergy.of(instance), proof.certificate()
+    rows = checker.rows_of(arrays)
+    problem = checker.problem_of(arrays, rows, checker.limits_of(rows))
+    turn = np.append(energy.fit_angles(best), 0.0) - problem.centre
+    level, cells, squares = checker.first_level(problem, proof.levels[0].divisions), [], []
+    for number, facts in enumerate(proof.levels):
+        if number:
+            factor = facts.divisions // level.divisions
+            level = checker.next_level(problem, level, cells, squares, factor)
+        cells, squares = checker.stored_cells(arrays, number, level)
+        steps = turn / (np.pi / 2 / facts.divisions) - problem.half / 2
+        within = [
+            cell
+            & (
+                np.abs((step - labels - 0.5 + facts.divisions / 2) % facts.divisions - facts.divisions / 2)
+                <= 0.5 + 1e-9
+            )
+            for step, labels, cell in zip(steps, level.labels, level.cells, strict=True)
+        ]
+        ends = zip(rows.ends[: rows.pairs], squares, strict=True)
+        held = all((cell & here).any() for cell, here in zip(cells, within, strict=True))
+        if not held or not all((square & within[i][:, None] & within[j]).any() for (i, j), square in ends):
+            return False
+    return True
