@@ -17,7 +17,14 @@ from crossfield.models.instance.mesh import Mesh
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, integers_of
 from crossfield.models.proof import check_orthogonal as checker
 from crossfield.models.proof.orthogonal_certificate import unpack_arrays
-from small_meshes import beyond_forest, prove_from, random_instance, try_all_integers, worse_integers
+from small_meshes import (
+    beyond_forest,
+    keeps_optimum,
+    prove_from,
+    random_instance,
+    try_all_integers,
+    worse_integers,
+)
 
 REFUSALS = (checker.NotProvenError, checker.UnreadableError)
 MOST_FREE = 6  # integers that are tried
@@ -53,6 +60,72 @@ def test_no_bound_exceeds_the_optimum_of_all_integers(seed, grid):
 def test_no_bound_exceeds_the_optimum_of_many_instances(decade, grid):
     for seed in range(10 * decade, 10 * decade + 10):
         check_seed(seed, grid=grid)
+
+
+@pytest.mark.parametrize("seed", [2, 7, 21])
+def test_all_levels_keep_the_crosses_of_the_optimum(seed):
+    instance = random_instance(seed)
+    _, z = try_all_integers(instance)
+    for integers in (z, *worse_integers(instance, z, seed)):
+        assert keeps_optimum(instance, z, prove_from(instance, integers))
+
+
+def test_partial_sums_on_rings_that_are_cut_off_lose_the_optimum(monkeypatch):
+    # steps of a ring may cost less than nothing, so that a sum above the gap can still come down
+    instance = random_instance(21)
+    _, z = try_all_integers(instance)
+    complete, sums = checker.kept_of, checker.min_plus
+
+    def kept_of(problem, level, excess, most):
+        def cut(one, other):
+            total = sums(one, other)
+            return np.where(total > most - excess.bound, np.inf, total)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(checker, "min_plus", cut)
+            return complete(problem, level, excess, most)
+
+    monkeypatch.setattr(checker, "kept_of", kept_of)
+    assert not keeps_optimum(instance, z, prove_from(instance, z))
+
+
+def test_a_single_pair_of_labels_is_kept_with_its_square():
+    # a cross between two labels is rounded to both, so one that may stay keeps all squares that it touches
+    allowed = np.zeros((4, 4), dtype=bool)
+    allowed[1, 2] = True
+    assert np.argwhere(checker.spread(allowed, -1)).tolist() == [[0, 1], [0, 2], [1, 1], [1, 2]]
+    square = np.zeros((4, 4), dtype=bool)
+    square[1, 2] = True
+    assert np.argwhere(checker.spread(square, 1)).tolist() == [[1, 2], [1, 3], [2, 2], [2, 3]]
+
+
+def minimise_by_gurobi(instance):
+    """The least energy, by the free edition of Gurobi with its gap of 1e-6."""
+    gurobi = pytest.importorskip("gurobipy")
+    energy = OrthogonalEnergy.of(instance)
+    model = gurobi.Model(env=gurobi.Env(params={"OutputFlag": 0, "Threads": 1}))
+    alpha = model.addVars(energy.size, lb=-10, ub=10)
+    z = model.addVars(len(energy.first), lb=-4, ub=4, vtype="I")
+    for point in energy.pins:
+        alpha[point].lb = alpha[point].ub = 0
+    for row in np.flatnonzero(~np.isin(np.arange(len(energy.first)), beyond_forest(energy))):
+        z[row].lb = z[row].ub = 0
+    terms = [
+        alpha[i] - (alpha[j] if j < energy.size else 0) + c + np.pi / 2 * z[row]
+        for row, (i, j, c) in enumerate(zip(energy.first, energy.second, energy.offset, strict=True))
+    ]
+    model.setObjective(gurobi.quicksum(w * t * t for w, t in zip(energy.weight, terms, strict=True)))
+    model.setParam("MIPGap", 1e-6)
+    model.optimize()
+    return model.ObjVal
+
+
+@pytest.mark.parametrize("part", ["fan", "square"])
+def test_gurobi_finds_the_proven_optimum(part):
+    instance = fan() if part == "fan" else flat_square(0.2)
+    proof = cf.prove(instance)
+    assert proof.status == "optimal"
+    assert minimise_by_gurobi(instance) == pytest.approx(proof.energy, rel=1e-5)
 
 
 def fan(turn=0.0, *, shift=0):
