@@ -22,7 +22,7 @@ DOMAINS: Final = {
     "instance": BOTH,
     "export": BOTH,
     "solve": BOTH,
-    "prove": SKETCHES,
+    "prove": BOTH,
     "read": BOTH,
     "draw": BOTH,
     "shade": SKETCHES,

@@ -115,15 +115,15 @@ class Request:
 class Method:
     """A method. find: yields its fields one by one, because a later one may fail.
 
-    The last one is its answer. timed: whether it runs up to the time limit, or ends when it is done. skewed:
-    whether it finds crosses at any angle on pixels only, and neither orthogonal ones nor any on meshes.
+    The last one is its answer. timed: whether it runs up to the time limit, or ends when it is done. takes:
+    whether it finds fields of an instance.
     """
 
     name: str
     summary: str
     find: Callable[[Request], Iterator[Candidate]]
     timed: bool = True
-    skewed: bool = False
+    takes: Callable[[Instance], bool] = lambda _: True
 
 
 def _find_greedy(request: Request) -> Iterator[Candidate]:
@@ -265,7 +265,7 @@ METHODS: Final = {
             " no limit cuts off the first factorisation",
             _find_polyvector,
             timed=False,
-            skewed=True,
+            takes=lambda instance: not takes_integers(instance),
         ),
         Method(
             "bend",
@@ -273,7 +273,7 @@ METHODS: Final = {
             " limit cuts off the factorisation of that field",
             _find_bend,
             timed=False,
-            skewed=True,
+            takes=lambda instance: not takes_integers(instance),
         ),
         Method(
             "search",
@@ -289,7 +289,7 @@ METHODS: Final = {
             "prove",
             "lower bounds on lattices of crosses, and fields from them, until one is proven optimal",
             _find_by_proof,
-            skewed=True,
+            takes=lambda instance: instance.orthogonal or not takes_integers(instance),
         ),
     )
 }
@@ -298,7 +298,7 @@ METHODS: Final = {
 
 def methods_of(instance: Instance) -> list[Method]:
     """The methods that find fields of an instance."""
-    return [method for method in METHODS.values() if not (method.skewed and takes_integers(instance))]
+    return [method for method in METHODS.values() if method.takes(instance)]
 
 
 def find_method(name: str, instance: Instance) -> Method:
@@ -306,8 +306,8 @@ def find_method(name: str, instance: Instance) -> Method:
     names = [method.name for method in methods_of(instance)]
     if name not in names:
         raise DomainError(
-            f"{name} takes pixels with crosses at any angle only, and {instance.name} has other ones; use "
-            f"{', '.join(names)}"
+            f"{name} finds no fields on the {instance.domain.kind}s of {instance.name} with "
+            f"{'right' if instance.orthogonal else 'free'} angles; use {', '.join(names)}"
         )
     return METHODS[name]
 
