@@ -41,6 +41,7 @@ RELATIVE = 1e-9
 FLAT = 1.1e-8  # radians; instances take smaller turns between frames as 0
 MOST_LEVELS = 64
 MOST_DIVISIONS = 10_000  # cells of a quarter turn
+MOST_COSTS = 1 << 27  # of two labels of all pairs of a level: some 10 GB
 MOST_RING = 64  # pairs of a ring
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
 MOST_NUMBER = 1e6  # of a weight and of an angle
@@ -555,6 +556,7 @@ def _check_levels(arrays: dict[str, Array], problem: Problem) -> ProvenClaim:
     divisions = take_array(arrays, "divisions", "<i4", None).tolist()
     _require(1 <= len(divisions) <= MOST_LEVELS, "divisions", "has too few or too many levels")
     _require(divisions[0] >= 3 and max(divisions) <= MOST_DIVISIONS, "divisions", "is out of range")
+    check_size(problem, [divisions[0]] * (rows.size + 1))
     level, kept, bounds = first_level(problem, divisions[0]), None, list[float]()
     for number, count in enumerate(divisions):
         if kept is not None:
@@ -563,6 +565,7 @@ def _check_levels(arrays: dict[str, Array], problem: Problem) -> ProvenClaim:
             stored = stored_cells(arrays, number - 1, level)
             covered = all((a | ~b).all() for new, old in zip(stored, kept) for a, b in zip(new, old))
             _require(covered, f"level {number}", "does not cover what the level before leaves")
+            check_size(problem, [factor * int(cell.sum()) for cell in stored[0]])
             level = next_level(problem, level, *stored, factor)
         shares, tables = stored_shares(arrays, number, problem, level)
         excess = excess_of(problem, costs_of(problem, level), shares, tables)
@@ -576,6 +579,12 @@ def _check_levels(arrays: dict[str, Array], problem: Problem) -> ProvenClaim:
     claim = ProvenClaim(status_of(energy, bound), energy, bound, bounds, forced[: rows.pairs])
     check_claim(head, claim, proven, error)
     return claim
+
+
+def check_size(problem: Problem, cells: list[int]) -> None:
+    """Raise NotProvenError for a level with more costs than memory may hold. cells: of each point."""
+    costs = sum((cells[i] + 1) * (cells[j] + 1) for i, j in problem.rows.ends[: problem.rows.pairs])
+    _require(costs <= MOST_COSTS, "the level", "has too many labels")
 
 
 def energy_of(arrays: dict[str, Array], rows: Rows) -> tuple[float, float]:

@@ -193,6 +193,8 @@ class _Prover:
         """Go through the levels round the best field; the reason of the end, empty for a better field."""
         if reason := self.ends.reason():
             return reason
+        if self.rows.pairs * (_COARSEST + 1) ** 2 > _MOST_COSTS:
+            return "labels"
         chain = self._first_chain()
         problem, rings, self.pruned = chain.problem, list[int](), math.inf
         level, before = checker.first_level(problem, _COARSEST), None
