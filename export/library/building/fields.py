@@ -19,6 +19,7 @@ from ....models.formulations.problem import Problem, formulate, with_integers_fi
 from ....models.instance.angles import HALF
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import write_certificate
+from ....models.proof.record import Proof
 from ....models.search.angle_program import alternate_absolute
 from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
@@ -141,7 +142,8 @@ def _prove(start: CrossField, file: str, norm: Norm = 2) -> tuple[KnownField, Ch
 
     proof = prove(start.instance, norm=norm, start=start, work=_MOST_WORK, jobs=1)
     field = reproducible_field(proof.field) if norm == 2 else proof.field
-    proof = replace(proof, field=field, energy=field.energy(norm).total)
+    if isinstance(proof, Proof):  # the bytes of other proofs hold their field
+        proof = replace(proof, field=field, energy=field.energy(norm).total)
     with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
         path = Path(folder) / "a.certificate.npz"
         claim = write_certificate(proof, path)

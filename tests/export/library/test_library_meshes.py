@@ -110,6 +110,14 @@ def test_a_site_shows_meshes_with_faces_and_pictures(built, tmp_path):
     assert "cf_rand_n004_s6.thumb.svg" in index
 
 
+def test_the_certificate_of_a_mesh_that_ships_proves_its_entries():
+    entry = cf.entry("cf_bracket_f0760_cycle")
+    assert entry.status == "optimal"
+    assert entry.certificate.status == "optimal"
+    assert entry.certificate.bound == pytest.approx(entry.bound, rel=1e-12)
+    assert cf.entry("cf_bracket_f0760_cycle1").certificate is None
+
+
 MESH = '[[sketches]]\nname = "a"\nmesh = "disc"\n'
 WRONG = {
     "a size": (
