@@ -85,8 +85,8 @@ def prove(
     Raises
     ------
     InputError
-        For another norm, one other than 2 where crosses are orthogonal, and for too few or too many jobs
-        or threads.
+        For another norm, one other than 2 where crosses are orthogonal, weights of pairs where they are
+        not, and for too few or too many jobs or threads.
     InstanceError
         For a start on another instance.
     SolverError
@@ -96,6 +96,11 @@ def prove(
     check_norm(norm)
     if instance.orthogonal and norm != 2:
         raise InputError(f"orthogonal crosses have proofs in the norm 2 only, not {norm!r}; leave it out")
+    if instance.pair_weights is not None and not instance.orthogonal:
+        raise InputError(
+            f"{instance.name} has weights of pairs, which proofs cover for orthogonal crosses only; "
+            "leave pair_weights out, or make the instance orthogonal"
+        )
     check_count("seed", seed)
     if work is not None:
         check_count("work", work, 1)
