@@ -2,12 +2,15 @@
 
     python docs/cycle_study.py [--minutes N] [--limit SECONDS] [--data FILE]
     python docs/cycle_study.py --skewed [--limit SECONDS] [--data FILE]
+    python docs/cycle_study.py --narrowed [--limit SECONDS]
     python docs/cycle_study.py --page
 
 It does the runs that have no row yet, one after the other on one thread, and continues after an interruption.
 Each solver reads a file without a start. Other work on the machine delays runs: the rows have the processor
 time too. --skewed adds rows of cycles and limits to the
-file of miqp-exact, for crosses that may be skewed. --page replaces the tables in docs/cycles.md.
+file of miqp-exact, for crosses that may be skewed. --narrowed proves
+each sketch for that time, and counts the limits that say more than its narrowed windows, as a table of the
+page. --page replaces the other tables in docs/cycles.md.
 """
 
 from __future__ import annotations
@@ -39,6 +42,7 @@ from crossfield.models.instance.cycles import find_cycles
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.mesh import Mesh
 from crossfield.models.mesh.shapes import blocks
+from crossfield.models.proof.tightening import remaining_windows
 from make import markdown, replace_between
 from studying.rows import DATA as FOLDER
 from studying.rows import Keyed, Row, Rows
@@ -157,10 +161,12 @@ class Skewed(Keyed):
     solver: str
 
 
+_FEW: Final = ("pixels 5 7001", "singular 8", "mouse 8")
+_MORE: Final = ("cylinder_bend 11", "bottle 11", "straight 5 7005", "curved 5 7009", "skew 8")
 SKEWED: Final = tuple(
     Skewed(name, limits, cycles, solver)
-    for name in ("pixels 5 7001", "singular 8", "mouse 8", "skew 8", "mouse 11")
-    for solver in ("scip", "cplex")
+    for solver, names in (("scip", _FEW), ("cplex", (*_FEW, *_MORE)))
+    for name in names
     for limits, cycles in ((False, False), (True, False), (False, True), (True, True))
 )
 
@@ -236,6 +242,24 @@ def _answer_of_cplex(path: Path, limit: float) -> tuple[str, float | None, float
 _ANSWERS: Final = {"scip": _answer_of_scip, "cplex": _answer_of_cplex}
 
 
+def narrowed_table(limit: float) -> str:
+    """Share of limits below what a proof leaves of the change of direction, as a table."""
+    lines = []
+    for name in GRIDS:
+        instance = make_instance(name)
+        proof = cf.prove(instance, limits=cf.Limits(limit, gap=0), jobs=1)
+        with tempfile.TemporaryDirectory(prefix="crossfield-cycles-") as folder:
+            windows = remaining_windows(cf.write_certificate(proof, Path(folder) / "it.npz"))
+        pairs, one_step = instance.pair_terms, limit_residuals(instance)[0]
+        skew = np.maximum(np.abs(windows.beta_lower), np.abs(windows.beta_upper))
+        both = np.minimum(one_step + 4 / np.pi * skew[pairs.first] * skew[pairs.second], 2 * one_step)
+        least, _ = pairs.range_a(windows.alpha_lower, windows.alpha_upper, windows.p_min)
+        _, most = pairs.range_a(windows.alpha_lower, windows.alpha_upper, windows.p_max)
+        shares = (windows.p_max > windows.p_min).mean(), (both < np.maximum(-least, most) - GAP).mean()
+        lines.append([name, str(len(both)), *(f"{share:.0%}" for share in shares)])
+    return markdown(("sketch", "pairs", "jumps left open", "limits that are narrower"), lines)
+
+
 def _child_seconds() -> float:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
@@ -255,8 +279,12 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=LIMIT)
     parser.add_argument("--data", type=Path)
     parser.add_argument("--skewed", action="store_true")
+    parser.add_argument("--narrowed", action="store_true")
     parser.add_argument("--page", action="store_true")
     options = parser.parse_args()
+    if options.narrowed:
+        replace_between(PAGE, "narrowed", narrowed_table(options.limit))
+        return
     if options.page:
         write_page(table(DATA).rows, table(SKEWED_DATA, Skewed).rows)
         return
@@ -310,7 +338,8 @@ def _cell(row: Row | None, best: float | None) -> str:
     """Seconds to a proven optimum; else the bound, in per cent of the best objective of all runs."""
     if row is None:
         return ""
-    if row["status"] in {str(Status.OPTIMAL_GLOBAL), "optimal", "gaplimit"}:
+    solved = {str(Status.OPTIMAL_GLOBAL), str(Status.OPTIMAL_LOCAL), "optimal", "gaplimit"}  # all are convex
+    if row["status"] in solved:
         return f"{row['wall']:.1f} s"
     if row["status"] in {TOO_LARGE, FAILED}:
         return row["status"]

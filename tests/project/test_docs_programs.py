@@ -52,6 +52,13 @@ def test_a_run_of_the_study_is_measured(docs_module):
     assert row["status"] != rows.FAILED, row
 
 
+def test_a_run_with_cycles_is_measured(docs_module, tmp_path):
+    study = docs_module("cycle_study")
+    assert study.measure(study.Run("cube", "milp-cycle", False, "highs"), 10.0)["objective"] == 0
+    study.extended_model(study.Skewed("pixels 5 7001", True, True, "scip"), tmp_path / "it.lp")
+    assert "\n cyc_0: +1 d_" in (tmp_path / "it.lp").read_text()
+
+
 def test_a_run_of_a_solver_is_measured(docs_module, tmp_path):
     study, plan = docs_module("solver_study"), docs_module("studying.solvers.plan")
     run = next(run for run in plan.QUICK.first() if run.solver == "highs")

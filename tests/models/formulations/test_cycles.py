@@ -6,6 +6,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.bundle.problem_files import write_all
+from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import highs
 from crossfield.export.verify.checks import Verdict
@@ -239,6 +240,12 @@ def test_other_instances_are_refused_with_a_remedy(tmp_path):
     assert limited == {"miqp-orthogonal", "miqp-cycle"}
     problem = next(manifest for manifest in manifests if manifest.formulation == "miqp-cycle").problem()
     assert "the optimum stays" in problem.limited
+
+
+def test_an_export_names_what_it_leaves_out(tmp_path, capsys):
+    assert invoke(["export", "mouse", "--size", "4", "--format", "mps", "-o", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.replace("\n", " ")
+    assert "not written: miqp-orthogonal, milp-orthogonal, miqp-cycle, milp-cycle, which is for ort" in lines
 
 
 # files
