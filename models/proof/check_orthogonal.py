@@ -16,6 +16,7 @@ Sums of costs that are not negative have a relative error below RELATIVE. pi sta
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -44,6 +45,7 @@ MOST_DIVISIONS = 10_000  # cells of a quarter turn
 MOST_COSTS = 1 << 27  # of two labels of all pairs of a level: some 10 GB
 MOST_RING = 64  # pairs of a ring
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
+MOST_CASES = 256  # of integers after the last level
 MOST_NUMBER = 1e6  # of a weight and of an angle
 BLOCK = 256  # rows whose limits are computed at once
 TREES = 2
@@ -489,27 +491,42 @@ def ring_marginals(problem: Problem, ring: int, excess: Excess) -> list[Array]:
 # Section 6: forced jumps -----------------------------------------------------------------------------------
 
 
-def forced_rows(problem: Problem, level: Level, cells: list[Array], squares: list[Array]) -> Array:
-    """Lemma 5: whether all optimal fields have the centre's jump at each row, bool (r,)."""
-    rows, h = problem.rows, HALF / level.divisions
-    allowed = HALF - problem.limit - h * (1 + RELATIVE) - RELATIVE
+def possible_turns(
+    problem: Problem, level: Level, cells: list[Array], squares: list[Array]
+) -> list[list[int]]:
+    """Lemma 5: of each row, by how much more than the centre's its integer may be in an optimal field."""
+    rows, h, turns = problem.rows, HALF / level.divisions, list[list[int]]()
+    reach = problem.limit + h * (1 + RELATIVE) + RELATIVE
     position = [h * (labels + half / 2) for labels, half in zip(level.labels, problem.half.tolist())]
-    forced = np.zeros(len(rows.first), bool)
     for row, (i, j) in enumerate(rows.ends):
         square = squares[row] if row < rows.pairs else cells[i][:, None]
-        at = problem.residual[row] + position[i][:, None] - position[j]
-        forced[row] = (np.abs(at[square]) <= allowed[row]).all()
-    return forced
+        at = (problem.residual[row] + position[i][:, None] - position[j])[square]
+        turns.append([turn for turn in range(-3, 4) if (np.abs(at + HALF * turn) <= reach[row]).any()])
+    return turns
 
 
-def convex_bound(problem: Problem) -> float:
-    """Lemma 6: a lower bound of the energy of the centre's jumps, by its tangent within half a turn."""
-    rows, r = problem.rows, problem.residual
-    force = 2 * rows.weight * r
-    slope = np.bincount(rows.first, force, rows.size + 1) - np.bincount(rows.second, force, rows.size + 1)
-    size = 2 * np.pi * float(np.sum(rows.weight * (1 + np.abs(problem.centre[rows.first]))))
-    free = np.abs(slope)[~problem.fixed]
-    return math.fsum(rows.weight * r * r) - math.pi * math.fsum(free) - ROUNDING * PRECISION * size
+def cases_of(turns: list[list[int]]) -> list[tuple[int, ...]]:
+    """All choices of one turn for each row; none if there are too many."""
+    return list(itertools.product(*turns)) if math.prod(map(len, turns)) <= MOST_CASES else []
+
+
+def cases_bound(problem: Problem, turns: list[list[int]], angles: Array) -> float:
+    """Lemma 6: a lower bound of the energy in all cases, by a tangent at the angles (k, n) of each."""
+    rows, cases = problem.rows, cases_of(turns)
+    if not cases or len(cases) != len(angles):
+        return -math.inf
+    nearest = np.round(-rows.residuals(problem.centre) / HALF)
+    bounds: list[float] = []
+    for turn, angle in zip(cases, np.column_stack([angles, np.zeros(len(angles))])):
+        r = rows.residuals(angle) + HALF * (nearest + np.array(turn))
+        force = 2 * rows.weight * r
+        slope = np.bincount(rows.first, force, rows.size + 1) - np.bincount(rows.second, force, rows.size + 1)
+        away = np.abs(angle - problem.centre) + np.where(problem.fixed, 0.0, np.pi)
+        size = float(np.sum(rows.weight * (1 + r * r) * (1 + np.abs(angle[rows.first])))) * (1 + away.max())
+        bounds.append(
+            math.fsum(rows.weight * r * r) - math.fsum(np.abs(slope) * away) - ROUNDING * PRECISION * size
+        )
+    return min(bounds)
 
 
 # Section 7: the theorem ------------------------------------------------------------------------------------
@@ -572,8 +589,11 @@ def _check_levels(arrays: dict[str, Array], problem: Problem) -> ProvenClaim:
         bounds.append(excess.bound)
         kept = kept_of(problem, level, excess, threshold)
     assert kept is not None
-    forced = forced_rows(problem, level, *kept)
-    least = convex_bound(problem) if forced.all() else -math.inf
+    turns = possible_turns(problem, level, *kept)
+    angles = take_array(arrays, "cases", "<f8", None, rows.size)
+    _require(np.abs(angles) <= MOST_NUMBER, "cases", "is too large") if angles.size else None
+    least = cases_bound(problem, turns, angles)
+    forced = np.array([of_row == [0] for of_row in turns], bool)
     proven = max(0.0, min(max(*bounds, least), energy - error))
     bound = max(0.0, proven - SPARE * (1 + proven))
     claim = ProvenClaim(status_of(energy, bound), energy, bound, bounds, forced[: rows.pairs])

@@ -206,14 +206,14 @@ class _Prover:
             closing = self._ascend(dual, chain.threshold)
             if self._find_better_field(dual) and not self.ends.over():
                 return ""
+            least = self.least
             kept = self._record(chain, dual, costs)
             if chain.bound >= self.bound:
                 self.proven = chain
-            if reason := self._reason_to_end(chain):
-                return reason
+            reason = self._reason_to_end(chain)
             wide = len(chain.levels) == 1 and self.least - chain.bound > _WIDE * self.least
-            if wide and self._search(_SEARCH * self.ends.deadline.left()):
-                return ""
+            if reason or self.least < least or (wide and self._search(_SEARCH * self.ends.deadline.left())):
+                return reason
             more = self._more_rings(dual)
             factor = 1 if closing else self._next_factor(level, kept[0], more=bool(more))
             if not factor:
@@ -302,10 +302,15 @@ class _Prover:
             chain.arrays[f"level_{number}_{name}"] = packed
         labels = sum(map(len, level.labels[:-1]))
         chain.levels.append(LevelFacts(level.divisions, labels, excess.bound))
-        forced = checker.forced_rows(problem, level, *kept)
-        chain.forced = int(forced[: self.rows.pairs].sum())
-        if forced.all():
-            chain.convex = checker.convex_bound(problem)
+        turns = checker.possible_turns(problem, level, *kept)
+        chain.forced = sum(of_row == [0] for of_row in turns[: self.rows.pairs])
+        nearest = np.round(-self.rows.residuals(problem.centre) / np.pi * 2).astype(np.int32)
+        cases = [nearest + np.array(case, dtype=np.int32) for case in checker.cases_of(turns)]
+        angles = np.array([self.energy.fit_angles(z) for z in cases]).reshape(-1, self.rows.size)
+        chain.arrays["cases"] = angles
+        chain.convex = checker.cases_bound(problem, turns, angles)
+        for z in cases:
+            self._offer(z)
         return kept
 
     def _reason_to_end(self, chain: _Chain) -> str:
