@@ -35,6 +35,7 @@ NAMES: Final = {
         lambda readers: dict.fromkeys(re.split(r"[ ,]", reader.description)[0] for reader in readers),
     ),
     "samples": _names_in("...models.sketch.samples", "SAMPLES"),
+    "mesh samples": _names_in("...models.mesh.shapes", "MESHES"),
     "meshes": _names_in("...models.mesh.formats", "MESH_READERS"),
     "size": _names_in("...models.sketch.read", "DEFAULT_SIZE", lambda size: [str(size)]),
     "most weight": _names_in("...models.instance.instance", "MOST_WEIGHT", lambda weight: [f"{weight:,.0f}"]),

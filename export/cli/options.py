@@ -32,19 +32,9 @@ def _norm_option(option: str, terms: str) -> Any:
 
 # Input and output
 
-Input = Annotated[
-    str,
-    typer.Argument(
-        metavar="SKETCH|SAMPLE|MESH|INSTANCE",
-        help=f"One of: {_SKETCH} a triangle mesh ({{meshes}}); {_SAVED}",
-    ),
-]
-SketchInput = Annotated[
-    str, typer.Argument(metavar="SKETCH|SAMPLE|INSTANCE", help=f"One of: {_SKETCH} {_SAVED}")
-]
-OptionalSketchInput = Annotated[
-    str | None, typer.Argument(metavar="[SKETCH|SAMPLE|INSTANCE]", help=f"One of: {_SKETCH} {_SAVED}")
-]
+_ANY: Final = f"One of: {_SKETCH} a triangle mesh ({{meshes}}), or a built-in one: {{mesh samples}}; {_SAVED}"
+Input = Annotated[str, typer.Argument(metavar="SKETCH|SAMPLE|MESH|INSTANCE", help=_ANY)]
+OptionalInput = Annotated[str | None, typer.Argument(metavar="[SKETCH|SAMPLE|MESH|INSTANCE]", help=_ANY)]
 FieldOrInput = Annotated[
     str,
     typer.Argument(

@@ -28,7 +28,7 @@ UNPROVEN: Final = "unproven"
 
 
 def prove_command(
-    source: options.OptionalSketchInput = None,
+    source: options.OptionalInput = None,
     output: options.ProofFolder = None,
     *,
     norm: options.Norm = "2",
