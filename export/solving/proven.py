@@ -60,7 +60,7 @@ def certify(proof: Proof | OrthogonalProof, path: Path) -> Certificate:
     """
     from ...models.proof.certificate import write_certificate
 
-    if not proof.levels or (proof.proven is not None and proof.bound <= 0 < proof.energy):
+    if not proof.levels or (proof.proven is not None and proof.bound <= 0 and proof.status == "gap"):
         reason = _ENDED.get(proof.ended, "its levels prove no bound above 0")
         raise SolverError(f"nothing was proven, and there is no certificate: {reason}")
     return write_certificate(proof, path)

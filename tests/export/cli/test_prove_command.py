@@ -81,3 +81,11 @@ def test_certificates_are_checked(folder, capsys, tmp_path):
     printed = capsys.readouterr().err
     assert "wrong.npz: is refused as a certificate: energy is claimed as" in printed
     assert printed.count("\n") == 1
+
+
+def test_a_field_without_energy_is_proven_with_a_bound_of_0(tmp_path, capsys):
+    """All edges of a cube are parallel to its crosses; rounding leaves an energy of some 1e-22."""
+    assert invoke(["prove", "cube", "-o", str(tmp_path / "proof"), "--time-limit", "60"]) == 0
+    capsys.readouterr()
+    assert invoke(["prove", "--check", str(tmp_path / "proof" / "cube.proof.certificate.npz")]) == 0
+    assert "the certificate is valid" in capsys.readouterr().out
