@@ -89,7 +89,7 @@ def table(rows: dict[str, Row]) -> str:
 def table_row(name: str, row: Row) -> list[str]:
     """The cells of a mesh."""
     greedy, best, bound = row["greedy"]["energy"], row["best"]["energy"], row["bound"]
-    gap = "0, proven" if is_optimal(row) else "-" if bound is None else f"{100 * (1 - bound / best):.1f} %"
+    gap = "0, proven" if is_optimal(row) else "-" if bound is None else f"{100 * (1 - bound / best):.2g} %"
     greedy, best, bound = ("-" if value is None else f"{value:.3f}" for value in (greedy, best, bound))
     above = f"{excess(row):.1f} %"
     return [
