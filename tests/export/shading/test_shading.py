@@ -9,6 +9,7 @@ from crossfield.export.shading.colours import ball_normals as matcap_ball
 from crossfield.export.shading.raster import Raster, raster
 from crossfield.export.surfaces.files import encode_png
 from crossfield.models.errors import InputError
+from crossfield.models.instance.instance import Instance
 from PIL import Image
 from shapes import ball, ball_normals, disc, plane, surface_of
 
@@ -94,7 +95,7 @@ def test_strokes_at_the_border_are_the_border():
     mask = np.ones((16, 16), dtype=bool)
     surface = surface_of(mask, lambda x, _: 0 * x)
     edge = np.argwhere(~np.pad(np.ones((14, 14), dtype=bool), 1))
-    instance = type(surface.instance)("shape", mask, edge, np.zeros(len(edge)), np.ones(len(edge)))
+    instance = Instance.on_pixels("shape", mask, edge, np.zeros(len(edge)), np.ones(len(edge)))
     drawn = raster(instance, surface.normals, 10).opacity
     assert fine(surface, 10).opacity[80].sum() == pytest.approx(160, abs=1.5)
     assert drawn[80].sum() == pytest.approx(152, abs=1.5)
