@@ -4,19 +4,13 @@ import csv
 import io
 
 import pytest
-from crossfield.export.library.building.build import build
 from crossfield.export.library.building.table import COLUMNS, TABLE, parse_table
-from crossfield.export.library.plan.spec import read_spec
+from libraries import library_of
 
-SPEC = """format = "crossfield-library-spec"
-version = 1
-title = "Data for tests"
-formulations = ["exact", "qp"]
-
+SPEC = """formulations = ["exact", "qp"]
 [rungs.tiny]
 sizes = [3]
 formats = ["mps"]
-
 [[sketches]]
 name = "fam"
 random = "full"
@@ -28,9 +22,7 @@ points = "greedy"
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """A library with its table; not to be changed."""
-    folder = tmp_path_factory.mktemp("data")
-    (folder / "spec.toml").write_text(SPEC)
-    return build(read_spec(folder / "spec.toml"), folder / "library")
+    return library_of(tmp_path_factory.mktemp("data"), SPEC)
 
 
 def test_the_table_has_features_and_labels(built):
