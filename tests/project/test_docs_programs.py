@@ -6,7 +6,14 @@ from dataclasses import asdict
 import pytest
 from places import ROOT
 
-NEEDS = {"conf": "sphinx", "studio_pictures": "selenium", "studio_times": "selenium"}
+NEEDS = {
+    "command_pages": "sphinx",
+    "conf": "sphinx",
+    "formulas": "latex2mathml",
+    "studio_pictures": "selenium",
+    "studio_times": "selenium",
+}
+"""Packages of the extra `docs` that a program needs."""
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "docs").glob("*.py")))

@@ -69,6 +69,7 @@ OTHERS = {
     "pyqplib": (importlib.util.find_spec("pyqplib"), "pyqplib", "pip install pyqplib"),
     "toulbar2": (importlib.util.find_spec("pytoulbar2"), "toulbar2", "pip install pytoulbar2"),
     "trimesh": (importlib.util.find_spec("trimesh"), "trimesh", "pip install trimesh"),
+    "pyvista": (importlib.util.find_spec("pyvista"), "pyvista", "pip install pyvista"),
     "bpy": (importlib.util.find_spec("bpy"), "Blender as a module", "pip install bpy (1 GB)"),
     "chromium": (
         importlib.util.find_spec("selenium") and shutil.which("chromedriver") and browser(),

@@ -60,8 +60,10 @@ def test_directions_do_not_depend_on_the_first_corner_of_a_face():
     assert other.singularities.index.sum() == mesh.euler_characteristic
 
 
+@pytest.mark.needs("trimesh")
 def test_trimesh_reads_the_ply_with_its_directions(tmp_path):
-    trimesh = pytest.importorskip("trimesh")
+    import trimesh
+
     field = on_mesh("flange")
     path = write_field(field, tmp_path / "field.ply")
     read = trimesh.load(io.BytesIO(path.read_bytes()), file_type="ply", process=False)
@@ -72,8 +74,10 @@ def test_trimesh_reads_the_ply_with_its_directions(tmp_path):
     np.testing.assert_allclose(vectors.reshape(-1, 2, 3), vectors_of(field))
 
 
+@pytest.mark.needs("pyvista")
 def test_vtk_reads_the_vtk_with_directions_and_indices(tmp_path):
-    pyvista = pytest.importorskip("pyvista")
+    import pyvista
+
     for field in (on_mesh("cube", orthogonal=False), random_field(random_instance(3), 3)):
         read = pyvista.read(write_field(field, tmp_path / "field.vtk"))
         mesh = mesh_of(field.instance)

@@ -136,7 +136,7 @@ def test_optima_of_both_formulations_are_the_least_of_all_jumps(name):
         assert solution.field.energy(1).total == pytest.approx(least, abs=1e-6)
 
 
-@pytest.mark.oracles
+@pytest.mark.needs("gurobi")
 @pytest.mark.parametrize("name", ["tetrahedron", "tetrahedron without strokes"])
 def test_optima_stay_with_limits_and_are_the_least_of_all_jumps(name):
     instance = INSTANCES[name]()
@@ -149,7 +149,7 @@ def test_optima_stay_with_limits_and_are_the_least_of_all_jumps(name):
             assert solution.bound == pytest.approx(least, abs=1e-5)
 
 
-@pytest.mark.oracles
+@pytest.mark.needs("gurobi")
 @pytest.mark.slow
 @for_each("name", ["cube", "cube with weights", "sheet", "grid", "grid with holes"])
 def test_the_optimum_is_that_of_the_windows(name):

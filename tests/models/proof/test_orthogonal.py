@@ -101,7 +101,8 @@ def test_a_single_pair_of_labels_is_kept_with_its_square():
 
 def minimise_by_gurobi(instance):
     """The least energy, by the free edition of Gurobi with its gap of 1e-6."""
-    gurobi = pytest.importorskip("gurobipy")
+    import gurobipy as gurobi
+
     energy = OrthogonalEnergy.of(instance)
     model = gurobi.Model(env=gurobi.Env(params={"OutputFlag": 0, "Threads": 1}))
     alpha = model.addVars(energy.size, lb=-10, ub=10)
@@ -120,6 +121,7 @@ def minimise_by_gurobi(instance):
     return model.ObjVal
 
 
+@pytest.mark.needs("gurobi")
 @pytest.mark.parametrize("part", ["fan", "square"])
 def test_gurobi_finds_the_proven_optimum(part):
     instance = fan() if part == "fan" else flat_square(0.2)

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError
+from crossfield.models.sketch import publication
 from crossfield.models.sketch.publication import publishable_sketch, svg_of_curves
 from crossfield.models.sketch.samples import SAMPLES, sample_svg
 from crossfield.models.sketch.svg import read_svg
@@ -63,6 +64,6 @@ def test_the_suffix_of_a_published_file_follows_from_its_content(data, suffix, e
 
 
 def test_a_drawing_that_would_be_too_large_to_read_again_is_refused(monkeypatch):
-    monkeypatch.setattr("crossfield.models.sketch.publication.MAX_DATA", 500)
+    monkeypatch.setattr(publication, "MAX_DATA", 500)
     with pytest.raises(InputError, match="has paths of more than 500 characters; simplify the drawing"):
         publishable_sketch(TURNED, ".svg")
