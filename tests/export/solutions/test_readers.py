@@ -6,6 +6,7 @@ import tracemalloc
 import numpy as np
 import places
 import pytest
+from crossfield.export.solutions.readers import grammar
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.grammar import EntryForm
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
@@ -281,7 +282,7 @@ def test_columns_of_text_larger_than_a_piece(monkeypatch):
     ]
     data = "".join(f"{name} {value}\n" for name, value in rows).encode()
     for size in (1, 30, 64, 1000, 4096, len(data) - 1, len(data), len(data) + 1):
-        monkeypatch.setattr("crossfield.export.solutions.readers.grammar.PIECE", size)
+        monkeypatch.setattr(grammar, "PIECE", size)
         names, values = read_entries(data, 0, EntryForm("name value"))[:2]
         assert names.tolist() == [name.encode() for name, _ in rows]
         assert values.tolist() == [float(value) for _, value in rows]
