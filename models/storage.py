@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import re
 import secrets
 import shutil
+import socket
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import IO, Final
 
 from .errors import InputError, OutputError
 
 PART: Final = ".part"  # suffix of the names of temporary neighbours, which begin with a dot
+_MARK: Final = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]+\.part", re.DOTALL)
 _UNFINISHED: Final[set[Path]] = set()
 _LONGEST: Final = 50  # characters of a name that a neighbour's name repeats, at most 200 of 255 bytes
 
@@ -30,6 +35,7 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
     _UNFINISHED.add(temporary)
     try:
         try:
+            remove_dead(path.parent)
             stream = temporary.open("xb")
         except OSError as error:
             raise OutputError(
@@ -61,6 +67,7 @@ def replacing_files(folder: str | Path) -> Iterator[Path]:
     _UNFINISHED.add(temporary)
     try:
         try:
+            remove_dead(folder)
             temporary.mkdir()
         except OSError as error:
             raise OutputError(
@@ -100,8 +107,47 @@ def remove_file(path: Path) -> None:
 
 
 def neighbour(path: Path) -> Path:
-    """A name in the folder of `path` that no other writer uses."""
-    return path.with_name(f".{path.name[:_LONGEST]}.{secrets.token_hex(8)}{PART}")
+    """A name in the folder of `path` that no other writer uses, because it contains machine and process."""
+    return path.with_name(f".{path.name[:_LONGEST]}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}{PART}")
+
+
+@lru_cache(maxsize=1024)
+def remove_dead(folder: Path) -> None:
+    """Remove temporary files of this user's killed processes from a folder, once per process and folder.
+
+    Keeps files of processes whose state is unknown: on Windows, and for other machines. No write needs the
+    removal, because names are never used twice. Raises OSError when the folder cannot be listed.
+    """
+    for path in folder.iterdir():
+        mark = _MARK.fullmatch(path.name)
+        if mark is None or mark[1] != _machine() or _lives(int(mark[2])):
+            continue
+        with suppress(OSError):
+            status = path.lstat()
+            if status.st_uid != os.geteuid():
+                continue
+            if stat.S_ISDIR(status.st_mode):
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink()
+
+
+def _machine() -> str:
+    """Eight digits for the name of this machine."""
+    return hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
+
+
+def _lives(process: int) -> bool:
+    """Whether a process may be running."""
+    if os.name == "nt":  # signal 0 would end it there
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def write_bytes(path: str | Path, data: bytes) -> Path:

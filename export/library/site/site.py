@@ -20,7 +20,7 @@ from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.instance.file import read_instance
 from ....models.processes.deadline import Progress, silent
-from ....models.storage import make_folder, neighbour, read_bytes, write_bytes
+from ....models.storage import make_folder, neighbour, read_bytes, remove_dead, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS
 from ...pictures.draw import count_singularities
@@ -272,6 +272,7 @@ def _replace_folder(output: Path) -> Iterator[Path]:
                 f"holds {strange[0]!r}, which is no part of a site; choose another folder", file=output
             )
         make_folder(output.parent)
+        remove_dead(output.parent)
         stage = neighbour(output)
         stage.mkdir()
         try:
