@@ -98,13 +98,13 @@ def test_a_new_default_format_needs_no_other_edit(tmp_path, monkeypatch):
 
 
 def test_a_doubted_surface_and_warnings_are_explained(tmp_path):
-    square = '<path stroke="black" d="M5 47V5H95V95H5V54"/>'
+    square = '<path stroke="black" d="M5 47V5H95V95H5V54"/><path stroke="black" d="M120 5V95"/>'
     lines = "".join(
         f'<path stroke="red" d="M{x} 10V90"/><path stroke="red" d="M10 {x}H90"/>' for x in (30, 60)
     )
     drawing = tmp_path / "flat.svg"
     drawing.write_text(
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="100" height="100" fill="none">{square}{lines}</svg>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="130" height="100" fill="none">{square}{lines}</svg>'
     )
     report = cf.run(
         cf.read_sketch(drawing, size=40), tmp_path / "out", limits=cf.Limits(0.3), drawing=drawing
