@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arguments import check_arguments
 from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
-from ..errors import InputError, InstanceError, naming
+from ..errors import InputError, InstanceError, OutputError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.angles import MOST_ANGLE
 from ..instance.domain import Bools, Floats, Ints
@@ -38,7 +38,7 @@ from ..instance.mesh import MOST_FACES, Mesh
 from ..storage import read_bytes, write_bytes
 from .exchange import most_exchange_bytes, parse_ply, parse_rosy, parse_vtk, to_ply, to_rosy, to_vtk
 from .field import CrossField
-from .rawfield import most_rawfield_bytes, parse_rawfield, to_obj, to_rawfield, to_sings
+from .rawfield import OF_MESH, most_rawfield_bytes, parse_rawfield, to_obj, to_rawfield, to_sings
 
 FORMAT: Final = "crossfield-field"
 VERSION: Final = 1
@@ -75,16 +75,28 @@ def write_field(field: CrossField, path: str | Path) -> Path:
     InputError
         For another suffix.
     OutputError
-        If a file cannot be written.
+        If a file cannot be written, or if the .obj would replace a mesh that crossfield has not written.
 
     """
     path = Path(path)
     write = _look_up_suffix(_WRITERS, path, "written")
     if write in (to_rawfield, to_rosy):
-        write_bytes(path.with_suffix(".obj"), to_obj(field.instance))
+        _write_mesh(field.instance, path.with_suffix(".obj"))
     if write is to_rawfield:
         write_bytes(path.with_suffix(".sings"), to_sings(field))
     return write_bytes(path, write(field))
+
+
+def _write_mesh(instance: Instance, path: Path) -> None:
+    """Write the mesh beside a field, which often has the name of the part that the instance was read from."""
+    if isinstance(instance.domain, Mesh) and path.exists():
+        with path.open("rb") as file:
+            if file.read(len(OF_MESH)) != OF_MESH:
+                raise OutputError(
+                    "is a mesh that would be replaced by that of the field; give the field another name",
+                    file=path,
+                )
+    write_bytes(path, to_obj(instance))
 
 
 @check_arguments

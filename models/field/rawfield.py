@@ -36,12 +36,19 @@ def to_rawfield(field: CrossField) -> bytes:
     return f"4 {len(vectors)}\n{rows}".encode()
 
 
+OF_MESH: Final = b"# the mesh of a cross field of crossfield: "
+"""How the .obj of a mesh begins, by which it differs from the user's own mesh."""
+
+
 def to_obj(instance: Instance) -> bytes:
     """The mesh: vertices and, 1-based, faces."""
-    mesh, pixels = mesh_of(instance), not isinstance(instance.domain, Mesh)
-    note = ": triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, row by row; y up" * pixels
-    vertices, faces = text_of_rows(mesh.vertices, "v "), text_of_rows(mesh.faces + 1, "f ")
-    return f"# {instance.name}{note}\n{vertices}{faces}".encode()
+    mesh, on_mesh = mesh_of(instance), isinstance(instance.domain, Mesh)
+    of_pixels = (
+        f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, row by row; y up"
+    )
+    head = OF_MESH + instance.name.encode() if on_mesh else of_pixels.encode()
+    rows = text_of_rows(mesh.vertices, "v ") + text_of_rows(mesh.faces + 1, "f ")
+    return head + b"\n" + rows.encode()
 
 
 def to_sings(field: CrossField) -> bytes:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from crossfield.models.errors import InputError, InstanceError
+from crossfield.models.errors import InputError, InstanceError, OutputError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.file import read_field, write_field
 from crossfield.models.field.triangles import mesh_of, vectors_of
@@ -107,3 +107,16 @@ def test_damaged_files_are_refused_with_the_place(suffix, old, new, message, tmp
         read_field(path, on=field.instance)
     with pytest.raises(InputError, match="holds no instance"):
         read_field(path)
+
+
+@pytest.mark.parametrize("suffix", ["rawfield", "rosy"])
+def test_the_mesh_of_the_user_is_not_replaced(suffix, tmp_path):
+    field = on_mesh("cube")
+    theirs = tmp_path / "part.obj"
+    theirs.write_text("# Blender\nvt 0 0\n")
+    with pytest.raises(OutputError, match=r"part.obj: .* give the field another name"):
+        write_field(field, tmp_path / f"part.{suffix}")
+    assert theirs.read_text() == "# Blender\nvt 0 0\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["part.obj"]
+    for _ in range(2):  # our own mesh is written again
+        write_field(field, tmp_path / f"field.{suffix}")
