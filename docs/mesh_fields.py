@@ -55,7 +55,7 @@ def measure(name: str, seconds: float, rounds: int = ROUNDS) -> Row:
 
 
 def clock(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What the work returns, and its processor seconds, which other programs hardly change."""
+    """Result of the work, and its processor seconds, which other programs hardly change."""
     began = time.process_time()
     return work(), round(time.process_time() - began, 2)
 
@@ -100,7 +100,7 @@ def table_row(name: str, row: Row) -> list[str]:
 
 
 def sentence(rows: dict[str, Row]) -> str:
-    """What the table shows, with its numbers."""
+    """Sentences on the findings of the table, with its numbers."""
     above = {name: excess(row) for name, row in rows.items()}
     worse = [name for name in above if above[name] > 0]
     most = max(above, key=lambda name: above[name])

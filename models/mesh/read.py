@@ -77,11 +77,11 @@ def read_mesh(
         mesh, lines = read_mesh_file(path)
         mesh.check()
         edges = feature_edges(mesh, sharp=sharp, boundary=boundary, lines=lines)
-    given = None
+    directed = None
     if directions is not None:
         with naming(directions):
-            given = read_directions(Path(directions), mesh)
-    strokes = combine_strokes(mesh, edges, given)
+            directed = read_directions(Path(directions), mesh)
+    strokes = combine_strokes(mesh, edges, directed)
     warnings: tuple[str, ...] = ()
     if len(strokes.contradictory):
         warnings = (f"no stroke on {list_faces(strokes.contradictory)}, where directions cancel out",)
