@@ -51,7 +51,7 @@ class Bitmap:
 
     ink: [h, w], 0 for paper to 1 for ink as dark as the strokes. red: [h, w] in [0, 1], the part of the ink
     that is red. reduction: pixels of the file per pixel of these arrays in each direction. width, height: in
-    pixels of the file.
+    pixels of the file. notes: what was left out or changed while reading, one line each.
     """
 
     ink: Ink
@@ -59,6 +59,7 @@ class Bitmap:
     reduction: int
     width: int
     height: int
+    notes: tuple[str, ...] = ()
 
     @property
     def page(self) -> Box:

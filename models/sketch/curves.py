@@ -26,6 +26,7 @@ class Curves:
     red: bool (k,), True where a stroke is drawn in red.
     page: x, y, width and height of the page, or None if the file does not state it.
     chosen: bool (k,), True where a stroke was chosen as a curvature line, or None without a choice.
+    notes: what was left out or changed while reading, one line each.
     """
 
     points: Floats
@@ -33,6 +34,7 @@ class Curves:
     red: Bools
     page: Box | None
     chosen: Bools | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def line(self) -> Bools:

@@ -150,7 +150,8 @@ def instance_of_drawing(
         frame, region = frame_around_white(white, drawing.page, size)
         covers = drawing.covers(frame)
         mask = region & ~covers.cuts
-        reading = Reading(drawing.page, _list_warnings(describe_crowding(covers.filled, mask, frame)))
+        warnings = _list_warnings(*drawing.notes, describe_crowding(covers.filled, mask, frame))
+        reading = Reading(drawing.page, warnings)
         if silhouette == "outer":
             covers = drop_outline_directions(covers, region)
     return instance_of_mask(
@@ -183,6 +184,7 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
         )
     warnings = _list_warnings(
+        *drawing.notes,
         describe_open_drawing(region),
         describe_loose_strokes(walls, region, frame),
         describe_crowding(covers.filled, mask, frame),
