@@ -41,13 +41,7 @@ from .views import field_step, lines_step, surface_step
 LOOPBACK: Final = "127.0.0.1"
 COARSE: Final = 48  # pixels of the field that is shown before a finer one
 _FINE: Final = 64  # pixels from which on there is a coarse field first
-_FILES: Final = {
-    "studio.css": "text/css",
-    "studio.js": "text/javascript",
-    "document.js": "text/javascript",
-    "drawing.js": "text/javascript",
-    "shading.js": "text/javascript",
-}
+_TYPES: Final = {".css": "text/css", ".js": "text/javascript"}
 _HEADERS: Final = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -136,10 +130,11 @@ class Page:
     async def file(self, request: Request) -> Response:
         """A script or the style sheet."""
         name = request.path_params["name"]
-        if name not in _FILES:
-            return PlainTextResponse("There is no such file.", 404)
         folder = Path(ENVIRONMENT.get_template("studio/index.html.j2").filename or "").parent
-        return Response((folder / name).read_bytes(), media_type=_FILES[name])
+        files = {path.name: path for path in folder.iterdir() if path.suffix in _TYPES}
+        if name not in files:
+            return PlainTextResponse("There is no such file.", 404)
+        return Response(files[name].read_bytes(), media_type=_TYPES[files[name].suffix])
 
     async def start(self, _: Request) -> Response:
         """The drawing that the page opens with."""

@@ -1,6 +1,6 @@
 // The left picture: strokes, mask and field, in the units of the drawing.
 
-import { boxOf } from "./document.js";
+import { boxOf } from "./strokes.js";
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const COLOURS = {

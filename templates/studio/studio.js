@@ -1,8 +1,10 @@
 // The page: tools, keys, requests. The document lives here; the server computes functions of it.
 
-import { History, decoded, emptyDocument, encoded, erased, FORMAT, rounded, strokeAt, strokesIn } from "./document.js";
+import { History, decoded, emptyDocument, encoded, FORMAT } from "./document.js";
 import { View, paint, paintBase } from "./drawing.js";
+import { listen } from "./pointer.js";
 import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shading.js";
+import { erased, rounded, strokeAt, strokesIn } from "./strokes.js";
 
 const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
 const page = crypto.randomUUID(), KEPT = "crossfield-studio", FILE = `${KEPT}-file`, REACH = 9, RETRY = 3000;
@@ -218,6 +220,7 @@ const tools = {
     if (live) finish(live);
     refresh(false);
   },
+  cancel() { state.live = null; refresh(false); },
 };
 function finish({ tool, path, radius, mark: kind, pressure }) {
   const moved = path.length > 2, first = path.slice(0, 2);
@@ -267,64 +270,19 @@ const arrows = {
     else if (hit >= 0) commit({ hints: rest });
     refresh();
   },
+  cancel() { state.arrow = null; refresh(false); },
 };
 
-// Pointers: one finger or the pen uses the tool, two fingers and the wheel zoom and move.
-function pointers(view, tool, hover) {
-  const { canvas } = view, down = new Map();
-  const middle = () => [...down.values()].reduce(([x, y], each) => [x + each.clientX / down.size, y + each.clientY / down.size], [0, 0]);
-  const spread = () => { const [a, b] = [...down.values()]; return Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY); };
-  const pressure = event => event.pointerType === "pen" && event.pressure ? event.pressure : 1;
-  canvas.addEventListener("pointerdown", event => {
-    canvas.focus({ preventScroll: true }); view.cursor = null;
-    try { canvas.setPointerCapture(event.pointerId); } catch { /* the pointer is gone */ }
-    down.set(event.pointerId, event);
-    if (down.size > 1 || event.button === 1) { state.live = state.arrow = null; refresh(false); } else if (event.button === 0) tool.begin(view.at(event), pressure(event));
-  });
-  canvas.addEventListener("pointermove", event => {
-    const before = down.get(event.pointerId);
-    if (before && (down.size > 1 || before.buttons & 4)) {
-      const [x, y] = middle(), wide = down.size > 1 ? spread() : 1;
-      down.set(event.pointerId, event);
-      const [nx, ny] = middle(), place = canvas.getBoundingClientRect();
-      view.zoom(down.size > 1 ? spread() / wide : 1, x - place.left, y - place.top, nx - x, ny - y); refresh();
-    } else if (before) for (const each of event.getCoalescedEvents?.().length ? event.getCoalescedEvents() : [event]) tool.move(view.at(each), pressure(each));
-    hover(event);
-  });
-  for (const kind of ["pointerup", "pointercancel"]) canvas.addEventListener(kind, event => {
-    if (down.delete(event.pointerId) && !down.size) kind === "pointerup" ? tool.end() : (state.live = state.arrow = null, refresh(false));
-  });
-  canvas.addEventListener("wheel", event => {
-    event.preventDefault();
-    const place = canvas.getBoundingClientRect();
-    view.zoom(Math.exp(-Math.max(-60, Math.min(60, event.deltaY)) / 250), event.clientX - place.left, event.clientY - place.top); refresh();
-  }, { passive: false });
-  canvas.addEventListener("focus", () => { refresh(false); });
-  canvas.addEventListener("blur", () => { if (view.cursor) { view.cursor = null; tool.end(); } });
-  let held = false;
-  canvas.addEventListener("keydown", event => {
-    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
-    if (!way && event.key !== " " && event.key !== "Enter" || event.ctrlKey || event.metaKey) return;
-    event.preventDefault();
-    if (!view.cursor) { held = false; view.cursor = [(view.wide / 2 - view.x) / view.scale, (view.high / 2 - view.y) / view.scale]; }
-    if (way) {
-      const far = (event.shiftKey ? 40 : 8) / view.scale;
-      view.cursor = view.cursor.map((value, k) => value + far * way[k]);
-      if (held) tool.move(view.cursor, 1);
-    } else if (event.key === "Enter") { held = false; tool.begin(view.cursor, 1); tool.end(); }
-    else { held = !held; held ? tool.begin(view.cursor, 1) : tool.end(); }
-    refresh(false);
-  });
-}
-pointers(left, tools, event => {
+// Pointers and keys of both pictures.
+listen(left, tools, { refresh, hover(event) {
   const wide = { paint: brushRadius(), unpaint: brushRadius(), erase: REACH / left.scale }[state.tool], [x, y] = left.at(event);
   if (wide || state.brush) { state.brush = wide && event.pointerType !== "touch" ? { x, y, radius: wide } : null; refresh(false); }
-});
-pointers(right, arrows, event => {
+} });
+listen(right, arrows, { refresh, hover(event) {
   if (state.arrow || state.kind !== "shaded" || event.pointerType === "touch") return;
   const place = right.canvas.getBoundingClientRect(), x = 2 * (event.clientX - place.left) / place.width - 1, y = 1 - 2 * (event.clientY - place.top) / place.height;
   state.lamp = { azimuth: Math.atan2(y, x), elevation: Math.PI / 2 * (1 - 0.85 * Math.min(1, Math.hypot(x, y))) }; refresh(false);
-});
+} });
 right.canvas.addEventListener("pointerleave", () => { state.lamp = LAMP_AT; refresh(false); });
 
 // Files.
@@ -418,7 +376,7 @@ all("input[name=surface]").forEach(each => each.addEventListener("change", () =>
 const keys = {
   d: () => choose("draw"), v: () => choose("select"), e: () => choose("erase"), b: () => choose("paint"), n: () => choose("unpaint"), a: () => choose("area"), r: () => choose("turn"),
   1: () => mark("line"), 2: () => mark("cut"), 3: () => mark("ignored"), f: flip, q: () => next("field"), w: () => next("surface"),
-  delete: remove, backspace: remove, escape: () => { closeMenus(); state.live = state.arrow = null; select([]); }, "?": actions.help,
+  delete: remove, backspace: remove, escape: () => { closeMenus(); tools.cancel(); arrows.cancel(); select([]); }, "?": actions.help,
   "+": () => { left.zoom(1.25); refresh(); }, "-": () => { left.zoom(0.8); refresh(); }, 0: () => { left.fit(pageBox(state.doc)); right.zoomed = false; right.resize(); refresh(); },
   "ctrl+z": () => step(-1), "ctrl+shift+z": () => step(1), "ctrl+y": () => step(1), "ctrl+s": save, "ctrl+o": actions.open, "ctrl+a": () => select(state.doc.strokes.map((_, k) => k)),
 };

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import threading
 
 import pytest
@@ -27,7 +28,10 @@ def test_the_page_loads_nothing_from_elsewhere(page):
     text = body.decode()
     assert "http" not in text.replace("http-equiv", "")
     assert "<script>" not in text
-    for name in ("studio.js", "document.js", "drawing.js", "shading.js", "studio.css"):
+    _, _, script = page.ask("studio.js")
+    modules = re.findall(r'from "\./(.*)"', script.decode())
+    assert "pointer.js" in modules
+    for name in ("studio.js", "studio.css", *modules):
         status, headers, body = page.ask(name)
         assert status == 200, name
         assert b"http" not in body.replace(b"http-equiv", b""), name
