@@ -116,12 +116,11 @@ def too_many_curves() -> InputError:
 
 @dataclass(eq=False)
 class _PathBuilder:
-    """The target of svgelements' lexer: straight lines and cubics as points of the complex plane.
+    """The target of svgelements' lexer: cubics, in the order of the path, as points of the complex plane.
 
-    smooth: the kind of the last curve (2: quadratic, 3: cubic) and its last control point.
+    A straight line has its control points at its ends. smooth: the kind of the last curve (2: quadratic, 3: cubic) and its last control point.
     """
 
-    lines: list[tuple[complex, complex]] = field(default_factory=list)
     cubics: list[tuple[complex, complex, complex, complex]] = field(default_factory=list)
     here: complex = 0j
     begin: complex = 0j
@@ -133,8 +132,11 @@ class _PathBuilder:
 
     def points(self) -> Floats:
         """Control points (k, 4, 2)."""
-        straight, curved = _as_points(self.lines, 2), _as_points(self.cubics, 4)
-        return np.concatenate([lines_as_cubics(straight[:, 0], straight[:, 1]), curved])
+        values = np.array(self.cubics, dtype=complex).reshape(-1, 4)
+        cubics: Floats = np.stack([values.real, values.imag], axis=-1)
+        straight = (values[:, 0] == values[:, 1]) & (values[:, 2] == values[:, 3])
+        cubics[straight] = lines_as_cubics(cubics[straight, 0], cubics[straight, 3])
+        return cubics
 
     def start(self) -> None:
         pass
@@ -148,9 +150,8 @@ class _PathBuilder:
 
     def line(self, point: _Coordinates, **_: bool) -> None:
         end = self._at(point)
-        self._check_room()
-        self.lines.append((self.here, end))
-        self.here, self.smooth = end, (0, 0j)
+        self._curve(self.here, end, end)
+        self.smooth = (0, 0j)
 
     def horizontal(self, x: float, *, relative: bool) -> None:
         self.line((x + self.here.real * relative, self.here.imag))
@@ -204,17 +205,14 @@ class _PathBuilder:
             self.here = start
             self._curve(first, second, end)
         elif isinstance(segment, svgelements.Linear):
-            self._check_room()
-            self.lines.append((complex(segment.start), complex(segment.end)))
+            self.here, end = complex(segment.start), complex(segment.end)
+            self._curve(self.here, end, end)
 
     def _curve(self, first: complex, second: complex, end: complex) -> None:
-        self._check_room()
+        if len(self.cubics) >= MAX_CURVES:
+            raise too_many_curves()
         self.cubics.append((self.here, first, second, end))
         self.here = end
-
-    def _check_room(self) -> None:
-        if len(self.lines) + len(self.cubics) >= MAX_CURVES:
-            raise too_many_curves()
 
     def _reflected_control(self, kind: int) -> complex:
         """A smooth curve's first control point: the last one reflected after a curve of its kind."""
@@ -222,8 +220,3 @@ class _PathBuilder:
 
     def _at(self, point: _Coordinates) -> complex:
         return self.begin if isinstance(point, str) else complex(*point)
-
-
-def _as_points(rows: list[Any], width: int) -> Floats:
-    values = np.array(rows, dtype=complex).reshape(-1, width)
-    return np.stack([values.real, values.imag], axis=-1)
