@@ -118,7 +118,8 @@ def too_many_curves() -> InputError:
 class _PathBuilder:
     """The target of svgelements' lexer: cubics, in the order of the path, as points of the complex plane.
 
-    A straight line has its control points at its ends. smooth: the kind of the last curve (2: quadratic, 3: cubic) and its last control point.
+    A straight line has its control points at its ends. smooth: the kind of the last curve (2: quadratic,
+    3: cubic) and its last control point.
     """
 
     cubics: list[tuple[complex, complex, complex, complex]] = field(default_factory=list)
