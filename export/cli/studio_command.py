@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import json
 import secrets
 import webbrowser
 from pathlib import Path
@@ -62,7 +60,6 @@ def _read_strokes(drawing: str) -> dict[str, Any]:
     from ...models.errors import naming
     from ...models.sketch.drawing_file import read_file
     from ...models.sketch.samples import SAMPLES, sample_svg
-    from ..studio.document import Document
     from ..studio.opening import open_drawing
 
     path = Path(drawing)
@@ -71,10 +68,4 @@ def _read_strokes(drawing: str) -> dict[str, Any]:
     is_mesh_file(path, "studio")  # raises an error for a mesh
     data = read_file(path)
     with naming(path):
-        if data.lstrip().startswith(b"{"):
-            Document.from_bytes(data)
-            return {"document": json.loads(data)}
-        strokes = open_drawing(data, path.name)
-    if strokes["spatial"]:  # the page reads it again from other sides
-        strokes["file"] = {"name": path.name, "data": base64.b64encode(data).decode()}
-    return strokes
+        return open_drawing(data, path.name)

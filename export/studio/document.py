@@ -89,9 +89,12 @@ class Document:
     def from_json(cls, content: Any) -> Document:
         """Check a parsed document. Raises InputError that names the faulty entry."""
         if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise InputError("this is not a session of crossfield; open a file that the page saved")
+            raise InputError("this is not a session of crossfield; open a drawing or a saved session")
         if content.get("version") != VERSION:
-            raise InputError(f"the session has version {shortened(content.get('version'))}, not {VERSION}")
+            raise InputError(
+                f"the session has version {shortened(content.get('version'))}, and this crossfield reads "
+                f"version {VERSION}; open it with the crossfield that saved it and download the drawing there"
+            )
         low, high = SIZES
         document = cls(
             name=name_from_text(str(content.get("name", ""))[:200]) or "drawing",

@@ -1,7 +1,9 @@
-"""Strokes of the page from a file: SVG, .scap and .curves by their curves, pictures by thinned ink."""
+"""Documents of the page from files: saved sessions, curves, and pictures by their thinned ink."""
 
 from __future__ import annotations
 
+import base64
+import json
 from typing import Any, Final
 
 import numpy as np
@@ -16,6 +18,7 @@ from ...models.sketch.cover import Box, block_means
 from ...models.sketch.curves import Curves, flatten, run_numbers
 from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
 from ...models.sketch.thinning import thin_shape
+from .document import Document
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
 _THINNED: Final = 700  # pixels on the longer side of a picture while it is traced
@@ -30,23 +33,29 @@ _Way = list[_Pixel]
 
 
 def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[str, Any]:
-    """Name, page and strokes of a drawing, as in a document. Raises InputError.
+    """A session under `document`, or else name, page and strokes of a drawing. Raises InputError.
 
-    view: direction of a .curves file, as for `read_sketch`. `spatial` states whether it has one.
+    view: direction of a .curves file, as for `read_sketch`. Without it, such a file is added as `file` with
+    name and data in base64, because the page reads it again from other sides.
     """
     if not data:
         raise InputError("the file is empty; save the drawing again")
+    if data.lstrip().startswith(b"{"):
+        Document.from_bytes(data)
+        return {"document": json.loads(data)}
     stem, dot, suffix = file_name.rpartition(".")
     suffix = f".{suffix.lower()}" if dot else ""
     spatial = detect_file_kind(data, suffix) == "curves"
     drawing = parse_drawing(data, suffix, _THINNED // 4, view=view if spatial else None)
     page, strokes = _trace_picture(drawing) if isinstance(drawing, Bitmap) else _strokes_of_curves(drawing)
-    return {
+    opened: dict[str, Any] = {
         "name": name_from_text(stem or file_name),
         "page": list(page),
         "strokes": strokes,
-        "spatial": spatial,
     }
+    if spatial and view is None:
+        opened["file"] = {"name": file_name, "data": base64.b64encode(data).decode()}
+    return opened
 
 
 def _stroke_document(points: Floats, *, line: bool) -> dict[str, Any]:

@@ -1,16 +1,16 @@
 // The page: tools, keys, requests. The document lives here; the server computes functions of it.
 
-import { History, decoded, emptyDocument, encoded, FORMAT } from "./document.js";
+import { History, check, decoded, emptyDocument } from "./document.js";
 import { View, paint, paintBase } from "./drawing.js";
 import { listen } from "./pointer.js";
 import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shading.js";
 import { erased, rounded, strokeAt, strokesIn } from "./strokes.js";
 
 const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
-const page = crypto.randomUUID(), KEPT = "crossfield-studio", FILE = `${KEPT}-file`, REACH = 9, RETRY = 3000;
+const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file"], REACH = 9, RETRY = 3000;
 const state = {
   history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "line", live: null, brush: null, edit: 0,
-  field: null, lines: null, surface: null, mode: "crosses", kind: "shaded", lamp: LAMP_AT, suspects: new Set(), opened: null,
+  field: null, lines: null, surface: null, mode: "crosses", kind: "shaded", lamp: LAMP_AT, suspects: new Set(),
 };
 state.doc = state.history.now;
 const left = new View($("#drawing"), () => refresh()), right = new View($("#surface"), () => refresh());
@@ -41,7 +41,9 @@ function ready(text) { status(text); document.documentElement.dataset.state = "r
 
 // Documents.
 function show(doc, { compute = true } = {}) {
+  if (doc.page !== state.doc.page) { forget(); left.fit(pageBox(doc)); right.zoomed = false; }
   state.doc = doc; state.chosen = new Set([...state.chosen].filter(k => k < doc.strokes.length));
+  if (state.tool === "turn" && !doc.file) state.tool = "draw";
   controls(); refresh();
   if (compute) request();
 }
@@ -50,29 +52,37 @@ function commit(change) {
   state.history.commit(next); keep(); show(next);
 }
 function step(by) { if (state.history.step(by)) { state.chosen.clear(); keep(); show(state.history.now); } }
-function start(doc, opened = null) {
-  state.history.reset(doc); state.opened = opened; keepFile(opened); state.chosen.clear(); forget(); left.fit(pageBox(doc)); keep(); show(doc);
-  if (state.tool === "turn" && !opened) choose("draw");
+/** Shows another drawing that is in a file. Undo brings the present one back, unless it is empty. */
+function replace(doc) {
+  if (!state.history.now.strokes.length) state.history.at -= 1;
+  state.history.saved.add(doc); state.chosen.clear(); commit(() => doc);
 }
 const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); doubts(); };
 const pageBox = ({ page: [x, y, w, h] }) => [x, y, x + w, y + h];
-function keep() {
-  try { sessionStorage.setItem(`${KEPT}-at`, location.pathname); sessionStorage.setItem(KEPT, JSON.stringify(state.history.now)); } catch {
-    sessionStorage.removeItem(KEPT);
-    banner("This drawing is too large to survive a reload of the page. Save it as a session.", { kind: "large" });
-  }
-}
+const isSaved = () => state.history.saved.has(state.history.now);
 
-// The file of a drawing in space, from which it is turned.
-function keepFile(opened) {
-  sessionStorage.removeItem(FILE);
-  try { if (opened) sessionStorage.setItem(FILE, JSON.stringify({ name: opened.name, data: encoded(opened.bytes) })); } catch {
-    banner("This file is too large to be turned after a reload of the page. Open it again to turn it then.", { kind: "large" });
-  }
+// What survives a reload of the page. The large parts change rarely: they are stored apart, and computing needs none.
+const computable = doc => JSON.stringify({ ...doc, ...Object.fromEntries(PARTS.map(part => [part, undefined])) });
+const stored = new Map();
+function store(name, value, text = String) {
+  if (stored.has(name) && stored.get(name) === value) return true;
+  stored.delete(name); sessionStorage.removeItem(name);
+  try { if (value) sessionStorage.setItem(name, text(value)); stored.set(name, value); return true; } catch { return false; }
 }
-function keptFile() {
-  const file = JSON.parse(sessionStorage.getItem(FILE));
-  return file && { name: file.name, bytes: decoded.bytes(file.data) };
+function keep() {
+  const { now } = state.history, whole = PARTS.map(part => store(`${KEPT}-${part}`, now[part], JSON.stringify)).every(Boolean);
+  store(`${KEPT}-at`, location.pathname); store(`${KEPT}-saved`, isSaved() && "yes");
+  if (!store(KEPT, now, computable)) banner("This drawing is too large to survive a reload of this page. Save it as a file.", { kind: "large" });
+  else if (!whole) banner("A reload of this page keeps the strokes, but not the file that they come from, which is too large. Save the drawing.", { kind: "large" });
+}
+function kept() {
+  try {
+    const text = sessionStorage.getItem(KEPT), parts = PARTS.map(part => [part, JSON.parse(sessionStorage.getItem(`${KEPT}-${part}`))]);
+    return text && check({ ...JSON.parse(text), ...Object.fromEntries(parts.filter(([, value]) => value)) });
+  } catch (error) {
+    banner(`The drawing that this tab kept cannot be shown: ${error.message}. The next change replaces it.`, { kind: "kept" });
+    return null;
+  }
 }
 
 // Requests. A newer edit aborts older ones, here and on the server.
@@ -112,7 +122,7 @@ async function request() {
   const wanted = new URLSearchParams({ page, edit, size: doc.size });
   if (state.mode === "lines") wanted.set("lines", 1);
   try {
-    const response = await ask(`compute?${wanted}`, { method: "POST", body: JSON.stringify(doc), signal: waiting.signal });
+    const response = await ask(`compute?${wanted}`, { method: "POST", body: computable(doc), signal: waiting.signal });
     clear("lost");
     if (!response.ok) { banner(await trouble(response)); ready(""); return; }
     for await (const found of lined(response)) if (edit === state.edit) take(found);
@@ -179,9 +189,9 @@ function controls() {
   const marks = new Set([...chosen].map(k => doc.strokes[k].mark)), shown = marks.size === 1 ? [...marks][0] : chosen.size ? "" : state.mark;
   all("[data-mark]").forEach(each => each.setAttribute("aria-pressed", each.dataset.mark === shown));
   all("[data-tool]").forEach(each => each.setAttribute("aria-pressed", each.dataset.tool === state.tool));
-  $("[data-tool=turn]").hidden = !state.opened;
+  $("[data-tool=turn]").hidden = !doc.file;
 }
-function choose(tool) { if (tool === "turn" && !state.opened) return; state.tool = tool; state.brush = null; controls(); refresh(false); }
+function choose(tool) { if (tool === "turn" && !state.doc.file) return; state.tool = tool; state.brush = null; controls(); refresh(false); }
 function select(numbers) { state.chosen = new Set(numbers); controls(); refresh(); }
 function mark(kind) {
   state.mark = kind;
@@ -243,16 +253,16 @@ const editMask = edit => commit(doc => ({ ...doc, mask: [...doc.mask, edit] }));
 // Turning a drawing in space: the file is read again from another side.
 let turning = null;
 async function turn({ path }, done = false) {
-  const { opened } = state, from = state.history.now.view ?? [30, 25], k = path.length - 2;
+  const { file } = state.doc, from = state.history.now.view ?? [30, 25], k = path.length - 2;
   const view = [from[0] - (path[k] - path[0]) * left.scale / 3, Math.max(-89, Math.min(89, from[1] + (path[k + 1] - path[1]) * left.scale / 3))].map(Math.round);
   if (turning && !done) return;
   await turning;
-  turning = read(opened.bytes, opened.name, view.join(",")).finally(() => { turning = null; });
+  turning = read(decoded.bytes(file.data), file.name, view.join(",")).finally(() => { turning = null; });
   const found = await turning;
-  if (!found || opened !== state.opened) return;
+  if (!found || file !== state.doc.file) return;
   const doc = { ...state.history.now, page: found.page, strokes: found.strokes, mask: [], hints: [], view };
-  left.fit(pageBox(doc)); state.chosen.clear();
-  if (done) commit(doc); else { state.doc = doc; state.field = state.lines = null; refresh(); }
+  state.chosen.clear();
+  done ? commit(doc) : show(doc, { compute: false });
 }
 
 // Hints.
@@ -295,24 +305,13 @@ async function read(bytes, name, view) {
   } catch { /* the server is lost, which is shown */ }
   return null;
 }
-const drawn = (found, opened) => start({ ...emptyDocument(), size: state.doc.size, name: found.name || "drawing", page: found.page, strokes: found.strokes }, opened);
-const mayReplace = () => state.history.saved === state.history.now || !state.doc.strokes.length || confirm("Replace the drawing? Changes since the last save are lost.");
+/** The document of what the server read from a file. */
+const documentOf = ({ document: session, name, page, strokes, file }) => ({ ...emptyDocument(), size: state.doc.size, ...session ?? { name: name || "drawing", page, strokes, file } });
+const mayReplace = () => isSaved() || !state.doc.strokes.length || confirm("Replace this drawing? It has changes that are not in a saved file. Undo brings it back until this page is closed or loaded again.");
 async function open(file) {
   if (!file || !mayReplace()) return;
-  const bytes = await file.arrayBuffer();
-  const head = new TextDecoder().decode(bytes.slice(0, 200)).trimStart();
-  if (head.startsWith("{") && head.includes(FORMAT)) {
-    try { const doc = { ...emptyDocument(), ...JSON.parse(new TextDecoder().decode(bytes)) }; check(doc); banner(""); start(doc); } catch (error) { banner(`${file.name}: this session is damaged (${error.message}).`); }
-    return;
-  }
-  const found = await read(bytes, file.name);
-  if (found) { banner(""); drawn(found, found.spatial ? { bytes, name: file.name } : null); }
-}
-function check(doc) {
-  const flat = points => Array.isArray(points) && points.length >= 2 && points.length % 2 === 0 && points.every(Number.isFinite);
-  if (!flat(doc.page) || doc.page.length !== 4) throw new Error("page");
-  for (const key of ["strokes", "mask", "hints"]) if (!Array.isArray(doc[key])) throw new Error(key);
-  if (![...doc.strokes, ...doc.mask].every(each => each && flat(each.points))) throw new Error("points");
+  const found = await read(file, file.name);
+  if (found) { banner(""); replace(documentOf(found)); }
 }
 function give(blob, name) {
   const link = document.createElement("a");
@@ -321,13 +320,13 @@ function give(blob, name) {
 }
 function save() {
   give(new Blob([JSON.stringify(state.history.now)], { type: "application/json" }), `${state.doc.name}.studio.json`);
-  state.history.saved = state.history.now; status("saved");
+  state.history.saved.add(state.history.now); keep(); status("saved");
 }
 async function download(what) {
   const query = new URLSearchParams({ what, formulation: $("#formulation").value, format: $("#format").value });
   status(`writing ${what} …`);
   try {
-    const response = await ask(`download?${query}`, { method: "POST", body: JSON.stringify(state.doc) });
+    const response = await ask(`download?${query}`, { method: "POST", body: computable(state.doc) });
     if (!response.ok) { banner(await trouble(response)); status(""); return; }
     give(await response.blob(), /filename="(.*)"/.exec(response.headers.get("content-disposition"))[1]);
     ready(`${what} written`);
@@ -337,7 +336,7 @@ function dialog(title, ...content) { $("#dialog h2").textContent = title; $("#di
 const actions = {
   undo: () => step(-1), redo: () => step(1), save, flip, delete: remove, retry: request, dismiss: () => banner(""),
   open: () => $("#file").click(), unhint: () => commit({ hints: [] }),
-  empty: () => { if (mayReplace()) start({ ...emptyDocument(), size: state.doc.size }); },
+  empty: () => { if (mayReplace()) replace({ ...emptyDocument(), size: state.doc.size }); },
   help: () => dialog("Help", $("#help").content.cloneNode(true)),
   elsewhere: () => state.field ? dialog("The same without the page", element("p", "Download the drawing and the instance, then run in their folder:"),
     element("pre", state.field.commands.join("\n").replace("milp-mccormick -F mps", `${$("#formulation").value} -F ${$("#format").value}`))) : status("There is no field yet."),
@@ -352,7 +351,7 @@ document.addEventListener("click", event => {
   if (tool) choose(tool);
   if (kind) mark(kind);
   if (what) download(what);
-  if (sample && mayReplace()) ask(`sample/${sample}`).then(response => response.json()).then(found => drawn(found, null)).catch(() => {});
+  if (sample && mayReplace()) ask(`sample/${sample}`).then(response => response.json()).then(found => replace(documentOf(found))).catch(() => {});
 });
 $("#file").addEventListener("change", event => { open(event.target.files[0]).finally(() => { event.target.value = ""; }); });
 document.addEventListener("dragover", event => event.preventDefault());
@@ -395,15 +394,14 @@ others.addEventListener("message", ({ data }) => {
   if (data === "there" && !bannerKind) banner("This studio is open in another tab too. Each tab has its own drawing.", { kind: "tab" });
 });
 others.postMessage("opened");
-addEventListener("beforeunload", event => { if (state.history.saved !== state.history.now) event.preventDefault(); });
+addEventListener("beforeunload", event => { if (!isSaved()) event.preventDefault(); });
 
 // What this tab had before it was loaded again, or the drawing of the command line.
 async function begin() {
-  const kept = sessionStorage.getItem(KEPT), same = sessionStorage.getItem(`${KEPT}-at`) === location.pathname;
-  let found = null;
-  try { found = await (await ask("first")).json(); } catch { return; }
-  if (kept && (same || !found || confirm("This tab has a drawing of an earlier page. Keep it instead of the new one?"))) try { const doc = JSON.parse(kept); check(doc); start(doc, keptFile()); return; } catch { sessionStorage.removeItem(KEPT); }
-  if (found?.document) start({ ...emptyDocument(), ...found.document });
-  else found ? drawn(found, found.file ? { bytes: decoded.bytes(found.file.data), name: found.file.name } : null) : start(emptyDocument());
+  const mine = kept(), same = sessionStorage.getItem(`${KEPT}-at`) === location.pathname, saved = sessionStorage.getItem(`${KEPT}-saved`);
+  const given = await ask("first").then(response => response.json()).catch(() => null), first = documentOf(given ?? { document: {} });
+  state.history.reset(mine || first, { saved: !mine || saved === "yes" }); show(state.history.now);
+  if (mine && given && !same && !confirm("This tab has a drawing of an earlier page. Keep it instead of the new one?")) replace(first);
+  else if (mine) keep();
 }
 controls(); doubts(); begin();

@@ -177,6 +177,63 @@ def test_every_edit_is_undone_and_done_again(empty, tmp_path):
     assert document(settled(browser)) == states[1]
 
 
+def answer(browser, *, accept):
+    """Answer the question that the page asks, and return its text."""
+    from selenium.webdriver.support import expected_conditions
+
+    question = until(browser, expected_conditions.alert_is_present())
+    text = question.text
+    question.accept() if accept else question.dismiss()
+    return text
+
+
+def test_no_drawing_is_lost_by_a_reload_and_another_file(empty, tmp_path):
+    browser = empty
+    drag(browser, [(100, 200), (200, 220), (300, 200)])
+    drawn = document(browser)
+    browser.refresh()
+    assert document(settled(browser)) == drawn
+    other = tmp_path / "other.studio.json"
+    other.write_text(json.dumps(PEBBLE))
+    for accept, shown in ((False, drawn), (True, PEBBLE)):
+        find(browser, "#file").send_keys(str(other))
+        assert "not in a saved file" in answer(browser, accept=accept)
+        until(browser, lambda _, shown=shown: document(browser) == shown)
+    find(browser, "#undo").click()
+    assert document(settled(browser)) == drawn
+    find(browser, "#redo").click()
+    assert document(settled(browser)) == PEBBLE
+
+
+def test_the_drawing_of_the_command_line_replaces_one_of_an_earlier_page_only_on_request(browser):
+    with studio("skew") as page:
+        opened(browser, page.address)
+        browser.execute_script(
+            "sessionStorage.setItem('crossfield-studio', arguments[0]);"
+            "sessionStorage.setItem('crossfield-studio-at', 'elsewhere')",
+            json.dumps(PEBBLE),
+        )
+        browser.refresh()
+        assert "Keep it" in answer(browser, accept=False)
+        assert document(settled(browser))["name"] == "skew"
+        find(browser, "#undo").click()
+        assert document(settled(browser)) == PEBBLE
+
+
+def test_a_session_of_another_version_is_refused_with_a_remedy(empty, tmp_path):
+    browser = pebble(empty, tmp_path)
+    path = tmp_path / "newer.json"
+    path.write_text(json.dumps(PEBBLE | {"version": 2}))
+    find(browser, "#file").send_keys(str(path))
+    until(browser, lambda _: "version 2" in banner(browser))
+    assert "download the drawing there" in banner(browser)
+    assert document(browser) == PEBBLE
+    browser.execute_script("sessionStorage.setItem('crossfield-studio', arguments[0])", path.read_text())
+    browser.refresh()
+    assert "version is 2" in banner(settled(browser))
+    assert "version 1" in banner(browser)
+
+
 def test_it_works_with_the_keyboard_alone(empty):
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
