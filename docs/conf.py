@@ -59,6 +59,7 @@ def _block(writer: Any, node: Any) -> None:
 
 
 def setup(app: Sphinx) -> None:
-    """Show formulas as MathML, for which browsers need no script."""
+    """Show formulas as MathML, for which browsers need no script, and small pictures enlarged."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     app.add_css_file("formulas.css")
+    app.add_css_file("gallery.css")

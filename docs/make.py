@@ -6,7 +6,9 @@ The tables state sizes, seeds and time limits. Other pages have programs of thei
 from __future__ import annotations
 
 import re
+import shlex
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from crossfield.export.cli.domains import BOTH, DOMAINS
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import DEFAULTS
 from crossfield.export.solvers_table import PROGRAMS
+from crossfield.models.errors import InputError
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.formulations.latex import latex
 from crossfield.models.formulations.symbols import VARIABLES
@@ -297,6 +300,42 @@ def samples_in_short() -> str:
     )
 
 
+GALLERY = """crossfield reads what a person sees. These small drawings are written as the named programs
+write them, each with something that is easily misread. Most show the same body, a black outline and two red
+lines. The second picture is the right answer on the grid, computed from the shapes alone: white is outside,
+grey is the mask, and the colour of a curvature line is its direction. In a test, no pixel may be more than
+one pixel off [`test_a_drawing_is_read_as_it_looks`]. The last column has the warnings of
+`crossfield instance`."""
+
+
+def write_gallery() -> None:
+    """Write docs/gallery.md: drawings of many programs, what is read of them, and what is reported."""
+    folder = DOCS.parent / "tests" / "data" / "drawings"
+    table = tomllib.loads((folder / "drawings.toml").read_text())
+    parts = ["# Drawings of many programs", generated_line("python docs/make.py gallery"), GALLERY]
+    for kind, title in table["kinds"].items():
+        rows = [gallery_row(folder, row) for row in table["drawing"] if row["kind"] == kind]
+        columns = ("drawing", "right answer", "content", "reported")
+        parts += [f"## {title}", markdown(columns, rows)] if rows else []
+    (DOCS / "gallery.md").write_text("\n\n".join(parts) + "\n")
+
+
+def gallery_row(folder: Path, row: dict[str, Any]) -> list[str]:
+    """The drawing, its right answer, its content and the reader's warnings or refusal, as Markdown."""
+    path = folder / row["file"]
+    options = {key: row[key] for key in ("size", "curvature") if key in row}
+    try:
+        reported = " ".join(f"{line}." for line in cf.read_sketch(path, **options).reading.warnings)
+    except InputError as error:
+        reported = f"error: {error}".replace(f"{path}: ", "")
+    where = f"../{folder.relative_to(DOCS.parent).as_posix()}"
+    answer = f"![{row['picture']}]({where}/expected/{row['picture']}.png)" if "picture" in row else "none"
+    drawing = f"![{row['file']}]({where}/{row['file']})" if "picture" in row else f"`{row['file']}`"
+    texts = {key: value if key == "size" else shlex.join(value) for key, value in options.items()}
+    set_by = "".join(f", `--{key} {text}`" for key, text in texts.items())
+    return [drawing, answer, f"{row['shows']} ({row['program']}{set_by})", reported]
+
+
 def write_readme() -> None:
     """Replace the table of formulations inside README.md, between its markers."""
     _, rows = tables()["formulations"]
@@ -362,6 +401,7 @@ PAGES: dict[str, Callable[[], None]] = {
     "formulations": write_formulations,
     "errata": write_errata,
     "samples": write_samples,
+    "gallery": write_gallery,
     "solved": draw_solved_field,
     "shaded": draw_mouse_surface,
     "figures": draw_figures,
