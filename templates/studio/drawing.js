@@ -4,9 +4,9 @@ import { boxOf } from "./strokes.js";
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const COLOURS = {
-  light: { line: "#c2281d", cut: "#1c2430", ignored: "#9aa3ae", page: "#c9d0d9", chosen: "#0b6b8066", u: "#0b7285", v: "#b3560a",
+  light: { line: "#c2281d", cut: "#1c2430", ignored: "#9aa3ae", page: "#c9d0d9", beyond: "#eef0f3", chosen: "#0b6b8066", u: "#0b7285", v: "#b3560a",
     plus: "#d6202b", minus: "#2f4bd0", cursor: "#0b6b80", suspect: "#f08c0066", tints: ["#0000", "#4a90e226", "#f5a5236b", "#0000"] },
-  dark: { line: "#ff7b72", cut: "#e6eaf0", ignored: "#6b7685", page: "#3a434f", chosen: "#5cc3d677", u: "#41b3c5", v: "#f0a35e",
+  dark: { line: "#ff7b72", cut: "#e6eaf0", ignored: "#6b7685", page: "#3a434f", beyond: "#0e1115", chosen: "#5cc3d677", u: "#41b3c5", v: "#f0a35e",
     plus: "#ff6b70", minus: "#8ba4ff", cursor: "#5cc3d6", suspect: "#f0a35e77", tints: ["#0000", "#6aa9f033", "#f5a5237a", "#0000"] },
 };
 const ANGLES = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
@@ -64,10 +64,30 @@ const trace = (context, points) => {
   for (let k = 2; k < points.length; k += 2) context.lineTo(points[k], points[k + 1]);
 };
 
-/** Draws strokes in one colour. */
-export function draw(context, strokes, colour, width) {
+/** Draws strokes in one colour and width. */
+function draw(context, strokes, colour, width) {
   context.strokeStyle = colour; context.lineWidth = width; context.beginPath();
   strokes.forEach(({ points }) => trace(context, points)); context.stroke();
+}
+
+const LEVELS = 12; // of pressure
+
+/** Width of a stroke as a share of that at full pressure; as in export/studio/files.py. */
+const shareOf = pressure => 0.3 + 0.7 * pressure;
+
+/** Draws strokes in one colour, as wide as their pressure. width: at full pressure. */
+export function drawInk(context, strokes, colour, width) {
+  const paths = Array.from({ length: LEVELS + 1 }, () => null);
+  for (const { points, pressures, weight } of strokes) {
+    let last = null;
+    for (let k = 2; k < points.length; k += 2) {
+      const level = Math.round(LEVELS * Math.max(0, Math.min(1, pressures?.[k / 2] ?? weight ?? 1))), path = paths[level] ??= new Path2D();
+      if (level !== last) path.moveTo(points[k - 2], points[k - 1]);
+      path.lineTo(points[k], points[k + 1]); last = level;
+    }
+  }
+  context.strokeStyle = colour;
+  paths.forEach((path, level) => { if (path) { context.lineWidth = width * shareOf(level / LEVELS); context.stroke(path); } });
 }
 
 /** A small picture with a pixel per pixel of the grid. */
@@ -125,6 +145,8 @@ function crosses(context, field, scale) {
 /** Draws everything that changes with the document, the field and the view, into the hidden canvas. */
 export function paintBase(view, { doc, chosen, field, lines, mode, suspects }) {
   const context = view.begin(view.base), thin = 1 / view.scale, ink = colours();
+  const left = -view.x / view.scale, top = -view.y / view.scale, wide = view.wide / view.scale, high = view.high / view.scale;
+  context.fillStyle = ink.beyond; context.fillRect(left, top, wide, high); context.clearRect(...doc.page);
   context.strokeStyle = ink.page; context.lineWidth = thin; context.strokeRect(...doc.page);
   if (field) {
     const { x, y, pixel, rows, columns } = field.frame, place = [x, y, pixel * columns, pixel * rows];
@@ -139,17 +161,16 @@ export function paintBase(view, { doc, chosen, field, lines, mode, suspects }) {
     });
     context.globalAlpha = 1;
   }
-  const left = -view.x / view.scale, top = -view.y / view.scale, right = left + view.wide / view.scale, bottom = top + view.high / view.scale;
   const seen = doc.strokes.map((stroke, number) => ({ stroke, number })).filter(({ stroke }) => {
     const box = boxOf(stroke);
-    return box[2] >= left && box[0] <= right && box[3] >= top && box[1] <= bottom;
+    return box[2] >= left && box[0] <= left + wide && box[3] >= top && box[1] <= top + high;
   });
   const drawn = some => seen.filter(some).map(({ stroke }) => stroke);
   draw(context, drawn(({ number }) => suspects.has(number)), ink.suspect, 11 * thin);
   draw(context, drawn(({ number }) => chosen.has(number)), ink.chosen, 9 * thin);
   for (const mark of ["ignored", "cut", "line"]) {
     context.setLineDash(mark === "ignored" ? [4 * thin, 4 * thin] : []);
-    draw(context, drawn(({ stroke }) => stroke.mark === mark), ink[mark], (mark === "ignored" ? 1.2 : 2.2) * thin);
+    drawInk(context, drawn(({ stroke }) => stroke.mark === mark), ink[mark], (mark === "ignored" ? 1.4 : 2.6) * thin);
   }
   context.setLineDash([]);
   if (!field) return;
@@ -159,17 +180,21 @@ export function paintBase(view, { doc, chosen, field, lines, mode, suspects }) {
   }
 }
 
-/** Copies the hidden canvas and draws what follows the pointer. live: path, kind and radius of a tool in use. */
-export function paint(view, live, brush) {
+/** Copies the hidden canvas and draws what follows the pointer. live: the tool in use, with what it has done so far. */
+export function paint(view, { live, brush, doc }) {
   const context = view.canvas.getContext("2d"), ink = colours();
   context.setTransform(1, 0, 0, 1, 0, 0); context.clearRect(0, 0, view.canvas.width, view.canvas.height);
   context.drawImage(view.base, 0, 0);
   context.setTransform(view.ratio * view.scale, 0, 0, view.ratio * view.scale, view.ratio * view.x, view.ratio * view.y);
   context.lineCap = context.lineJoin = "round";
-  if (live) {
+  if (live?.tool === "draw") {
+    const points = live.path.length > 2 ? live.path : [...live.path, ...live.path];
+    context.save(); context.beginPath(); context.rect(...doc.page); context.clip();
+    drawInk(context, [{ points, pressures: live.pressures }], ink[live.mark], 2.6 / view.scale); context.restore();
+  } else if (live?.path) {
     const wide = { erase: 2 * live.radius, paint: 2 * live.radius, unpaint: 2 * live.radius }[live.tool];
-    context.lineWidth = wide ?? (live.tool === "draw" ? 2 : 1.5) / view.scale;
-    context.strokeStyle = { draw: ink[live.mark], paint: "#4a90e266", unpaint: "#9aa3ae88", erase: "#9aa3ae66" }[live.tool] ?? ink.cursor;
+    context.lineWidth = wide ?? 1.5 / view.scale;
+    context.strokeStyle = { paint: "#4a90e266", unpaint: "#9aa3ae88", erase: "#9aa3ae66" }[live.tool] ?? ink.cursor;
     context.setLineDash(live.tool === "select" ? [5 / view.scale, 4 / view.scale] : []);
     context.beginPath(); trace(context, live.path.length > 2 ? live.path : [...live.path, ...live.path]); context.stroke(); context.setLineDash([]);
   } else if (brush) {

@@ -1,29 +1,71 @@
-// Pointers and keys of a picture: one finger or the pen uses the tool, two fingers and the wheel zoom and move.
+// Pointers and keys of a picture. The pen, the mouse and the keyboard use its tool; a finger uses it where fingers draw,
+// and otherwise taps, while its swipes scroll the page; two fingers and the wheel move and zoom the view.
 
-/** Lets pointers and keys of a view use a tool. refresh: paints, with false only what follows the pointer. */
-export function listen(view, tool, { hover, refresh }) {
+const PALM = 800; // milliseconds after the pen in which a touch may be the palm
+const TAP = 10; // pixels of the screen that a finger moves at most in a tap
+const ERASER = 32; // in `buttons`: the other end of a pen
+const pen = { down: false, at: -Infinity, seen: false };
+const isPalm = event => pen.down || event.timeStamp - pen.at < PALM;
+
+/** Watches for a pen on the whole page, and calls a function when it comes for the first time. */
+export function watchPen(first) {
+  for (const kind of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) document.addEventListener(kind, event => {
+    if (event.pointerType !== "pen") return;
+    pen.down = event.buttons > 0 && kind !== "pointercancel"; pen.at = event.timeStamp;
+    if (!pen.seen) first();
+    pen.seen = true;
+  }, true);
+  stopTouches(document, () => pen.down);
+}
+
+/** Keeps the browser from scrolling, zooming and clicking by touches. */
+function stopTouches(target, isStopped) {
+  for (const kind of ["touchstart", "touchmove"]) target.addEventListener(kind, event => { if (event.cancelable && isStopped(event)) event.preventDefault(); }, { passive: false });
+}
+
+const readContact = ({ pointerType, pressure, buttons }) => ({
+  pressure: pointerType === "pen" ? Math.max(0.05, pressure) : 1, erasing: (buttons & ERASER) > 0, coarse: pointerType === "touch",
+});
+
+/** Lets pointers and keys of a view use a tool.
+ * hover: what a pointer does without the tool. refresh: paints, with false only what follows the pointer. fingers: whether they draw. */
+export function listen(view, tool, { hover, refresh, fingers }) {
   const { canvas } = view, down = new Map();
+  let user = null, gesture = false, held = false, nudging = false; // user: the pointer that uses the tool
   const middle = () => [...down.values()].reduce(([x, y], each) => [x + each.clientX / down.size, y + each.clientY / down.size], [0, 0]);
   const spread = () => { const [a, b] = [...down.values()]; return Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY); };
-  const pressure = event => event.pointerType === "pen" && event.pressure ? event.pressure : 1;
+  const stop = () => { if (user !== null) tool.cancel(); user = null; };
+  const drop = () => { stop(); down.clear(); gesture = false; };
+  stopTouches(canvas, event => event.targetTouches.length > 1 || fingers() || isPalm(event));
   canvas.addEventListener("pointerdown", event => {
+    const touch = event.pointerType === "touch";
+    if (touch && (pen.down || [...down.values()].some(each => each.pointerType !== "touch"))) return; // the palm beside the pen
+    if (!touch) drop(); // the palm before the pen
     canvas.focus({ preventScroll: true }); view.cursor = null;
     try { canvas.setPointerCapture(event.pointerId); } catch { /* the pointer is gone */ }
     down.set(event.pointerId, event);
-    if (down.size > 1 || event.button === 1) tool.cancel(); else if (event.button === 0) tool.begin(view.at(event), pressure(event));
+    if (down.size > 1 || event.button === 1) { stop(); gesture = true; }
+    else if (touch ? fingers() && !isPalm(event) : [0, 5].includes(event.button)) { user = event.pointerId; tool.begin(view.at(event), readContact(event)); }
   });
   canvas.addEventListener("pointermove", event => {
     const before = down.get(event.pointerId);
+    if (before && pen.down && event.pointerType === "touch") { drop(); return; }
     if (before && (down.size > 1 || before.buttons & 4)) {
       const [x, y] = middle(), wide = down.size > 1 ? spread() : 1;
       down.set(event.pointerId, event);
       const [nx, ny] = middle(), place = canvas.getBoundingClientRect();
       view.zoom(down.size > 1 ? spread() / wide : 1, x - place.left, y - place.top, nx - x, ny - y); refresh();
-    } else if (before) for (const each of event.getCoalescedEvents?.().length ? event.getCoalescedEvents() : [event]) tool.move(view.at(each), pressure(each));
+    } else if (event.pointerId === user) for (const each of event.getCoalescedEvents?.().length ? event.getCoalescedEvents() : [event]) tool.move(view.at(each), readContact(each));
     hover(event);
   });
   for (const kind of ["pointerup", "pointercancel"]) canvas.addEventListener(kind, event => {
-    if (down.delete(event.pointerId) && !down.size) kind === "pointerup" ? tool.end() : tool.cancel();
+    const before = down.get(event.pointerId), still = before && Math.hypot(event.clientX - before.clientX, event.clientY - before.clientY) < TAP;
+    if (!down.delete(event.pointerId)) return;
+    if (kind === "pointercancel") stop();
+    else if (event.pointerId === user) tool.end();
+    else if (event.pointerType === "touch" && still && !gesture && !isPalm(event)) tool.tap(view.at(event), readContact(event));
+    if (event.pointerId === user) user = null;
+    if (!down.size) gesture = false;
   });
   canvas.addEventListener("wheel", event => {
     event.preventDefault();
@@ -31,19 +73,20 @@ export function listen(view, tool, { hover, refresh }) {
     view.zoom(Math.exp(-Math.max(-60, Math.min(60, event.deltaY)) / 250), event.clientX - place.left, event.clientY - place.top); refresh();
   }, { passive: false });
   canvas.addEventListener("focus", () => { refresh(false); });
-  canvas.addEventListener("blur", () => { if (view.cursor) { view.cursor = null; tool.end(); } });
-  let held = false;
+  canvas.addEventListener("blur", () => { if (view.cursor || nudging) { view.cursor = null; nudging = false; tool.end(); } });
   canvas.addEventListener("keydown", event => {
     const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
     if (!way && event.key !== " " && event.key !== "Enter" || event.ctrlKey || event.metaKey) return;
     event.preventDefault();
+    const far = (event.shiftKey ? 40 : 8) / view.scale;
+    if (way && !view.cursor && tool.nudge(way.map(part => part * far / 4))) { nudging = true; return; }
     if (!view.cursor) { held = false; view.cursor = [(view.wide / 2 - view.x) / view.scale, (view.high / 2 - view.y) / view.scale]; }
     if (way) {
-      const far = (event.shiftKey ? 40 : 8) / view.scale;
       view.cursor = view.cursor.map((value, k) => value + far * way[k]);
-      if (held) tool.move(view.cursor, 1);
-    } else if (event.key === "Enter") { held = false; tool.begin(view.cursor, 1); tool.end(); }
-    else { held = !held; held ? tool.begin(view.cursor, 1) : tool.end(); }
+      if (held) tool.move(view.cursor);
+    } else if (event.key === "Enter") { held = false; tool.begin(view.cursor); tool.end(); }
+    else { held = !held; held ? tool.begin(view.cursor) : tool.end(); }
     refresh(false);
   });
+  canvas.addEventListener("keyup", event => { if (nudging && event.key.startsWith("Arrow")) { nudging = false; tool.end(); } });
 }

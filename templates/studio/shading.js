@@ -1,6 +1,6 @@
 // The right picture: the surface as normal map, in the light of a lamp, or in the material of a glazed ball.
 
-import { colours, draw, gridPicture } from "./drawing.js";
+import { colours, drawInk, gridPicture } from "./drawing.js";
 
 const AMBIENT = 0.04, VIEWER = 0.10, LAMP = 0.95, FILL = 0.08, CLAY = [0.80, 0.77, 0.73]; // as export/shading/colours.py
 export const LAMP_AT = { azimuth: 130 * Math.PI / 180, elevation: 38 * Math.PI / 180 };
@@ -78,7 +78,7 @@ export function paintSurface(view, { surface, frame, kind, lamp, doubtful, strok
   }
   const reach = reachOf(frame), thin = 1 / view.scale;
   context.globalAlpha = 0.7;
-  if (surface) for (const mark of ["cut", "line"]) draw(context, strokes.filter(stroke => stroke.mark === mark), colours()[mark], 1.2 * thin);
+  if (surface) for (const mark of ["cut", "line"]) drawInk(context, strokes.filter(stroke => stroke.mark === mark), colours()[mark], 1.5 * thin);
   context.globalAlpha = 1;
   for (const hint of live ? [...hints, live] : hints) {
     const [x, y] = tipOf(hint, reach), angle = hint.tilt * Math.PI / 180;

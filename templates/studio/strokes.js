@@ -61,14 +61,47 @@ export function erased(strokes, path, reach) {
   return strokes.flatMap(stroke => {
     const box = boxOf(stroke);
     if (box[0] > right + reach || box[2] < left - reach || box[1] > bottom + reach || box[3] < top - reach) return [stroke];
-    const points = dense(stroke.points, reach / 2), pieces = [[]];
-    let cut = false;
-    for (let k = 0; k < points.length; k += 2) {
-      if (near(path, points[k], points[k + 1], reach)) { cut = true; if (pieces.at(-1).length) pieces.push([]); }
-      else pieces.at(-1).push(points[k], points[k + 1]);
-    }
-    return cut ? pieces.filter(piece => piece.length > 2).map(piece => ({ ...stroke, points: piece })) : [stroke];
+    return split(stroke, dense(samplesOf(stroke), reach / 2), ([x, y]) => !near(path, x, y, reach));
   });
+}
+
+/** The parts of a stroke on a page. */
+export function clipped(stroke, [x, y, wide, high]) {
+  const low = [x, y], most = [x + wide, y + high], samples = samplesOf(stroke), crossed = samples.slice(0, 1);
+  for (let k = 1; k < samples.length; k++) {
+    const [from, to] = [samples[k - 1], samples[k]], places = [];
+    for (const axis of [0, 1]) for (const border of [low[axis], most[axis]]) {
+      const t = (border - from[axis]) / (to[axis] - from[axis]);
+      if (t > 0 && t < 1) { const sample = between(from, to, t); sample[axis] = border; places.push([t, sample]); }
+    }
+    crossed.push(...places.sort((a, b) => a[0] - b[0]).map(([, sample]) => sample), to);
+  }
+  return split(stroke, crossed, sample => [0, 1].every(axis => sample[axis] >= low[axis] && sample[axis] <= most[axis]));
+}
+
+/** A stroke at another place. */
+export const moved = (stroke, shift) => ({ ...stroke, points: stroke.points.map((value, k) => rounded(value + shift[k % 2])) });
+
+/** The shift of strokes nearest to a wanted one that keeps them on a page, or the page under them if they are larger. */
+export function fitShift(strokes, [x, y, wide, high], shift) {
+  const [left, top, right, bottom] = boxOf({ points: strokes.flatMap(boxOf) });
+  return [[x - left, x + wide - right], [y - top, y + high - bottom]].map((room, axis) => {
+    return Math.max(Math.min(...room), Math.min(Math.max(...room), shift[axis]));
+  });
+}
+
+// Samples x, y, pressure of a stroke; without pressures the third is its weight.
+const samplesOf = ({ points, pressures, weight }) => Array.from({ length: points.length / 2 }, (_, k) => [points[2 * k], points[2 * k + 1], pressures?.[k] ?? weight]);
+const between = (from, to, t) => from.map((value, k) => rounded(value + t * (to[k] - value)));
+
+/** The runs of samples that are kept, as strokes; the stroke itself if all are. */
+function split(stroke, samples, isKept) {
+  const runs = [[]];
+  for (const sample of samples) if (isKept(sample)) runs.at(-1).push(sample); else if (runs.at(-1).length) runs.push([]);
+  if (runs[0].length === samples.length) return [stroke];
+  return runs.filter(run => run.length > 1).map(run => ({
+    ...stroke, points: run.flatMap(([x, y]) => [x, y]), ...stroke.pressures && { pressures: run.map(([, , pressure]) => pressure) },
+  }));
 }
 
 const near = (path, x, y, reach) => {
@@ -79,12 +112,8 @@ const near = (path, x, y, reach) => {
   return false;
 };
 
-const dense = (points, step) => {
-  const found = [points[0], points[1]];
-  for (let k = 2; k < points.length; k += 2) {
-    const [ax, ay, bx, by] = points.slice(k - 2, k + 2);
-    const parts = Math.min(200, Math.max(1, Math.ceil(Math.hypot(bx - ax, by - ay) / step)));
-    for (let part = 1; part <= parts; part++) found.push(rounded(ax + (bx - ax) * part / parts), rounded(ay + (by - ay) * part / parts));
-  }
-  return found;
-};
+const dense = (samples, step) => samples.flatMap((to, k) => {
+  if (!k) return [to];
+  const from = samples[k - 1], parts = Math.min(200, Math.max(1, Math.ceil(Math.hypot(to[0] - from[0], to[1] - from[1]) / step)));
+  return Array.from({ length: parts }, (_, part) => between(from, to, (part + 1) / parts));
+});

@@ -2,15 +2,17 @@
 
 import { History, check, decoded, emptyDocument } from "./document.js";
 import { View, paint, paintBase } from "./drawing.js";
-import { listen } from "./pointer.js";
+import { listen, watchPen } from "./pointer.js";
 import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shading.js";
-import { erased, rounded, strokeAt, strokesIn } from "./strokes.js";
+import { clipped, erased, fitShift, moved, rounded, strokeAt, strokesIn } from "./strokes.js";
 
 const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
-const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file"], REACH = 9, RETRY = 3000;
+const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file"], RETRY = 3000;
+const REACH = 9, FINGER = 18, STILL = 4, PASTED = 16; // pixels of the screen: near a stroke, also for a finger; in a click; between copies
 const state = {
   history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "line", live: null, brush: null, edit: 0,
   field: null, lines: null, surface: null, mode: "crosses", kind: "shaded", lamp: LAMP_AT, suspects: new Set(),
+  copied: [], fingers: null, // whether fingers draw; null: until a pen comes
 };
 state.doc = state.history.now;
 const left = new View($("#drawing"), () => refresh()), right = new View($("#surface"), () => refresh());
@@ -25,7 +27,7 @@ function refresh(base = true) {
     asked = false;
     if (dirty) paintBase(left, state);
     dirty = false;
-    paint(left, state.live, state.brush);
+    paint(left, state);
     paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked, strokes: $("#ink").checked ? state.doc.strokes : [], hints: state.doc.hints, live: state.arrow });
   });
 }
@@ -58,6 +60,8 @@ function replace(doc) {
   state.history.saved.add(doc); state.chosen.clear(); commit(() => doc);
 }
 const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); doubts(); };
+/** A page in the shape of the canvas. */
+const canvasPage = () => [0, 0, 800, Math.round(800 * left.high / left.wide)];
 const pageBox = ({ page: [x, y, w, h] }) => [x, y, x + w, y + h];
 const isSaved = () => state.history.saved.has(state.history.now);
 
@@ -178,7 +182,7 @@ function doubts() {
 // Controls.
 function controls() {
   const { doc, history, chosen } = state;
-  $("#undo").disabled = !history.can(-1); $("#redo").disabled = !history.can(1); $("#delete").disabled = !chosen.size;
+  $("#undo").disabled = !history.can(-1); $("#redo").disabled = !history.can(1); $("#delete").disabled = $("#copy").disabled = !chosen.size; $("#paste").disabled = !state.copied.length;
   $("#welcome").hidden = doc.strokes.length > 0;
   $("#unhint").disabled = !doc.hints.length; $("#flip").setAttribute("aria-pressed", doc.flip);
   $("#selected").textContent = chosen.size ? `${chosen.size} selected` : "";
@@ -189,16 +193,29 @@ function controls() {
   const marks = new Set([...chosen].map(k => doc.strokes[k].mark)), shown = marks.size === 1 ? [...marks][0] : chosen.size ? "" : state.mark;
   all("[data-mark]").forEach(each => each.setAttribute("aria-pressed", each.dataset.mark === shown));
   all("[data-tool]").forEach(each => each.setAttribute("aria-pressed", each.dataset.tool === state.tool));
+  $("#fingers").setAttribute("aria-pressed", fingersDraw());
   $("[data-tool=turn]").hidden = !doc.file;
 }
-function choose(tool) { if (tool === "turn" && !state.doc.file) return; state.tool = tool; state.brush = null; controls(); refresh(false); }
+function choose(tool) { if (tool === "turn" && !state.doc.file) return; state.tool = tool; state.brush = null; tool === "draw" ? select([]) : (controls(), refresh(false)); }
 function select(numbers) { state.chosen = new Set(numbers); controls(); refresh(); }
 function mark(kind) {
-  state.mark = kind;
-  if (!state.chosen.size) { controls(); return; }
+  if (!state.chosen.size) { state.mark = kind; controls(); return; }
   commit(doc => ({ ...doc, strokes: doc.strokes.map((stroke, k) => state.chosen.has(k) ? { ...stroke, mark: kind } : stroke) }));
 }
 function remove() { if (state.chosen.size) commit(doc => { const rest = doc.strokes.filter((_, k) => !state.chosen.has(k)); state.chosen.clear(); return { ...doc, strokes: rest }; }); }
+function copy() {
+  if (!state.chosen.size || getSelection().type === "Range") return false;
+  state.copied = chosenStrokes(); controls(); status(`${counted(state.copied)} copied`);
+}
+function paste() {
+  if (!state.copied.length) return false;
+  const shift = fitShift(state.copied, state.doc.page, [PASTED / left.scale, PASTED / left.scale]), first = state.doc.strokes.length;
+  state.copied = state.copied.map(stroke => moved(stroke, shift)); // the next copy lies beside this one
+  choose("select"); commit(doc => ({ ...doc, strokes: [...doc.strokes, ...state.copied] })); select(state.copied.map((_, k) => first + k)); left.canvas.focus();
+}
+const chosenStrokes = () => state.doc.strokes.filter((_, k) => state.chosen.has(k));
+const counted = strokes => strokes.length === 1 ? "1 stroke" : `${strokes.length} strokes`;
+const fingersDraw = () => state.fingers ?? true;
 function flip() {
   if (state.surface) state.surface = mirrored(state.surface);
   commit(doc => ({ ...doc, flip: !doc.flip, hints: doc.hints.map(hint => ({ ...hint, tilt: (hint.tilt + 360) % 360 - 180 })) }));
@@ -211,17 +228,20 @@ function next(name) {
 // Tools: begin, move and end at points of the drawing, by pointer or by keyboard.
 const brushRadius = () => $("#brush").value * (state.field?.frame.pixel ?? state.doc.page[2] / 60) / 2;
 const tools = {
-  begin([x, y], pressure) {
-    state.live = { tool: state.tool, mark: state.mark, path: [rounded(x), rounded(y)], radius: state.tool === "erase" ? REACH / left.scale : brushRadius(), pressure: [pressure] };
+  begin([x, y], { pressure = 1, erasing = false, coarse = false } = {}) {
+    const reach = (coarse ? FINGER : REACH) / left.scale, grabbed = state.tool === "select" && strokeAt(chosenStrokes(), [x, y], reach) >= 0;
+    const tool = erasing ? "erase" : grabbed ? "move" : state.tool;
+    state.live = { tool, mark: state.mark, path: [rounded(x), rounded(y)], reach, radius: tool === "erase" ? REACH / left.scale : brushRadius(), pressures: [rounded(pressure)] };
     refresh(false);
   },
-  move([x, y], pressure) {
+  move([x, y], { pressure = 1 } = {}) {
     const { live } = state;
     if (!live) return;
     const [px, py] = live.path.slice(-2);
     if (Math.hypot(x - px, y - py) * left.scale < 1.2) return;
-    live.path.push(rounded(x), rounded(y)); live.pressure.push(pressure);
+    live.path.push(rounded(x), rounded(y)); live.pressures.push(rounded(pressure));
     if (live.tool === "turn") turn(live);
+    if (live.tool === "move" && hasLeft(live)) shift([x - live.path[0], y - live.path[1]]);
     refresh(false);
   },
   end() {
@@ -230,16 +250,37 @@ const tools = {
     if (live) finish(live);
     refresh(false);
   },
-  cancel() { state.live = null; refresh(false); },
+  cancel() {
+    if (state.live?.tool === "move") state.doc = state.history.now;
+    state.live = null; refresh();
+  },
+  tap(point, contact) { if (["select", "area"].includes(state.tool)) { tools.begin(point, contact); tools.end(); } },
+  nudge(step) {
+    if (state.tool !== "select" || !state.chosen.size) return false;
+    state.live ??= { tool: "move", path: [0, 0], shift: [0, 0] };
+    shift(state.live.shift.map((value, axis) => value + step[axis]));
+    return true;
+  },
 };
-function finish({ tool, path, radius, mark: kind, pressure }) {
-  const moved = path.length > 2, first = path.slice(0, 2);
-  if (tool === "draw" && moved) {
-    const mean = pressure.reduce((sum, each) => sum + each, 0) / pressure.length;
-    state.chosen.clear(); commit(doc => ({ ...doc, strokes: [...doc.strokes, { points: path, mark: kind, weight: rounded(Math.max(0.05, Math.min(1, mean))) }] }));
-  } else if (tool === "select") {
-    const hit = strokeAt(state.doc.strokes, first, REACH / left.scale);
-    if (moved && path.length > 4) select(strokesIn(state.doc.strokes, path));
+/** Whether the path of a tool is more than a click. */
+const hasLeft = ({ path: [x, y, ...rest] }) => rest.some((value, k) => Math.abs(value - [x, y][k % 2]) * left.scale > STILL);
+/** Shows the selected strokes at another place; the tool commits it when it ends. */
+function shift(wanted) {
+  const doc = state.history.now;
+  state.live.shift = fitShift(doc.strokes.filter((_, k) => state.chosen.has(k)), doc.page, wanted);
+  state.doc = { ...doc, strokes: doc.strokes.map((stroke, k) => state.chosen.has(k) ? moved(stroke, state.live.shift) : stroke) }; refresh();
+}
+function finish(live) {
+  const { tool, path, reach, radius, mark: kind, pressures } = live, first = path.slice(0, 2);
+  if (tool === "draw" && path.length > 2) {
+    const weight = rounded(pressures.reduce((sum, each) => sum + each, 0) / pressures.length), varied = pressures.some(each => each !== pressures[0]);
+    const parts = clipped({ points: path, mark: kind, weight, ...varied && { pressures } }, state.doc.page);
+    if (parts.length) { state.chosen.clear(); commit(doc => ({ ...doc, strokes: [...doc.strokes, ...parts] })); } else status("Draw inside the page.");
+  } else if (tool === "move" && live.shift) {
+    if (live.shift.some(Boolean)) commit({ strokes: state.doc.strokes });
+  } else if (tool === "select" || tool === "move") {
+    const hit = strokeAt(state.doc.strokes, first, reach);
+    if (hasLeft(live)) select(strokesIn(state.doc.strokes, path));
     else select(hit < 0 ? [] : [hit]);
   } else if (tool === "erase") {
     const strokes = erased(state.doc.strokes, path, radius);
@@ -266,6 +307,10 @@ async function turn({ path }, done = false) {
 }
 
 // Hints.
+function hintAt([x, y]) {
+  const close = 12 / right.scale, reach = reachOf(state.surface.frame);
+  return state.doc.hints.findIndex(hint => [[hint.x, hint.y], tipOf(hint, reach)].some(([hx, hy]) => Math.hypot(hx - x, hy - y) < close));
+}
 const arrows = {
   begin([x, y]) { if (state.surface) { state.arrow = { x: rounded(x), y: rounded(y), slant: 0, tilt: 0 }; refresh(false); } },
   move([x, y]) { if (state.arrow) { Object.assign(state.arrow, leaning(x - state.arrow.x, y - state.arrow.y, reachOf(state.surface.frame))); refresh(false); } },
@@ -273,22 +318,31 @@ const arrows = {
     const { arrow } = state;
     state.arrow = null;
     if (!arrow) return;
-    const { frame } = state.surface, close = 12 / right.scale;
-    const hit = state.doc.hints.findIndex(hint => [[hint.x, hint.y], tipOf(hint, reachOf(frame))].some(([x, y]) => Math.hypot(x - arrow.x, y - arrow.y) < close));
+    const hit = hintAt([arrow.x, arrow.y]);
     const rest = state.doc.hints.filter((_, k) => k !== hit);
     if (arrow.slant >= 5) commit({ hints: [...rest, { ...arrow, slant: Math.round(arrow.slant), tilt: Math.round(arrow.tilt) }] });
     else if (hit >= 0) commit({ hints: rest });
     refresh();
   },
   cancel() { state.arrow = null; refresh(false); },
+  nudge: () => false,
+  tap(point) {
+    if (state.arrow) { arrows.move(point); arrows.end(); return; }
+    arrows.begin(point);
+    if (!state.arrow) return;
+    if (hintAt(point) >= 0) arrows.end(); else status("Tap where the normal leans to, or tap the same point again for no hint.");
+  },
 };
 
 // Pointers and keys of both pictures.
-listen(left, tools, { refresh, hover(event) {
+watchPen(() => { state.fingers ??= false; controls(); });
+listen(left, tools, { refresh, fingers: () => fingersDraw() && state.tool !== "area", hover(event) {
+  const grabs = event.pointerType === "mouse" && state.tool === "select" && strokeAt(chosenStrokes(), left.at(event), REACH / left.scale) >= 0;
+  left.canvas.style.cursor = grabs ? "move" : "";
   const wide = { paint: brushRadius(), unpaint: brushRadius(), erase: REACH / left.scale }[state.tool], [x, y] = left.at(event);
   if (wide || state.brush) { state.brush = wide && event.pointerType !== "touch" ? { x, y, radius: wide } : null; refresh(false); }
 } });
-listen(right, arrows, { refresh, hover(event) {
+listen(right, arrows, { refresh, fingers: () => false, hover(event) {
   if (state.arrow || state.kind !== "shaded" || event.pointerType === "touch") return;
   const place = right.canvas.getBoundingClientRect(), x = 2 * (event.clientX - place.left) / place.width - 1, y = 1 - 2 * (event.clientY - place.top) / place.height;
   state.lamp = { azimuth: Math.atan2(y, x), elevation: Math.PI / 2 * (1 - 0.85 * Math.min(1, Math.hypot(x, y))) }; refresh(false);
@@ -334,9 +388,10 @@ async function download(what) {
 }
 function dialog(title, ...content) { $("#dialog h2").textContent = title; $("#dialog div").replaceChildren(...content); $("#dialog").showModal(); }
 const actions = {
-  undo: () => step(-1), redo: () => step(1), save, flip, delete: remove, retry: request, dismiss: () => banner(""),
+  undo: () => step(-1), redo: () => step(1), save, flip, copy, paste, delete: remove, retry: request, dismiss: () => banner(""),
   open: () => $("#file").click(), unhint: () => commit({ hints: [] }),
-  empty: () => { if (mayReplace()) replace({ ...emptyDocument(), size: state.doc.size }); },
+  empty: () => { if (mayReplace()) replace({ ...emptyDocument(), page: canvasPage(), size: state.doc.size }); },
+  fingers: () => { state.fingers = !fingersDraw(); controls(); },
   help: () => dialog("Help", $("#help").content.cloneNode(true)),
   elsewhere: () => state.field ? dialog("The same without the page", element("p", "Download the drawing and the instance, then run in their folder:"),
     element("pre", state.field.commands.join("\n").replace("milp-mccormick -F mps", `${$("#formulation").value} -F ${$("#format").value}`))) : status("There is no field yet."),
@@ -377,14 +432,15 @@ const keys = {
   1: () => mark("line"), 2: () => mark("cut"), 3: () => mark("ignored"), f: flip, q: () => next("field"), w: () => next("surface"),
   delete: remove, backspace: remove, escape: () => { closeMenus(); tools.cancel(); arrows.cancel(); select([]); }, "?": actions.help,
   "+": () => { left.zoom(1.25); refresh(); }, "-": () => { left.zoom(0.8); refresh(); }, 0: () => { left.fit(pageBox(state.doc)); right.zoomed = false; right.resize(); refresh(); },
-  "ctrl+z": () => step(-1), "ctrl+shift+z": () => step(1), "ctrl+y": () => step(1), "ctrl+s": save, "ctrl+o": actions.open, "ctrl+a": () => select(state.doc.strokes.map((_, k) => k)),
+  "ctrl+z": () => step(-1), "ctrl+shift+z": () => step(1), "ctrl+y": () => step(1), "ctrl+s": save, "ctrl+o": actions.open, "ctrl+c": copy, "ctrl+x": () => copy() ?? remove(), "ctrl+v": paste,
+  "ctrl+a": () => select(state.doc.strokes.map((_, k) => k)),
 };
 document.addEventListener("keydown", event => {
   const typing = event.target.closest("input:not([type=range],[type=radio],[type=checkbox]), select, dialog");
   const control = event.ctrlKey || event.metaKey, key = event.key.toLowerCase();
   const run = keys[control ? `ctrl+${event.shiftKey ? "shift+" : ""}${key}` : key];
   if (!run || event.altKey || (typing && !(control && "so".includes(key)))) return;
-  event.preventDefault(); run();
+  if (run() !== false) event.preventDefault();
 });
 
 // Pages do not share drawings; a second one says so.
@@ -399,7 +455,7 @@ addEventListener("beforeunload", event => { if (!isSaved()) event.preventDefault
 // What this tab had before it was loaded again, or the drawing of the command line.
 async function begin() {
   const mine = kept(), same = sessionStorage.getItem(`${KEPT}-at`) === location.pathname, saved = sessionStorage.getItem(`${KEPT}-saved`);
-  const given = await ask("first").then(response => response.json()).catch(() => null), first = documentOf(given ?? { document: {} });
+  const given = await ask("first").then(response => response.json()).catch(() => null), first = documentOf(given ?? { document: { page: canvasPage() } });
   state.history.reset(mine || first, { saved: !mine || saved === "yes" }); show(state.history.now);
   if (mine && given && !same && !confirm("This tab has a drawing of an earlier page. Keep it instead of the new one?")) replace(first);
   else if (mine) keep();

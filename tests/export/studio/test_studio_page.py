@@ -7,68 +7,10 @@ import math
 
 import pytest
 from browsing import CONTRAST, find, show, sideways
+from studio_pages import BOX, document, drag, load, opened, pebble, settled, tool, until
 from studios import CONTRADICTING, PEBBLE, studio
 
 pytestmark = pytest.mark.slow
-
-READY = "return document.documentElement.dataset.state === 'ready'"
-BOX = "const r = document.querySelector(arguments[0]).getBoundingClientRect(); return [r.x, r.y]"
-
-
-@pytest.fixture(scope="module")
-def page():
-    with studio() as served:
-        yield served
-
-
-@pytest.fixture
-def empty(browser, page):
-    """The browser on an empty page; what it leaves behind does not ask before it closes."""
-    yield opened(browser, page.address)
-    browser.execute_script(
-        "addEventListener('beforeunload', event => event.stopImmediatePropagation(), true);"
-        "sessionStorage.clear()"
-    )
-
-
-def opened(browser, address):
-    browser.get(address)
-    return settled(browser)
-
-
-def until(browser, holds):
-    """What a function of the browser returns as soon as it is true."""
-    from selenium.webdriver.support.ui import WebDriverWait
-
-    return WebDriverWait(browser, 200, 0.05).until(holds)
-
-
-def settled(browser):
-    """The browser once all answers to the last edit have arrived."""
-    until(browser, lambda page: page.execute_script(READY))
-    return browser
-
-
-def document(browser):
-    return json.loads(browser.execute_script("return sessionStorage.getItem('crossfield-studio')"))
-
-
-def drag(browser, points, canvas="#drawing"):
-    """Press the mouse at the first of these points of a canvas, move along the others, and let go."""
-    x, y = browser.execute_script(BOX, canvas)
-
-    def send(kind, point, buttons):
-        place = {"x": x + point[0], "y": y + point[1]}
-        browser.execute_cdp_cmd(
-            "Input.dispatchMouseEvent",
-            {"type": kind, **place, "button": "left", "buttons": buttons, "clickCount": 1},
-        )
-
-    send("mousePressed", points[0], 1)
-    for point in points[1:]:
-        send("mouseMoved", point, 1)
-    send("mouseReleased", points[-1], 0)
-    return settled(browser)
 
 
 def circle(x, y, radius, count=40):
@@ -76,21 +18,6 @@ def circle(x, y, radius, count=40):
         (x + radius * math.cos(math.tau * k / count), y + radius * math.sin(math.tau * k / count))
         for k in range(count + 1)
     ]
-
-
-def tool(browser, name):
-    find(browser, f"[data-tool={name}]").click()
-
-
-def load(browser, path, content):
-    path.write_bytes(content if isinstance(content, bytes) else json.dumps(content).encode())
-    browser.execute_script("document.documentElement.dataset.state = 'loading'")
-    find(browser, "#file").send_keys(str(path))
-    return settled(browser)
-
-
-def pebble(browser, folder, **parts):
-    return load(browser, folder / "pebble.studio.json", PEBBLE | parts)
 
 
 def given(browser, folder, pressed):
