@@ -17,6 +17,7 @@ MAX_USES: Final = 10_000  # copies made by `use`
 MAX_USE_DEPTH: Final = 100  # copies inside of copies
 MAX_DATA: Final = 10_000_000  # characters of path data, point lists, styles and transforms of elements
 MAX_CURVES: Final = 500_000  # segments of all shapes, counting every repetition by `use`
+MAX_OUTLINE_SAMPLES: Final = 2_000_000  # samples of the outlines of all shapes that are only filled
 MAX_LENGTH: Final = 64  # characters of a length or a colour
 MAX_TRANSFORM: Final = 1000  # characters of a transform
 LEAST_LENGTH: Final = 1e-9  # width and height of a page: the quotient of two smaller lengths is not finite

@@ -94,11 +94,12 @@ def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]
         raise InputError(f"has more than {MAX_SEGMENTS} segments; simplify it, or choose a smaller size")
     owner = np.repeat(np.arange(len(points)), steps)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)
-    ends = [_evaluate_cubics(points[owner], (step + side) / steps[owner]) for side in (0, 1)]
+    ends = [evaluate_cubics(points[owner], (step + side) / steps[owner]) for side in (0, 1)]
     return np.stack(ends, axis=1), owner
 
 
-def _evaluate_cubics(points: Floats, t: Floats) -> Floats:
+def evaluate_cubics(points: Floats, t: Floats) -> Floats:
+    """The points (k, 2) of cubics (k, 4, 2) at their parameters t (k,)."""
     t = t[:, None]
     back = 1 - t
     start, first, second, end = points.swapaxes(0, 1)
