@@ -70,7 +70,7 @@ def split_runs(cubics):
 
 
 @pytest.mark.parametrize("width", WIDE)
-@pytest.mark.parametrize("path, scale", zip(PATHS, (1e-3, 1, 1e4, 1), strict=True))
+@pytest.mark.parametrize("path, scale", list(zip(PATHS, (1e-3, 1, 1e4, 1), strict=True)))
 def test_a_pen_stroke_becomes_the_line_that_the_pen_followed(path, width, scale):
     half = WIDE[width]
     (line,) = centre_lines([scale * shape(pen_outline(PATHS[path](ALONG), half))])
