@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import shlex
 import zipfile
 
@@ -74,6 +75,17 @@ def test_the_weight_of_a_stroke_scales_its_reliability():
     light = [stroke | {"weight": 0.5} for stroke in PEBBLE["strokes"]]
     before, after = read_drawn(document()).instance, read_drawn(document(strokes=light)).instance
     assert np.allclose(after.w, before.w / 2)
+
+
+def test_the_downloaded_drawing_shows_pressure_and_is_read_the_same(tmp_path):
+    strokes = [
+        stroke | {"weight": weight} for stroke, weight in zip(PEBBLE["strokes"], (1, 0.05, 0.5), strict=True)
+    ]
+    name, svg = download(changed(strokes=strokes), "drawing")
+    widths = [float(width) for width in re.findall(rb'stroke-width="([^"]*)"', svg)]
+    assert widths == pytest.approx([0.3, 0.3 * 0.335, 0.3 * 0.65], rel=1e-3)
+    (tmp_path / name).write_bytes(svg)
+    assert cf.read_sketch(tmp_path / name, size=16).sha256 == read_drawn(document()).instance.sha256
 
 
 def test_a_brush_changes_the_mask_where_it_passed():
