@@ -17,8 +17,9 @@ from ...models.sketch.bitmap import Bitmap
 from ...models.sketch.cover import Box, block_means
 from ...models.sketch.curves import Curves, flatten, run_numbers
 from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
+from ...models.sketch.parallels import find_parallels
 from ...models.sketch.thinning import thin_shape
-from .document import Document
+from .document import Document, Mark
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
 _THINNED: Final = 700  # pixels on the longer side of a picture while it is traced
@@ -36,7 +37,8 @@ def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[s
     """A session under `document`, or else name, page and strokes of a drawing. Raises InputError.
 
     view: direction of a .curves file, as for `read_sketch`. Without it, such a file is added as `file` with
-    name and data in base64, because the page reads it again from other sides.
+    name and data in base64, because the page reads it again from other sides. `notes` are lines on what was
+    left out, or is ignored at first.
     """
     if not data:
         raise InputError("the file is empty; save the drawing again")
@@ -47,32 +49,45 @@ def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[s
     suffix = f".{suffix.lower()}" if dot else ""
     spatial = detect_file_kind(data, suffix) == "curves"
     drawing = parse_drawing(data, suffix, _THINNED // 4, view=view if spatial else None)
-    page, strokes = _trace_picture(drawing) if isinstance(drawing, Bitmap) else _strokes_of_curves(drawing)
+    notes = list(drawing.notes)
+    if isinstance(drawing, Bitmap):
+        page, strokes = _trace_picture(drawing)
+    else:
+        families = find_parallels(drawing)
+        ignored = np.isin(drawing.curve, np.concatenate([[-1], *(family.curve for family in families)]))
+        if not (drawing.line & ~ignored).any():
+            families, ignored = [], np.zeros_like(ignored)
+        page, strokes = _strokes_of_curves(drawing, ignored)
+        notes += [
+            f"{family} look like {family.kind} and are ignored; mark them otherwise to use them"
+            for family in families
+        ]
     opened: dict[str, Any] = {
         "name": name_from_text(stem or file_name),
         "page": list(page),
         "strokes": strokes,
+        "notes": notes,
     }
     if spatial and view is None:
         opened["file"] = {"name": file_name, "data": base64.b64encode(data).decode()}
     return opened
 
 
-def _stroke_document(points: Floats, *, line: bool) -> dict[str, Any]:
-    rounded = np.round(points, 3).ravel().tolist()
-    return {"points": rounded, "mark": "line" if line else "cut", "weight": 1}
+def _stroke_document(points: Floats, mark: Mark) -> dict[str, Any]:
+    return {"points": np.round(points, 3).ravel().tolist(), "mark": mark, "weight": 1}
 
 
-def _strokes_of_curves(curves: Curves) -> tuple[Box, list[dict[str, Any]]]:
-    """Page and strokes of curves: their unbroken runs as polylines."""
+def _strokes_of_curves(curves: Curves, ignored: Bools) -> tuple[Box, list[dict[str, Any]]]:
+    """Page and strokes of curves, some (k,) of them ignored: their unbroken runs as polylines."""
     left, top, right, bottom = curves.box
     page = curves.page or (left, top, max(right - left, 1e-6), max(bottom - top, 1e-6))
     segments, owner = flatten(curves.points, _FINE * max(right - left, bottom - top, 1e-6))
     run = run_numbers(curves.points, curves.curve)[owner]
     starts = np.flatnonzero(np.diff(run, prepend=-1))
+    marks = np.where(ignored, "ignored", np.where(curves.line, "line", "cut"))[owner[starts]].tolist()
     strokes = [
-        _stroke_document(np.concatenate([part[:, 0], part[-1:, 1]]), line=bool(line))
-        for part, line in zip(np.split(segments, starts[1:]), curves.line[owner[starts]], strict=True)
+        _stroke_document(np.concatenate([part[:, 0], part[-1:, 1]]), mark)
+        for part, mark in zip(np.split(segments, starts[1:]), marks, strict=True)
     ]
     return page, strokes
 
@@ -90,7 +105,7 @@ def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
     as_lines = is_red if is_red.any() and not is_red.all() else np.ones(len(ways), dtype=bool)
     scale = reduced * picture.reduction
     strokes = [
-        _stroke_document(scale * (_smooth(way)[:, ::-1] + 0.5), line=bool(marked))
+        _stroke_document(scale * (_smooth(way)[:, ::-1] + 0.5), "line" if marked else "cut")
         for way, marked in zip(ways, as_lines, strict=True)
     ]
     return (0.0, 0.0, float(picture.width), float(picture.height)), strokes

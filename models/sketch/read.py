@@ -21,6 +21,7 @@ from ..instance.domain import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading, name_from_text
 from .bitmap import read_white_pixels
 from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
+from .curves import Curves
 from .doubts import (
     describe_crowding,
     describe_loose_strokes,
@@ -30,6 +31,7 @@ from .doubts import (
 from .drawing_file import Drawing, parse_drawing, read_file
 from .labels import label_of
 from .outline import find_inside, find_strokes_along_outline, keep_parts_with_strokes
+from .parallels import leave_out_parallels
 
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
@@ -139,6 +141,8 @@ def instance_of_drawing(
 
     white: the picture from `read_mask`; without it the mask is the inside of the drawing.
     """
+    if isinstance(drawing, Curves):
+        drawing = leave_out_parallels(drawing)
     if white is None:
         frame = fit_frame(drawing.box, size, margin=True)
         covers = drawing.covers(frame)

@@ -365,7 +365,7 @@ const mayReplace = () => isSaved() || !state.doc.strokes.length || confirm("Repl
 async function open(file) {
   if (!file || !mayReplace()) return;
   const found = await read(file, file.name);
-  if (found) { banner(""); replace(documentOf(found)); }
+  if (found) { banner((found.notes ?? []).map(note => `${note}.`).join(" "), { kind: "notes" }); replace(documentOf(found)); }
 }
 function give(blob, name) {
   const link = document.createElement("a");

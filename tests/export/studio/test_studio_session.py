@@ -226,3 +226,15 @@ def test_files_that_are_no_drawing_are_refused(data, name, words):
 
 def test_the_name_of_a_file_is_no_path():
     assert open_drawing(sample_svg("skew").encode(), "../../etc/passwd.svg")["name"] == "etc_passwd"
+
+
+def test_hatching_comes_ignored_unless_nothing_else_is_a_curvature_line():
+    hatch = "".join(f'<path d="M{20 + 2 * k} 30l9 20"/>' for k in range(12))
+    body = '<circle cx="50" cy="50" r="45"/>'
+    flow = '<path d="M10 50Q50 30 90 50"/>'
+    drawing = f'<svg fill="none"><g stroke="black">{body}{hatch}</g><g stroke="red">{flow}</g></svg>'
+    session = open_drawing(drawing.encode(), "body.svg")
+    assert [stroke["mark"] for stroke in session["strokes"]] == ["cut", *12 * ["ignored"], "line"]
+    assert session["notes"][0].startswith("12 parallel lines round (35.5, 40) look like hatching")
+    session = open_drawing(f'<svg fill="none" stroke="black">{hatch}</svg>'.encode(), "hatch.svg")
+    assert {stroke["mark"] for stroke in session["strokes"]} == {"line"}
