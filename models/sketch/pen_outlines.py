@@ -37,6 +37,7 @@ _BASE: Final = 1.5  # length over which the direction of an end is found as a sh
 _REACH: Final = 4.0  # greatest gap between two pieces of a stroke as a share of their width
 _LEAST: Final = 2.0  # least length of a centre line as a share of the mean width
 _AHEAD: Final = 0.8  # least cosine between the end of a piece and the way to the piece that continues it
+_MOST_BODIES: Final = 1000  # larger areas with which an area is compared
 _NEAR: Final = 1e-3  # distance of the test for the fill from a sample as a share of the step
 _MOST_TESTS: Final = 100_000_000  # of samples for the loops of a shape
 _QUARTERS: Final = (0.0, 0.25, 0.5, 0.75)  # parameters of curves where the polygons of the test have corners
@@ -51,10 +52,21 @@ _UPPER: Final = np.array([[0, 6, 3, 1], [0, 0, 3, 3], [0, 0, 0, 6], [0, 0, 0, 0]
 _AREA: Final = _UPPER - _UPPER.T
 
 
-def centre_lines(
+@dataclass(frozen=True, eq=False)
+class PenStroke:
+    """The centre lines of a pen stroke and its mean width.
+
+    points: control points (m, 4, 2) of smooth runs, in which each curve starts where the last one ends.
+    """
+
+    points: Floats
+    width: float
+
+
+def find_pen_strokes(
     outlines: Sequence[Floats], widest: float = np.inf, *, even_odd: Sequence[bool] | None = None
-) -> list[Floats | None]:
-    """Centre lines of filled shapes that are pen strokes, and None for each that is an area.
+) -> list[PenStroke | None]:
+    """Find the centre lines of filled shapes that are pen strokes; None stands for an area.
 
     Parameters
     ----------
@@ -68,7 +80,7 @@ def centre_lines(
     Returns
     -------
     list
-        Control points (m, 4, 2) for each stroke: smooth runs in which each curve starts where the last ends.
+        The stroke of each shape, or None.
 
     Raises
     ------
@@ -77,23 +89,40 @@ def centre_lines(
 
     """
     room = MAX_OUTLINE_SAMPLES
-    lines: list[Floats | None] = []
+    strokes: list[PenStroke | None] = []
     for number, outline in enumerate(outlines):
         cubics, loop = _close_loops(outline)
         side = _filled_sides(cubics, loop, even_odd=even_odd is not None and even_odd[number])
         width, share = _measure_shape(cubics, side)
-        line = None
+        stroke = None
         if 0 < width <= widest:
             room -= int(share.sum())
             if room < 0:
                 raise InputError("draws too many long and thin filled shapes; simplify the drawing")
-            line = _centre_line(_sample_outline(cubics, loop, side, share), width, widest)
-        lines.append(line)
-    return lines
+            stroke = _find_stroke(_sample_outline(cubics, loop, side, share), width, widest)
+        strokes.append(stroke)
+    return strokes
 
 
-def _centre_line(samples: _Samples, width: float, widest: float) -> Floats | None:
-    """Control points (m, 4, 2) of the centre lines of a shape of this mean width; None for an area."""
+def find_silhouettes(areas: Sequence[Floats]) -> list[int]:
+    """The numbers of the areas, control points (k, 4, 2) each, that are not in the box of a larger one.
+
+    They are the outline of a drawing that has no other: in it, only areas show where the body ends.
+    """
+    low, high = (
+        np.array([bound(area.reshape(-1, 2), axis=0) for area in areas]) for bound in (np.min, np.max)
+    )
+    outer: list[int] = []
+    for number in np.argsort(-np.prod(high - low, axis=1), kind="stable").tolist():
+        around = outer[:_MOST_BODIES]
+        is_within = (low[around] <= low[number]) & (high[around] >= high[number])
+        if not is_within.all(axis=1).any():
+            outer.append(number)
+    return sorted(outer)
+
+
+def _find_stroke(samples: _Samples, width: float, widest: float) -> PenStroke | None:
+    """The stroke whose outline has these samples and this mean width; None for an area."""
     partner = _pair_samples(samples, width)
     if partner is None:
         return None
@@ -105,7 +134,8 @@ def _centre_line(samples: _Samples, width: float, widest: float) -> Floats | Non
     longest = max((_polyline_length(points) for points, _ in lines), default=0.0)
     if greatest > widest or longest < SLENDER * greatest:
         return None
-    return np.concatenate([_smooth_cubics(points, width, closed=closed) for points, closed in lines])
+    cubics = [_smooth_cubics(points, width, closed=closed) for points, closed in lines]
+    return PenStroke(np.concatenate(cubics), width)
 
 
 # --- samples of the outline ---------------------------------------------------------------------------------

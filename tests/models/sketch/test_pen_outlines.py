@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from crossfield.models.sketch.curves import flatten, lines_as_cubics
-from crossfield.models.sketch.pen_outlines import centre_lines
+from crossfield.models.sketch.pen_outlines import find_pen_strokes, find_silhouettes
 from scipy.spatial import cKDTree
 
 ALONG = np.linspace(0, 1, 60)
@@ -58,6 +58,10 @@ def crescent(thickness):
     angle = np.linspace(-np.pi / 2, np.pi / 2, 40)
     outer = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return np.concatenate([outer, (outer * [1 - thickness, 1])[::-1][1:-1]])
+
+
+def centre_lines(outlines, **options):
+    return [stroke and stroke.points for stroke in find_pen_strokes(outlines, **options)]
 
 
 def points_on(cubics):
@@ -176,3 +180,15 @@ def test_outlines_without_area_are_no_strokes():
     there_and_back = np.array([[0.0, 0], [50, 0], [100, 1e-9], [50, 0]])
     bow_tie = np.array([[0.0, 0], [10, 10], [10, 0], [0, 10]])
     assert centre_lines([shape(there_and_back), shape(bow_tie)]) == [None, None]
+
+
+def test_the_width_of_a_stroke_is_that_of_its_pen():
+    for half in (1.0, 2.0):
+        (stroke,) = find_pen_strokes([shape(pen_outline(PATHS["wave"](ALONG), np.full(60, half)))])
+        assert stroke.width == pytest.approx(2 * half, rel=0.03)
+
+
+def test_silhouettes_are_the_areas_that_stand_for_themselves():
+    body, patch, arm = (shape(circle(radius) + at) for radius, at in ((50, 0), (10, 20), (20, [60, 0])))
+    assert find_silhouettes([patch, body, arm, body]) == [1, 2]
+    assert find_silhouettes([patch]) == [0]
