@@ -18,6 +18,7 @@ from ...models.input_limits import MAX_ELEMENTS, MAX_SEGMENTS
 from ...models.instance.domain import Bools, Floats, Ints
 from ...models.instance.file import parse_json
 from ...models.instance.instance import STROKE_WEIGHT, name_from_text
+from ...models.sketch.cover import Box
 from ...models.sketch.curves import Curves, lines_as_cubics
 from ...models.sketch.read import Silhouette
 
@@ -68,7 +69,7 @@ class Document:
     """Everything that determines field and surface."""
 
     name: str
-    page: tuple[float, float, float, float]
+    page: Box
     strokes: tuple[Stroke, ...]
     mask: tuple[MaskEdit, ...]
     hints: tuple[PlacedHint, ...]
@@ -123,21 +124,30 @@ class Document:
         ]
         return np.array(read, dtype=np.int32)
 
+    def segments(self) -> tuple[Floats, Ints]:
+        """The straight parts (k, 2, 2) of the visible strokes, and the number (k,) of the stroke of each."""
+        visible = self.visible
+        points = [self.strokes[number].points for number in visible]
+        ends = [np.stack([part[:-1], part[1:]], axis=1) for part in points] or [np.empty((0, 2, 2))]
+        joined, owner = np.concatenate(ends), np.repeat(visible, [len(part) - 1 for part in points])
+        long = (joined[:, 0] != joined[:, 1]).any(axis=1)
+        return joined[long], owner[long]
+
     def curves(self) -> Curves:
         """The visible strokes as curves with their numbers. Raises NoStrokeError without a curvature line."""
-        visible = self.visible
-        if not any(self.strokes[number].mark == "line" for number in visible):
+        segments, owner = self.segments()
+        line: Bools = np.array([stroke.mark == "line" for stroke in self.strokes], dtype=bool)[owner]
+        if not line.any():
             raise NoStrokeError("there is no curvature line yet; draw one, or mark a stroke as one")
-        ends, owner = [], []
-        for number in visible:
-            points = self.strokes[number].points
-            ends.append(np.stack([points[:-1], points[1:]], axis=1))
-            owner.append(np.full(len(points) - 1, number, dtype=np.int32))
-        joined, curve = np.concatenate(ends), np.concatenate(owner)
-        long = (joined[:, 0] != joined[:, 1]).any(axis=1)
-        joined, curve = joined[long], curve[long]
-        line: Bools = np.array([stroke.mark == "line" for stroke in self.strokes])[curve]
-        return Curves(lines_as_cubics(joined[:, 0], joined[:, 1]), curve, line, self.page, line)
+        return Curves(lines_as_cubics(segments[:, 0], segments[:, 1]), owner, line, self.sheet, line)
+
+    @property
+    def sheet(self) -> Box:
+        """The page, enlarged to hold the visible strokes; x, y, width and height."""
+        x, y, width, height = self.page
+        corners = np.concatenate([[[x, y], [x + width, y + height]], self.segments()[0].reshape(-1, 2)])
+        (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        return left, top, right - left, bottom - top
 
     @property
     def weights(self) -> Floats:
@@ -192,7 +202,7 @@ def _read_points(value: Any, where: str) -> Floats:
     return points.reshape(-1, 2)
 
 
-def _read_page(value: Any) -> tuple[float, float, float, float]:
+def _read_page(value: Any) -> Box:
     values = _read_points(value, "page").ravel()
     if len(values) != 4 or not (values[2:] > 0).all():
         raise InputError("page of the session must be x, y, width and height")

@@ -40,7 +40,7 @@ def _write_drawing(document: Document, folder: Path) -> Path:
 
 def drawing_svg(document: Document) -> bytes:
     """The visible strokes as SVG, as wide as their weight, in red for curvature lines and black for cuts."""
-    x, y, width, height = (f"{value:.12g}" for value in document.page)
+    x, y, width, height = (f"{value:.12g}" for value in document.sheet)
     thick = max(document.page[2:]) / 400
     paths = [_stroke_svg(document.strokes[number], thick) for number in document.visible]
     head = (

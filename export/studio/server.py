@@ -36,7 +36,7 @@ from .document import SIZES
 from .files import DOWNLOADS, download
 from .opening import open_drawing
 from .session import OvertakenError
-from .views import field_step, lines_step, surface_step
+from .views import field_step, lines_step, next_step, surface_step
 
 LOOPBACK: Final = "127.0.0.1"
 COARSE: Final = 48  # pixels of the field that is shown before a finer one
@@ -111,7 +111,7 @@ class Page:
             Route("/sample/{name}", self.sample),
             Route("/open", self.open, methods=["POST"]),
             Route("/compute", self.compute, methods=["POST"]),
-            Route("/stop", self.stop, methods=["POST"]),
+            Route("/next", self.next, methods=["POST"]),
             Route("/download", self.download, methods=["POST"]),
             Route("/{name}", self.file),
         ]
@@ -157,10 +157,10 @@ class Page:
         size, lines = _parse_number(request, "size"), "lines" in request.query_params
         return _stream_response(self._compute_views(data, size, stop, lines=lines))
 
-    async def stop(self, request: Request) -> Response:
-        """End the work on earlier edits of a page."""
-        await self._edit(request)
-        return JSONResponse({})
+    async def next(self, request: Request) -> Response:
+        """What a document without curvature lines needs next. Ends the work on earlier edits."""
+        data, stop = await self._edit(request)
+        return await _answered(lambda: self.desk.submit("fields", next_step, data, stop=stop).result())
 
     async def download(self, request: Request) -> Response:
         """A file of a document."""

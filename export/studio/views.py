@@ -16,6 +16,7 @@ from ..pictures.marks import split_runs
 from ..pictures.streamlines import streamlines
 from ..shading.raster import raster
 from .document import Document
+from .next_step import find_next_step
 from .session import DrawnInstance, OvertakenError, compute_field, compute_surface
 
 SIDE: Final = 480  # pixels of the longer side of a shaded picture
@@ -41,6 +42,11 @@ def field_step(data: bytes, size: int | None = None) -> tuple[dict[str, Any], Dr
     return _field_view(document, drawn, field), drawn, field
 
 
+def next_step(data: bytes) -> dict[str, Any]:
+    """What a drawing needs next, for documents without a field. Raises InputError."""
+    return {"next": find_next_step(Document.from_bytes(data))}
+
+
 def _field_view(document: Document, drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     instance, (x, y), spots = drawn.instance, drawn.instance.origin, field.singularities
     pixel = instance.pixel_size
@@ -62,6 +68,7 @@ def _field_view(document: Document, drawn: DrawnInstance, field: CrossField) -> 
             )
         ],
         "suspects": _find_suspects(drawn, deviation > FAR),
+        "next": find_next_step(document),
         "numbers": {
             "pixels": instance.grid.size,
             "strokes": len(instance.theta),

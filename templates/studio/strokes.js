@@ -23,6 +23,12 @@ const fromSegment = (px, py, ax, ay, bx, by) => {
   return Math.hypot(px - ax - t * dx, py - ay - t * dy);
 };
 
+/** Whether a path ends about where it began, far from a mere dot. */
+export function isClosed(points) {
+  const [left, top, right, bottom] = boxOf({ points }), [x, y] = points.slice(-2);
+  return points.length > 16 && Math.hypot(x - points[0], y - points[1]) < 0.15 * Math.max(right - left, bottom - top);
+}
+
 /** Number of the stroke nearest to a point within a reach, or -1. */
 export function strokeAt(strokes, [x, y], reach) {
   let best = reach, found = -1;

@@ -4,13 +4,13 @@ import { History, check, decoded, emptyDocument } from "./document.js";
 import { View, paint, paintBase } from "./drawing.js";
 import { listen, watchPen } from "./pointer.js";
 import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shading.js";
-import { clipped, erased, fitShift, moved, rounded, strokeAt, strokesIn } from "./strokes.js";
+import { clipped, erased, fitShift, isClosed, moved, rounded, strokeAt, strokesIn } from "./strokes.js";
 
 const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
 const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file"], RETRY = 3000;
 const REACH = 9, FINGER = 18, STILL = 4, PASTED = 16; // pixels of the screen: near a stroke, also for a finger; in a click; between copies
 const state = {
-  history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "line", live: null, brush: null, edit: 0,
+  history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "cut", preset: true, next: "outline", live: null, brush: null, edit: 0,
   field: null, lines: null, surface: null, mode: "crosses", kind: "shaded", lamp: LAMP_AT, suspects: new Set(),
   copied: [], fingers: null, // whether fingers draw; null: until a pen comes
 };
@@ -43,7 +43,10 @@ function ready(text) { status(text); document.documentElement.dataset.state = "r
 
 // Documents.
 function show(doc, { compute = true } = {}) {
-  if (doc.page !== state.doc.page) { forget(); left.fit(pageBox(doc)); right.zoomed = false; }
+  if (doc.page !== state.doc.page) {
+    forget(); left.fit(pageBox(doc)); right.zoomed = false;
+    if (!doc.strokes.length) { state.mark = "cut"; state.preset = true; } else presetLine();
+  }
   state.doc = doc; state.chosen = new Set([...state.chosen].filter(k => k < doc.strokes.length));
   if (state.tool === "turn" && !doc.file) state.tool = "draw";
   controls(); refresh();
@@ -62,6 +65,8 @@ function replace(doc) {
 const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); doubts(); };
 /** A page in the shape of the canvas. */
 const canvasPage = () => [0, 0, 800, Math.round(800 * left.high / left.wide)];
+/** The outline is there: the pen goes on to curvature lines, unless its kind was chosen. */
+function presetLine() { if (state.preset) state.mark = "line"; state.preset = false; }
 const pageBox = ({ page: [x, y, w, h] }) => [x, y, x + w, y + h];
 const isSaved = () => state.history.saved.has(state.history.now);
 
@@ -116,19 +121,16 @@ async function request() {
   waiting?.abort(); clearTimeout(lost);
   const doc = state.doc, edit = ++state.edit;
   document.documentElement.dataset.state = "busy"; begun = performance.now(); state.first = true;
-  if (!doc.strokes.some(stroke => stroke.mark === "line")) {
-    forget(); $("#times").textContent = ""; $("#numbers").replaceChildren(); clear("error"); refresh();
-    fetch(`stop?page=${page}&edit=${edit}`, { method: "POST" }).catch(() => {});
-    ready(doc.strokes.length ? "Draw a curvature line, or mark a stroke as one." : "Draw the outline as cut, and curvature lines across it; or open a drawing.");
-    return;
-  }
+  const hasLine = doc.strokes.some(stroke => stroke.mark === "line");
+  if (!hasLine) { forget(); $("#times").textContent = ""; $("#numbers").replaceChildren(); clear("error"); refresh(); }
   waiting = new AbortController(); status("computing …");
   const wanted = new URLSearchParams({ page, edit, size: doc.size });
   if (state.mode === "lines") wanted.set("lines", 1);
   try {
-    const response = await ask(`compute?${wanted}`, { method: "POST", body: computable(doc), signal: waiting.signal });
+    const response = await ask(`${hasLine ? "compute" : "next"}?${wanted}`, { method: "POST", body: computable(doc), signal: waiting.signal });
     clear("lost");
     if (!response.ok) { banner(await trouble(response)); ready(""); return; }
+    if (!hasLine) { take({ stage: "next", ...await response.json() }); return; }
     for await (const found of lined(response)) if (edit === state.edit) take(found);
   } catch (error) { if (error.name !== "AbortError" && edit === state.edit) missing(); }
 }
@@ -137,14 +139,15 @@ const numbered = mask => { let n = 0; return Int32Array.from(mask, inside => ins
 function take(found) {
   if (found.stage === "error") { forget(); banner(found.message); refresh(); ready(""); return; }
   if (found.stage === "overtaken") return;
-  if (found.stage === "done") { ready(""); return; }
+  if (found.stage === "next") proceed(found.next);
+  if (found.stage === "next" || found.stage === "done") { ready(""); return; }
   const times = $("#times").dataset;
   if (found.stage === "field") {
     clear("error");
     state.field = { ...found, kinds: decoded.bytes(found.kinds), u: decoded.floats(found.u), v: decoded.floats(found.v), number: numbered(decoded.bytes(found.mask)) };
     state.lines = null; state.suspects = new Set(found.suspects); if (state.first) { state.first = false; times.field = seconds(); times.fine = times.lines = times.surface = ""; } else times.fine = seconds();
     if (!right.zoomed) { const { x, y, pixel, rows, columns } = found.frame; right.fit([x, y, x + pixel * columns, y + pixel * rows]); }
-    numbers(found); doubts();
+    numbers(found); proceed(found.next);
   } else if (found.stage === "lines") { state.lines = found.families; times.lines = seconds(); }
   else if (found.stage === "surface") {
     state.surface = { ...found, frame: state.field.frame, normals: decoded.shorts(found.normals), opacity: decoded.bytes(found.opacity), confidence: decoded.bytes(found.confidence), number: numbered(decoded.bytes(found.mask)) };
@@ -152,6 +155,23 @@ function take(found) {
   }
   $("#times").textContent = Object.entries({ ...times }).filter(([, value]) => value).map(([key, value]) => `${key} ${value}`).join(" · ");
   refresh();
+}
+
+// The next step, until the strokes determine a field.
+const STEPS = {
+  outline: { mark: "cut", text: "Draw the outline of a shape, and close it." },
+  line: { mark: "line", text: "Draw a curvature line: a line along which the surface bends." },
+  across: { mark: "line", text: "Draw a curvature line across the others." },
+};
+function proceed(next) {
+  state.next = next;
+  if (next === "line") presetLine();
+  controls(); doubts();
+}
+function showNext() {
+  const step = STEPS[state.next], choice = step && step.mark !== state.mark ? `Choose ${$(`[data-mark=${step.mark}]`).textContent}. ` : "";
+  $("#next").textContent = step ? choice + step.text : ""; $("#welcome").hidden = state.doc.strokes.length > 0;
+  $("#surface-note").textContent = !state.field ? "The surface appears here." : state.next === "across" ? "This surface is arbitrary until a curvature line crosses the others." : "Drag an arrow, or tap its two ends with a finger: there the normal leans.";
 }
 
 // Numbers, doubts.
@@ -173,9 +193,10 @@ function doubts() {
   state.suspects = new Set(some);
   if (some.length) item(`${some.length === 1 ? "1 stroke does" : `${some.length} strokes do`} not fit. Probably they are not curvature lines; otherwise they may be hidden lines.`,
     action("Select them", () => select(some)), action("Mark as cuts", () => { select(some); mark("cut"); }));
-  for (const text of surface?.doubts ?? []) item(`Surface: ${text}.`);
-  for (const text of surface?.freedom ?? []) item(`Free: ${text}.`, ...text.startsWith("inside out") ? [action("Flip", flip)] : []);
-  if (!items.length) items.push(element("li", surface ? "None." : "Not computed yet."));
+  const settled = surface && state.next !== "across";
+  for (const text of settled ? surface.doubts : []) item(`Surface: ${text}.`);
+  for (const text of settled ? surface.freedom : []) item(`Free: ${text}.`, ...text.startsWith("inside out") ? [action("Flip", flip)] : []);
+  if (!items.length) items.push(element("li", settled ? "None." : "The field is not determined yet."));
   $("#doubts").replaceChildren(...items);
 }
 
@@ -183,7 +204,7 @@ function doubts() {
 function controls() {
   const { doc, history, chosen } = state;
   $("#undo").disabled = !history.can(-1); $("#redo").disabled = !history.can(1); $("#delete").disabled = $("#copy").disabled = !chosen.size; $("#paste").disabled = !state.copied.length;
-  $("#welcome").hidden = doc.strokes.length > 0;
+  showNext();
   $("#unhint").disabled = !doc.hints.length; $("#flip").setAttribute("aria-pressed", doc.flip);
   $("#selected").textContent = chosen.size ? `${chosen.size} selected` : "";
   if (document.activeElement !== $("#name")) $("#name").value = doc.name;
@@ -199,7 +220,7 @@ function controls() {
 function choose(tool) { if (tool === "turn" && !state.doc.file) return; state.tool = tool; state.brush = null; tool === "draw" ? select([]) : (controls(), refresh(false)); }
 function select(numbers) { state.chosen = new Set(numbers); controls(); refresh(); }
 function mark(kind) {
-  if (!state.chosen.size) { state.mark = kind; controls(); return; }
+  if (!state.chosen.size) { state.mark = kind; state.preset = false; controls(); return; }
   commit(doc => ({ ...doc, strokes: doc.strokes.map((stroke, k) => state.chosen.has(k) ? { ...stroke, mark: kind } : stroke) }));
 }
 function remove() { if (state.chosen.size) commit(doc => { const rest = doc.strokes.filter((_, k) => !state.chosen.has(k)); state.chosen.clear(); return { ...doc, strokes: rest }; }); }
@@ -275,6 +296,7 @@ function finish(live) {
   if (tool === "draw" && path.length > 2) {
     const weight = rounded(pressures.reduce((sum, each) => sum + each, 0) / pressures.length), varied = pressures.some(each => each !== pressures[0]);
     const parts = clipped({ points: path, mark: kind, weight, ...varied && { pressures } }, state.doc.page);
+    if (kind === "cut" && isClosed(path)) presetLine();
     if (parts.length) { state.chosen.clear(); commit(doc => ({ ...doc, strokes: [...doc.strokes, ...parts] })); } else status("Draw inside the page.");
   } else if (tool === "move" && live.shift) {
     if (live.shift.some(Boolean)) commit({ strokes: state.doc.strokes });

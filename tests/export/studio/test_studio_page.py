@@ -40,10 +40,7 @@ def pixels(browser):
 
 def test_a_session_from_the_first_stroke_to_the_saved_file(empty, tmp_path):
     browser = empty
-    find(browser, "[data-mark=cut]").click()
     drag(browser, circle(240, 300, 150))
-    assert "curvature line" in find(browser, "#status").text
-    find(browser, "[data-mark=line]").click()
     drag(browser, [(95, 300), (170, 340), (240, 350), (310, 340), (385, 300)])
     drag(browser, [(240, 155), (225, 230), (225, 370), (240, 445)])
     assert [stroke["mark"] for stroke in document(browser)["strokes"]] == ["cut", "line", "line"]
@@ -82,6 +79,30 @@ def test_a_session_from_the_first_stroke_to_the_saved_file(empty, tmp_path):
     assert document(settled(browser))["strokes"] == []
     load(browser, tmp_path / "again.json", saved.read_bytes())
     assert document(browser) == before
+
+
+def test_hints_lead_to_a_determined_field(empty):
+    def hint():
+        return find(empty, "#next").text
+
+    def pressed():
+        return find(empty, "#marks [aria-pressed=true]").get_attribute("data-mark")
+
+    assert ("outline" in hint(), pressed()) == (True, "cut")
+    drag(empty, circle(240, 300, 150)[:21])
+    assert ("outline" in hint(), pressed()) == (True, "cut")
+    drag(empty, circle(240, 300, 150)[20:])
+    assert ("along which the surface bends" in hint(), pressed()) == (True, "line")
+    drag(empty, [(95, 300), (170, 340), (240, 350), (310, 340), (385, 300)])
+    assert "across the others" in hint()
+    assert "arbitrary" in find(empty, "#surface-note").text
+    find(empty, "[data-mark=cut]").click()
+    assert "Choose Curvature line" in hint()
+    find(empty, "[data-mark=line]").click()
+    drag(empty, [(240, 155), (225, 230), (225, 370), (240, 445)])
+    assert hint() == ""
+    assert "arbitrary" not in find(empty, "#surface-note").text
+    assert [stroke["mark"] for stroke in document(empty)["strokes"]] == ["cut", "cut", "line", "line"]
 
 
 def test_every_edit_is_undone_and_done_again(empty, tmp_path):

@@ -91,7 +91,7 @@ def test_a_newer_edit_stops_work_that_has_begun(page):
 
     older = threading.Thread(target=ask)
     older.start()
-    page.ask("stop?page=d&edit=2", b"")
+    page.ask("next?page=d&edit=2", changed(strokes=[]))
     newer = page.steps("compute?page=d&edit=3&size=16", changed())
     older.join()
     assert [step["stage"] for step in newer] == ["field", "surface", "done"]

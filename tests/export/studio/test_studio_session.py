@@ -13,6 +13,7 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.studio.document import Document
 from crossfield.export.studio.files import download
+from crossfield.export.studio.next_step import find_next_step
 from crossfield.export.studio.opening import open_drawing
 from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, hints_on_mask, read_drawn
 from crossfield.export.studio.views import field_step
@@ -63,6 +64,42 @@ def test_a_drawing_without_a_curvature_line_asks_for_one():
     cuts = [stroke | {"mark": "cut"} for stroke in PEBBLE["strokes"]]
     with pytest.raises(cf.NoStrokeError, match="draw one"):
         read_drawn(document(strokes=cuts))
+
+
+ROUND = [value for t in np.linspace(0, 2 * np.pi, 50) for value in (60 + 45 * np.cos(t), 50 + 45 * np.sin(t))]
+OUTLINE = {"points": ROUND, "mark": "cut"}
+HALF = {"points": ROUND[:50], "mark": "cut"}
+
+
+def line(*points):
+    return {"points": points, "mark": "line"}
+
+
+@pytest.mark.parametrize(
+    "strokes, step",
+    [
+        ([], "outline"),
+        ([HALF], "outline"),
+        ([HALF, line(40, 30, 80, 30)], "outline"),
+        ([OUTLINE], "line"),
+        ([OUTLINE, OUTLINE | {"mark": "ignored"}], "line"),
+        ([OUTLINE, line(20, 50, 100, 50)], "across"),
+        ([OUTLINE, line(20, 40, 60, 65, 100, 40)], "across"),  # one stroke is one line, however it bends
+        ([OUTLINE, *(line(20, y, 60, y + 15, 100, y) for y in (30, 45, 60))], "across"),
+        ([OUTLINE, line(20, 50, 100, 50), line(20, 50.5, 60, 49, 100, 51)], "across"),  # drawn twice
+        ([OUTLINE, line(20, 50, 100, 50), line(60, 10, 60, 90)], ""),
+        ([OUTLINE, line(20, 50, 100, 50), line(60, 52, 60, 90)], ""),  # about a pixel is missing
+        ([line(20, 50, 100, 50), line(60, 10, 60, 90)], ""),
+    ],
+)
+def test_the_next_step_of_a_drawing(strokes, step):
+    assert find_next_step(document(strokes=strokes)) == step
+
+
+def test_strokes_beyond_the_page_enlarge_it(tmp_path):
+    beyond = document(strokes=[*PEBBLE["strokes"], line(100, 50, 150, 130)])
+    assert beyond.sheet == (0, 0, 150, 130)
+    assert read_drawn(beyond).instance.reading.warnings == ()
 
 
 def test_the_instance_is_that_of_the_downloaded_drawing(tmp_path):

@@ -194,6 +194,7 @@ return data.reduce((sum, red, k) => sum + (k % 4 === 0 && red > data[k + 1] + 80
 
 
 def test_a_stroke_is_as_wide_as_its_pressure(tablet):
+    find(tablet, "[data-mark=line]").click()
     stroke(tablet, *((80 + 8 * k, 300) for k in range(31)), forces=[0.05 + 0.03 * k for k in range(31)])
     (line,) = document(tablet)["strokes"]
     assert len(line["pressures"]) == len(line["points"]) / 2
@@ -218,9 +219,9 @@ def test_marking_a_selected_stroke_leaves_the_pen_as_it_is(empty):
     find(empty, "[data-mark=ignored]").click()
     settled(empty)
     tool(empty, "draw")
-    assert find(empty, "[data-mark=line]").get_attribute("aria-pressed") == "true"
+    assert find(empty, "[data-mark=cut]").get_attribute("aria-pressed") == "true"
     drag(empty, [(100, 400), (200, 410), (300, 400)])
-    assert [each["mark"] for each in document(empty)["strokes"]] == ["ignored", "line"]
+    assert [each["mark"] for each in document(empty)["strokes"]] == ["ignored", "cut"]
 
 
 def test_strokes_end_at_the_border_of_the_page(empty):
