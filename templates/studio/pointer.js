@@ -7,10 +7,10 @@ const ERASER = 32; // in `buttons`: the other end of a pen
 const pen = { down: false, at: -Infinity, seen: false };
 const isPalm = event => pen.down || event.timeStamp - pen.at < PALM;
 
-/** Watches for a pen on the whole page, and calls a function when it comes for the first time. */
+/** Watches for a pen on the pictures, and calls a function when it comes for the first time. */
 export function watchPen(first) {
   for (const kind of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) document.addEventListener(kind, event => {
-    if (event.pointerType !== "pen") return;
+    if (event.pointerType !== "pen" || !event.target.matches("canvas")) return; // elsewhere, its release can be missed
     pen.down = event.buttons > 0 && kind !== "pointercancel"; pen.at = event.timeStamp;
     if (!pen.seen) first();
     pen.seen = true;

@@ -25,7 +25,7 @@ function refresh(base = true) {
   asked = true;
   requestAnimationFrame(() => {
     asked = false;
-    if (dirty) paintBase(left, state);
+    if (dirty) paintBase(left, { ...state, doc: state.live?.shift ? shifted(state.live) : state.doc });
     dirty = false;
     paint(left, state);
     paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked, strokes: $("#ink").checked ? state.doc.strokes : [], hints: state.doc.hints, live: state.arrow });
@@ -62,7 +62,7 @@ function replace(doc) {
   if (!state.history.now.strokes.length) state.history.at -= 1;
   state.history.saved.add(doc); state.chosen.clear(); commit(() => doc);
 }
-const forget = () => { state.field = state.lines = state.surface = null; state.suspects = new Set(); doubts(); };
+const forget = () => { state.field = state.lines = state.surface = state.arrow = null; state.suspects = new Set(); doubts(); };
 /** A page in the shape of the canvas. */
 const canvasPage = () => [0, 0, 800, Math.round(800 * left.high / left.wide)];
 /** The outline is there: the pen goes on to curvature lines, unless its kind was chosen. */
@@ -234,7 +234,7 @@ function paste() {
   state.copied = state.copied.map(stroke => moved(stroke, shift)); // the next copy lies beside this one
   choose("select"); commit(doc => ({ ...doc, strokes: [...doc.strokes, ...state.copied] })); select(state.copied.map((_, k) => first + k)); left.canvas.focus();
 }
-const chosenStrokes = () => state.doc.strokes.filter((_, k) => state.chosen.has(k));
+const chosenStrokes = () => state.history.now.strokes.filter((_, k) => state.chosen.has(k));
 const counted = strokes => strokes.length === 1 ? "1 stroke" : `${strokes.length} strokes`;
 const fingersDraw = () => state.fingers ?? true;
 function flip() {
@@ -262,8 +262,8 @@ const tools = {
     if (Math.hypot(x - px, y - py) * left.scale < 1.2) return;
     live.path.push(rounded(x), rounded(y)); live.pressures.push(rounded(pressure));
     if (live.tool === "turn") turn(live);
-    if (live.tool === "move" && hasLeft(live)) shift([x - live.path[0], y - live.path[1]]);
-    refresh(false);
+    if (live.tool === "move" && hasLeft(live)) live.shift = [x - live.path[0], y - live.path[1]];
+    refresh(Boolean(live.shift));
   },
   end() {
     const { live } = state;
@@ -271,35 +271,32 @@ const tools = {
     if (live) finish(live);
     refresh(false);
   },
-  cancel() {
-    if (state.live?.tool === "move") state.doc = state.history.now;
-    state.live = null; refresh();
-  },
+  cancel() { const { live } = state; state.live = null; refresh(Boolean(live?.shift)); },
   tap(point, contact) { if (["select", "area"].includes(state.tool)) { tools.begin(point, contact); tools.end(); } },
   nudge(step) {
     if (state.tool !== "select" || !state.chosen.size) return false;
-    state.live ??= { tool: "move", path: [0, 0], shift: [0, 0] };
-    shift(state.live.shift.map((value, axis) => value + step[axis]));
+    state.live ??= { tool: "move", shift: [0, 0] };
+    state.live.shift = state.live.shift.map((value, axis) => value + step[axis]); refresh();
     return true;
   },
 };
 /** Whether the path of a tool is more than a click. */
 const hasLeft = ({ path: [x, y, ...rest] }) => rest.some((value, k) => Math.abs(value - [x, y][k % 2]) * left.scale > STILL);
-/** Shows the selected strokes at another place; the tool commits it when it ends. */
-function shift(wanted) {
-  const doc = state.history.now;
-  state.live.shift = fitShift(doc.strokes.filter((_, k) => state.chosen.has(k)), doc.page, wanted);
-  state.doc = { ...doc, strokes: doc.strokes.map((stroke, k) => state.chosen.has(k) ? moved(stroke, state.live.shift) : stroke) }; refresh();
+/** The document with the selected strokes where a tool moves them. */
+function shifted({ shift }) {
+  const { now } = state.history, by = fitShift(chosenStrokes(), now.page, shift);
+  return by.some(Boolean) ? { ...now, strokes: now.strokes.map((stroke, k) => state.chosen.has(k) ? moved(stroke, by) : stroke) } : now;
 }
 function finish(live) {
-  const { tool, path, reach, radius, mark: kind, pressures } = live, first = path.slice(0, 2);
+  const { tool, path, reach, radius, mark: kind, pressures } = live, first = path?.slice(0, 2);
   if (tool === "draw" && path.length > 2) {
     const weight = rounded(pressures.reduce((sum, each) => sum + each, 0) / pressures.length), varied = pressures.some(each => each !== pressures[0]);
     const parts = clipped({ points: path, mark: kind, weight, ...varied && { pressures } }, state.doc.page);
     if (kind === "cut" && isClosed(path)) presetLine();
     if (parts.length) { state.chosen.clear(); commit(doc => ({ ...doc, strokes: [...doc.strokes, ...parts] })); } else status("Draw inside the page.");
-  } else if (tool === "move" && live.shift) {
-    if (live.shift.some(Boolean)) commit({ strokes: state.doc.strokes });
+  } else if (live.shift) {
+    const doc = shifted(live);
+    if (doc !== state.history.now) commit(() => doc);
   } else if (tool === "select" || tool === "move") {
     const hit = strokeAt(state.doc.strokes, first, reach);
     if (hasLeft(live)) select(strokesIn(state.doc.strokes, path));
@@ -335,7 +332,7 @@ function hintAt([x, y]) {
 }
 const arrows = {
   begin([x, y]) { if (state.surface) { state.arrow = { x: rounded(x), y: rounded(y), slant: 0, tilt: 0 }; refresh(false); } },
-  move([x, y]) { if (state.arrow) { Object.assign(state.arrow, leaning(x - state.arrow.x, y - state.arrow.y, reachOf(state.surface.frame))); refresh(false); } },
+  move([x, y], { erasing = false } = {}) { if (state.arrow && !erasing) { Object.assign(state.arrow, leaning(x - state.arrow.x, y - state.arrow.y, reachOf(state.surface.frame))); refresh(false); } },
   end() {
     const { arrow } = state;
     state.arrow = null;

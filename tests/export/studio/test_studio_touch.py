@@ -280,6 +280,21 @@ def test_selected_strokes_are_moved_copied_and_pasted_with_undo(empty):
     assert spots(settled(empty)) == states[-1]
 
 
+def test_the_keyboard_alone_moves_a_stroke(empty):
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    empty.execute_script("document.querySelector('#drawing').focus()")
+    across = [Keys.ARROW_LEFT * 10, Keys.SPACE, Keys.ARROW_RIGHT * 20, Keys.SPACE, Keys.ARROW_LEFT * 5]
+    ActionChains(empty).send_keys(*across).perform()
+    (before,) = spots(settled(empty))
+    moving = ["v", Keys.ENTER, Keys.SPACE, Keys.ARROW_DOWN * 3, Keys.SPACE]
+    ActionChains(empty).send_keys(*moving).perform()
+    (after,) = spots(settled(empty))
+    assert after[::2] == before[::2]
+    assert after[1] > before[1]
+
+
 def test_a_moved_stroke_stays_on_the_page(empty):
     _, _, wide, _ = document(drag(empty, [(100, 300), (200, 300), (300, 300)]))["page"]
     tool(empty, "select")
