@@ -8,6 +8,7 @@ A row is a surface; a known true surface is shaded next to it. All rows have the
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -16,12 +17,14 @@ import crossfield as cf
 import numpy as np
 from crossfield.export.pictures.underlay import read_underlay
 from crossfield.export.shading.colours import colour_normals, matcap, shade_by_light, to_eight_bit
-from crossfield.export.shading.raster import raster
+from crossfield.export.shading.raster import Raster, View, raster, view_of_grid
 from crossfield.export.surfaces.files import draw_strokes, lay_over
+from crossfield.export.surfaces.outline import find_outline
 from crossfield.models.instance.domain import Floats
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.surface import Surface
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from PIL import Image
 from surface import SURFACES, angles, field_by, normal_error
 
@@ -51,7 +54,7 @@ class Row:
 
 def draw_rows(rows: list[Row], path: Path) -> Path:
     """Draw a PNG with a row for each surface, and return its path."""
-    cells = [_cells(row, _scale(row)) for row in rows]
+    cells = [_cells(row, _view(row)) for row in rows]
     columns = max(map(len, cells))
     heights = [CELL * max(cell.shape[0] / max(cell.shape[:2]) for cell in line) for line in cells]
     size = (columns * (CELL + 0.15), sum(heights) + 0.3 * len(rows) + 0.3)
@@ -77,35 +80,39 @@ def draw_rows(rows: list[Row], path: Path) -> Path:
     return path
 
 
-def _scale(row: Row) -> int:
+def _view(row: Row) -> View:
     """Twice as fine as the picture is."""
-    return max(1, round(2 * CELL * DOTS / max(row.surface.instance.mask.shape)))
+    instance = row.surface.instance
+    return view_of_grid(instance, max(1, round(2 * CELL * DOTS / max(instance.mask.shape))))
 
 
 def strip(surface: Surface, drawing: str | Path, path: Path) -> Path:
     """Draw a PNG of a surface four times, strokes, normals, lamp, matcap, and return its path."""
     row = Row("", surface, drawing)
     scale = max(1, WIDTH // (4 * surface.instance.grid.width))
-    shaded = raster(surface.instance, surface.normals, scale)
-    joined = np.concatenate([*_cells(row, scale), matcap(shaded)], axis=1)
-    picture = Image.fromarray(to_eight_bit(lay_over(joined, np.ones(joined.shape))[..., :3]))
+    view = view_of_grid(surface.instance, scale)
+    joined = np.concatenate(_cells(row, view, matcap), axis=1)
+    picture = Image.fromarray(lay_over(joined, np.full_like(joined, 255))[..., :3])
     picture.save(path, optimize=True)
     return path
 
 
-def _cells(row: Row, scale: int) -> list[Floats]:
-    """The pictures of a row, (h, w, 4) each, `scale` pixels per pixel of the grid."""
+def _cells(row: Row, view: View, *materials: Callable[[Raster], Floats]) -> list[NDArray[np.uint8]]:
+    """The pictures of a row, uint8 (h, w, 4) each, in a view of the grid, at last in other materials."""
     instance = row.surface.instance
     drawing = None if row.drawing is None else read_underlay(row.drawing, on=instance)
-    shaded = raster(instance, row.surface.normals, scale)
-    faint = np.ones((*shaded.opacity.shape, 4)) * (0.94, 0.94, 0.94, 1.0)
-    faint[..., 3] = shaded.opacity
+    outline = None if drawing is None else find_outline(instance, drawing)
+    shaded = raster(instance, row.surface.normals, view, outline=outline)
+    faint = to_eight_bit(np.ones((*shaded.opacity.shape, 4)) * (0.94, 0.94, 0.94, 1.0))
+    faint[..., 3] = to_eight_bit(shaded.opacity)
     cells = [
-        lay_over(draw_strokes(instance, drawing, scale), faint),
-        colour_normals(shaded),
-        shade_by_light(shaded),
+        lay_over(draw_strokes(instance, drawing, view), faint),
+        to_eight_bit(colour_normals(shaded)),
+        *(to_eight_bit(colour(shaded)) for colour in (shade_by_light, *materials)),
     ]
-    return cells if row.truth is None else [*cells, shade_by_light(raster(instance, row.truth, scale))]
+    if row.truth is None:
+        return cells
+    return [*cells, to_eight_bit(shade_by_light(raster(instance, row.truth, view)))]
 
 
 def known_rows() -> list[Row]:

@@ -70,7 +70,7 @@ PANELS: Final = {
     "Method and solver": "method solver start program solve search",
     "Entries": "rung",
     "Files": "format nl-form gzip manifest solution check on underlay",
-    "Picture and surface": "kind scale light flip hint port no-browser",
+    "Picture and surface": "kind side light flip hint port no-browser",
     "Limits and processes": "time-limit gap threads jobs tolerance up-to scheduler",
     FACTS: "",
     "Output": "output quiet json help",

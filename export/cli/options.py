@@ -330,13 +330,13 @@ Lamp = Annotated[
         " plane of the drawing; {light} by default.",
     ),
 ]
-Scale = Annotated[
+PictureSide = Annotated[
     int | None,
     typer.Option(
-        "--scale",
+        "--side",
         min=1,
-        metavar="N",
-        help="Picture pixels per pixel of the grid; by default 1 in the normal map, and in other pictures"
-        " enough for about {picture side} on the longer side.",
+        metavar="PIXELS",
+        help="Pixels on the longer side of the pictures; by default those of a sketch that is a picture,"
+        " and about {picture side} for others.",
     ),
 ]

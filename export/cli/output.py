@@ -314,8 +314,10 @@ def show_surface(surface: Surface, folder: Path) -> None:
     from ..surfaces.files import surface_facts
 
     facts = surface_facts(surface)
-    sentences = ("doubts", "freedom")
+    sentences = ("doubts", "support", "freedom")
     show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in sentences})
+    for name, text in facts["support"].items():
+        print_line(_wrap(f"{name}: {text}"))
     for text in surface.freedom:
         print_line(_wrap(f"undetermined: {text}"))
     if surface.freedom:

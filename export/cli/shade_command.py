@@ -30,7 +30,7 @@ def shade_command(
     flip: options.Flip = False,
     hint: options.Hints = None,
     light: options.Lamp = None,
-    scale: options.Scale = None,
+    side: options.PictureSide = None,
     on: options.On = None,
     underlay: options.Underlay = None,
     sketch: SketchOptions,
@@ -38,13 +38,18 @@ def shade_command(
 ) -> None:
     """Compute the surface whose curvature lines are the crosses: normals, shaded pictures, heights, mesh.
 
+    All pictures have the page of the drawing, so they lie on it as layers, transparent outside the mask. The
+    normal map follows OpenGL: red to the right, green up. Without a page, pictures show the grid.
+
     Crosses do not determine which parts are bumps and which are hollows (--flip), nor the depth of parts that
-    bend in one direction only (--hint). Doubts about the surface are printed and written to surface.json.
-    A surface without doubts can be wrong too: crosses between strokes are extrapolated.
+    bend in one direction only (--hint). What is drawn, what is guessed, where crosses do not fit, and doubts
+    are printed and written to surface.json. A surface without doubts can be wrong too, most of all far from
+    strokes.
     """
     from ...models.field.file import write_field
     from ...models.surface.lift import surface
-    from ..surfaces.files import surface_document, write_surface
+    from ..pictures.underlay import read_underlay
+    from ..surfaces.files import choose_view, surface_document, write_surface
 
     hints, lamp = parse_hints(hint), parse_light(light)
     with show_progress(quiet=printing.quiet) as show:
@@ -60,13 +65,15 @@ def shade_command(
             underlay = underlay or find_drawing(source)
         else:
             field = saved
+        drawing = None if underlay is None else read_underlay(underlay, on=field.instance)
+        view = choose_view(field.instance, drawing, side)
         solid = surface(field, hints, flip=flip, progress=show)
         about = _describe_choices("bend" if saved is None else None, hints, lamp, flip=flip)
         show("drawing and writing")
-        write_surface(solid, output, drawing=underlay, light=lamp, scale=scale, about=about)
+        write_surface(solid, output, drawing=drawing, light=lamp, side=side, about=about)
         if saved is None:
             write_field(field, output / FIELD)
-    printing.show(surface_document(solid, about), lambda: show_surface(solid, output))
+    printing.show(surface_document(solid, view, about), lambda: show_surface(solid, output))
 
 
 def _read_saved_field(source: str, on: Path | None) -> CrossField | None:

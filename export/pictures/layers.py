@@ -50,12 +50,15 @@ def field_sheet(field: CrossField, drawing: Underlay | None = None) -> Sheet:
     return Sheet(place.page if drawing is None else drawing.page, layers, drawing)
 
 
-def strokes_sheet(instance: Instance, drawing: Underlay | None = None) -> Sheet:
-    """The strokes of the drawing, or of the instance, on the part of the page that the grid covers."""
+def strokes_sheet(
+    instance: Instance, page: Box, drawing: Underlay | None = None, width: float | None = None
+) -> Sheet:
+    """The strokes of the drawing, or of the instance, on a page. width: of lines in pixels of the grid."""
     place = SheetPlace(instance)
-    layer = Layer("strokes", _stroke_lines(place)) if drawing is None else _drawing_layer(drawing, place)
-    size = instance.pixel_size
-    page = (*instance.origin, size * instance.grid.width, size * instance.grid.height)
+    if drawing is None:
+        layer = Layer("strokes", _stroke_lines(place))
+    else:
+        layer = _drawing_layer(drawing, place, width and width * instance.pixel_size)
     return Sheet(page, (layer,), drawing)
 
 
@@ -89,11 +92,11 @@ class SheetPlace:
         return x, y, width, height
 
 
-def _drawing_layer(drawing: Underlay, place: SheetPlace) -> Layer:
-    """The curves of a drawing; many over each other are drawn thinner."""
+def _drawing_layer(drawing: Underlay, place: SheetPlace, width: float | None = None) -> Layer:
+    """The curves of a drawing with a line width; without one, many over each other are drawn thinner."""
     every = [piece for curves in drawing.curves.values() for piece in curves]
     length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)
-    width = _BELOW * place.unit / np.sqrt(max(length / (_MUCH * UNITS * place.unit), 1.0))
+    width = width or _BELOW * place.unit / np.sqrt(max(length / (_MUCH * UNITS * place.unit), 1.0))
     lines = (Lines(INK[name], width, curves) for name, curves in drawing.curves.items() if curves)
     return Layer("drawing", tuple(lines))
 

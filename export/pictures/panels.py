@@ -12,7 +12,7 @@ from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
 from ..shading.colours import shade_by_light
-from ..shading.raster import raster
+from ..shading.raster import raster, view_of_grid
 from .canvas import draw_smooth_image, paint
 from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, GridFrame
 
@@ -151,5 +151,6 @@ def draw_surface(axes: Any, picture: PanelContent) -> None:
     """The surface in the light of a lamp, smooth at any size."""
     assert picture.surface is not None
     scale = max(1, round(_DOTS_PER_POINT * picture.unit))
-    image = shade_by_light(raster(picture.instance, picture.surface.normals, scale))
+    view = view_of_grid(picture.instance, scale)
+    image = shade_by_light(raster(picture.instance, picture.surface.normals, view))
     draw_smooth_image(axes, image, picture.extent)

@@ -41,13 +41,14 @@ class Underlay:
 
     page: x, y, width, height, larger where strokes lie beyond it. curves: unbroken runs by colours of INK,
     each (k, 4, 2) cubics or (k, 2, 2) straight pieces. size: width and height with the units that the drawing
-    declares, as `210mm`. ink: uint8 [h, w], numbers of colours in `ink_colours`; None for curves. scale: side
-    of a pixel of the ink.
+    declares, as `210mm`. declared: the page as the drawing states it, None without one. ink: uint8 [h, w],
+    numbers of colours in `ink_colours`; None for curves. scale: side of a pixel of the ink.
     """
 
     page: Box
     curves: dict[str, list[Floats]]
     size: tuple[str, str]
+    declared: Box | None
     ink: NDArray[np.uint8] | None = None
     scale: float = 1.0
 
@@ -82,7 +83,7 @@ def _underlay_of_curves(curves: Curves, data: bytes) -> Underlay:
     runs_by_colour: dict[str, list[Floats]] = {name: [] for name in INK}
     for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):
         runs_by_colour["red" if red else "black"].append(run[:, [0, 3]] if are_straight(run) else run)
-    return Underlay(page, runs_by_colour, _page_size(data, curves.page, page))
+    return Underlay(page, runs_by_colour, _page_size(data, curves.page, page), curves.page)
 
 
 def size_in_units(page: Box) -> tuple[str, str]:
@@ -111,7 +112,7 @@ def _underlay_of_ink(picture: Bitmap) -> Underlay:
     level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
     ink = (level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)).astype(np.uint8)
     page = (0.0, 0.0, float(picture.width), float(picture.height))
-    return Underlay(page, {}, size_in_units(page), ink, float(picture.reduction))
+    return Underlay(page, {}, size_in_units(page), page, ink, float(picture.reduction))
 
 
 def ink_colours() -> Any:

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ...models.arguments import check_fields
 from ...models.errors import InputError
 from ...models.instance.domain import Floats
-from ...models.instance.instance import Instance
-from .raster import Raster, choose_scale, raster
+from .raster import Raster
 
 Bytes = NDArray[np.uint8]
 
@@ -118,21 +117,8 @@ def ball_normals(normals: Floats) -> Floats:
     return np.asarray(_BODY * (soft + side + _FLOOR) + 0.4 * gloss + 0.55 * rim)
 
 
-def normal_map(instance: Instance, normals: Floats, scale: int = 1) -> Bytes:
-    """Red, green, blue and opacity, uint8 (h, w, 4), as in OpenGL and Blender (green up).
-
-    scale: texels per pixel of the grid; at 1, each has its own normal, otherwise they are smooth.
-    """
-    if choose_scale(instance, scale) > 1:
-        return to_eight_bit(colour_normals(raster(instance, normals, scale)))
-    image = np.zeros((*instance.mask.shape, 3))
-    image[..., 2] = 1.0
-    image[instance.mask] = normals
-    return to_eight_bit(colour_normals(Raster(image, instance.mask.astype(np.float64))))
-
-
 def colour_normals(picture: Raster) -> Floats:
-    """Red, green, blue and opacity (h, w, 4) in [0, 1] of the normals."""
+    """Red, green, blue and opacity (h, w, 4) in [0, 1] of the normals, as in OpenGL (green up)."""
     return np.concatenate([(picture.normals + 1) / 2, picture.opacity[..., None]], axis=-1)
 
 

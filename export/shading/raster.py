@@ -1,5 +1,7 @@
 """A surface on a finer raster: smooth normals inside of a smooth outline.
 
+A `View` states which part of the drawing a picture shows, and in how many pixels.
+
 Normals are interpolated by cubic B-splines over the pixels of the mask. The outline is where the splines of
 the mask itself are one half. A wider blur smooths its stairs. It may move the outline by half a pixel, and by
 less where the mask or a gap in it is thin.
@@ -7,17 +9,18 @@ less where the mask or a gap in it is thin.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from ...models.errors import InputError
-from ...models.input_limits import MAX_PIXELS
+from ...models.input_limits import MAX_PIXELS, MAX_SIDE
 from ...models.instance.domain import Bools, Floats
 from ...models.instance.instance import Instance
 
-SIDE: Final = 1000  # pixels, about, of a picture's longer side unless a scale is given
+SIDE: Final = 2048  # pixels, about, of the longer side of a picture of a page unless a side is given
 _BLUR: Final = 2.0  # pixels of the grid over which stairs are smoothed
 _MOVED: Final = 0.33  # at most, of the share of a place that is inside
 _MOVED_THIN: Final = 0.12  # where the mask or a gap is one or two pixels thin
@@ -27,7 +30,56 @@ _DRAWN: Final = 0.4  # pixels from the border to strokes on it, which pass throu
 _TIP: Final = 8  # most pixels of a tip; larger thin regions are parts
 _BUMP: Final = 2  # most pixels of a bump, one pixel wide, that smoothing may remove; longer ones are lines
 _RAISED: Final = 0.5  # added to the mask on lines: a diagonal one alone would reach one half only
+ALL: Final = slice(None)
 _REACH: Final = 2  # pixels of the grid to each side that a cubic B-spline has
+
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class View:
+    """A part of the drawing, and the size of a picture of it in pixels.
+
+    box: x, y, width and height in the units of the drawing, y down.
+    """
+
+    box: Box
+    width: int
+    height: int
+
+    @property
+    def pixel(self) -> tuple[float, float]:
+        """Width and height of a pixel of the picture, in the units of the drawing."""
+        return self.box[2] / self.width, self.box[3] / self.height
+
+
+def grid_box(instance: Instance) -> Box:
+    """x, y, width and height of the grid in the units of the drawing."""
+    height, width = instance.mask.shape
+    return (*instance.origin, instance.pixel_size * width, instance.pixel_size * height)
+
+
+def view_of_grid(instance: Instance, scale: int) -> View:
+    """The whole grid, with `scale` pixels of the picture along each pixel of the grid."""
+    height, width = instance.mask.shape
+    return View(grid_box(instance), width * scale, height * scale)
+
+
+def view_of_box(box: Box, side: int | None = None) -> View:
+    """A picture of a box with `side` pixels along its longer side. Raises InputError.
+
+    By default a unit has a whole number of pixels, for about SIDE in all: a box of whole units fits exactly.
+    """
+    longer = max(box[2:])
+    side = round(longer * round(SIDE / longer)) or SIDE if side is None else side
+    width, height = (max(1, round(side * extent / longer)) for extent in box[2:])
+    if side < 1 or max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
+        raise InputError(
+            f"a picture cannot have {side} pixels on its longer side; give 1 to {MAX_SIDE}, and at most "
+            f"{MAX_PIXELS // 10**6} million pixels in all"
+        )
+    return View(box, width, height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,58 +90,91 @@ class Raster:
     opacity: Floats
 
 
-def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Raster:
-    """The normals of a surface, (n, 3) at the pixels of the grid, at a scale as in `choose_scale`."""
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """An outline finer than the pixels of the grid: where a level [h, w] at the pixels of a view is 0.
+
+    Inside, the level is positive.
+    """
+
+    view: View
+    level: Floats
+
+
+def raster(
+    instance: Instance, normals: Floats, view: View, rows: slice = ALL, outline: Outline | None = None
+) -> Raster:
+    """The normals of a surface, (n, 3) at the pixels of the grid, in some rows of a view.
+
+    outline: of the surface, which replaces that of the mask.
+    """
     from scipy import ndimage
 
-    scale = choose_scale(instance, scale)
-    mask = np.pad(instance.mask, _REACH)
+    mask, pixel = np.pad(instance.mask, _REACH), instance.pixel_size
+    height, width = mask.shape
+    x, y = (start - _REACH * pixel for start in instance.origin)
+    spread = _interpolation(View((x, y, width * pixel, height * pixel), width, height), view, rows)
     image = np.zeros((*mask.shape, 3))
     image[mask] = normals
-    up, across = (_splines(count, scale)[_REACH * scale : -_REACH * scale] for count in mask.shape)
-
-    def spread(values: Floats) -> Floats:
-        return np.asarray(up @ (across @ values.T).T)
-
-    summed = np.stack([spread(part) for part in np.moveaxis(image, -1, 0)], axis=-1)
-    length = np.linalg.norm(summed, axis=-1, keepdims=True)
-    viewer = np.array([0.0, 0.0, 1.0])
-    unit = np.where(length > 1e-9, summed / np.maximum(length, 1e-9), viewer)
-    lines = _lines(mask)
-    thin = spread(
-        (_find_thin_parts(mask) | ndimage.binary_dilation(lines, np.ones((3, 3)))).astype(np.float64)
-    )
-    within = _DRAWN * border_width(instance) * (1 - thin)
-    solid = mask.astype(np.float64)
-    blurred = ndimage.gaussian_filter(solid, _BLUR, mode="constant")
-    narrow = spread(solid + _RAISED * lines) - _SLOPE * within
-    wide = spread(blurred) - _BLURRED_SLOPE * within
-    most = _MOVED + thin * (_MOVED_THIN - _MOVED)
-    # The part of each pixel inside of the outline, where the level is one half.
-    depth = np.pad(narrow + np.clip(wide - narrow, -most, most) - 0.5, 1, mode="edge")
+    image[~mask] = _normalise(ndimage.gaussian_filter(image, (_BLUR, _BLUR, 0), mode="constant")[~mask])
+    unit = _normalise(np.stack([spread(part)[1:-1] for part in np.moveaxis(image, -1, 0)], axis=-1))
+    if outline is None:
+        depth = _depth_in_mask(mask, border_width(instance), spread)
+    else:
+        outside = outline.level.min()
+        depth = _interpolation(outline.view, view, rows)(outline.level - outside) + outside
+    # The part of each pixel inside of the outline.
+    depth = np.pad(depth, ((0, 0), (1, 1)), mode="edge")
     steepness = np.hypot(*np.gradient(depth))
     opacity = np.clip(0.5 + depth / np.maximum(steepness, 1e-9), 0.0, 1.0)
     return Raster(unit, opacity[1:-1, 1:-1])
 
 
-def choose_scale(instance: Instance, scale: int | None) -> int:
-    """Picture pixels per pixel of the grid, by default for a longer side of SIDE. Raises InputError."""
-    height, width = instance.mask.shape
-    if scale is None:
-        return max(1, round(SIDE / int(max(height, width))))
-    if scale < 1 or height * width * scale**2 > MAX_PIXELS:
-        raise InputError(
-            f"the scale {scale} makes no picture of {width} x {height} pixels: it has to be 1 or more, "
-            f"and the picture no more than {MAX_PIXELS // 10**6} million pixels; choose another scale"
-        )
-    return scale
+def _normalise(vectors: Floats) -> Floats:
+    """The vectors (..., 3) with length 1; towards the viewer where there is none."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.where(length > 1e-9, vectors / np.maximum(length, 1e-9), (0.0, 0.0, 1.0))
 
 
-def _splines(count: int, scale: int) -> Any:
-    """The cubic B-splines of `count` pixels at the centres of `count * scale` finer ones, a sparse matrix."""
+def _interpolation(values: View, view: View, rows: slice) -> Callable[[Floats], Floats]:
+    """The function that interpolates values [h, w], 0 beyond them, at the pixels of some rows of a view.
+
+    It adds a row above and below.
+    """
+    (wide, high), (step_x, step_y) = view.pixel, values.pixel
+    numbers = np.arange(view.height)[rows]
+    down = (
+        view.box[1] - values.box[1] + (np.arange(numbers[0] - 1, numbers[-1] + 2, dtype=float) + 0.5) * high
+    )
+    right = view.box[0] - values.box[0] + (np.arange(view.width, dtype=float) + 0.5) * wide
+    up, across = _splines(values.height, down / step_y - 0.5), _splines(values.width, right / step_x - 0.5)
+    return lambda image: np.asarray(up @ (across @ image.T).T)
+
+
+def _depth_in_mask(mask: Bools, strokes: float, spread: Callable[[Floats], Floats]) -> Floats:
+    """A level that is 0 on the smooth outline of a mask and positive inside.
+
+    strokes: part of the border that carries strokes, as from `border_width`. spread: interpolates.
+    """
+    from scipy import ndimage
+
+    lines = _lines(mask)
+    thin = spread(
+        (_find_thin_parts(mask) | ndimage.binary_dilation(lines, np.ones((3, 3)))).astype(np.float64)
+    )
+    within = _DRAWN * strokes * (1 - thin)
+    solid = mask.astype(np.float64)
+    blurred = ndimage.gaussian_filter(solid, _BLUR, mode="constant")
+    narrow = spread(solid + _RAISED * lines) - _SLOPE * within
+    wide = spread(blurred) - _BLURRED_SLOPE * within
+    most = _MOVED + thin * (_MOVED_THIN - _MOVED)
+    return np.asarray(narrow + np.clip(wide - narrow, -most, most) - 0.5)
+
+
+def _splines(count: int, place: Floats) -> Any:
+    """The cubic B-splines of `count` pixels at places (m,) in pixels, a sparse matrix (m, count)."""
     from scipy import sparse
 
-    place = (np.arange(count * scale) + 0.5) / scale - 0.5
     near = np.floor(place)[:, None].astype(np.int64) + np.arange(1 - _REACH, 1 + _REACH)
     off = np.abs(place[:, None] - near)
     weight = np.where(off < 1, 2 / 3 - off**2 + off**3 / 2, np.maximum(2 - off, 0.0) ** 3 / 6)

@@ -24,7 +24,7 @@ from ..bundle.manifest import Manifest
 from ..bundle.problem_files import write_all
 from ..pictures.mask import has_mask, write_mask
 from ..pictures.underlay import Underlay, read_underlay
-from ..surfaces.files import SHADED, write_shaded
+from ..surfaces.files import NORMALS, SHADED, write_layers
 from .methods import METHODS, Candidate, Request, methods_of
 from .proven import ProvenBound
 from .report import Report, Stopwatch
@@ -70,7 +70,8 @@ def run(
     - DIR/solve: input and output of the local solvers
     - DIR/field.npz, .json, .rawfield with .obj and .sings: the kept field
     - DIR/overview.png and other pictures of it; overlay.svg, .png: the same on the drawing
-    - DIR/shaded.png: its surface, without doubts; otherwise report.json has the reasons
+    - DIR/normals.png, shaded.png: its surface on the page of the drawing, without doubts; otherwise
+      report.json has the reasons
     - DIR/lowest.npz: the field of minimum 2-norm energy
     - DIR/mask.png: the mask, as `read_sketch` accepts it; not for an instance from a file
     - DIR/certificate.npz: the certificate of the proven bound, with the field of the method `prove`
@@ -248,7 +249,7 @@ def _draw_all(
             report = _draw_field(report, new, underlay, request.progress, stop)
             watch.lap("pictures")
         if not report.interrupted and isinstance(report.instance.domain, Grid):
-            report = _draw_surface(report, new, request.progress, stop)
+            report = _draw_surface(report, new, underlay, request.progress, stop)
             watch.lap("surface")
         return report, {path.name for path in new.iterdir()}
 
@@ -278,7 +279,9 @@ def _draw_field(
     return report
 
 
-def _draw_surface(report: Report, folder: Path, progress: Progress, stop: Over) -> Report:
+def _draw_surface(
+    report: Report, folder: Path, underlay: Underlay | None, progress: Progress, stop: Over
+) -> Report:
     """Lift the kept field to a surface, and draw it if nothing speaks against it; return the report."""
     deadline = Deadline.after(LONGEST_LIFT)
     try:
@@ -286,7 +289,7 @@ def _draw_surface(report: Report, folder: Path, progress: Progress, stop: Over) 
         lifted = surface(report.kept.field, stop=lambda: deadline.passed() or stop(), progress=progress)
         report = replace(report, surface=lifted, interrupted="surface" if stop() else "")
         if report.surface is not None and report.shaded:
-            write_shaded(report.surface, folder / SHADED)
+            write_layers(report.surface, folder, underlay)
     except CrossfieldError as error:
         report.failures["surface"] = str(error)
     except KeyboardInterrupt:
@@ -298,7 +301,7 @@ def _write_report(report: Report, folder: Path, names: set[str]) -> None:
     """Write page and report, and remove files of an earlier run that this one did not replace."""
     document = report.document()
     write_page(folder, document, report.manifests, names, report.kept.field)
-    for name in {CERTIFICATE, MASK, SHADED, *OVERLAY, *map(picture_name, PICTURES)} - names:
+    for name in {CERTIFICATE, MASK, NORMALS, SHADED, *OVERLAY, *map(picture_name, PICTURES)} - names:
         remove_file(folder / name)
     write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
 

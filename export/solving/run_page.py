@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
 from base64 import b64encode
 from pathlib import Path
 from typing import Any, Final
+
+import numpy as np
 
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import declare
@@ -16,6 +19,7 @@ from ..bundle.manifest import Manifest
 from ..formats.registry import FORMATS
 from ..pictures.mesh_view import model_data
 from ..solvers_table import BUNDLED, smallest_problem, suitability
+from ..surfaces.files import encode_png
 from .methods import table_cells
 
 PAGE: Final = "index.html"
@@ -29,6 +33,7 @@ _LAYERS: Final = (
     ("singularities", True),
 )
 """Layers of overlay.svg, and whether they are shown at first."""
+_SHADED: Final = 1000  # pixels on the longer side of the surface on the page
 _COLUMNS: Final = ("1-norm", "off strokes", "lines < 45°", "singularities", "seconds")
 _FILES: Final = {
     "field.npz": "the field that is kept; also .json, and .rawfield with .obj and .sings",
@@ -41,7 +46,8 @@ _FILES: Final = {
     "crosses.png": "crosses",
     "angle.png": "angle between the lines",
     "instance.png": "strokes, on the mask or the mesh",
-    "shaded.png": "the surface",
+    "shaded.png": "the surface, a layer for the drawing",
+    "normals.png": "its normal map (OpenGL: green up), a layer for the drawing",
     "mask.png": "the pixels that are solved for; paint it and give it back with --mask",
     "report.json": "all facts",
 }
@@ -70,7 +76,7 @@ def write_page(
         layers=[entry for entry in _LAYERS if entry[0] != "drawing" or 'id="drawing"' in overlay],
         overlay=overlay,
         overview=_embed_picture(folder / "overview.png") if "overview.png" in names else "",
-        shaded=_embed_picture(folder / "shaded.png") if "shaded.png" in names else "",
+        shaded=_embed_picture(folder / "shaded.png", _SHADED) if "shaded.png" in names else "",
         columns=["method", "2-norm", *["gap"] * bool(report["proof"]), *_COLUMNS],
         methods=[
             [facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""), *table_cells(facts)]
@@ -93,9 +99,16 @@ def _read_svg(path: Path) -> str:
     return read_bytes(path).decode().partition("?>\n")[2]
 
 
-def _embed_picture(path: Path) -> str:
-    """A PNG as the address that contains it."""
-    return f"data:image/png;base64,{b64encode(read_bytes(path)).decode()}"
+def _embed_picture(path: Path, side: int | None = None) -> str:
+    """A PNG as the address that contains it, with at most `side` pixels on its longer side."""
+    data = read_bytes(path)
+    if side is not None:
+        from PIL import Image
+
+        with Image.open(io.BytesIO(data)) as picture:
+            picture.thumbnail((side, side))
+            data = encode_png(np.asarray(picture))
+    return f"data:image/png;base64,{b64encode(data).decode()}"
 
 
 def _describe_set(manifest: Manifest) -> dict[str, Any]:

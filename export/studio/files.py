@@ -15,8 +15,10 @@ from ...models.field.file import write_field
 from ...models.instance.file import write_instance
 from ..bundle.problem_files import write_all
 from ..pictures.draw import draw
-from ..shading.colours import normal_map
-from ..surfaces.files import encode_png, write_surface
+from ..pictures.underlay import read_underlay
+from ..shading.colours import colour_normals
+from ..shading.raster import view_of_box
+from ..surfaces.files import encode_png, paint_surface, write_surface
 from .document import Document, Stroke
 from .session import compute_field, compute_surface, read_drawn
 
@@ -65,8 +67,10 @@ def _write_layers(document: Document, folder: Path, *_: str) -> None:
 
 def _write_normals(document: Document, folder: Path, *_: str) -> None:
     solid = compute_surface(document, compute_field(document)[1])
-    texels = normal_map(solid.instance, solid.normals, max(1, 1024 // max(solid.instance.mask.shape)))
-    (folder / f"{document.name}.normals.png").write_bytes(encode_png(texels))
+    with tempfile.TemporaryDirectory() as temporary:
+        underlay = read_underlay(_write_drawing(document, Path(temporary)), on=solid.instance)
+    [picture] = paint_surface(solid, underlay, view_of_box(document.page), colour_normals)
+    (folder / f"{document.name}.normals.png").write_bytes(encode_png(picture))
 
 
 def _write_surface(document: Document, folder: Path, *_: str) -> None:

@@ -14,7 +14,7 @@ from ...models.surface.trust import OFF, UNFIT, right_angle_deviation
 from ..pictures.draw import count_singularities
 from ..pictures.marks import split_runs
 from ..pictures.streamlines import streamlines
-from ..shading.raster import raster
+from ..shading.raster import raster, view_of_grid
 from .document import Document
 from .next_step import find_next_step
 from .session import DrawnInstance, OvertakenError, compute_field, compute_surface
@@ -119,7 +119,7 @@ def surface_step(data: bytes, drawn: DrawnInstance, field: CrossField) -> dict[s
 def _surface_view(drawn: DrawnInstance, lifted: Surface) -> dict[str, Any]:
     instance, field = lifted.instance, lifted.field
     longer = max(instance.mask.shape)
-    picture = raster(instance, lifted.normals, max(1, SIDE // longer))
+    picture = raster(instance, lifted.normals, view_of_grid(instance, max(1, SIDE // longer)))
     height, width = picture.opacity.shape
     off = right_angle_deviation(field, lifted.heights)
     unfit = off > OFF

@@ -1,14 +1,15 @@
 """The folder of a surface: pictures, heights, a report, and a mesh (.obj) with a quad for each pixel.
 
-x runs to the right, y up, z towards the viewer, all in pixels; the lower left corner of the grid is at
-x = y = 0. Texture coordinates cover the grid.
+All pictures show the page of the drawing, so they lie on it as layers; without a page they show the grid. In
+the mesh, x runs to the right, y up, z towards the viewer, all in pixels of the grid; the lower left corner of
+the grid is at x = y = 0. Texture coordinates cover the pictures.
 """
 
 from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,21 +22,23 @@ from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import make_folder, write_bytes
 from ...models.surface.surface import Surface
-from ...models.surface.trust import right_angle_deviation
+from ...models.surface.trust import describe_support, right_angle_deviation
 from ..formats.registry import program_version
 from ..pictures.canvas import render_sheet
 from ..pictures.draw import fixed_settings
 from ..pictures.layers import strokes_sheet
 from ..pictures.underlay import Underlay, read_underlay
-from ..shading.colours import UPPER_LEFT, Light, matcap, normal_map, shade_by_light, to_eight_bit
-from ..shading.raster import choose_scale, raster
+from ..shading.colours import UPPER_LEFT, Light, colour_normals, matcap, shade_by_light, to_eight_bit
+from ..shading.raster import Box, Raster, View, grid_box, raster, view_of_box
+from .outline import find_outline
 
+NORMALS: Final = "normals.png"
 SHADED: Final = "shaded.png"
 DRAWING: Final = "drawing.png"
 MATERIALS: Final = "surface.mtl"
 REPORT: Final = "surface.json"
 FILES: Final = {
-    "normals.png": "normals as colours, a texel a pixel",
+    NORMALS: "normals as colours, as in OpenGL: red to the right, green up",
     SHADED: "in the light of a lamp",
     "matcap.png": "in the material of a glazed ball",
     "overlay.png": "in the light of a lamp, with the strokes",
@@ -43,12 +46,17 @@ FILES: Final = {
     "surface.obj": "mesh with texture coordinates and normals",
     MATERIALS: "its material",
     DRAWING: "the strokes on paper, its texture",
-    REPORT: "facts, doubts and freedom",
+    REPORT: "where the pictures lie, what supports the surface, doubts and freedom",
 }
 """The files of a surface, and the content of each."""
 _PAPER: Final = (0.93, 0.91, 0.88)
 _MATERIAL: Final = "drawing"
 _MTL: Final = f"newmtl {_MATERIAL}\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {DRAWING}\n"
+_ENCODING: Final = (
+    "red, green, blue = round(255 (n + 1) / 2) of the unit normal n: red to the right, green up (OpenGL; for "
+    "DirectX invert green), blue towards the viewer; numbers, not colours, so no colour profile applies"
+)
+_BAND: Final = 1 << 20  # pixels of a picture that are computed together
 _WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
 
@@ -59,7 +67,7 @@ def write_surface(
     *,
     drawing: str | Path | Underlay | None = None,
     light: Light = UPPER_LEFT,
-    scale: int | None = None,
+    side: int | None = None,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write a surface as pictures, heights, a mesh and a report. Equal surfaces give equal bytes.
@@ -73,13 +81,13 @@ def write_surface(
     folder
         Folder to write to; created if it does not exist.
     drawing
-        File or sample from which the instance was read, for the strokes; None shows a short line at each
-        stroke pixel.
+        File or sample from which the instance was read, for its page and strokes. None: the page that was
+        stated when the instance was read, and a short line at each stroke pixel.
     light
         Position of the lamp.
-    scale
-        Pixels of a picture per pixel of the grid. None: 1 in the normal map, and in other pictures enough for
-        about 1000 on the longer side.
+    side
+        Pixels on the longer side of the pictures. None: those of a drawing that is a picture, else about
+        2048.
     about
         Facts for the report on how the surface was made.
 
@@ -91,25 +99,27 @@ def write_surface(
     Raises
     ------
     InputError
-        For a drawing that is unreadable or does not match the instance, and for a scale out of range.
+        For a drawing that is unreadable or does not match the instance, and for a side out of range.
     OutputError
         If a file cannot be written.
 
     """
     if drawing is not None and not isinstance(drawing, Underlay):
         drawing = read_underlay(drawing, on=surface.instance)
-    fine = choose_scale(surface.instance, scale)
+    view = choose_view(surface.instance, drawing, side)
     folder = make_folder(folder)
     (folder / REPORT).unlink(missing_ok=True)
-    normals = raster(surface.instance, surface.normals, fine)
-    shaded, ink = shade_by_light(normals, light), draw_strokes(surface.instance, drawing, fine)
-    paper = np.broadcast_to((*_PAPER, 1.0), ink.shape)
+    normals, shaded, glazed = paint_surface(
+        surface, drawing, view, colour_normals, lambda part: shade_by_light(part, light), matcap
+    )
+    ink = draw_strokes(surface.instance, drawing, view)
+    paper = np.full_like(ink, to_eight_bit(np.array([*_PAPER, 1.0])))
     pictures = {
-        "normals.png": normal_map(surface.instance, surface.normals, scale or 1),
-        SHADED: to_eight_bit(shaded),
-        "matcap.png": to_eight_bit(matcap(normals)),
-        "overlay.png": to_eight_bit(lay_over(ink, shaded)),
-        DRAWING: to_eight_bit(lay_over(ink, paper)[..., :3]),
+        NORMALS: normals,
+        SHADED: shaded,
+        "matcap.png": glazed,
+        "overlay.png": lay_over(ink, shaded),
+        DRAWING: lay_over(ink, paper)[..., :3],
     }
     for name, picture in pictures.items():
         write_bytes(folder / name, encode_png(picture))
@@ -117,17 +127,60 @@ def write_surface(
     np.save(heights, surface.heights, allow_pickle=False)
     write_bytes(folder / "heights.npy", heights.getvalue())
     write_bytes(folder / MATERIALS, _MTL.encode())
-    write_bytes(folder / "surface.obj", to_obj(surface, MATERIALS))
-    document = surface_document(surface, about) | {"files": FILES}
+    write_bytes(folder / "surface.obj", to_obj(surface, MATERIALS, view.box))
+    document = surface_document(surface, view, about) | {"files": FILES}
     write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
     return folder
 
 
-def write_shaded(surface: Surface, path: str | Path) -> Path:
-    """Write a PNG of the surface in the light of a lamp, and return its path. Raises OutputError."""
-    return write_bytes(
-        path, encode_png(to_eight_bit(shade_by_light(raster(surface.instance, surface.normals))))
+def write_layers(surface: Surface, folder: Path, drawing: Underlay | None = None) -> None:
+    """Write normal map and shaded picture, to lie on the drawing as layers. Raises OutputError."""
+    view = choose_view(surface.instance, drawing)
+    pictures = paint_surface(surface, drawing, view, colour_normals, shade_by_light)
+    for name, picture in zip((NORMALS, SHADED), pictures, strict=True):
+        write_bytes(folder / name, encode_png(picture))
+
+
+def choose_view(instance: Instance, drawing: Underlay | None = None, side: int | None = None) -> View:
+    """The page of the drawing; the grid if there is none, or if the mask lies beside it. Raises InputError.
+
+    side: pixels on the longer side; by default those of a bitmap, and SIDE for other drawings.
+    """
+    if drawing is not None:
+        page = drawing.declared
+        if drawing.ink is not None and side is None:
+            side = round(max(drawing.page[2:]))
+    else:
+        page = instance.reading.page if instance.reading else None
+    return view_of_box(page if page and _is_on(page, instance) else grid_box(instance), side)
+
+
+def _is_on(page: Box, instance: Instance) -> bool:
+    """Whether the middle of a pixel of the mask lies on a page."""
+    x, y, width, height = page
+    across, down = (
+        start + instance.pixel_size * (steps + 0.5)
+        for start, steps in zip(instance.origin, (instance.grid.columns, instance.grid.rows), strict=True)
     )
+    return bool(((across >= x) & (across < x + width) & (down >= y) & (down < y + height)).any())
+
+
+def paint_surface(
+    surface: Surface, drawing: Underlay | None, view: View, *colours: Callable[[Raster], Floats]
+) -> list[NDArray[np.uint8]]:
+    """A picture of the surface, uint8 (h, w, 4), for each way to colour its normals.
+
+    It ends at the outline that is drawn, or at that of the mask.
+    """
+    outline = find_outline(surface.instance, drawing) if drawing else None
+    pictures = [np.empty((view.height, view.width, 4), dtype=np.uint8) for _ in colours]
+    band = max(1, _BAND // view.width)
+    for top in range(0, view.height, band):
+        rows = slice(top, top + band)
+        part = raster(surface.instance, surface.normals, view, rows, outline)
+        for picture, colour in zip(pictures, colours, strict=True):
+            picture[rows] = to_eight_bit(colour(part))
+    return pictures
 
 
 def encode_png(picture: NDArray[np.uint8]) -> bytes:
@@ -139,28 +192,29 @@ def encode_png(picture: NDArray[np.uint8]) -> bytes:
     return stream.getvalue()
 
 
-def draw_strokes(instance: Instance, drawing: Underlay | None, scale: int) -> Floats:
-    """Red, green, blue and opacity (h, w, 4) in [0, 1] of the strokes of the drawing, or of the instance."""
-    height, width = (side * scale for side in instance.mask.shape)
-    with fixed_settings():
-        drawn: Floats = render_sheet(strokes_sheet(instance, drawing), width, height) / 255.0
-    return drawn
-
-
-def lay_over(above: Floats, below: Floats) -> Floats:
+def lay_over(above: NDArray[np.uint8], below: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """One picture (h, w, 4) laid over another, both with opacity as fourth value."""
-    front, back = above[..., 3:], below[..., 3:] * (1 - above[..., 3:])
-    opacity = front + back
-    colour = (front * above[..., :3] + back * below[..., :3]) / np.maximum(opacity, 1e-9)
-    return np.concatenate([colour, opacity], axis=-1)
+    from PIL import Image
+
+    return np.asarray(Image.alpha_composite(Image.fromarray(below), Image.fromarray(above)))
 
 
-def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The report of a surface as JSON. about: how it was made, for instance the method of its field."""
+def draw_strokes(instance: Instance, drawing: Underlay | None, view: View) -> NDArray[np.uint8]:
+    """Red, green, blue and opacity, uint8 (h, w, 4), of the strokes of the drawing, or of the instance."""
+    with fixed_settings():
+        return render_sheet(strokes_sheet(instance, view.box, drawing), view.width, view.height)
+
+
+def surface_document(surface: Surface, view: View, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """The report of a surface as JSON.
+
+    view: of its pictures. about: how it was made, for instance the method of its field.
+    """
     instance = surface.instance
+    on_grid = view.box == grid_box(instance)
     return {
         "format": "crossfield-surface",
-        "version": 1,
+        "version": 2,
         "generator": program_version(),
         "instance": {
             "name": instance.name,
@@ -172,18 +226,24 @@ def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -
             "pixel_size": instance.pixel_size,
             "origin": list(instance.origin),
         },
+        "pictures": {
+            "show": "the grid, as no page is known" if on_grid else "the page of the drawing",
+            "page": [round(value, 6) for value in view.box],
+            "width": view.width,
+            "height": view.height,
+            "pixel_size": [float(f"{value:.9g}") for value in view.pixel],
+            "normals": _ENCODING,
+        },
         **(about or {}),
         **surface_facts(surface),
     }
 
 
 def surface_facts(surface: Surface) -> dict[str, Any]:
-    """Doubts about a surface, its freedom, and measurements in pixels and degrees."""
+    """Doubts about a surface, its support and freedom, and measurements in pixels and degrees."""
     off = np.degrees(right_angle_deviation(surface.field, surface.heights))
     slant = np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1.0, 1.0)))
     numbers = {
-        "confidence_mean": surface.confidence.mean(),
-        "confidence_least_tenth": np.percentile(surface.confidence, 10),
         "right_angle_error_mean_degrees": off.mean(),
         "right_angle_error_90_percent_degrees": np.percentile(off, 90),
         "slant_mean_degrees": slant.mean(),
@@ -192,19 +252,20 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
     }
     return {
         "doubts": list(surface.doubts),
+        "support": describe_support(surface.field, np.radians(off)),
         "freedom": list(surface.freedom),
         **{name: round(float(value), 4) for name, value in numbers.items()},
     }
 
 
-def to_obj(surface: Surface, materials: str) -> bytes:
-    """The mesh as text. materials: name of the .mtl file in its folder."""
+def to_obj(surface: Surface, materials: str, box: Box) -> bytes:
+    """The mesh as text. materials: name of the .mtl file in its folder. box: what its texture shows."""
     instance = surface.instance
     places, corners = vertices_of(instance.grid)
-    height, width = instance.mask.shape
     row, column = places.T
-    points = np.column_stack([column, height - row, surface.heights[row, column]])
-    texture = np.column_stack([column / width, 1 - row / height])
+    points = np.column_stack([column, instance.grid.height - row, surface.heights[row, column]])
+    steps = instance.pixel_size * places[:, ::-1] + instance.origin
+    texture = (steps - box[:2]) / box[2:] * (1, -1) + (0, 1)
     normals = np.zeros((len(places), 3))
     np.add.at(normals, corners, surface.normals[:, None, :])
     faces = corners[:, _WALK] + 1

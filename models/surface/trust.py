@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from scipy import ndimage
 
 from ..field.field import CrossField
 from ..instance.domain import Floats
+from ..instance.instance import Instance
 from .equations import Equations, Weights
 from .stencils import Crosses, Stencils, corners_of_blocks
 
@@ -47,3 +49,34 @@ def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
         "lines that cross at right angles everywhere do not determine a shape": slant.mean() < FLAT,
     }
     return tuple(doubt for doubt, holds in conditions.items() if holds)
+
+
+def describe_support(field: CrossField, off: Floats) -> dict[str, str]:
+    """What supports a surface, and where it is a guess. off: as from `right_angle_deviation`."""
+    instance = field.instance
+    free = np.ones(instance.mask.shape, dtype=bool)
+    free[tuple(instance.stroke_pixels.T)] = False
+    away, unfit = ndimage.distance_transform_edt(free)[instance.mask], off > OFF
+    far, far_at = away.max(), _describe_place(instance, away)
+    sentences = {
+        "drawn": f"{1 - np.mean(away > 0):.0%} of the pixels of the grid lie on a stroke, which gives the "
+        "direction of one line",
+        "guessed": f"all other crosses continue the strokes, farthest at {far_at}, {far:.1f} pixels "
+        f"({far * instance.pixel_size:.3g} units of the drawing) from a stroke; more lines there help most",
+        "fitting": f"on {1 - unfit.mean():.0%} of the pixels the two lines meet on the surface within "
+        f"{np.degrees(OFF):g} degrees of a right angle, as curvature lines do",
+    }
+    if unfit.any():
+        image = np.zeros(np.add(instance.mask.shape, 2))
+        image[1:-1, 1:-1][instance.mask] = unfit
+        depth = ndimage.distance_transform_edt(image)[1:-1, 1:-1][instance.mask]
+        place = _describe_place(instance, depth)
+        sentences["not fitting"] = f"above all round {place}; distrust normals there"
+    return sentences
+
+
+def _describe_place(instance: Instance, values: Floats) -> str:
+    """The middle of the pixel with the greatest value, in the coordinates of the drawing."""
+    pixel = np.argwhere(instance.mask)[np.argmax(values)]
+    x, y = instance.origin + instance.pixel_size * (pixel[::-1] + 0.5)
+    return f"({x:.4g}, {y:.4g})"

@@ -4,9 +4,16 @@ import io
 
 import numpy as np
 import pytest
-from crossfield.export.shading.colours import CLAY, Light, matcap, normal_map, shade_by_light
+from crossfield.export.shading.colours import (
+    CLAY,
+    Light,
+    colour_normals,
+    matcap,
+    shade_by_light,
+    to_eight_bit,
+)
 from crossfield.export.shading.colours import ball_normals as matcap_ball
-from crossfield.export.shading.raster import Raster, raster
+from crossfield.export.shading.raster import Raster, raster, view_of_grid
 from crossfield.export.surfaces.files import encode_png
 from crossfield.models.errors import InputError
 from crossfield.models.instance.instance import Instance
@@ -15,28 +22,23 @@ from shapes import ball, ball_normals, disc, plane, surface_of
 
 
 def fine(surface, scale):
-    return raster(surface.instance, surface.normals, scale)
+    return raster(surface.instance, surface.normals, view_of_grid(surface.instance, scale))
 
 
-def mapped(surface, scale=1):
-    return normal_map(surface.instance, surface.normals, scale).astype(int)
+def mapped(surface, scale):
+    return to_eight_bit(colour_normals(fine(surface, scale))).astype(int)
 
 
 def test_a_normal_map_is_half_of_the_normals_and_one_right_red_up_green():
-    surface = ball(24)
-    mask, texels = surface.instance.mask, mapped(surface)
-    assert texels.shape == (24, 24, 4)
-    assert (texels[..., 3] == np.where(mask, 255, 0)).all()
-    assert (texels[mask][:, :3] == np.round(255 * (surface.normals + 1) / 2)).all()
-    assert (texels[~mask][:, :3] == (128, 128, 255)).all()
-    assert np.abs(texels[mask][:, :3] - 255 * (ball_normals(surface) + 1) / 2).max() < 8
-    assert texels[12, 20, 0] > 180 > texels[12, 3, 0] + 100
-    assert texels[3, 12, 1] > 180 > texels[20, 12, 1] + 100
+    texels = mapped(ball(24), 3)
+    assert texels[36, 60, 0] > 180 > texels[36, 10, 0] + 100
+    assert texels[10, 36, 1] > 180 > texels[60, 36, 1] + 100
+    assert (mapped(plane(6, 0.0, 0.0), 3)[9, 9] == (128, 128, 255, 255)).all()
     read = Image.open(io.BytesIO(encode_png(texels.astype(np.uint8))))
     assert (np.asarray(read) == texels).all()
 
 
-def test_a_finer_normal_map_has_unit_normals_near_those_of_the_pixels():
+def test_a_normal_map_has_unit_normals_near_those_of_the_pixels():
     surface = ball(20)
     texels = mapped(surface, 5)
     assert texels.shape == (100, 100, 4)
@@ -96,7 +98,7 @@ def test_strokes_at_the_border_are_the_border():
     surface = surface_of(mask, lambda x, _: 0 * x)
     edge = np.argwhere(~np.pad(np.ones((14, 14), dtype=bool), 1))
     instance = Instance.on_pixels("shape", mask, edge, np.zeros(len(edge)), np.ones(len(edge)))
-    drawn = raster(instance, surface.normals, 10).opacity
+    drawn = raster(instance, surface.normals, view_of_grid(instance, 10)).opacity
     assert fine(surface, 10).opacity[80].sum() == pytest.approx(160, abs=1.5)
     assert drawn[80].sum() == pytest.approx(152, abs=1.5)
 

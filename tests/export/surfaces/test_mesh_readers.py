@@ -30,7 +30,7 @@ print("facts " + json.dumps(facts))
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     surface = ball(16)
-    return surface, cf.write_surface(surface, tmp_path_factory.mktemp("ball"), scale=4)
+    return surface, cf.write_surface(surface, tmp_path_factory.mktemp("ball"), side=64)
 
 
 @pytest.mark.needs("trimesh")

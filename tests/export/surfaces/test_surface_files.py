@@ -1,18 +1,21 @@
 """Files of a surface: the mesh equals the surface, writes are repeatable and complete."""
 
 import json
+import re
 from collections import Counter
 
 import crossfield as cf
 import matplotlib as mpl
 import numpy as np
 import pytest
+from crossfield.export.shading.raster import grid_box
 from crossfield.export.surfaces.files import FILES, surface_facts, to_obj, write_surface
 from crossfield.models.errors import InputError, OutputError
+from crossfield.models.surface.surface import Surface
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
-from shapes import ball, ball_normals, plane, surface_of
+from shapes import ball, ball_normals, corners_of, plane, surface_of
 
 
 def parsed(obj):
@@ -39,9 +42,14 @@ def size_of(path):
         return *opened.size, opened.mode
 
 
+def mesh_of(surface):
+    """The tables of the mesh of a surface, whose texture covers the grid."""
+    return parsed(to_obj(surface, "any.mtl", grid_box(surface.instance)))
+
+
 def check_mesh(surface):
     """Each quad is a pixel: its corners, heights and place on a picture; counter-clockwise, a manifold."""
-    mesh, grid = parsed(to_obj(surface, "any.mtl")), surface.instance.grid
+    mesh, grid = mesh_of(surface), surface.instance.grid
     height, width = surface.instance.mask.shape
     assert mesh["f"].shape == (grid.size, 4, 3)
     assert (np.ptp(mesh["f"], axis=2) == 0).all()
@@ -73,7 +81,7 @@ def test_every_mask_becomes_a_manifold_of_its_pixels(mask):
 def test_a_ball_has_the_normals_of_a_ball():
     surface = ball(32, part=0.8)
     check_mesh(surface)
-    mesh = parsed(to_obj(surface, "any.mtl"))
+    mesh = mesh_of(surface)
     place = (mesh["v"] - (16, 16, 0)) / 16
     off = np.degrees(np.arccos(np.clip(np.sum(place * mesh["vn"], axis=1), -1, 1)))
     assert off.mean() < 0.8
@@ -92,13 +100,14 @@ def test_the_folder_has_every_file_the_same_twice_whatever_the_users_settings(tm
     heights = np.load(first / "heights.npy", allow_pickle=False)
     assert np.array_equal(heights, surface.heights, equal_nan=True)
     sizes = {name: size_of(first / name) for name in FILES if name.endswith(".png")}
-    assert sizes.pop("normals.png") == (12, 12, "RGBA")
-    assert sizes.pop("drawing.png") == (996, 996, "RGB")
-    assert set(sizes.values()) == {(996, 996, "RGBA")}
+    assert sizes.pop("drawing.png") == (2052, 2052, "RGB")  # 171 pixels per pixel of the grid
+    assert set(sizes.values()) == {(2052, 2052, "RGBA")}
     assert (first / "surface.mtl").read_text().split()[-2:] == ["map_Kd", "drawing.png"]
     facts = json.loads((first / "surface.json").read_text())
     assert facts["doubts"] == []
     assert "trusted" not in facts  # no check shows that a surface is right
+    assert facts["pictures"]["show"] == "the grid, as no page is known"
+    assert (facts["pictures"]["page"], facts["pictures"]["width"]) == ([0, 0, 12, 12], 2052)
     assert facts["instance"]["sha256"] == surface.instance.sha256
     assert not any("second" in key for key in facts)
 
@@ -107,9 +116,9 @@ def test_strokes_of_the_drawing_lie_over_the_surface(tmp_path):
     instance = cf.sample("mouse", 16)
     flat = surface_of(instance.mask, lambda x, _: 0 * x)
     field = cf.power_field(instance)
-    surface = type(flat)(field, flat.heights, flat.confidence)
-    drawn = write_surface(surface, tmp_path / "drawn", drawing="mouse", scale=10)
-    pieces = write_surface(surface, tmp_path / "pieces", scale=10)
+    surface = Surface(field, flat.heights, flat.confidence)
+    drawn = write_surface(surface, tmp_path / "drawn", drawing="mouse", side=400)
+    pieces = write_surface(surface, tmp_path / "pieces", side=400)
     plain, over, dashed = (
         on_white(path) for path in (drawn / "shaded.png", drawn / "overlay.png", pieces / "overlay.png")
     )
@@ -117,25 +126,26 @@ def test_strokes_of_the_drawing_lie_over_the_surface(tmp_path):
     assert 0.02 < ink.mean() < 0.3
     assert (over <= plain).mean() > 0.95
     assert 0.3 < (plain - dashed > 50).mean() / ink.mean() < 3
-    row, column = instance.stroke_pixels[instance.w > 0.9].T
-    near = [
-        ink[10 * r - 5 : 10 * r + 15, 10 * c - 5 : 10 * c + 15].any()
-        for r, c in zip(row, column, strict=True)
-    ]
+    assert ink.shape == (334, 400)  # the page of the sample
+    middles = instance.origin + instance.pixel_size * (
+        instance.stroke_pixels[instance.w > 0.9][:, ::-1] + 0.5
+    )
+    half = instance.pixel_size
+    near = [ink[int(y - half) : int(y + half), int(x - half) : int(x + half)].any() for x, y in middles]
     assert np.mean(near) > 0.95
     with pytest.raises(InputError, match="lies elsewhere"):
         write_surface(ball(8), tmp_path / "none", drawing="bottle")
 
 
 def test_what_fails_leaves_no_report_of_an_earlier_surface(tmp_path):
-    write_surface(ball(8), tmp_path / "there", scale=2)
-    with pytest.raises(InputError, match="choose another scale"):
-        write_surface(ball(8), tmp_path / "there", scale=0)
+    write_surface(ball(8), tmp_path / "there", side=20)
+    with pytest.raises(InputError, match="give 1 to"):
+        write_surface(ball(8), tmp_path / "there", side=-1)
     assert (tmp_path / "there" / "surface.json").exists()  # nothing was begun
     (tmp_path / "there" / "heights.npy").unlink()
     (tmp_path / "there" / "heights.npy").mkdir()
     with pytest.raises(OutputError, match="heights"):
-        write_surface(ball(8), tmp_path / "there", scale=2)
+        write_surface(ball(8), tmp_path / "there", side=20)
     assert not (tmp_path / "there" / "surface.json").exists()
     assert not list((tmp_path / "there").glob("*.part"))
 
@@ -151,3 +161,97 @@ def test_facts_are_those_of_a_plane():
     assert facts["right_angle_error_mean_degrees"] == pytest.approx(error, abs=1e-3)
     assert facts["slant_mean_degrees"] == pytest.approx(45.0)
     assert facts["height_range_pixels"] == pytest.approx(0.6 * 8 + 0.8 * 6)
+    assert facts["support"]["fitting"].startswith("on 0% of the pixels")
+    assert exact["support"].keys() == {"drawn", "guessed", "fitting"}
+    assert "farthest at (7.5, 5.5), 8.6 pixels" in exact["support"]["guessed"]
+
+
+PAGE = 'viewBox="300 -100 400 250"'  # the drawing lies off the middle of a page that does not begin at 0
+CENTRE, RADIUS = np.array([450.0, 40.0]), 90.0
+
+
+def ball_on_a_page(tmp_path):
+    """The drawing of a ball's outline, in an instance whose surface is that ball."""
+    drawing = tmp_path / "ball.svg"
+    circle = '<circle cx="450" cy="40" r="90" stroke="black"/>'
+    drawing.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" {PAGE} fill="none">{circle}'
+        f'<path d="M360 40H540M450 -50V130" stroke="red"/></svg>'
+    )
+    instance = cf.read_sketch(drawing, size=32)
+    row, column = np.mgrid[: instance.grid.height + 1, : instance.grid.width + 1]
+    steps = instance.origin + instance.pixel_size * np.stack([column, row], axis=-1) - CENTRE
+    heights = np.sqrt(np.maximum(RADIUS**2 - (steps**2).sum(axis=-1), 0.0)) / instance.pixel_size
+    heights[~corners_of(instance.mask)] = np.nan
+    field = cf.power_field(instance)
+    return drawing, Surface(field, heights, np.ones(instance.grid.size))
+
+
+def read_layer(path):
+    """Normals (h, w, 3), opacity (h, w) and places (h, w, 2) round the ball's centre, of a layer."""
+    with Image.open(path) as picture:
+        texels = np.asarray(picture) / 255
+    height, width = texels.shape[:2]
+    y, x = np.mgrid[:height, :width] + 0.5
+    place = np.stack([300 + 400 * x / width, -100 + 250 * y / height], axis=-1) - CENTRE
+    return 2 * texels[..., :3] - 1, texels[..., 3], place
+
+
+def test_a_normal_map_is_a_layer_of_the_drawing_to_its_outline(tmp_path):
+    drawing, surface = ball_on_a_page(tmp_path)
+    write_surface(surface, tmp_path / "out", drawing=drawing)
+    normals, opacity, place = read_layer(tmp_path / "out" / "normals.png")
+    assert opacity.shape == (1250, 2000)  # five pixels per unit
+    away = np.hypot(*np.moveaxis(place, -1, 0))
+    pixel = surface.instance.pixel_size
+    assert opacity[away < RADIUS - 0.1 * pixel].min() == 1  # the mask ends a pixel before its outline
+    assert opacity[away > RADIUS + 0.1 * pixel].max() == 0
+    assert opacity.sum() / 25 == pytest.approx(np.pi * RADIUS**2, rel=2e-3)
+    true = np.concatenate([place * (1, -1), np.sqrt(np.maximum(RADIUS**2 - away**2, 0))[..., None]], axis=-1)
+    inner = away < 0.8 * RADIUS
+    cosine = (normals * true).sum(axis=-1)[inner] / RADIUS / np.linalg.norm(normals[inner], axis=-1)
+    assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < 3
+    facts = json.loads((tmp_path / "out" / "surface.json").read_text())["pictures"]
+    assert facts["page"] == [300, -100, 400, 250]
+    assert facts["pixel_size"] == [0.2, 0.2]
+    mesh = parsed((tmp_path / "out" / "surface.obj").read_bytes())
+    drawn = surface.instance.origin + surface.instance.pixel_size * (
+        mesh["v"][:, :2] * (1, -1) + (0, surface.instance.grid.height)
+    )
+    assert np.abs(mesh["vt"] * (400, -250) + (300, 150) - drawn).max() < 1e-3
+
+
+def test_a_gap_in_the_outline_and_a_stroke_within_keep_the_rest(tmp_path):
+    """A cell of both sides is divided by the mask, and a hole that the mask leaves out stays one."""
+    _, surface = ball_on_a_page(tmp_path)
+    closed = tmp_path / "ball.svg"
+    text = closed.read_text()
+    open_arc = '<path d="M466 -48.6A90 90 0 1 1 434 -48.6" stroke="black"/>'  # lacks 20 degrees at the top
+    closed.write_text(re.sub("<circle[^>]*>", open_arc, text))
+    write_surface(surface, tmp_path / "open", drawing=closed, side=800)
+    _, opacity, place = read_layer(tmp_path / "open" / "normals.png")
+    away = np.hypot(*np.moveaxis(place, -1, 0))
+    assert opacity[away < RADIUS - 2.5 * surface.instance.pixel_size].min() == 1
+    assert opacity[away > RADIUS + surface.instance.pixel_size].max() == 0
+
+
+def test_layers_have_the_size_of_a_picture_and_of_the_page_without_its_file(tmp_path):
+    from PIL import ImageDraw
+
+    picture = Image.new("L", (301, 200), 255)
+    ImageDraw.Draw(picture).ellipse((120, 40, 280, 180), outline=0, width=3)
+    ImageDraw.Draw(picture).line((200, 40, 200, 180), fill=0, width=3)
+    picture.save(tmp_path / "ink.png")
+    instance = cf.read_sketch(tmp_path / "ink.png", size=24)
+    flat = surface_of(instance.mask, lambda x, _: 0 * x)
+    surface = Surface(cf.power_field(instance), flat.heights, flat.confidence)
+    write_surface(surface, tmp_path / "out", drawing=tmp_path / "ink.png")
+    assert size_of(tmp_path / "out" / "normals.png") == (301, 200, "RGBA")
+    with Image.open(tmp_path / "out" / "normals.png") as layer:
+        opacity = np.asarray(layer)[..., 3] / 255
+    y, x = np.mgrid[:200, :301] + 0.5
+    within = np.hypot((x - 200.5) / 80, (y - 110.5) / 70)
+    assert opacity[within < 0.95].min() == 1
+    assert opacity[within > 1.03].max() == 0
+    write_surface(surface, tmp_path / "page", side=602)
+    assert size_of(tmp_path / "page" / "normals.png") == (602, 400, "RGBA")
