@@ -5,8 +5,11 @@ The browser keeps the document, and sends all of it with every request. The serv
 
 from __future__ import annotations
 
+import base64
+import io
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Literal, TypeVar, get_args
@@ -30,6 +33,8 @@ FORMAT: Final = "crossfield-studio"
 VERSION: Final = 1
 SIZES: Final = (8, 256)  # least and most pixels of the longer side that the page offers
 FARTHEST: Final = 1e6  # coordinates
+PICTURE_SIDE: Final = 1600  # most pixels of the longer side of the picture under the strokes
+_MOST_ATTACHED: Final = 40_000_000  # characters of a picture or file in a session
 _MOST_WEIGHT: Final = 1e3  # of the strokes
 
 
@@ -96,6 +101,8 @@ class Document:
                 f"the session has version {shortened(content.get('version'))}, and this crossfield reads "
                 f"version {VERSION}; open it with the crossfield that saved it and download the drawing there"
             )
+        _check_picture(content.get("picture"))
+        _check_file(content.get("file"))
         low, high = SIZES
         document = cls(
             name=name_from_text(str(content.get("name", ""))[:200]) or "drawing",
@@ -208,6 +215,44 @@ def _read_page(value: Any) -> Box:
         raise InputError("page of the session must be x, y, width and height")
     x, y, width, height = values.tolist()
     return x, y, width, height
+
+
+def _check_picture(value: Any) -> None:
+    """Check the picture under the strokes: a JPEG in base64, which the page decodes."""
+    if value is None:
+        return
+    from PIL import Image
+
+    data = _decode(value, "picture")
+    try:
+        with Image.open(io.BytesIO(data), formats=["JPEG"]) as image:  # reads the header only
+            size = image.size
+    except Exception as error:  # damaged pictures make decoders raise nearly anything
+        raise InputError("picture of the session is not a JPEG; open the picture itself again") from error
+    if max(size) > PICTURE_SIDE:
+        raise InputError(
+            f"picture of the session has {size[0]} x {size[1]} pixels, but at most "
+            f"{PICTURE_SIDE} a side are shown; open the picture itself again"
+        )
+
+
+def _check_file(value: Any) -> None:
+    """Check the file of a drawing in space: its name, and its bytes in base64, which `open_drawing` reads."""
+    if value is None:
+        return
+    if not isinstance(value, dict) or not isinstance(value.get("name"), str):
+        raise InputError("file of the session must have a name and data; open the file itself again")
+    _decode(value.get("data"), "file")
+
+
+def _decode(value: Any, where: str) -> bytes:
+    if isinstance(value, str) and len(value) <= _MOST_ATTACHED:
+        with suppress(ValueError):
+            return base64.b64decode(value, validate=True)
+    raise InputError(
+        f"{where} of the session must be text in base64 of at most {_MOST_ATTACHED} characters; "
+        f"open the {where} itself again"
+    )
 
 
 def _read_number(value: Any, where: str, least: float, most: float) -> float:

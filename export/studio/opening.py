@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import io
 import json
 from typing import Any, Final
 
@@ -19,12 +20,13 @@ from ...models.sketch.curves import Curves, flatten, run_numbers
 from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
 from ...models.sketch.parallels import find_parallels
 from ...models.sketch.thinning import thin_shape
-from .document import Document, Mark
+from .document import PICTURE_SIDE, Document, Mark
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
 _THINNED: Final = 700  # pixels on the longer side of a picture while it is traced
 _INK: Final = 0.3
 _RED: Final = 0.5
+_QUALITY: Final = 80  # of a JPEG
 _SMOOTH: Final = 2.0  # pixels over which a traced line is smoothed
 _SHORTEST: Final = 6  # pixels of a traced line; shorter ones are burrs of the thinning
 _AROUND: Final = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
@@ -35,6 +37,8 @@ _Way = list[_Pixel]
 
 def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[str, Any]:
     """A session under `document`, or else name, page and strokes of a drawing. Raises InputError.
+
+    A picture is added as `picture`, upright and reduced, as JPEG in base64; it lies on the page.
 
     view: direction of a .curves file, as for `read_sketch`. Without it, such a file is added as `file` with
     name and data in base64, because the page reads it again from other sides. `notes` are lines on what was
@@ -68,9 +72,21 @@ def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[s
         "strokes": strokes,
         "notes": notes,
     }
+    if isinstance(drawing, Bitmap):
+        opened["picture"] = _encode_picture(drawing.pixels)
     if spatial and view is None:
         opened["file"] = {"name": file_name, "data": base64.b64encode(data).decode()}
     return opened
+
+
+def _encode_picture(pixels: NDArray[np.uint8]) -> str:
+    from PIL import Image
+
+    image = Image.fromarray(pixels if pixels.shape[-1] == 3 else pixels[..., 0])
+    image.thumbnail((PICTURE_SIDE, PICTURE_SIDE))
+    stream = io.BytesIO()
+    image.save(stream, "JPEG", quality=_QUALITY)
+    return base64.b64encode(stream.getvalue()).decode()
 
 
 def _stroke_document(points: Floats, mark: Mark) -> dict[str, Any]:

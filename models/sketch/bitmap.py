@@ -50,12 +50,14 @@ class Bitmap:
     """A bitmap sketch, ready for any frame.
 
     ink: [h, w], 0 for paper to 1 for ink as dark as the strokes. red: [h, w] in [0, 1], the part of the ink
-    that is red. reduction: pixels of the file per pixel of these arrays in each direction. width, height: in
-    pixels of the file. notes: what was left out or changed while reading, one line each.
+    that is red. pixels: uint8 [h, w, 1 or 3], the picture on white. reduction: pixels of the file per pixel
+    of these arrays in each direction. width, height: in pixels of the file. notes: what was left out or
+    changed while reading, one line each.
     """
 
     ink: Ink
     red: Ink
+    pixels: NDArray[np.uint8]
     reduction: int
     width: int
     height: int
@@ -147,7 +149,7 @@ def read_bitmap(data: bytes, size: int) -> Bitmap:
             f"shows ink on {covered:.0%} of the paper, and strokes would leave most of it bare; "
             "crop it to the drawing, take the picture in brighter light, or thin the strokes"
         )
-    return Bitmap(ink, _find_red(rgb, raw), reduction, width, height)
+    return Bitmap(ink, _find_red(rgb, raw), pixels, reduction, width, height)
 
 
 def read_white_pixels(data: bytes) -> Bools:

@@ -143,10 +143,11 @@ function crosses(context, field, scale) {
 }
 
 /** Draws everything that changes with the document, the field and the view, into the hidden canvas. */
-export function paintBase(view, { doc, chosen, field, lines, mode, suspects }) {
+export function paintBase(view, { doc, picture, opacity, chosen, field, lines, mode, suspects }) {
   const context = view.begin(view.base), thin = 1 / view.scale, ink = colours();
   const left = -view.x / view.scale, top = -view.y / view.scale, wide = view.wide / view.scale, high = view.high / view.scale;
   context.fillStyle = ink.beyond; context.fillRect(left, top, wide, high); context.clearRect(...doc.page);
+  if (picture && opacity) { context.globalAlpha = opacity; context.drawImage(picture, ...doc.page); context.globalAlpha = 1; }
   context.strokeStyle = ink.page; context.lineWidth = thin; context.strokeRect(...doc.page);
   if (field) {
     const { x, y, pixel, rows, columns } = field.frame, place = [x, y, pixel * columns, pixel * rows];

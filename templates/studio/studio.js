@@ -7,7 +7,7 @@ import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shad
 import { clipped, erased, fitShift, isClosed, moved, rounded, strokeAt, strokesIn } from "./strokes.js";
 
 const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
-const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file"], RETRY = 3000;
+const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file", "picture"], RETRY = 3000;
 const REACH = 9, FINGER = 18, STILL = 4, PASTED = 16; // pixels of the screen: near a stroke, also for a finger; in a click; between copies
 const state = {
   history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "cut", preset: true, next: "outline", live: null, brush: null, edit: 0,
@@ -25,7 +25,7 @@ function refresh(base = true) {
   asked = true;
   requestAnimationFrame(() => {
     asked = false;
-    if (dirty) paintBase(left, { ...state, doc: state.live?.shift ? shifted(state.live) : state.doc });
+    if (dirty) paintBase(left, { ...state, doc: state.live?.shift ? shifted(state.live) : state.doc, picture: picture(), opacity: Number($("#opacity").value) });
     dirty = false;
     paint(left, state);
     paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked, strokes: $("#ink").checked ? state.doc.strokes : [], hints: state.doc.hints, live: state.arrow });
@@ -68,6 +68,18 @@ const canvasPage = () => [0, 0, 800, Math.round(800 * left.high / left.wide)];
 /** The outline is there: the pen goes on to curvature lines, unless its kind was chosen. */
 function presetLine() { if (state.preset) state.mark = "line"; state.preset = false; }
 const pageBox = ({ page: [x, y, w, h] }) => [x, y, x + w, y + h];
+/** The decoded picture under the strokes; it is painted again once it is decoded. */
+const under = { source: null, image: null };
+function picture() {
+  const { picture: source } = state.doc;
+  if (source !== under.source) {
+    Object.assign(under, { source, image: null });
+    if (source) createImageBitmap(new Blob([decoded.bytes(source)], { type: "image/jpeg" })).then(image => {
+      if (source === under.source) { under.image = image; refresh(); }
+    }, () => banner("The picture under the strokes cannot be shown. Open its file again.", { kind: "picture" }));
+  }
+  return under.image;
+}
 const isSaved = () => state.history.saved.has(state.history.now);
 
 // What survives a reload of the page. The large parts change rarely: they are stored apart, and computing needs none.
@@ -82,7 +94,7 @@ function keep() {
   const { now } = state.history, whole = PARTS.map(part => store(`${KEPT}-${part}`, now[part], JSON.stringify)).every(Boolean);
   store(`${KEPT}-at`, location.pathname); store(`${KEPT}-saved`, isSaved() && "yes");
   if (!store(KEPT, now, computable)) banner("This drawing is too large to survive a reload of this page. Save it as a file.", { kind: "large" });
-  else if (!whole) banner("A reload of this page keeps the strokes, but not the file that they come from, which is too large. Save the drawing.", { kind: "large" });
+  else if (!whole) banner("A reload of this page keeps the strokes, but not the picture or file that they come from, which is too large. Save the drawing.", { kind: "large" });
 }
 function kept() {
   try {
@@ -210,6 +222,7 @@ function controls() {
   if (document.activeElement !== $("#name")) $("#name").value = doc.name;
   $("#size").value = doc.size; $("#size-value").textContent = `${doc.size} pixels`;
   $("#weight").value = Math.log10(Math.max(doc.stroke_weight, 0.1)); $("#weight-value").textContent = doc.stroke_weight.toPrecision(3);
+  $("#opacity").parentElement.hidden = !doc.picture;
   $("#silhouette").checked = doc.silhouette === "outer"; $("#brush-value").textContent = `${$("#brush").value} pixels`;
   const marks = new Set([...chosen].map(k => doc.strokes[k].mark)), shown = marks.size === 1 ? [...marks][0] : chosen.size ? "" : state.mark;
   all("[data-mark]").forEach(each => each.setAttribute("aria-pressed", each.dataset.mark === shown));
@@ -379,7 +392,7 @@ async function read(bytes, name, view) {
   return null;
 }
 /** The document of what the server read from a file. */
-const documentOf = ({ document: session, name, page, strokes, file }) => ({ ...emptyDocument(), size: state.doc.size, ...session ?? { name: name || "drawing", page, strokes, file } });
+const documentOf = ({ document: session, name, page, strokes, file, picture }) => ({ ...emptyDocument(), size: state.doc.size, ...session ?? { name: name || "drawing", page, strokes, file, picture } });
 const mayReplace = () => isSaved() || !state.doc.strokes.length || confirm("Replace this drawing? It has changes that are not in a saved file. Undo brings it back until this page is closed or loaded again.");
 async function open(file) {
   if (!file || !mayReplace()) return;
@@ -440,7 +453,7 @@ for (const [name, read_] of Object.entries(settings)) {
   if (name === "size" || name === "weight") $(`#${name}`).addEventListener("input", () => show({ ...state.doc, ...read_() }));
   $(`#${name}`).addEventListener("change", () => commit(read_()));
 }
-$("#brush").addEventListener("input", controls);
+$("#brush").addEventListener("input", controls); $("#opacity").addEventListener("input", () => refresh());
 for (const name of ["#doubtful", "#ink"]) $(name).addEventListener("change", () => refresh(false));
 all("input[name=field]").forEach(each => each.addEventListener("change", () => { state.mode = each.value; refresh(); if (each.value === "lines" && !state.lines) request(); }));
 all("input[name=surface]").forEach(each => each.addEventListener("change", () => { state.kind = each.value; refresh(false); }));

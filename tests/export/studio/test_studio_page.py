@@ -105,6 +105,58 @@ def test_hints_lead_to_a_determined_field(empty):
     assert [stroke["mark"] for stroke in document(empty)["strokes"]] == ["cut", "cut", "line", "line"]
 
 
+def shown_at(browser, x, y):
+    """Colour of the drawing canvas at a point of the document."""
+    return browser.execute_script(
+        """const canvas = document.querySelector("#drawing"), ratio = devicePixelRatio;
+        const [, , wide, high] = arguments[0];
+        const scale = 0.94 * Math.min(canvas.clientWidth / wide, canvas.clientHeight / high);
+        const at = [[canvas.clientWidth, wide, arguments[1]], [canvas.clientHeight, high, arguments[2]]];
+        const [x, y] = at.map(([room, side, value]) => ratio * ((room - scale * side) / 2 + scale * value));
+        return [...canvas.getContext("2d").getImageData(x, y, 1, 1).data];""",
+        document(browser)["page"], x, y,
+    )  # fmt: skip
+
+
+def slide(browser, selector, value):
+    browser.execute_script(
+        "const slider = document.querySelector(arguments[0]); slider.value = arguments[1];"
+        "for (const kind of ['input', 'change']) slider.dispatchEvent(new Event(kind, { bubbles: true }))",
+        selector, value,
+    )  # fmt: skip
+    browser.execute_async_script("requestAnimationFrame(() => setTimeout(arguments[0], 100))")
+
+
+def test_a_picture_lies_under_its_traced_strokes(empty, tmp_path):
+    from PIL import Image, ImageDraw
+
+    image = Image.new("RGB", (300, 200), (250, 220, 120))
+    pen = ImageDraw.Draw(image)
+    pen.ellipse([60, 20, 240, 180], outline="black", width=4)
+    pen.line([62, 100, 238, 100], fill=(220, 0, 0), width=4)
+    image.save(tmp_path / "photo.png")
+    browser = load(empty, tmp_path / "photo.png", (tmp_path / "photo.png").read_bytes())
+    slide(browser, "#opacity", 1)
+    red, green, blue, solid = shown_at(browser, 20, 20)
+    assert (red > 200, green > 180, blue < 170, solid) == (True, True, True, 255)
+    slide(browser, "#opacity", 0)
+    assert shown_at(browser, 20, 20)[3] == 0
+    slide(browser, "#opacity", 1)
+    folder = tmp_path / "saved"
+    folder.mkdir()
+    saved = given(browser, folder, find(browser, "[data-do=save]").click)
+    for again in (browser.refresh, lambda: load(browser, tmp_path / "saved.json", saved.read_bytes())):
+        again()
+        settled(browser)
+        slide(browser, "#opacity", 1)
+        assert shown_at(browser, 20, 20) == [red, green, blue, solid]
+    find(browser, "#open-menu summary").click()
+    find(browser, "[data-do=empty]").click()
+    assert not find(settled(browser), "#opacity").is_displayed()
+    find(browser, "#undo").click()
+    assert find(settled(browser), "#opacity").is_displayed()
+
+
 def test_every_edit_is_undone_and_done_again(empty, tmp_path):
     browser = pebble(empty, tmp_path)
     states = [document(browser)]

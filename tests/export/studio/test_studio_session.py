@@ -6,6 +6,7 @@ import io
 import re
 import shlex
 import zipfile
+from base64 import b64decode, b64encode
 
 import crossfield as cf
 import numpy as np
@@ -30,6 +31,12 @@ def click(x, y, kind="toggle"):
     return [{"kind": kind, "points": [x, y], "radius": 0}]
 
 
+def jpeg(width):
+    stream = io.BytesIO()
+    Image.new("L", (width, 1)).save(stream, "JPEG")
+    return b64encode(stream.getvalue()).decode()
+
+
 @pytest.mark.parametrize(
     "parts, place",
     [
@@ -46,6 +53,12 @@ def click(x, y, kind="toggle"):
         ({"strokes": [7]}, "entry of strokes"),
         ({"strokes": {}}, "strokes"),
         ({"hints": [{"x": 1, "y": 1, "slant": 95, "tilt": 0}]}, "slant"),
+        ({"picture": 7}, "picture of the session"),
+        ({"picture": "<svg/>"}, "picture of the session"),
+        ({"picture": b64encode(b"GIF89a").decode()}, "not a JPEG"),
+        ({"picture": jpeg(1601)}, "1601 x 1 pixels"),
+        ({"file": {"name": "a.curves"}}, "file of the session"),
+        ({"file": {"name": "a.curves", "data": "?"}}, "file of the session"),
         ({"mask": [{"kind": "fill", "points": [1, 1]}]}, "kind"),
     ],
 )
@@ -239,6 +252,7 @@ def picture():
 def test_a_picture_is_traced_to_strokes_with_marks():
     session = open_drawing(picture(), "photo.png")
     assert session["page"] == [0, 0, 200, 160]
+    assert Image.open(io.BytesIO(b64decode(session["picture"]))).size == (200, 160)
     lines = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "line"]
     cuts = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "cut"]
     assert len(lines) == len(cuts) == 1
