@@ -12,6 +12,7 @@ from ..input_limits import MAX_BYTES
 from ..storage import read_bytes
 from .bitmap import Bitmap, read_bitmap
 from .curves import Curves
+from .foreign_files import check_not_foreign
 from .labels import LabelMatcher
 from .pen_strokes import CURVES_START, read_curves, read_scap
 from .svg import read_svg
@@ -71,9 +72,12 @@ def parse_drawing(
 
 def detect_file_kind(data: bytes, suffix: str) -> FileKind:
     """Kind of a drawing, by its content first and the suffix of its file second. Raises InputError."""
+    check_not_foreign(data)
     suffix, start = suffix.lower(), data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
     if data[:2] == b"\x1f\x8b":
-        raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
+        raise InputError(
+            "is compressed; unpack it (gunzip), or save it in Inkscape as Plain SVG, and give the SVG itself"
+        )
     is_text = _PICTURE.match(data) is None
     if CURVES_START.match(start) or (suffix == ".curves" and is_text and not start.startswith(b"<")):
         return "curves"
