@@ -1,18 +1,27 @@
 """Labels of strokes, by which curvature lines are chosen where the colours of a drawing do not tell them.
 
-Labels are `colour=`, `class=`, `id=` and `layer=` in SVG, also of groups, and `cluster=` in .scap.
+Labels are `colour=`, `class=`, `id=` and `layer=` in SVG, also of groups, and `cluster=` in .scap. They are
+compared without regard to case. Names of layers and ids are compared as the program shows them: Illustrator
+writes `_x26_` for `&` and `_` for a blank, so blanks and underscores are equal, and it numbers equal names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final
 
 from ..errors import InputError, shortened
 
 LABEL_KINDS: Final = ("colour", "class", "id", "layer", "cluster")
 _FEW: Final = 4  # labels of each kind that an error lists
+_INKSCAPE: Final = "{http://www.inkscape.org/namespaces/inkscape}"
+_LAYER_NAMES: Final = ("data-name", "{http://www.serif.com/}id")  # Illustrator's and Affinity's
+_ESCAPE: Final = re.compile(r"_x([0-9a-f]{2,6})_")  # a character in an id of Illustrator
+_NUMBERED: Final = re.compile(r" \d+ $")  # the second layer of a name is `Flow_1_` there
 
 
 @dataclass(eq=False)
@@ -28,12 +37,20 @@ class LabelMatcher:
         wanted = False
         for label in labels:
             listed = self.seen[label.partition("=")[0]]
-            if len(listed) < _FEW and label not in listed:
+            as_id = label.replace("layer=", "id=", 1)  # of a group that has only an id
+            if len(listed) < _FEW and not {label, as_id} & {*listed, *self.seen["id"]}:
                 listed.append(label)
-            if label in self.wanted:
-                self.matched.add(label)
-                wanted = True
+            matched = self._wanted_by_key.get(_key_of(label), ())
+            self.matched.update(matched)
+            wanted = wanted or bool(matched)
         return wanted
+
+    @cached_property
+    def _wanted_by_key(self) -> dict[str, list[str]]:
+        keys: dict[str, list[str]] = {}
+        for label in self.wanted:
+            keys.setdefault(_key_of(label), []).append(label)
+        return keys
 
     def check(self, *, any_stroke: bool) -> None:
         """Raise InputError if a wanted label is missing, or if no stroke has one."""
@@ -55,6 +72,35 @@ def label_of(selector: str) -> str:
             "write colour=red, class=flow, id=group2, layer=Flow or cluster=3"
         )
     return _named_colour(value) if kind == "colour" else f"{kind}={value}"
+
+
+def labels_of(tag: str, attributes: Mapping[str, str]) -> Iterator[str]:
+    """Labels of the strokes in an SVG element: its id, its classes, and its name as a layer.
+
+    attributes: by names as ElementTree writes them, `{namespace}name`. A layer is a group with the name that
+    Inkscape, Illustrator or Affinity has given it, or only an id.
+    """
+    identifier = attributes.get("id", "")
+    if identifier:
+        yield f"id={identifier}"
+    for name in attributes.get("class", "").split():
+        yield f"class={name}"
+    names = [attributes.get(key, "") for key in _LAYER_NAMES]
+    if attributes.get(_INKSCAPE + "groupmode") == "layer":
+        names.insert(0, attributes.get(_INKSCAPE + "label", ""))
+    elif tag == "g":
+        names.append(identifier)
+    if name := next(filter(None, map(str.strip, names)), ""):
+        yield f"layer={name}"
+
+
+def _key_of(label: str) -> str:
+    """The text by which labels are compared."""
+    kind, _, value = label.casefold().partition("=")
+    if kind in ("id", "layer"):
+        value = _ESCAPE.sub(lambda escape: chr(min(int(escape[1], 16), sys.maxunicode)), value)
+        value = _NUMBERED.sub("", re.sub(r"[\s_]", " ", value)).strip()
+    return f"{kind}={value}"
 
 
 def colour_label(rgb: tuple[float, float, float]) -> str:

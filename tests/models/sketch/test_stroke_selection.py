@@ -6,6 +6,7 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InputError
 from crossfield.models.instance.angles import line_difference
+from crossfield.models.sketch.labels import LabelMatcher, label_of, labels_of
 from loops import for_each
 from PIL import Image, ImageDraw
 from small_drawings import png, read, svg
@@ -63,6 +64,29 @@ def test_red_strokes_that_are_not_chosen_cut_the_field():
     )
     across = '<path class="flow" stroke="blue" d="M20 50H80"/>'
     assert read(svg(body.format(across)), curvature=("class=flow",)).grid.parts == 2
+
+
+INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
+NAMED = {
+    "layer=flow LINES": {f"{INKSCAPE}groupmode": "layer", f"{INKSCAPE}label": " Flow lines ", "id": "layer2"},
+    "layer=Flow & lines": {"id": "Flow_x0020__x26__x0020_lines_1_"},  # Illustrator, Save As
+    "layer=Flow lines": {"id": "Flow_lines-2", "data-name": "Flow lines"},  # Illustrator, Export As
+    "layer=Flow": {"id": "Flow1", "{http://www.serif.com/}id": "Flow"},  # Affinity
+    "layer=Curves / red": {"id": "Curves / red"},  # Figma
+    "class=Flow": {"class": "late flow"},
+    "id=GROUP2": {"id": "group2"},
+    "id=flow lines": {"id": "Flow_lines"},
+}
+
+
+@for_each("selector", NAMED)
+def test_names_are_those_that_the_program_shows_whatever_their_case(selector):
+    matcher = LabelMatcher(frozenset([label_of(selector)]))
+    assert matcher.matches(labels_of("g", NAMED[selector]))
+    assert not matcher.matches(labels_of("g", {"id": "Flowing", "class": "flow-late"}))
+    matcher.check(any_stroke=True)
+    as_path = list(labels_of("path", {"id": "Flow"}))
+    assert as_path == ["id=Flow"]  # no layer
 
 
 REFUSED = {
