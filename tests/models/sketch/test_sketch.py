@@ -623,10 +623,6 @@ REFUSED = {
     "empty.png": (b"", "is empty"),
     "text.png": (b"just text", "is not a whole picture"),
     "cut.png": (png(drawn(200))[:900], "is not a whole picture"),
-    "postscript.eps": (
-        b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\nshowpage",
-        "is not a whole picture",
-    ),
     "paper.png": (png(Image.new("RGB", (90, 90), "#eee")), "shows no stroke"),
     "night.png": (png(ImageOps.invert(drawn(200))), "is dark all over"),
     "bomb.png": (declared(60_000, 60_000), "absurdly many pixels"),
