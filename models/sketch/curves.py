@@ -98,6 +98,20 @@ def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]
     return np.stack(ends, axis=1), owner
 
 
+def cut_cubics(points: Floats, start: Floats, end: Floats) -> Floats:
+    """The parts of cubics (k, 4, 2) between two parameters (k,) each; whole ones unchanged."""
+    pairs = np.stack([start, end], axis=1)
+    # A control point of the part is the polar form at its two parameters, taken 3 - i and i times.
+    corners = []
+    for ends in range(4):
+        level = points
+        for step in range(3):
+            t = pairs[:, int(step < ends)][:, None, None]
+            level = level[:, :-1] * (1 - t) + level[:, 1:] * t
+        corners.append(level[:, 0])
+    return np.where(((start == 0) & (end == 1))[:, None, None], points, np.stack(corners, axis=1))
+
+
 def evaluate_cubics(points: Floats, t: Floats) -> Floats:
     """The points (k, 2) of cubics (k, 4, 2) at their parameters t (k,)."""
     t = t[:, None]

@@ -1,65 +1,99 @@
-"""Reader of SVG drawings: the outlines of everything that is painted, as cubic Beziers.
+"""Reader of SVG drawings: the strokes that their picture shows, as cubic Beziers.
 
-svgelements parses path data, transforms and lengths, tinycss2 style sheets and colours. Each element is
-parsed once, for any number of uses, and the work is bounded by the limits of `input_limits`. The bytes first
-pass defusedxml, which refuses entities. Pictures and `use` of other files are never loaded. Clip paths,
-masks, dashes and text are ignored. Shapes that are only filled count as strokes, because drawing programs
-export strokes as filled outlines; white (paper) counts as invisible.
+A drawing passes four steps. defusedxml parses it and refuses entities. `cascade.py` finds the style of every
+element. The walk below replaces each `use` by what it shows and places the outline of every painted shape,
+which `path_data.py` reads. `visible.py` lets resvg draw the result, and keeps of each stroke what the picture
+shows, in the colour that it shows. Pictures and `use` of other files are never loaded, text, dashes, markers
+and filters are ignored, and the work is bounded by the limits of `input_limits`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import Any, Final
-from xml.etree.ElementTree import Element, ParseError
+from xml.etree.ElementTree import Element, ParseError, SubElement
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shortened
 from ..input_limits import (
     LEAST_LENGTH,
     MAX_CURVES,
     MAX_DATA,
+    MAX_DEPTH,
     MAX_ELEMENTS,
-    MAX_LENGTH,
     MAX_TAGS,
     MAX_TRANSFORM,
-    MAX_USE_DEPTH,
     MAX_USES,
 )
 from ..instance.angles import transform_vectors
 from ..instance.domain import Floats
-from .colour import is_paper, is_red
+from .cascade import cascade_of
+from .colour import is_red
 from .cover import Box
 from .curves import Curves, run_numbers
 from .labels import LabelMatcher, colour_label
 from .path_data import SHAPES, length_in_pixels, shape_curves, too_many_curves
-from .style_sheet import KNOWN, PAINT, StyleSheet, style_properties, style_sheet
+from .visible import Seen, Shape, see_strokes
 
 _GREATEST: Final = 1e9
-_SVG: Final = "http://www.w3.org/2000/svg"
+_SVG: Final = "{http://www.w3.org/2000/svg}"
 _INKSCAPE: Final = "{http://www.inkscape.org/namespaces/inkscape}"
 _HREFS: Final = ("href", "{http://www.w3.org/1999/xlink}href")
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
-_START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "color": "black"}
+_INHERITED: Final = (
+    "stroke",
+    "fill",
+    "visibility",
+    "color",
+    "stroke-width",
+    "stroke-opacity",
+    "fill-opacity",
+)
+_START: Final = {"stroke": "none", "fill": "#000000", "visibility": "visible", "color": "#000000"}
+_GROUP: Final = ("id", "style", "transform")  # attributes of an element that its group keeps
+_SERVERS: Final = ("linearGradient", "radialGradient", "pattern")
+_UNPAGED: Final = (0.0, 0.0, 100.0, 100.0)  # the page to which percentages refer where there is none
+_REFERENCE: Final = re.compile(r"url\(\s*['\"]?#([^'\")]*)['\"]?\s*\)\s*(.*)")
+_SIDES: Final = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "bottom": "100%"}
+_OWN_MARGIN: Final = 0.05  # of the drawing, around the picture of a drawing without a page
 
 
 @dataclass(frozen=True)
-class _Visit:
-    """An element to visit. chosen: whether it, or an element around it, has a chosen label."""
+class _Page:
+    """The page of a drawing.
+
+    view: its viewBox, or width and height from (0, 0). box: the same in the units of the result, which differ
+    where a page is stretched. window: what of these units is shown.
+    """
+
+    view: Box
+    box: Box
+    window: Box
+
+
+@dataclass(frozen=True)
+class _Place:
+    """An element to visit, and what it takes from those around it.
+
+    size: width and height to which percentages refer. links: ids of the copies around it. depth: number of
+    elements around it. chosen: whether it, or an element around it, has a chosen label.
+    """
 
     element: Element
     style: Mapping[str, str]
     matrix: Any
-    uses: tuple[str, ...]
+    size: tuple[float, float]
+    links: tuple[str, ...] = ()
+    depth: int = 0
     chosen: bool = False
 
 
 def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
-    """Read the strokes of an SVG drawing in the units of its viewBox. Raises InputError.
+    """Read the visible strokes of an SVG drawing in the units of its viewBox. Raises InputError.
 
     matcher: matches the labels of curvature lines; None: colours decide.
     """
@@ -68,19 +102,50 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
         tag = root.tag.split("}")[-1][:30]
         raise InputError(f"its root element is <{tag}>, not <svg>; expected an SVG drawing")
     page = _page_of(root)
-    texts = ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
-    walk = _ElementWalk(style_sheet(texts), page, matcher)
-    shapes = list(walk.shapes(root))
-    if not sum(len(points) for _, points, _ in shapes):
-        raise InputError("draws no stroke: it has no visible path, line or shape; export it again")
-    paints, outlines, taken = zip(*shapes, strict=True)
-    red, points = is_red(np.array(paints)), np.concatenate(outlines)
-    shape = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(points) for points in outlines])
+    cascade = cascade_of("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
+    walk = _ElementWalk(_put_styles(root, cascade.declare(root)), matcher)
+    shapes = list(walk.shapes(root, page))
+    unread = _list_unread(cascade.unread)
+    if not sum(len(shape.points) for shape in shapes):
+        reason = "; ".join(unread) or "it has no visible path, line or shape; export it again"
+        raise InputError(f"draws no stroke: {reason}")
+    _check_effort(root)
+    window = page.window if page else _window_around(shapes)
+    seen, notes = see_strokes(_framed(root, page, window), window, shapes)
+    return _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
+
+
+def _join_strokes(
+    shapes: Sequence[Shape],
+    seen: Sequence[Seen],
+    page: _Page | None,
+    matcher: LabelMatcher | None,
+    notes: tuple[str, ...],
+) -> Curves:
+    """The curves of what is seen of the shapes, with colours and choices. Raises InputError."""
+    if not sum(len(part.points) for part in seen):
+        raise InputError(f"shows no stroke: {'; '.join(notes) or 'all have the colour of the paper'}")
+    points = np.concatenate([part.points for part in seen])
+    number = np.repeat(np.arange(len(seen), dtype=np.int32), [len(part.points) for part in seen])
+    red = is_red(np.array([part.colour for part in seen]))
     chosen = None
     if matcher is not None:
-        chosen = np.array(taken)[shape]
+        taken = [
+            (len(part.points) > 0 and matcher.matches([colour_label(part.colour)])) or shape.chosen
+            for shape, part in zip(shapes, seen, strict=True)
+        ]
+        chosen = np.array(taken)[number]
         matcher.check(any_stroke=bool(chosen.any()))
-    return Curves(points, run_numbers(points, shape), red[shape], page, chosen)
+    return Curves(points, run_numbers(points, number), red[number], page.box if page else None, chosen, notes)
+
+
+def _list_unread(unread: Mapping[Element, str]) -> tuple[str, ...]:
+    """A note on the colours that were not understood."""
+    if not unread:
+        return ()
+    element, text = next(iter(unread.items()))
+    colours = "1 colour is" if len(unread) == 1 else f"{len(unread)} colours are"
+    return (f"{colours} not understood, first {shortened(text, 40)!r} of {name_of(element)}; write #rrggbb",)
 
 
 def _parse_xml(data: bytes) -> Element:
@@ -95,100 +160,151 @@ def _parse_xml(data: bytes) -> Element:
         raise InputError("declares XML entities, which are unsafe; save it as plain SVG") from error
     except (ParseError, ValueError, LookupError, RecursionError) as error:
         raise InputError(f"is not well-formed XML: {error}; save the drawing again") from error
+    for element in root.iter():
+        if "}" not in element.tag:  # a drawing without a namespace
+            element.tag = _SVG + element.tag
     return root
+
+
+def _put_styles(root: Element, styles: dict[Element, dict[str, str]]) -> dict[Element, dict[str, str]]:
+    """The same styles, put into the attribute `style` of each element in place of style sheets."""
+    characters = 0
+    for element in root.iter():
+        characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
+        if characters > MAX_DATA:
+            raise InputError(
+                f"has more than {MAX_DATA} characters of paths, styles and transforms; simplify the drawing"
+            )
+        for key in ("filter", "stroke-dasharray", "marker-start", "marker-mid", "marker-end", "style"):
+            element.attrib.pop(key, None)
+        if styles[element]:
+            element.set("style", ";".join(f"{key}:{value}" for key, value in styles[element].items()))
+        for child in list(element):
+            if _tag(child) in ("style", "script", "filter") or (_tag(child) == "image"):
+                element.remove(child)
+    return styles
 
 
 @dataclass(eq=False)
 class _ElementWalk:
-    """A walk through a drawing. Results that depend only on an element are computed once for all its uses."""
+    """A walk through a drawing. styles: of every element, without what it inherits."""
 
-    sheet: StyleSheet
-    page: Box | None
+    styles: dict[Element, dict[str, str]]
     matcher: LabelMatcher | None
-    styles: dict[Element, tuple[Mapping[str, str], Any, bool]] = field(default_factory=dict)
-    outlines: dict[Element, Floats] = field(default_factory=dict)
+    outlines: dict[Any, Floats] = field(default_factory=dict)
 
     visited: int = 0
     used: int = 0
-    characters: int = 0
     curves: int = 0
 
-    def shapes(self, root: Element) -> Iterator[tuple[tuple[float, float, float], Floats, bool]]:
-        """Every visible shape in drawing order: colour, control points in the root's units, if chosen."""
+    def shapes(self, root: Element, page: _Page | None) -> Iterator[Shape]:
+        """Every painted shape in drawing order. Replaces each `use` by a group of what it shows."""
         from svgelements import Matrix
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
-        stack = [_Visit(root, _START, Matrix(), ())]
+        view, box = (page.view, page.box) if page else (_UNPAGED, _UNPAGED)
+        stack = [_Place(root, _START, Matrix.scale(box[2] / view[2], box[3] / view[3]), view[2:])]
         while stack:
             place = self._apply_style(stack.pop())
             tag, element = _tag(place.element), place.element
             self.visited += 1
             if self.visited > MAX_ELEMENTS:
                 raise InputError(f"draws more than {MAX_ELEMENTS} elements; simplify the drawing")
+            if place.depth > MAX_DEPTH:
+                raise InputError(
+                    f"has elements nested more than {MAX_DEPTH} deep, counting <use>; ungroup them"
+                )
             if place.style.get("display") == "none" or _number(place.style.get("opacity")) == 0:
                 continue
             if tag in SHAPES:
-                paint = _paint(place.style)
-                if not (place.style["visibility"] in ("hidden", "collapse") or is_paper(np.array(paint))):
-                    painted = self.matcher is not None and self.matcher.matches([colour_label(paint)])
-                    yield paint, self._place_shape(place), painted or place.chosen
-            elif tag in _CONTAINERS:
-                inner = _view(place, element) if element is not root else place.matrix
-                stack += [replace(place, element=child, matrix=inner) for child in reversed(element)]
-            elif tag == "use":
-                stack += self._follow_use(place, named)
+                yield from self._painted_shape(place, named)
+                continue
+            if tag == "use":
+                place = self._expand_use(place, named)
+            elif tag not in _CONTAINERS:
+                continue
+            elif tag == "svg" and element is not root:
+                place = _inner_view(place)
+            inner = replace(place, depth=place.depth + 1)
+            stack += [replace(inner, element=child) for child in reversed(element)]
 
-    def _apply_style(self, place: _Visit) -> _Visit:
-        """The place with the element's own style and transform applied."""
+    def _apply_style(self, place: _Place) -> _Place:
+        """The place with the element's own style, transform and labels applied."""
         element = place.element
-        if element not in self.styles:
-            self.characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
-            if self.characters > MAX_DATA:
-                raise InputError(
-                    f"has more than {MAX_DATA} characters of paths, styles and transforms; "
-                    "simplify the drawing"
-                )
-            style = _own_style(element, self.sheet)
-            taken = self.matcher is not None and self.matcher.matches(_labels(element))
-            self.styles[element] = style, _transform(element, style), taken
-        changes, transform, taken = self.styles[element]
-        inherited = {key: place.style[key] for key in PAINT if key in place.style}
-        style = inherited | {key: value for key, value in changes.items() if value != "inherit"}
-        matrix = place.matrix if transform is None else transform * place.matrix
-        return _Visit(element, style, matrix, place.uses, taken or place.chosen)
+        own = self.styles[element]
+        inherited = {key: place.style[key] for key in _INHERITED if key in place.style}
+        style = inherited | {key: value for key, value in own.items() if value != "inherit"}
+        matrix, transform = place.matrix, _transform(element, own, place.size)
+        if transform is not None:
+            matrix = transform * matrix
+            terms = (getattr(transform, key) for key in "abcdef")
+            element.set("transform", f"matrix({' '.join(f'{term:.12g}' for term in terms)})")
+        taken = self.matcher is not None and self.matcher.matches(_labels(element))
+        return replace(place, style=style, matrix=matrix, chosen=taken or place.chosen)
 
-    def _follow_use(self, place: _Visit, named: Mapping[str, Element]) -> list[_Visit]:
-        """The elements that a `use` refers to; none when it points into another file or at itself."""
-        from svgelements import Matrix
-
+    def _expand_use(self, place: _Place, named: Mapping[str, Element]) -> _Place:
+        """The place of a `use` that became a group of what it shows: nothing of another file or of itself."""
         self.used += 1
         if self.used > MAX_USES:
             raise InputError(f"draws more than {MAX_USES} <use> elements; expand them in the drawing program")
-        element = place.element
+        element, style = place.element, self.styles[place.element]
         link = next((element.get(key, "") for key in _HREFS if key in element.attrib), "")
+        moves = [_length(element, key, 0.0, side) for key, side in zip(("x", "y"), place.size, strict=True)]
+        sides, kept = (_chosen_attributes(element, keys) for keys in (("width", "height"), _GROUP))
+        element.clear()
+        element.tag, element.attrib = _SVG + "g", kept
         target = named.get(link[1:]) if link.startswith("#") else None
-        if target is None or link in place.uses:
-            return []
-        if len(place.uses) == MAX_USE_DEPTH:
-            raise InputError(f"has <use> elements nested more than {MAX_USE_DEPTH} deep; expand them")
-        moved = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
-        uses = (*place.uses, link)
-        used = replace(place, matrix=moved, uses=uses)
-        if _tag(target) != "symbol":
-            return [replace(used, element=target)]
-        inner = _view(used, target)
-        return [replace(used, element=child, matrix=inner) for child in reversed(target)]
+        if target is None or link in place.links:
+            return place
+        copy = deepcopy(target)
+        self.styles.update(
+            (new, self.styles[old]) for new, old in zip(copy.iter(), target.iter(), strict=True)
+        )
+        if _tag(target) in ("symbol", "svg"):
+            copy.tag = _SVG + "svg"
+            copy.attrib.update(sides)
+        moved = SubElement(element, _SVG + "g", {"transform": f"translate({moves[0]!r} {moves[1]!r})"})
+        self.styles[moved] = {}
+        moved.append(copy)
+        self.styles[element] = style
+        return replace(place, links=(*place.links, link))
 
-    def _place_shape(self, place: _Visit) -> Floats:
-        """Control points (k, 4, 2) of a shape in the units of the root."""
-        if place.element not in self.outlines:
-            size = self.page[2:] if self.page else (100.0, 100.0)
+    def _painted_shape(self, place: _Place, named: Mapping[str, Element]) -> Iterator[Shape]:
+        """The shape of an element, if it is painted."""
+        style = place.style
+        stroke, fill = (_paint(style, kind, named) for kind in ("stroke", "fill"))
+        if style["visibility"] in ("hidden", "collapse") or not (stroke or fill):
+            return
+        scale = float(np.sqrt(abs(place.matrix.determinant)))
+        width = _length_of(style.get("stroke-width", "1"), 1.0, float(np.hypot(*place.size) / np.sqrt(2)))
+        fixed = style.get("vector-effect") == "non-scaling-stroke"
+        yield Shape(
+            place.element,
+            name_of(place.element),
+            self._place_shape(place),
+            stroke or fill or "",
+            width=width * (1.0 if fixed else scale) if stroke else 0.0,
+            scale=scale,
+            is_stroked=bool(stroke),
+            is_filled=bool(fill),
+            chosen=place.chosen,
+        )
+
+    def _place_shape(self, place: _Place) -> Floats:
+        """Control points (k, 4, 2) of a shape in the units of the result."""
+        attributes, tag = place.element.attrib, _tag(place.element)
+        key = (
+            tag,
+            place.size,
+            *((name, text) for name, text in attributes.items() if name not in ("id", "style")),
+        )
+        if key not in self.outlines:
             try:
-                points = shape_curves(_tag(place.element), place.element.attrib, size)
+                points = shape_curves(tag, attributes, place.size)
             except InputError as error:
-                raise InputError(f"{_name_of(place.element)}: {error}") from error
-            self.outlines[place.element] = points
-        points, m = self.outlines[place.element], place.matrix
+                raise InputError(f"{name_of(place.element)}: {error}") from error
+            self.outlines[key] = points
+        points, m = self.outlines[key], place.matrix
         self.curves += len(points)
         if self.curves > MAX_CURVES:
             raise too_many_curves()
@@ -197,7 +313,7 @@ class _ElementWalk:
             placed: Floats = transform_vectors(points, turn) + shift
         if not (np.abs(placed) <= _GREATEST).all():
             raise InputError(
-                f"{_name_of(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"
+                f"{name_of(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"
             )
         return np.asarray(placed[(placed != placed[:, :1]).any(axis=(1, 2))])
 
@@ -212,83 +328,158 @@ def _labels(element: Element) -> Iterator[str]:
         yield f"layer={element.get(_INKSCAPE + 'label', '').strip()}"
 
 
-def _own_style(element: Element, sheet: StyleSheet) -> dict[str, str]:
-    """The element's own style: attributes, style sheets and its `style`, of increasing priority."""
-    attributes = element.attrib
-    presentation = {key: value.strip() for key, value in attributes.items() if key in KNOWN}
-    by_sheet = sheet.properties(_tag(element), attributes.get("id", ""), attributes.get("class", ""))
-    return {**presentation, **by_sheet, **style_properties(attributes.get("style", ""))}
-
-
-def _transform(element: Element, style: Mapping[str, str]) -> Any:
-    """The matrix of an element's own transform, None without one. Raises InputError."""
+def _transform(element: Element, style: Mapping[str, str], size: tuple[float, float]) -> Any:
+    """The matrix of an element's own transform, about its origin; None without one. Raises InputError."""
     from svgelements import Matrix
 
-    text = style.get("transform", "")
-    if not text:
+    text = style.get("transform", element.get("transform", ""))
+    if not text or text == "none":
         return None
     if len(text) > MAX_TRANSFORM:
         raise InputError(
-            f"{_name_of(element)}: its transform has more than {MAX_TRANSFORM} characters; simplify it"
+            f"{name_of(element)}: its transform has more than {MAX_TRANSFORM} characters; simplify it"
         )
     try:
-        return Matrix(text)
+        matrix = Matrix(text)
     except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError) as error:
-        raise InputError(f"{_name_of(element)}: its transform {text[:40]!r} cannot be read") from error
+        raise InputError(f"{name_of(element)}: its transform {text[:40]!r} cannot be read") from error
+    if origin := style.get("transform-origin", ""):
+        sides = [_SIDES.get(side.lower(), side) for side in origin.split()]
+        if sides[0] in ("top", "bottom") or sides[1:] == ["left"]:
+            sides.reverse()
+        x, y = (_length_of(side, 0.0, whole) for side, whole in zip([*sides, "50%"][:2], size, strict=True))
+        matrix = Matrix.translate(-x, -y) * matrix * Matrix.translate(x, y)
+    return matrix
 
 
-def _view(place: _Visit, element: Element) -> Any:
-    """The transform inside an inner svg or symbol: its viewBox centred in its width and height."""
+def _paint(style: Mapping[str, str], kind: str, named: Mapping[str, Element]) -> str | None:
+    """The stroke or fill as #rrggbb, #rrggbbaa or url(#id); None if it paints nothing."""
+    widths = ("stroke-opacity", "stroke-width") if kind == "stroke" else ("fill-opacity",)
+    if any(_number(style.get(name)) == 0 for name in widths):
+        return None
+    paint = style[kind]
+    if reference := _REFERENCE.match(paint):
+        server = named.get(reference[1])
+        if server is not None and _tag(server) in _SERVERS:
+            return f"url(#{reference[1]})"
+        paint = reference[2] or "none"
+    paint = style["color"] if paint == "currentcolor" else paint
+    is_clear = len(paint) == 9 and paint.endswith("00")
+    return paint if paint.startswith("#") and not is_clear else None
+
+
+def _inner_view(place: _Place) -> _Place:
+    """The place inside an inner svg: its viewBox fitted into its width and height."""
     from svgelements import Matrix
 
-    if _tag(element) not in ("svg", "symbol"):
-        return place.matrix
-    corner = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
-    box = _view_box(element)
-    if box is None:
-        return corner
-    x, y, width, height = box
-    wide, high = _length(place.element, "width", width), _length(place.element, "height", height)
-    scale = min(wide / width, high / height)
-    centre = Matrix.translate((wide - scale * width) / 2, (high - scale * height) / 2)
-    return Matrix.translate(-x, -y) * Matrix.scale(scale) * centre * corner
+    element = place.element
+    x, y = (_length(element, key, 0.0, side) for key, side in zip("xy", place.size, strict=True))
+    wide, high = (
+        _length(element, key, side, side) for key, side in zip(("width", "height"), place.size, strict=True)
+    )
+    view = _view_box(element)
+    if view is None:
+        return replace(place, matrix=Matrix.translate(x, y) * place.matrix, size=(wide, high))
+    across, down, right, below = _fit_view(view, wide, high, element.get("preserveAspectRatio", ""))
+    matrix = Matrix.translate(-view[0], -view[1]) * Matrix.scale(across, down)
+    matrix *= Matrix.translate(x + right, y + below) * place.matrix
+    return replace(place, matrix=matrix, size=view[2:])
 
 
-def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
-    """Red, green, blue in [0, 1] of the stroke, else of the fill; white without either."""
-    for kind in ("stroke", "fill"):
-        colour = style[kind]
-        colour = style["color"] if colour.lower() == "currentcolor" else colour
-        numbers = ("stroke-opacity", "stroke-width") if kind == "stroke" else ("fill-opacity",)
-        seen = all(_number(style.get(name)) != 0 for name in numbers)
-        if seen and colour.lower() not in ("none", "transparent"):
-            return _colour_on_paper(colour)
-    return 1.0, 1.0, 1.0
+def _fit_view(view: Box, wide: float, high: float, rule: str) -> tuple[float, float, float, float]:
+    """Scales across and down, and shifts, that fit a viewBox into a width and height; rule: its aspect."""
+    across, down = wide / view[2], high / view[3]
+    if rule.strip().startswith("none"):
+        return across, down, 0.0, 0.0
+    scale = max(across, down) if "slice" in rule else min(across, down)
+    shares = [
+        next((share for word, share in (("Min", 0.0), ("Max", 1.0)) if axis + word in rule), 0.5)
+        for axis in ("x", "Y")
+    ]
+    return scale, scale, shares[0] * (wide - scale * view[2]), shares[1] * (high - scale * view[3])
 
 
-@lru_cache(maxsize=1024)
-def _colour_on_paper(colour: str) -> tuple[float, float, float]:
-    """The colour on white paper; black for gradients and for unreadable colours."""
-    from tinycss2.color4 import parse_color
+def _page_of(root: Element) -> _Page | None:
+    """The page of a drawing; None if it states neither a viewBox nor a width and height."""
+    view = _view_box(root)
+    wide, high = (_length(root, key, 0.0) for key in ("width", "height"))
+    has_size = min(wide, high) >= LEAST_LENGTH
+    if view is None:
+        box = (0.0, 0.0, wide, high)
+        return _Page(box, box, box) if has_size else None
+    if not has_size:
+        return _Page(view, view, view)
+    across, down, right, below = _fit_view(view, wide, high, root.get("preserveAspectRatio", ""))
+    stretch = down / across
+    box = (view[0], view[1] * stretch, view[2], view[3] * stretch)
+    window = (box[0] - right / across, box[1] - below / across, wide / across, high / across)
+    return _Page(view, box, window)
 
-    parsed = parse_color(colour) if len(colour) <= MAX_LENGTH else None
-    if parsed is None or isinstance(parsed, str):
-        return 0.0, 0.0, 0.0
-    try:
-        channels = parsed.to("srgb").coordinates
-    except NotImplementedError:  # of Lab and its kin
-        return 0.0, 0.0, 0.0
-    red, green, blue = (1 - parsed.alpha * (1 - min(max(channel, 0.0), 1.0)) for channel in channels)
-    return red, green, blue
+
+def _window_around(shapes: Sequence[Shape]) -> Box:
+    """The box of all shapes with a margin, for a drawing without a page."""
+    corners = np.concatenate([shape.points.reshape(-1, 2) for shape in shapes])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    margin = _OWN_MARGIN * max(float((high - low).max()), LEAST_LENGTH)
+    (left, top), (wide, tall) = (low - margin).tolist(), (high - low + 2 * margin).tolist()
+    return left, top, wide, tall
 
 
-def _page_of(root: Element) -> Box | None:
-    """The viewBox, or else width and height from (0, 0), or None."""
-    box = _view_box(root)
-    if box is not None:
-        return box
-    width, height = _length(root, "width", 0.0), _length(root, "height", 0.0)
-    return (0.0, 0.0, width, height) if min(width, height) >= LEAST_LENGTH else None
+def _framed(root: Element, page: _Page | None, window: Box) -> Element:
+    """The drawing inside a root whose viewBox is the window."""
+    view, box = (page.view, page.box) if page else (_UNPAGED, _UNPAGED)
+    frame = Element(_SVG + "svg", {"viewBox": _join(window), "preserveAspectRatio": "none"})
+    sides = {key: f"{value!r}" for key, value in zip(("x", "y", "width", "height"), box, strict=True)}
+    inner = SubElement(
+        frame,
+        _SVG + "svg",
+        {**sides, "viewBox": _join(view), "preserveAspectRatio": "none", "overflow": "visible"},
+    )
+    SubElement(inner, _SVG + "g", _chosen_attributes(root, _GROUP)).extend(list(root))
+    return frame
+
+
+def _chosen_attributes(element: Element, names: Sequence[str]) -> dict[str, str]:
+    return {name: element.attrib[name] for name in names if name in element.attrib}
+
+
+def _join(box: Box) -> str:
+    return " ".join(f"{value!r}" for value in box)
+
+
+def _check_effort(root: Element) -> None:
+    """Raise InputError if clips, masks and patterns draw too many elements, or nest them too deep."""
+    named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
+    efforts: dict[Element, tuple[int, int]] = {}
+    stack, around = [(root, False)], set[Element]()
+    while stack:
+        element, is_left = stack.pop()
+        inner = [*element, *_drawn_references(element, named)]
+        if is_left:
+            around.discard(element)
+            known = [efforts[part] for part in inner if part in efforts]
+            count, depth = 1 + sum(one for one, _ in known), 1 + max((deep for _, deep in known), default=0)
+            if count > MAX_ELEMENTS or depth > 2 * MAX_DEPTH:
+                raise InputError(
+                    f"draws more than {MAX_ELEMENTS} elements, or more than {2 * MAX_DEPTH} inside of one "
+                    "another, by its clips, masks and patterns; flatten it in the drawing program"
+                )
+            efforts[element] = count, depth
+        elif element not in efforts and element not in around:
+            around.add(element)
+            stack += [(element, True), *((part, False) for part in inner)]
+
+
+def _drawn_references(element: Element, named: Mapping[str, Element]) -> Iterator[Element]:
+    """The clips, masks, patterns and copies that an element draws."""
+    texts = [element.get(key, "") for key in ("style", "clip-path", "mask", "fill", "stroke")]
+    if _tag(element) == "use":
+        texts += [f"url({element.get(key, '')})" for key in _HREFS]
+    for text in texts:
+        for name in re.findall(r"url\(\s*['\"]?#([^'\")]*)", text) if "url(" in text else ():
+            target = named.get(name)
+            if target is not None and not _tag(target).endswith("Gradient"):
+                yield target
 
 
 def _view_box(element: Element) -> Box | None:
@@ -299,16 +490,22 @@ def _view_box(element: Element) -> Box | None:
         x, y, width, height = (float(field) for field in fields)
     except ValueError as error:
         raise InputError(
-            f"{_name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} is not four numbers"
+            f"{name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} is not four numbers"
         ) from error
     if not (np.abs([x, y, width, height]) <= _GREATEST).all() or min(width, height) < LEAST_LENGTH:
-        raise InputError(f"{_name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} has no area")
+        raise InputError(f"{name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} has no area")
     return x, y, width, height
 
 
-def _length(element: Element, key: str, default: float) -> float:
-    """A length in CSS pixels; `default` when it is missing, a percentage or unreadable."""
-    pixels = length_in_pixels(element.get(key, ""))
+def _length(element: Element, key: str, default: float, whole: float | None = None) -> float:
+    """A length in CSS pixels, a percentage of `whole`; `default` when it is missing or unreadable."""
+    return _length_of(element.get(key, ""), default, whole)
+
+
+def _length_of(text: str, default: float, whole: float | None) -> float:
+    if text.endswith("%") and whole is not None:
+        return whole * _number(text) / 100
+    pixels = length_in_pixels(text)
     return default if pixels is None else pixels
 
 
@@ -320,10 +517,10 @@ def _number(text: str | None) -> float:
 
 def _tag(element: Element) -> str:
     """The tag of an SVG element without its namespace; empty for elements of other languages."""
-    space, _, tag = element.tag.rpartition("}")
-    return tag if space in ("", "{" + _SVG) else ""
+    return element.tag.removeprefix(_SVG) if element.tag.startswith(_SVG) else ""
 
 
-def _name_of(element: Element) -> str:
+def name_of(element: Element) -> str:
+    """An element as a message names it."""
     name = element.get("id")
     return f"<{_tag(element)}" + (f' id="{name[:40]}">' if name else ">")

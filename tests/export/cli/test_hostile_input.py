@@ -143,9 +143,9 @@ def test_costly_drawings_are_read_or_refused_in_little_time(tmp_path):
     messages = [message for message, _ in read_by_child(*paths).values()]
     refused = {name: message for name, message in zip(COSTLY_SVG, messages, strict=True) if message}
     assert set(refused) == {
-        "rules of one class", "a point list without blanks", "a transform that never closes", "uses of uses",
+        "rules of one class", "a point list without blanks", "a colour of digits", "a transform that never closes", "uses of uses",
     }  # fmt: skip
-    assert f"nested more than {input_limits.MAX_USE_DEPTH} deep" in refused["uses of uses"]
+    assert f"nested more than {input_limits.MAX_DEPTH} deep" in refused["uses of uses"]
     assert f"more than {input_limits.MAX_RULE_CHECKS} comparisons" in refused["rules of one class"]
     assert f"more than {input_limits.MAX_TRANSFORM} characters" in refused["a transform that never closes"]
 

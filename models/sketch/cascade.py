@@ -1,0 +1,207 @@
+"""Styles of SVG elements: what their attributes, the style sheets and their `style` declare together.
+
+cssselect2 matches selectors, tinycss2 parses, and `colour.py` reads colours. A declaration that cannot be
+read does not count, so an earlier one stays valid, as in browsers. The work is bounded by the limits of
+`input_limits`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, Final
+from xml.etree.ElementTree import Element
+
+from ..errors import InputError
+from ..input_limits import MAX_LENGTH, MAX_RULE_CHECKS, MAX_STYLE
+from .colour import hex_colour
+
+ATTRIBUTES: Final = frozenset(
+    {"stroke", "fill", "color", "stop-color", "visibility", "display", "opacity", "stroke-width",
+     "stroke-opacity", "fill-opacity", "stop-opacity", "vector-effect", "transform-origin", "clip-path",
+     "mask"}
+)  # fmt: skip
+"""Attributes of SVG elements that style sheets can override."""
+_COLOURS: Final = frozenset({"stroke", "fill", "color", "stop-color"})
+_KEYWORDS: Final = frozenset({"none", "currentcolor", "inherit", "context-fill", "context-stroke"})
+_INITIAL: Final = {"stroke": "none"}  # black for the others
+_DROPPED: Final = re.compile(r"filter|marker|stroke-dash|font|animation|transition|-")
+"""Beginnings of properties that do not tell which strokes there are: filters, markers, dashes, text."""
+_VARIABLE: Final = re.compile(r"var\(\s*(--[\w-]+)\s*(?:,\s*((?:[^()]|\([^()]*\))*))?\)")
+_DEEPEST: Final = 10  # variables inside of variables
+
+_Declared = tuple[str, str, bool]
+"""Name, value, and whether it is important."""
+
+
+@dataclass(eq=False)
+class Cascade:
+    """The rules of a drawing. unread: an element and its colour, for each colour that cannot be read."""
+
+    matcher: Any
+    combinators: dict[int, int] = field(default_factory=dict)
+    unread: dict[Element, str] = field(default_factory=dict)
+    checks: int = 0
+
+    def declare(self, root: Element) -> dict[Element, dict[str, str]]:
+        """The style of every element under a root, without what it inherits. Raises InputError."""
+        import cssselect2
+
+        styles: dict[Element, dict[str, str]] = {}
+        variables: dict[Element, Mapping[str, str]] = {}
+        for wrapper in cssselect2.ElementWrapper.from_xml_root(root).iter_subtree():
+            element, parent = wrapper.etree_element, wrapper.parent
+            inherited = variables[parent.etree_element] if parent is not None else {}
+            declared = list(self._declarations(wrapper))
+            own = {name: value for name, value, _ in declared if name.startswith("--")}
+            variables[element] = {**inherited, **own} if own else inherited
+            styles[element] = self._valid_style(element, declared, variables[element])
+        return styles
+
+    def _declarations(self, wrapper: Any) -> Iterator[_Declared]:
+        """All declarations for an element, the ones that count most last."""
+        element = wrapper.etree_element
+        yield from ((key, element.attrib[key], False) for key in ATTRIBUTES & element.attrib.keys())
+        declared: list[_Declared] = []
+        if self.combinators:
+            self._count(wrapper)
+            for *_, pseudo, declarations in self.matcher.match(wrapper):
+                declared += declarations if pseudo is None else ()
+        declared += style_declarations(element.get("style", ""))
+        yield from sorted(declared, key=lambda declaration: declaration[2])
+
+    def _count(self, wrapper: Any) -> None:
+        """Count the comparisons for an element. Raises InputError beyond MAX_RULE_CHECKS."""
+        steps = 1 + sum(1 for _ in wrapper.ancestors) + wrapper.index
+        matcher = self.matcher
+        lists = [
+            matcher.other_selectors,
+            matcher.lower_local_name_selectors.get(wrapper.local_name.lower(), ()),
+        ]
+        lists += [matcher.class_selectors.get(name, ()) for name in wrapper.classes]
+        lists.append(matcher.id_selectors.get(wrapper.id, ()))
+        self.checks += sum(steps ** self.combinators[entry[2]] for entries in lists for entry in entries)
+        if self.checks > MAX_RULE_CHECKS:
+            raise InputError(
+                f"its style sheets take more than {MAX_RULE_CHECKS} comparisons; export it without"
+            )
+
+    def _valid_style(
+        self, element: Element, declared: Iterable[_Declared], variables: Mapping[str, str]
+    ) -> dict[str, str]:
+        """The values that can be read, colours as #rrggbb or #rrggbbaa."""
+        style: dict[str, str] = {}
+        for name, text, _ in declared:
+            if _DROPPED.match(name):
+                continue
+            value = _replace_variables(text, variables) if "var(" in text else text.strip()
+            if name in _COLOURS:
+                colour = _paint_value(name, value)
+                if colour is None:
+                    self.unread[element] = text
+                    continue
+                value = colour
+            style[name] = value
+        return style
+
+
+def cascade_of(texts: Iterable[str]) -> Cascade:
+    """The rules of style sheets, in order. Raises InputError beyond MAX_STYLE characters."""
+    import cssselect2
+    import tinycss2
+
+    cascade, length = Cascade(cssselect2.Matcher()), 0
+    for text in texts:
+        length += len(text)
+        if length > MAX_STYLE:
+            raise InputError(f"its style sheets have more than {MAX_STYLE} characters; export it without")
+        try:
+            rules = tinycss2.parse_stylesheet(text, skip_comments=True, skip_whitespace=True)
+        except ValueError:  # a whole number of thousands of digits
+            continue
+        _add_rules(cascade, rules)
+    return cascade
+
+
+def _add_rules(cascade: Cascade, rules: Iterable[Any]) -> None:
+    import cssselect2
+    import tinycss2
+
+    for rule in rules:
+        if rule.type == "at-rule" and rule.lower_at_keyword == "media" and rule.content is not None:
+            if _text(rule.prelude).lower() in ("", "all", "screen"):
+                inner = tinycss2.parse_rule_list(rule.content, skip_comments=True, skip_whitespace=True)
+                _add_rules(cascade, inner)
+        elif rule.type == "qualified-rule" and (declared := _declared(rule.content)):
+            try:
+                selectors = cssselect2.compile_selector_list(rule.prelude)
+            except (cssselect2.SelectorError, RecursionError, MemoryError, SyntaxError):
+                continue
+            text = _text(rule.prelude)
+            for selector in selectors:
+                cascade.matcher.add_selector(selector, declared)
+                cascade.combinators[cascade.matcher.order] = _combinators(text)
+
+
+def _combinators(selector: str) -> int:
+    """A bound on the number of combinators of a selector, whose comparisons are tried for every ancestor."""
+    return len(re.findall(r"[\s>+~]+|:has", selector.strip()))
+
+
+@lru_cache(maxsize=1024)
+def style_declarations(text: str) -> tuple[_Declared, ...]:
+    """The declarations in a `style` attribute."""
+    try:
+        return _declared(text) if text else ()
+    except ValueError:  # a whole number of thousands of digits
+        return ()
+
+
+def _declared(content: Any) -> tuple[_Declared, ...]:
+    """The declarations in a text or in the tokens of a rule."""
+    import tinycss2
+
+    return tuple(
+        (name if (name := declaration.name).startswith("--") else declaration.lower_name,
+         _text(declaration.value), declaration.important)
+        for declaration in tinycss2.parse_blocks_contents(content, skip_comments=True, skip_whitespace=True)
+        if declaration.type == "declaration"
+    )  # fmt: skip
+
+
+def _text(tokens: list[Any]) -> str:
+    import tinycss2
+
+    try:
+        return str(tinycss2.serialize(tokens)).strip()
+    except RecursionError:
+        return ""
+
+
+def _replace_variables(text: str, variables: Mapping[str, str]) -> str:
+    """The text with the values of its variables; empty where one has no value."""
+    for _ in range(_DEEPEST):
+        if len(text) > MAX_LENGTH or "var(" not in text:
+            break
+        text = _VARIABLE.sub(lambda use: variables.get(use[1], use[2] or ""), text)
+    return text.strip()
+
+
+@lru_cache(maxsize=1024)
+def _paint_value(name: str, text: str) -> str | None:
+    """A paint with its colour as #rrggbb or #rrggbbaa; None where it cannot be read."""
+    lower = text.lower()
+    if lower in _KEYWORDS:
+        return lower
+    if lower in ("unset", "revert", "initial"):
+        return _INITIAL.get(name, "#000000") if lower == "initial" or name == "stop-color" else "inherit"
+    if lower.startswith("url("):
+        server, _, fallback = text.partition(")")
+        return (
+            server + ")"
+            if not fallback.strip()
+            else f"{server}) {_paint_value(name, fallback.strip()) or ''}"
+        )
+    return hex_colour(text)

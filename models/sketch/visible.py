@@ -1,0 +1,321 @@
+"""What a picture of a drawing shows of its strokes.
+
+resvg draws the picture, without fonts, files and links. A stroke counts where the colour at its centre line
+differs from the ground, which is the picture without strokes. So what is clipped, masked, covered, erased or
+off the page does not count, and white lines on a dark page do. Where colours do not tell which stroke a pixel
+shows, a second picture, with a flat colour for each shape, tells which one is in front.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+from xml.etree.ElementTree import Element, tostring
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, shortened
+from ..instance.domain import Bools, Floats, Ints
+from .colour import PAPER
+from .cover import Box, Indices
+from .curves import cut_cubics, evaluate_cubics, run_numbers
+
+SIDE: Final = 1024  # pixels on the longer side of the pictures
+_LEAST_WIDTH: Final = 3.0  # pixels; thinner strokes are widened, so that each has pixels at its centre line
+_STEP: Final = 1.5  # pixels between two samples of a centre line
+_MOST_SAMPLES: Final = 4_000_000
+_SAME: Final = 0.03  # greatest difference of equal colours in a channel
+_CROSSING: Final = 3.0  # widths of the shape in front: a longer covered part is no crossing
+_GLITCH: Final = 3.0  # pixels: a shorter gap is one of rasterization
+_WORTH_A_NOTE: Final = 0.05  # of the length of a shape
+_REASONS: Final = ("clipped or masked", "covered", "off the page", "drawn elsewhere by the renderer")
+_PALE: Final = len(_REASONS)  # a stroke in the colour of its ground is none, and needs no note
+_HIDDEN, _VISIBLE, _CROSSED = 0, 1, 2
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A painted shape of a drawing.
+
+    points: (k, 4, 2), control points of its centre line in the units of the page, none for an area. paint: of
+    its stroke, or else of its fill, as #rrggbb, #rrggbbaa or url(#id). width: of its stroke in units of the
+    page. scale: units of the page per unit of the element. chosen: whether it has a chosen label.
+    """
+
+    element: Element
+    name: str
+    points: Floats
+    paint: str
+    width: float
+    scale: float
+    is_stroked: bool
+    is_filled: bool
+    chosen: bool
+
+    @property
+    def is_ground(self) -> bool:
+        """Whether its fill is an area, and so belongs to the ground of the strokes."""
+        return self.is_filled and (self.is_stroked or not len(self.points))
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What is seen of a shape: control points (m, 4, 2), and red, green, blue in [0, 1]."""
+
+    points: Floats
+    colour: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Points on the centre lines of shapes, in the order of the lines.
+
+    shape, cubic, run: (s,), numbers of the shape, of its cubic among all, and of the unbroken run. start,
+    end: (s,), parameters on the cubic between which a sample stands. place: (s, 2), in units of the page.
+    pixel: (s,), number of the picture's pixel; -1 off the page. length: (s,), in pixels.
+    """
+
+    shape: Indices
+    cubic: Indices
+    run: Ints
+    start: Floats
+    end: Floats
+    place: Floats
+    pixel: Indices
+    length: Floats
+
+
+def see_strokes(root: Element, window: Box, shapes: Sequence[Shape]) -> tuple[list[Seen], tuple[str, ...]]:
+    """What is seen of each shape, and notes on what is left out. Raises InputError.
+
+    root: the drawing, whose viewBox is the window; its shapes get other styles. window: x, y, width, height.
+    """
+    pixel = max(window[2:]) / SIDE
+    samples = _sample_lines(shapes, window, pixel)
+    styles = [shape.element.get("style", "") for shape in shapes]
+    for shape, style in zip(shapes, styles, strict=True):
+        shape.element.set("style", style + _widened(shape, pixel))
+    shown = _render(root)
+    ground = None
+    if any(shape.is_ground for shape in shapes):
+        for shape, style in zip(shapes, styles, strict=True):
+            shape.element.set("style", style + ";stroke:none" + ("" if shape.is_ground else ";fill:none"))
+        ground = _render(root)
+    inside = samples.pixel >= 0
+    colour = np.where(inside[:, None], _at(shown, samples.pixel), np.nan)
+    contrast = inside & (np.abs(colour - _at(ground, samples.pixel)).max(axis=1) > PAPER)
+    expected = np.array([_opaque_colour(shape.paint) for shape in shapes])[samples.shape]
+    own = contrast & (np.abs(colour - expected).max(axis=1) <= _SAME)
+    notes: tuple[str, ...] = ()
+    visible, front = own, 2 * samples.shape
+    if not own.all():
+        front, elsewhere = _find_fronts(root, shapes, styles, samples, pixel)
+        visible, reason = _decide(samples, shapes, front, elsewhere, contrast=contrast, own=own, pixel=pixel)
+        notes = _describe_hidden(samples, shapes, visible, reason)
+    pure = visible & (own | (front == 2 * samples.shape))
+    colour[~pure] = np.nan
+    return _collect(samples, shapes, visible, colour, expected), notes
+
+
+def _widened(shape: Shape, pixel: float) -> str:
+    """The style that gives a shape a stroke of its paint, wide enough for its centre line to have pixels."""
+    if not len(shape.points):
+        return ""
+    width = max(shape.width, _LEAST_WIDTH * pixel) / shape.scale if shape.scale > 0 else shape.width
+    opacity = "" if shape.is_stroked else ";stroke-opacity:1"
+    return f";stroke:{shape.paint};stroke-width:{width:.6g};vector-effect:none{opacity}"
+
+
+def _opaque_colour(paint: str) -> tuple[float, float, float]:
+    """Red, green and blue in [0, 1] of an opaque colour; not numbers for other paints."""
+    if len(paint) != 7 or not paint.startswith("#"):
+        return np.nan, np.nan, np.nan
+    red, green, blue = (int(paint[place : place + 2], 16) / 255 for place in (1, 3, 5))
+    return red, green, blue
+
+
+def _render(root: Element) -> NDArray[np.uint8]:
+    """The picture of a drawing on white, uint8 [h, w, 3], without antialiasing. Raises InputError."""
+    import resvg_py
+    from PIL import Image
+
+    _, _, width, height = (float(number) for number in root.get("viewBox", "").split())
+    scale = SIDE / max(width, height)
+    wide, high = (max(1, round(scale * side)) for side in (width, height))
+    root.attrib.update(width=str(wide), height=str(high))
+    try:
+        data = resvg_py.svg_to_bytes(
+            svg_string=tostring(root, encoding="unicode"),
+            background="#ffffff",
+            skip_system_fonts=True,
+            shape_rendering="crisp_edges",
+        )
+    except BaseException as error:
+        if isinstance(error, ValueError) or type(error).__name__ == "PanicException":  # of resvg's own code
+            raise InputError(f"cannot be drawn: {shortened(error)}; export it again") from error
+        raise
+    return np.asarray(Image.open(io.BytesIO(bytes(data))).convert("RGB"))
+
+
+def _at(picture: NDArray[np.uint8] | None, pixel: Indices) -> Floats:
+    """Colours (s, 3) in [0, 1] at pixels (s,); white without a picture."""
+    if picture is None:
+        return np.ones((len(pixel), 3))
+    return np.asarray(picture.reshape(-1, 3)[pixel] / 255.0)
+
+
+def _sample_lines(shapes: Sequence[Shape], window: Box, pixel: float) -> _Samples:
+    """Samples of the centre lines of all shapes, at least two on each cubic."""
+    points = np.concatenate([shape.points for shape in shapes])
+    number = np.repeat(np.arange(len(shapes)), [len(shape.points) for shape in shapes])
+    length = np.hypot(*np.moveaxis(np.diff(points, axis=1), -1, 0)).sum(axis=1) / pixel
+    step = max(_STEP, float(length.sum()) / _MOST_SAMPLES)
+    count = np.ceil(length / step).clip(2, _MOST_SAMPLES).astype(np.intp)
+    cubic = np.repeat(np.arange(len(points)), count)
+    place = np.arange(len(cubic)) - np.repeat(np.cumsum(count) - count, count)
+    start, end = place / count[cubic], (place + 1) / count[cubic]
+    at = evaluate_cubics(points[cubic], (start + end) / 2)
+    ways = np.where(np.diff(cubic) == 0, np.hypot(*np.diff(at, axis=0).T), 0.0) / pixel
+    ways = np.r_[0.0, ways, 0.0]
+    wide, high = (max(1, round(side / pixel)) for side in window[2:])
+    column, row = np.floor((at - window[:2]) / np.array(window[2:]) * (wide, high)).astype(np.intp).T
+    inside = (column >= 0) & (column < wide) & (row >= 0) & (row < high)
+    return _Samples(
+        number[cubic],
+        cubic,
+        run_numbers(points, number.astype(np.int32))[cubic],
+        start,
+        end,
+        at,
+        np.where(inside, row * wide + column, -1),
+        (ways[:-1] + ways[1:]) / 2,
+    )
+
+
+def _find_fronts(
+    root: Element, shapes: Sequence[Shape], styles: Sequence[str], samples: _Samples, pixel: float
+) -> tuple[Indices, Bools]:
+    """The number of the paint in front (s,) at each sample, and which shapes are painted elsewhere only.
+
+    Number 2 n is the line of shape n, and 2 n + 1 the area that it fills. -1 is paper, -2 a mixture.
+    """
+    for number, (shape, style) in enumerate(zip(shapes, styles, strict=True)):
+        line, area = (f"#{_flat_colour(2 * number + part):06x}" for part in (0, int(shape.is_ground)))
+        flat = ";opacity:1;stroke-opacity:1;fill-opacity:1"
+        flat += (f";stroke:{line}" if len(shape.points) else "") + (
+            f";fill:{area}" if shape.is_filled else ""
+        )
+        shape.element.set("style", style + _widened(shape, pixel) + flat)
+    _make_opaque(root)
+    picture = _render(root).reshape(-1, 3)
+    known = {_flat_colour(number): number for number in range(2 * len(shapes))} | {0xFFFFFF: -1}
+    codes, inverse = np.unique(_codes(picture[samples.pixel]), return_inverse=True)
+    front = np.array([known.get(code, -2) for code in codes.tolist()])[inverse]
+    front[samples.pixel < 0] = -1
+    is_met = np.zeros(len(shapes), dtype=bool)
+    is_met[samples.shape[front == 2 * samples.shape]] = True
+    unmet = np.flatnonzero(~is_met)
+    elsewhere = np.zeros(len(shapes), dtype=bool)
+    if len(unmet):
+        elsewhere[unmet] = np.isin([_flat_colour(2 * number) for number in unmet.tolist()], _codes(picture))
+    return front, elsewhere
+
+
+def _codes(colours: NDArray[np.uint8]) -> Indices:
+    """Colours (n, 3) as whole numbers (n,)."""
+    red, green, blue = colours.astype(np.intp).T
+    return np.asarray(red << 16 | green << 8 | blue)
+
+
+def _flat_colour(number: int) -> int:
+    """A colour of its own for each number, far from those of its neighbours, and never white."""
+    return (number * 7_368_787 + 1) % 16_777_213
+
+
+def _make_opaque(root: Element) -> None:
+    """Make groups opaque, except in masks, whose colours decide what they show."""
+    stack = [root]
+    while stack:
+        element = stack.pop()
+        if element.tag.rpartition("}")[2] not in ("mask", "clipPath", "pattern"):
+            style = element.get("style", "")
+            if "opacity" in style or "mix-blend-mode" in style:
+                element.set("style", style + ";opacity:1;mix-blend-mode:normal")
+            stack += element
+
+
+def _decide(
+    samples: _Samples,
+    shapes: Sequence[Shape],
+    front: Indices,
+    elsewhere: Bools,
+    *,
+    contrast: Bools,
+    own: Bools,
+    pixel: float,
+) -> tuple[Bools, Indices]:
+    """Which samples (s,) are visible, and the number (s,) in _REASONS, or _PALE, why others are not."""
+    line = 2 * samples.shape
+    is_crossed = contrast & ~own & (front >= 0) & (front % 2 == 0) & (front != line)
+    state = np.where(is_crossed, _CROSSED, np.where(contrast, _VISIBLE, _HIDDEN))
+    reason = np.where(front == line, _PALE, np.where(front >= 0, 1, 0))
+    reason[(reason == 0) & elsewhere[samples.shape]] = 3
+    reason[samples.pixel < 0] = 2
+    width = np.maximum(np.array([shape.width for shape in shapes]) / pixel, _LEAST_WIDTH)
+    limit = np.where(is_crossed, _CROSSING * width[front.clip(0) // 2], _GLITCH)
+    starts = np.flatnonzero((np.diff(samples.run, prepend=-1) != 0) | (np.diff(state, prepend=-1) != 0))
+    length = np.add.reduceat(samples.length, starts)
+    part, run = state[starts], samples.run[starts]
+    beside = [
+        np.where(np.roll(run, step) == run, np.roll(part, step), _HIDDEN) == _VISIBLE for step in (1, -1)
+    ]
+    is_short = length <= np.maximum.reduceat(limit, starts)
+    visible = (part == _VISIBLE) | (is_short & (beside[0] | beside[1]))
+    return np.repeat(visible, np.diff([*starts, len(state)])), reason
+
+
+def _describe_hidden(
+    samples: _Samples, shapes: Sequence[Shape], visible: Bools, reason: Indices
+) -> tuple[str, ...]:
+    """A note for each reason for which more than a small part of a shape is left out."""
+    whole = np.bincount(samples.shape, samples.length, len(shapes))
+    notes = []
+    for number, words in enumerate(_REASONS):
+        lost = ~visible & (reason == number)
+        share = np.bincount(samples.shape[lost], samples.length[lost], len(shapes)) / np.maximum(whole, 1e-9)
+        left_out = np.flatnonzero(share > _WORTH_A_NOTE)
+        if len(left_out):
+            first = samples.place[np.flatnonzero(lost & (samples.shape == left_out[0]))[0]]
+            count = f"{len(left_out)} strokes are" if len(left_out) > 1 else "1 stroke is"
+            partly = "" if (share[left_out] > 1 - _WORTH_A_NOTE).all() else ", wholly or in part"
+            notes.append(
+                f"{count} {words}{partly}, first {shapes[left_out[0]].name} round "
+                f"({first[0]:.4g}, {first[1]:.4g}): left out, as the picture does not show it there"
+            )
+    return tuple(notes)
+
+
+def _collect(
+    samples: _Samples, shapes: Sequence[Shape], visible: Bools, colour: Floats, expected: Floats
+) -> list[Seen]:
+    """The visible parts of each shape, whole cubics unchanged. colour: (s, 3), nan where another's."""
+    points = np.concatenate([shape.points for shape in shapes])
+    before = np.r_[False, visible[:-1] & (np.diff(samples.cubic) == 0)]
+    after = np.r_[before[1:] & visible[1:], False]
+    starts, ends = np.flatnonzero(visible & ~before), np.flatnonzero(visible & ~after)
+    parts = cut_cubics(points[samples.cubic[starts]], samples.start[starts], samples.end[ends])
+    bounds = np.searchsorted(samples.shape[starts], np.arange(len(shapes) + 1))
+    edges = np.searchsorted(samples.shape, np.arange(len(shapes) + 1))
+    seen = []
+    for number in range(len(shapes)):
+        within = slice(edges[number], edges[number + 1])
+        shown = colour[within][np.isfinite(colour[within, 0])]
+        rgb = expected[edges[number]] if len(shown) else np.zeros(3)
+        if len(shown) and not (np.abs(np.median(shown, axis=0) - rgb) <= _SAME).all():
+            rgb = np.median(shown, axis=0)
+        red, green, blue = rgb.tolist()
+        seen.append(Seen(parts[bounds[number] : bounds[number + 1]], (red, green, blue)))
+    return seen
