@@ -20,8 +20,8 @@ from .colour import hex_colour
 
 ATTRIBUTES: Final = frozenset(
     {"stroke", "fill", "color", "stop-color", "visibility", "display", "opacity", "stroke-width",
-     "stroke-opacity", "fill-opacity", "stop-opacity", "vector-effect", "transform-origin", "clip-path",
-     "mask"}
+     "stroke-opacity", "fill-opacity", "stop-opacity", "fill-rule", "vector-effect", "transform-origin",
+     "clip-path", "mask"}
 )  # fmt: skip
 """Attributes of SVG elements that style sheets can override."""
 _COLOURS: Final = frozenset({"stroke", "fill", "color", "stop-color"})
@@ -194,7 +194,7 @@ def _paint_value(name: str, text: str) -> str | None:
     """A paint with its colour as #rrggbb or #rrggbbaa; None where it cannot be read."""
     lower = text.lower()
     if lower in _KEYWORDS:
-        return lower
+        return lower.replace("currentcolor", "currentColor")  # as resvg writes it
     if lower in ("unset", "revert", "initial"):
         return _INITIAL.get(name, "#000000") if lower == "initial" or name == "stop-color" else "inherit"
     if lower.startswith("url("):

@@ -37,7 +37,8 @@ from .cover import Box
 from .curves import Curves, run_numbers
 from .labels import LabelMatcher, colour_label
 from .path_data import SHAPES, length_in_pixels, shape_curves, too_many_curves
-from .visible import Seen, Shape, see_strokes
+from .pen_outlines import find_pen_strokes, find_silhouettes
+from .visible import Seen, Shape, opaque_colour, see_strokes
 
 _GREATEST: Final = 1e9
 _SVG: Final = "{http://www.w3.org/2000/svg}"
@@ -55,10 +56,12 @@ _INHERITED: Final = (
 )
 _START: Final = {"stroke": "none", "fill": "#000000", "visibility": "visible", "color": "#000000"}
 _GROUP: Final = ("id", "style", "transform")  # attributes of an element that its group keeps
+_MOVES: Final = ("transform", "transform-origin")
 _SERVERS: Final = ("linearGradient", "radialGradient", "pattern")
 _UNPAGED: Final = (0.0, 0.0, 100.0, 100.0)  # the page to which percentages refer where there is none
 _REFERENCE: Final = re.compile(r"url\(\s*['\"]?#([^'\")]*)['\"]?\s*\)\s*(.*)")
 _SIDES: Final = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "bottom": "100%"}
+_WIDEST: Final = 0.1  # greatest width of a stroke as a share of the drawing
 _OWN_MARGIN: Final = 0.05  # of the drawing, around the picture of a drawing without a page
 
 
@@ -104,7 +107,7 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     page = _page_of(root)
     cascade = cascade_of("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
     walk = _ElementWalk(_put_styles(root, cascade.declare(root)), matcher)
-    shapes = list(walk.shapes(root, page))
+    shapes = _trace_fills(list(walk.shapes(root, page)))
     unread = _list_unread(cascade.unread)
     if not sum(len(shape.points) for shape in shapes):
         reason = "; ".join(unread) or "it has no visible path, line or shape; export it again"
@@ -113,6 +116,31 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     window = page.window if page else _window_around(shapes)
     seen, notes = see_strokes(_framed(root, page, window), window, shapes)
     return _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
+
+
+def _trace_fills(shapes: list[Shape]) -> list[Shape]:
+    """The shapes with the centre lines of those that are only filled, and without lines for areas.
+
+    Areas show where the body ends if no stroke does, so their outlines then count as strokes.
+    """
+    filled = [number for number, shape in enumerate(shapes) if not shape.is_stroked and len(shape.points)]
+    if not filled:
+        return shapes
+    shapes = list(shapes)
+    corners = np.concatenate([shape.points.reshape(-1, 2) for shape in shapes])
+    widest = _WIDEST * float(np.ptp(corners, axis=0).max())
+    outlines = [shapes[number].points for number in filled]
+    even_odd = [shapes[number].is_even_odd for number in filled]
+    for number, stroke in zip(filled, find_pen_strokes(outlines, widest, even_odd=even_odd), strict=True):
+        points, width = (stroke.points, stroke.width) if stroke else (outlines[0][:0], 0.0)
+        shapes[number] = replace(shapes[number], points=points, width=width)
+    colours = np.array([opaque_colour(shape.paint) for shape in shapes if len(shape.points)]).reshape(-1, 3)
+    areas = [place for place, number in enumerate(filled) if not len(shapes[number].points)]
+    if areas and is_red(colours).all():
+        for place in find_silhouettes([outlines[area] for area in areas]):
+            number = filled[areas[place]]
+            shapes[number] = replace(shapes[number], points=outlines[areas[place]])
+    return shapes
 
 
 def _join_strokes(
@@ -177,8 +205,10 @@ def _put_styles(root: Element, styles: dict[Element, dict[str, str]]) -> dict[El
             )
         for key in ("filter", "stroke-dasharray", "marker-start", "marker-mid", "marker-end", "style"):
             element.attrib.pop(key, None)
-        if styles[element]:
-            element.set("style", ";".join(f"{key}:{value}" for key, value in styles[element].items()))
+        style = styles[element]
+        element.attrib.update((key, style[key]) for key in _MOVES if key in style)
+        if text := ";".join(f"{key}:{value}" for key, value in style.items() if key not in _MOVES):
+            element.set("style", text)
         for child in list(element):
             if _tag(child) in ("style", "script", "filter") or (_tag(child) == "image"):
                 element.remove(child)
@@ -239,6 +269,7 @@ class _ElementWalk:
             matrix = transform * matrix
             terms = (getattr(transform, key) for key in "abcdef")
             element.set("transform", f"matrix({' '.join(f'{term:.12g}' for term in terms)})")
+            element.attrib.pop("transform-origin", None)
         taken = self.matcher is not None and self.matcher.matches(_labels(element))
         return replace(place, style=style, matrix=matrix, chosen=taken or place.chosen)
 
@@ -287,6 +318,7 @@ class _ElementWalk:
             scale=scale,
             is_stroked=bool(stroke),
             is_filled=bool(fill),
+            is_even_odd=style.get("fill-rule") == "evenodd",
             chosen=place.chosen,
         )
 
@@ -363,7 +395,7 @@ def _paint(style: Mapping[str, str], kind: str, named: Mapping[str, Element]) ->
         if server is not None and _tag(server) in _SERVERS:
             return f"url(#{reference[1]})"
         paint = reference[2] or "none"
-    paint = style["color"] if paint == "currentcolor" else paint
+    paint = style["color"] if paint == "currentColor" else paint
     is_clear = len(paint) == 9 and paint.endswith("00")
     return paint if paint.startswith("#") and not is_clear else None
 

@@ -28,7 +28,8 @@ _LEAST_WIDTH: Final = 3.0  # pixels; thinner strokes are widened, so that each h
 _STEP: Final = 1.5  # pixels between two samples of a centre line
 _MOST_SAMPLES: Final = 4_000_000
 _SAME: Final = 0.03  # greatest difference of equal colours in a channel
-_CROSSING: Final = 3.0  # widths of the shape in front: a longer covered part is no crossing
+_CROSSING: Final = 12.0  # widths of the shape in front: a line that is covered for longer does not cross it
+_MEETING: Final = 3.0  # the same for the covered end of a line
 _GLITCH: Final = 3.0  # pixels: a shorter gap is one of rasterization
 _WORTH_A_NOTE: Final = 0.05  # of the length of a shape
 _REASONS: Final = ("clipped or masked", "covered", "off the page", "drawn elsewhere by the renderer")
@@ -42,7 +43,8 @@ class Shape:
 
     points: (k, 4, 2), control points of its centre line in the units of the page, none for an area. paint: of
     its stroke, or else of its fill, as #rrggbb, #rrggbbaa or url(#id). width: of its stroke in units of the
-    page. scale: units of the page per unit of the element. chosen: whether it has a chosen label.
+    page. scale: units of the page per unit of the element. is_even_odd: the rule of its fill. chosen: whether
+    it has a chosen label.
     """
 
     element: Element
@@ -53,6 +55,7 @@ class Shape:
     scale: float
     is_stroked: bool
     is_filled: bool
+    is_even_odd: bool
     chosen: bool
 
     @property
@@ -107,7 +110,7 @@ def see_strokes(root: Element, window: Box, shapes: Sequence[Shape]) -> tuple[li
     inside = samples.pixel >= 0
     colour = np.where(inside[:, None], _at(shown, samples.pixel), np.nan)
     contrast = inside & (np.abs(colour - _at(ground, samples.pixel)).max(axis=1) > PAPER)
-    expected = np.array([_opaque_colour(shape.paint) for shape in shapes])[samples.shape]
+    expected = np.array([opaque_colour(shape.paint) for shape in shapes])[samples.shape]
     own = contrast & (np.abs(colour - expected).max(axis=1) <= _SAME)
     notes: tuple[str, ...] = ()
     visible, front = own, 2 * samples.shape
@@ -124,12 +127,13 @@ def _widened(shape: Shape, pixel: float) -> str:
     """The style that gives a shape a stroke of its paint, wide enough for its centre line to have pixels."""
     if not len(shape.points):
         return ""
-    width = max(shape.width, _LEAST_WIDTH * pixel) / shape.scale if shape.scale > 0 else shape.width
+    width = max(shape.width * shape.is_stroked, _LEAST_WIDTH * pixel)
+    width = width / shape.scale if shape.scale > 0 else width
     opacity = "" if shape.is_stroked else ";stroke-opacity:1"
     return f";stroke:{shape.paint};stroke-width:{width:.6g};vector-effect:none{opacity}"
 
 
-def _opaque_colour(paint: str) -> tuple[float, float, float]:
+def opaque_colour(paint: str) -> tuple[float, float, float]:
     """Red, green and blue in [0, 1] of an opaque colour; not numbers for other paints."""
     if len(paint) != 7 or not paint.startswith("#"):
         return np.nan, np.nan, np.nan
@@ -265,15 +269,16 @@ def _decide(
     reason[(reason == 0) & elsewhere[samples.shape]] = 3
     reason[samples.pixel < 0] = 2
     width = np.maximum(np.array([shape.width for shape in shapes]) / pixel, _LEAST_WIDTH)
-    limit = np.where(is_crossed, _CROSSING * width[front.clip(0) // 2], _GLITCH)
+    limit = np.where(is_crossed, _MEETING * width[front.clip(0) // 2], _GLITCH)
     starts = np.flatnonzero((np.diff(samples.run, prepend=-1) != 0) | (np.diff(state, prepend=-1) != 0))
     length = np.add.reduceat(samples.length, starts)
     part, run = state[starts], samples.run[starts]
     beside = [
         np.where(np.roll(run, step) == run, np.roll(part, step), _HIDDEN) == _VISIBLE for step in (1, -1)
     ]
-    is_short = length <= np.maximum.reduceat(limit, starts)
-    visible = (part == _VISIBLE) | (is_short & (beside[0] | beside[1]))
+    limit = np.maximum.reduceat(limit, starts)
+    is_crossing = (part == _CROSSED) & beside[0] & beside[1] & (length <= _CROSSING / _MEETING * limit)
+    visible = (part == _VISIBLE) | is_crossing | ((length <= limit) & (beside[0] | beside[1]))
     return np.repeat(visible, np.diff([*starts, len(state)])), reason
 
 

@@ -69,7 +69,8 @@ def test_an_open_wrist_that_loses_the_palm_is_warned_of():
 
 def test_solid_ink_and_hatching_are_warned_of_with_their_place():
     hatching = "".join(f"M20 {20 + k / 2}H80" for k in range(60))
-    (text,) = in_black("M10 10H90V90H10Z", hatching).reading.warnings
+    parallels, text = in_black("M10 10H90V90H10Z", hatching).reading.warnings
+    assert parallels.startswith("60 parallel lines round (50, 34.75) look like hatching")
     assert "strokes leave no room between them round (50," in text
     image = Image.new("L", (200, 200), 255)
     ImageDraw.Draw(image).rectangle((20, 20, 180, 180), outline=0, width=3)
@@ -80,8 +81,8 @@ def test_solid_ink_and_hatching_are_warned_of_with_their_place():
 
 def test_drawings_off_their_page_are_warned_of():
     data = drawing([("M10 10H90V190H10Z", "black")])
-    (text,) = read(data, 48).reading.warnings
-    assert text.startswith("48% of the pixels to solve for lie off the page")
+    off, *_ = read(data, 48).reading.warnings
+    assert off.startswith("1 stroke is off the page, wholly or in part, first <path> round (90, 100")
 
 
 def test_thinning_leaves_lines_of_one_pixel():
