@@ -35,13 +35,14 @@ export function listen(view, tool, { hover, refresh, fingers }) {
   const middle = () => [...down.values()].reduce(([x, y], each) => [x + each.clientX / down.size, y + each.clientY / down.size], [0, 0]);
   const spread = () => { const [a, b] = [...down.values()]; return Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY); };
   const stop = () => { if (user !== null) tool.cancel(); user = null; };
+  const release = () => { if (held || nudging) tool.end(); held = nudging = false; };
   const drop = () => { stop(); down.clear(); gesture = false; };
   stopTouches(canvas, event => event.targetTouches.length > 1 || fingers() || isPalm(event));
   canvas.addEventListener("pointerdown", event => {
     const touch = event.pointerType === "touch";
     if (touch && (pen.down || [...down.values()].some(each => each.pointerType !== "touch"))) return; // the palm beside the pen
     if (!touch) drop(); // the palm before the pen
-    canvas.focus({ preventScroll: true }); view.cursor = null;
+    release(); canvas.focus({ preventScroll: true }); view.cursor = null;
     try { canvas.setPointerCapture(event.pointerId); } catch { /* the pointer is gone */ }
     down.set(event.pointerId, event);
     if (down.size > 1 || event.button === 1) { stop(); gesture = true; }
@@ -73,7 +74,7 @@ export function listen(view, tool, { hover, refresh, fingers }) {
     view.zoom(Math.exp(-Math.max(-60, Math.min(60, event.deltaY)) / 250), event.clientX - place.left, event.clientY - place.top); refresh();
   }, { passive: false });
   canvas.addEventListener("focus", () => { refresh(false); });
-  canvas.addEventListener("blur", () => { if (view.cursor || nudging) { view.cursor = null; nudging = false; tool.end(); } });
+  canvas.addEventListener("blur", () => { release(); view.cursor = null; refresh(false); });
   canvas.addEventListener("keydown", event => {
     const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
     if (!way && event.key !== " " && event.key !== "Enter" || event.ctrlKey || event.metaKey) return;
@@ -88,5 +89,5 @@ export function listen(view, tool, { hover, refresh, fingers }) {
     else { held = !held; held ? tool.begin(view.cursor) : tool.end(); }
     refresh(false);
   });
-  canvas.addEventListener("keyup", event => { if (nudging && event.key.startsWith("Arrow")) { nudging = false; tool.end(); } });
+  canvas.addEventListener("keyup", event => { if (nudging && event.key.startsWith("Arrow")) release(); });
 }

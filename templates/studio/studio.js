@@ -238,7 +238,7 @@ function mark(kind) {
 }
 function remove() { if (state.chosen.size) commit(doc => { const rest = doc.strokes.filter((_, k) => !state.chosen.has(k)); state.chosen.clear(); return { ...doc, strokes: rest }; }); }
 function copy() {
-  if (!state.chosen.size || getSelection().type === "Range") return false;
+  if (!state.chosen.size) return false;
   state.copied = chosenStrokes(); controls(); status(`${counted(state.copied)} copied`);
 }
 function paste() {
@@ -288,6 +288,7 @@ const tools = {
   tap(point, contact) { if (["select", "area"].includes(state.tool)) { tools.begin(point, contact); tools.end(); } },
   nudge(step) {
     if (state.tool !== "select" || !state.chosen.size) return false;
+    if (state.live?.path) return true; // a pointer is at work
     state.live ??= { tool: "move", shift: [0, 0] };
     state.live.shift = state.live.shift.map((value, axis) => value + step[axis]); refresh();
     return true;
@@ -459,12 +460,13 @@ all("input[name=field]").forEach(each => each.addEventListener("change", () => {
 all("input[name=surface]").forEach(each => each.addEventListener("change", () => { state.kind = each.value; refresh(false); }));
 
 // Keys.
+const hasText = () => getSelection().type === "Range"; // which the browser copies
 const keys = {
   d: () => choose("draw"), v: () => choose("select"), e: () => choose("erase"), b: () => choose("paint"), n: () => choose("unpaint"), a: () => choose("area"), r: () => choose("turn"),
   1: () => mark("line"), 2: () => mark("cut"), 3: () => mark("ignored"), f: flip, q: () => next("field"), w: () => next("surface"),
   delete: remove, backspace: remove, escape: () => { closeMenus(); tools.cancel(); arrows.cancel(); select([]); }, "?": actions.help,
   "+": () => { left.zoom(1.25); refresh(); }, "-": () => { left.zoom(0.8); refresh(); }, 0: () => { left.fit(pageBox(state.doc)); right.zoomed = false; right.resize(); refresh(); },
-  "ctrl+z": () => step(-1), "ctrl+shift+z": () => step(1), "ctrl+y": () => step(1), "ctrl+s": save, "ctrl+o": actions.open, "ctrl+c": copy, "ctrl+x": () => copy() ?? remove(), "ctrl+v": paste,
+  "ctrl+z": () => step(-1), "ctrl+shift+z": () => step(1), "ctrl+y": () => step(1), "ctrl+s": save, "ctrl+o": actions.open, "ctrl+c": () => !hasText() && copy(), "ctrl+x": () => !hasText() && (copy() ?? remove()), "ctrl+v": paste,
   "ctrl+a": () => select(state.doc.strokes.map((_, k) => k)),
 };
 document.addEventListener("keydown", event => {
