@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shortened
 from ..input_limits import MAX_CURVES, MAX_LENGTH
 from ..instance.domain import Floats
 from .curves import lines_as_cubics
@@ -28,30 +28,32 @@ _BASIC: Final = {
     "rect": ("Rect", ("x", "y", "width", "height", "rx", "ry")),
 }
 SHAPES: Final = frozenset({"path", "polyline", "polygon", *_BASIC})
+_SIZES: Final = frozenset({"r", "rx", "ry", "width", "height"})  # lengths that cannot be negative
+_QUOTED: Final = 20  # characters of faulty data that are quoted
+_ALIEN: Final = re.compile(r"[^-+.\d\seE,]")  # in a list of points
 _NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 _Coordinates = tuple[float, float] | str
 """A point, or the letter that closes the subpath in place of its last point."""
 
 
-def shape_curves(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
-    """Control points (k, 4, 2) of a shape in its own units; percentages refer to the page. May raise."""
-    try:
-        with np.errstate(over="ignore", invalid="ignore"):  # refused when placed
-            return _shape_points(tag, attributes, page)
-    except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError) as error:
-        raise InputError("its numbers cannot be read; export the drawing again") from error
+def shape_curves(
+    tag: str, attributes: Mapping[str, str], page: tuple[float, float]
+) -> tuple[Floats, str | None]:
+    """Control points (k, 4, 2) of a shape in its own units, and what is faulty in it.
 
-
-def _shape_points(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
+    As in browsers, a path ends where its data cannot be read, and a shape with a faulty length is left out.
+    Percentages refer to the page. Raises InputError for too many curves.
+    """
     if tag in ("polyline", "polygon"):
         return _polygon_lines(attributes.get("points", ""), closed=tag == "polygon")
     drawn = _PathBuilder()
-    if tag == "path":
-        _trace_path(attributes.get("d", ""), drawn)
-    else:
-        _draw_basic(tag, attributes, page, drawn)
-    return drawn.points()
+    with np.errstate(over="ignore", invalid="ignore"):  # left out when placed
+        if tag == "path":
+            fault = _trace_path(attributes.get("d", ""), drawn)
+        else:
+            fault = _trace_basic(tag, attributes, page, drawn)
+        return drawn.points(), fault
 
 
 def length_in_pixels(text: str) -> float | None:
@@ -67,46 +69,68 @@ def length_in_pixels(text: str) -> float | None:
     return value if isinstance(value, float) and np.isfinite(value) else None
 
 
-def _trace_path(data: str, drawn: _PathBuilder) -> None:
+def _trace_path(data: str, drawn: _PathBuilder) -> str | None:
+    """Draw path data as far as it can be read, and return what is faulty in it."""
     from svgelements import SVGLexicalParser
 
     data = data.strip()
-    if data and data != "none" and data[0] not in "Mm":
-        raise InputError(f"its path data begins with {data[:10]!r}, not with a move (M); export it again")
-    SVGLexicalParser().parse(drawn, data)
+    if data in ("", "none"):
+        return None
+    if data[0] not in "Mm":
+        return f"its path data begins with {shortened(data, _QUOTED)!r}, not with a move (M)"
+    lexer = SVGLexicalParser()
+    try:
+        lexer.parse(drawn, data)
+    except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError):
+        lexer.pos = min(lexer.pos, len(data) - 1)
+    if lexer.pos == len(data):
+        return None
+    return f"its path data is faulty near {shortened(data[max(lexer.pos - 9, 0) :], _QUOTED)!r}"
 
 
-def _polygon_lines(text: str, *, closed: bool) -> Floats:
-    numbers = np.array(_NUMBER.findall(text), dtype=float)
+def _polygon_lines(text: str, *, closed: bool) -> tuple[Floats, str | None]:
+    """The lines between points as far as they can be read, and what is faulty in these."""
+    alien = _ALIEN.search(text)
+    numbers = np.array(_NUMBER.findall(text[: alien.start()] if alien else text), dtype=float)
     points = numbers[: len(numbers) // 2 * 2].reshape(-1, 2)
     if len(points) > MAX_CURVES:
         raise too_many_curves()
     if closed:
         points = np.concatenate([points, points[:1]])
-    return lines_as_cubics(points[:-1], points[1:])
+    fault = None
+    if alien:
+        fault = f"its points cannot be read from {shortened(text[alien.start() :], _QUOTED)!r} on"
+    elif len(numbers) % 2:
+        fault = "its last point has no y"
+    return lines_as_cubics(points[:-1], points[1:]), fault
 
 
-def _draw_basic(
+def _trace_basic(
     tag: str, attributes: Mapping[str, str], page: tuple[float, float], drawn: _PathBuilder
-) -> None:
+) -> str | None:
+    """Draw a basic shape, unless it is faulty; return what is."""
     import svgelements
 
     kind, keys = _BASIC[tag]
-    lengths = {key: _parse_length(attributes[key]) for key in keys if attributes.get(key)}
+    texts = {key: attributes[key] for key in keys if attributes.get(key)}
+    lengths = {key: _parse_length(text) for key, text in texts.items()}
+    for key, length in lengths.items():
+        if length is None:
+            return f"its {key} {shortened(texts[key], _QUOTED)!r} cannot be read"
+        if key in _SIZES and str(length).startswith("-"):
+            return f"its {key} is {shortened(texts[key], _QUOTED)}"
     shape = getattr(svgelements, kind)(lengths)
     shape.render(ppi=PPI, width=page[0], height=page[1])
     for segment in shape.segments():
         drawn.add(segment)
+    return None
 
 
-def _parse_length(length: str) -> str | float:
-    """A length in pixels, or the percentage."""
-    if length.endswith("%"):
-        return f"{float(length[:-1])}%"
-    pixels = length_in_pixels(length)
-    if pixels is None:
-        raise InputError(f"its length {length[:20]!r} cannot be read; give pixels, mm, in or %")
-    return pixels
+def _parse_length(length: str) -> str | float | None:
+    """A length in pixels, or the percentage; None if it cannot be read."""
+    if not length.endswith("%"):
+        return length_in_pixels(length)
+    return length if _NUMBER.fullmatch(length[:-1].strip()) else None
 
 
 def too_many_curves() -> InputError:
@@ -185,6 +209,8 @@ class _PathBuilder:
         from svgelements import Arc
 
         rotation, large, sweep, point = others
+        if large is None or sweep is None:
+            raise ValueError("a flag of an arc is neither 0 nor 1")
         end = self._at(point)
         if rx == 0 or ry == 0:  # as in SVG
             self.line((end.real, end.imag))

@@ -143,7 +143,8 @@ def test_costly_drawings_are_read_or_refused_in_little_time(tmp_path):
     messages = [message for message, _ in read_by_child(*paths).values()]
     refused = {name: message for name, message in zip(COSTLY_SVG, messages, strict=True) if message}
     assert set(refused) == {
-        "rules of one class", "a point list without blanks", "a colour of digits", "a transform that never closes", "uses of uses",
+        "rules of one class", "a point list without blanks", "a colour of digits",
+        "a transform that never closes", "uses of uses",
     }  # fmt: skip
     assert f"nested more than {input_limits.MAX_DEPTH} deep" in refused["uses of uses"]
     assert f"more than {input_limits.MAX_RULE_CHECKS} comparisons" in refused["rules of one class"]
@@ -181,9 +182,14 @@ STRANGE_SVG = {
         for data in ("C 1 1 2 2 3 3", "T 1 1", "Q 1 1 2 2", "S 1 1 2 2", "A 1 1 0 0 0 2 2", "L 1 1 2 2")
     },
     "a length in em": ('<line stroke="black" x1="1em" x2="32" y1="4" y2="4"/>', [16, 4, 32, 4]),
-    "data that ends in em": ('<path stroke="black" d="M1 1 L5em"/>', "its numbers cannot be read"),
+    "data that ends in em": ('<path stroke="black" d="M1 1 L5em"/>', "its path data is faulty near 'M1 1"),
     "a number and em": ('<path stroke="black" d="M1 1 L5 5em"/>', [1, 1, 5, 5]),
-    "an unknown unit": ('<circle stroke="black" r="1vw"/>', "its length '1vw' cannot be read"),
+    "an unknown unit": ('<circle stroke="black" r="1vw"/>', "its r '1vw' cannot be read"),
+    "a negative radius": ('<circle stroke="black" r="-3"/>', "its r is -3"),
+    "half a point": ('<polyline stroke="black" points="1,1 5,5 9"/>', [1, 1, 5, 5]),
+    "points with a word": ('<polyline stroke="black" points="1,1 5,5 x 9,9"/>', [1, 1, 5, 5]),
+    "data to a word": ('<path stroke="black" d="M1 1L5 5 9 9L foo"/>', [1, 1, 9, 9]),
+    "data to a flag of 2": ('<path stroke="black" d="M1 1L5 5A3 3 0 2 0 9 9L7 7"/>', [1, 1, 5, 5]),
     "digits in a style": (
         f'<path style="stroke-width:{"1" * 5000}" stroke="black" d="M1 1 L5 5"/>', [1, 1, 5, 5]
     ),
@@ -194,7 +200,7 @@ STRANGE_SVG = {
 }  # fmt: skip
 
 
-def test_strange_shapes_are_read_as_browsers_do_or_refused():
+def test_strange_shapes_are_read_as_browsers_do_or_refused_where_nothing_is_left():
     for shape, expected in STRANGE_SVG.values():
         drawing = SVG.format(shape).encode()
         if isinstance(expected, str):
@@ -203,6 +209,24 @@ def test_strange_shapes_are_read_as_browsers_do_or_refused():
         else:
             points = read_svg(drawing).points
             assert [*points[0, 0], *points[-1, -1]] == pytest.approx(expected)
+
+
+FAULTY = {
+    '<circle id="wheel" stroke="black" r="-3"/>': '<circle id="wheel">: its r is -3; export',
+    '<path stroke="black" d="M1e999 1L5 5"/>': "<path>: a coordinate is not a finite number below 1e+09; export",
+}
+
+
+def test_a_faulty_shape_is_noted_by_its_name_and_the_others_are_read():
+    whole = '<path stroke="black" d="M1 1L5 5"/>'
+    for shape, fault in FAULTY.items():
+        curves = read_svg(SVG.format(whole + shape).encode())
+        assert len(curves.points) == 1
+        assert f"1 shape is faulty and left out from the fault on, first {fault}" in curves.notes[0]
+    curves = read_svg(SVG.format(whole + "".join(FAULTY)).encode())
+    assert curves.notes[0].startswith(
+        '2 shapes are faulty and left out from the fault on, first <circle id="'
+    )
 
 
 def test_pages_without_extent_are_refused(tmp_path):

@@ -644,7 +644,7 @@ REFUSED = {
         svg(f'<path id="p" d="M1e999 0L5 5" {BLACK}/>'),
         '<path id="p">: a coordinate is not a finite number',
     ),
-    "word.svg": (svg(f'<path d="M0 0L foo bar" {BLACK}/>'), "<path>: its numbers cannot be read"),
+    "word.svg": (svg(f'<path d="M0 0L foo bar" {BLACK}/>'), "<path>: its path data is faulty near 'M0 0L"),
     "turn.svg": (
         svg(f'<g transform="rotate(x)">{LINE}</g>'),
         "<g>: its transform 'rotate(x)' cannot be read",

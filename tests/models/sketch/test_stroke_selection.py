@@ -35,6 +35,8 @@ CHOICES = {
     "class=flow": 'class="late flow"',
     "id=layer2": 'id="layer2"',
     "layer=Flow lines": LAYER,
+    "layer=flow": 'id="Flow1" xmlns:serif="http://www.serif.com/" serif:id="Flow"',
+    "layer=Flow & lines": 'id="Flow_x0020__x26__x0020_lines_1_"',
 }
 
 
