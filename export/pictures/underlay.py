@@ -32,6 +32,7 @@ INK: Final = {"black": "#4a4a4a", "red": "#c23b33"}
 _LEVELS: Final = 16  # of ink
 _LENGTH: Final = re.compile(r"(\d{1,9}(?:\.\d{1,12})?)(px|pt|pc|mm|cm|in|Q)?")
 _LOOKS_RED: Final = 0.5
+_EDGE: Final = 1e-2  # of the page: strokes that reach less far beyond it do not enlarge it
 _SAME: Final = 0.8  # least share of the stroke pixels of a field that lie on its drawing
 
 
@@ -77,8 +78,12 @@ def read_underlay(source: str | Path, *, on: Instance) -> Underlay:
 def _underlay_of_curves(curves: Curves, data: bytes) -> Underlay:
     left, top, right, bottom = curves.box
     x, y, width, height = curves.page or (0.0, 0.0, 0.0, 0.0)
-    left, top = min(left, x), min(top, y)
-    page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
+    if curves.page is None or (right - x > (1 + _EDGE) * width or bottom - y > (1 + _EDGE) * height
+                               or x - left > _EDGE * width or y - top > _EDGE * height):  # fmt: skip
+        left, top = min(left, x), min(top, y)
+        page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
+    else:
+        page = curves.page
     starts = np.flatnonzero(np.diff(run_numbers(curves.points, curves.curve), prepend=-1))
     runs_by_colour: dict[str, list[Floats]] = {name: [] for name in INK}
     for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):
@@ -102,9 +107,12 @@ def _page_size(data: bytes, declared: Box | None, page: Box) -> tuple[str, str]:
     width, height = (_LENGTH.fullmatch(root.get(side, "").strip()) for side in ("width", "height"))
     if not (declared and width and height and float(width[1]) and float(height[1])):
         return size_in_units(page)
+    scales = [float(side[1]) / whole for side, whole in zip((width, height), declared[2:], strict=True)]
+    if width[2] == height[2]:
+        scales = [min(scales)] * 2
     return (
-        f"{float(width[1]) * page[2] / declared[2]:.12g}{width[2] or ''}",
-        f"{float(height[1]) * page[3] / declared[3]:.12g}{height[2] or ''}",
+        f"{scales[0] * page[2]:.12g}{width[2] or ''}",
+        f"{scales[1] * page[3]:.12g}{height[2] or ''}",
     )
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, Literal
 
-from ..errors import InputError, shortened
+from ..errors import InputError, NoStrokeError, shortened
 from ..input_limits import MAX_BYTES
 from ..storage import read_bytes
 from .bitmap import Bitmap, read_bitmap
@@ -31,6 +32,8 @@ _SIGNATURES: Final = {
 }
 """First bytes of pictures, by the suffix of their files."""
 _PICTURE: Final = re.compile(b"|".join(_SIGNATURES.values()), re.DOTALL)
+_DATA_URI: Final = re.compile(rb"""href\s*=\s*["']\s*data:image/[^,"']*;base64,([^"']*)""")
+_LINE_END: Final = re.compile(rb"&#\w+;|\s")
 _UNLABELLED: Final = {
     "curves": "is a .curves file, whose strokes have no labels",
     "picture": "is a picture, whose strokes have no labels: only red strokes are recognised",
@@ -67,7 +70,27 @@ def parse_drawing(
     if kind == "picture":
         return read_bitmap(data, size)
     matcher = LabelMatcher(frozenset(labels)) if labels else None
-    return read_svg(data, matcher) if kind == "svg" else read_scap(data, matcher)
+    if kind == "scap":
+        return read_scap(data, matcher)
+    try:
+        return read_svg(data, matcher)
+    except NoStrokeError:
+        picture = _embedded_picture(data)
+        if picture is None or labels:
+            raise
+        return read_bitmap(picture, size)
+
+
+def _embedded_picture(data: bytes) -> bytes | None:
+    """The only picture in the data URIs of an SVG drawing, or None."""
+    texts = _DATA_URI.findall(data)
+    if len(texts) != 1:
+        return None
+    try:
+        picture = base64.b64decode(_LINE_END.sub(b"", texts[0]))
+    except ValueError:
+        return None
+    return picture if _PICTURE.match(picture) else None
 
 
 def detect_file_kind(data: bytes, suffix: str) -> FileKind:

@@ -32,14 +32,15 @@ _FEW: Final = 16  # samples on a curve from which on they are coarse
 _OPPOSITE: Final = -0.7  # greatest cosine between the normals of two sides that face each other
 _FAR: Final = 3.0  # greatest step along the other side as a share of the mean width: round a bend
 _LEAP: Final = 3.0  # greatest step of the centre line as a share of the step of the outline
-_CAP: Final = 4.0  # greatest length of the outline round the end of a stroke as a share of its width
+_CAP: Final = 2.0  # greatest length of the outline round the end of a stroke as a share of its width
 _BASE: Final = 1.5  # length over which the direction of an end is found as a share of its width
 _REACH: Final = 4.0  # greatest gap between two pieces of a stroke as a share of their width
 _LEAST: Final = 2.0  # least length of a centre line as a share of the mean width
 _AHEAD: Final = 0.8  # least cosine between the end of a piece and the way to the piece that continues it
 _MOST_BODIES: Final = 1000  # larger areas with which an area is compared
 _NEAR: Final = 1e-3  # distance of the test for the fill from a sample as a share of the step
-_MOST_TESTS: Final = 100_000_000  # of samples for the loops of a shape
+_MOST_TESTS: Final = 10_000_000  # tests of curves for the loops of a shape
+_MOST_SAMPLES: Final = 100_000  # of a stroke; what would need more counts as an area
 _QUARTERS: Final = (0.0, 0.25, 0.5, 0.75)  # parameters of curves where the polygons of the test have corners
 _TINY: Final = 1e-300
 
@@ -92,8 +93,9 @@ def find_pen_strokes(
     strokes: list[PenStroke | None] = []
     for number, outline in enumerate(outlines):
         cubics, loop = _close_loops(outline)
-        side = _filled_sides(cubics, loop, even_odd=even_odd is not None and even_odd[number])
-        width, share = _measure_shape(cubics, side)
+        area = _areas_under(cubics)
+        side = _filled_sides(cubics, loop, area, even_odd=even_odd is not None and even_odd[number])
+        width, share = _measure_shape(cubics, abs(float((side * area).sum())))
         stroke = None
         if 0 < width <= widest:
             room -= int(share.sum())
@@ -172,22 +174,25 @@ def _close_loops(outline: Floats) -> tuple[Floats, Indices]:
     return np.insert(outline, last + 1, closing, axis=0), np.insert(loop, last + 1, loop[last])
 
 
-def _filled_sides(cubics: Floats, loop: Indices, *, even_odd: bool) -> Floats:
-    """1 for each curve (k,) with the fill on its left (x to the right, y up), and -1 for the others."""
-    corner = np.stack([evaluate_cubics(cubics, np.full(len(cubics), part)) for part in _QUARTERS], axis=1)
-    corner = corner.reshape(-1, 2)
-    loop = np.repeat(loop, len(_QUARTERS))
+def _areas_under(cubics: Floats) -> Floats:
+    """The part (k,) of each curve in the area that the curves enclose, positive on their left (y up)."""
+    x, y = np.moveaxis(cubics - cubics[0, 0], -1, 0)
+    return np.asarray(((x @ _AREA) * y).sum(axis=1))
+
+
+def _filled_sides(cubics: Floats, loop: Indices, area: Floats, *, even_odd: bool) -> Floats:
+    """1 for each curve (k,) with the fill on its left (y up), and -1 for the others."""
     first = np.flatnonzero(np.diff(loop, prepend=-1))
-    number = np.arange(len(corner))
-    after, before = number + 1, number - 1
-    last = np.append(first[1:], len(corner)) - 1
-    after[last], before[first] = first, last
-    x, y = (corner - corner[0]).T
-    area = np.add.reduceat(x * y[after] - x[after] * y, first)
-    side = np.sign(area)
-    if len(first) > 1 and len(first) * len(corner) <= _MOST_TESTS:
+    side = np.sign(np.add.reduceat(area, first))
+    if 1 < len(first) <= _MOST_TESTS / len(cubics):
+        corner = np.stack([evaluate_cubics(cubics, np.full(len(cubics), t)) for t in _QUARTERS], axis=1)
+        corner = corner.reshape(-1, 2)
+        start = len(_QUARTERS) * first
+        end = np.append(start[1:], len(corner)) - 1
+        after, before = np.arange(len(corner)) + 1, np.arange(len(corner)) - 1
+        after[end], before[start] = start, end
         # One side of the leftmost corner of a loop lies outside of this loop; the other loops decide.
-        leftmost = np.lexsort((corner[:, 0], loop))[first]
+        leftmost = np.lexsort((corner[:, 0], np.repeat(loop, len(_QUARTERS))))[start]
         step = corner[after[leftmost]] - corner[before[leftmost]]
         normal = _NEAR * np.stack([-step[:, 1], step[:, 0]], axis=1)
         left, right = (
@@ -195,7 +200,7 @@ def _filled_sides(cubics: Floats, loop: Indices, *, even_odd: bool) -> Floats:
             for way in (1, -1)
         )
         side = np.where(left == right, side, np.where(left, 1.0, -1.0))
-    return np.asarray(side[loop[:: len(_QUARTERS)]])
+    return np.asarray(side[loop])
 
 
 def _is_filled(points: Floats, start: Floats, end: Floats, *, even_odd: bool) -> Bools:
@@ -209,15 +214,13 @@ def _is_filled(points: Floats, start: Floats, end: Floats, *, even_odd: bool) ->
     return filled
 
 
-def _measure_shape(cubics: Floats, side: Floats) -> tuple[float, Floats]:
+def _measure_shape(cubics: Floats, area: float) -> tuple[float, Floats]:
     """The mean width of a shape, 0 for one that is not long, and the samples (k,) that its curves need."""
-    x, y = np.moveaxis(cubics - cubics[0, 0], -1, 0)
-    area = abs(float((side[:, None] * (x @ _AREA) * y).sum()))
     legs = vector_length(*np.moveaxis(np.diff(cubics, axis=1), -1, 0)).sum(axis=1)
     length = (legs + vector_length(*(cubics[:, 3] - cubics[:, 0]).T)) / 2
     perimeter = float(length.sum())
     width = 2 * area / perimeter
-    if perimeter / 2 < _ELONGATED * width or perimeter > MAX_OUTLINE_SAMPLES * width:
+    if perimeter / 2 < _ELONGATED * width or perimeter > _MOST_SAMPLES * _FINE * width:
         return 0.0, length
     return width, np.maximum(length / (_COARSE * width), np.minimum(length / (_FINE * width), _FEW))
 
@@ -352,7 +355,7 @@ def _make_piece(
         (side[-1], other_side[-1], gap[-1]),
     ):
         points = points[::-1]
-        cap = _cap_samples(samples, step, last, first, width)
+        cap = _cap_samples(samples, step, last, first, max(width, end_gap))
         is_tip.append(cap is not None)
         if cap is not None:
             points = _extend_to_tip(points, at[cap], width, end_gap)
@@ -364,7 +367,7 @@ def _cap_samples(samples: _Samples, step: Floats, last: int, first: int, width: 
     if samples.first[last] != samples.first[first]:
         return None
     cap = samples.move_on(last, np.arange((first - last) % samples.count[last]))
-    return None if step[cap].sum() > _CAP * width else cap[1:]
+    return None if step[cap[1:-1]].sum() > _CAP * width else cap[1:]
 
 
 def _extend_to_tip(points: Floats, cap: Floats, width: float, end_gap: float) -> Floats:

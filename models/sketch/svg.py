@@ -18,7 +18,7 @@ from xml.etree.ElementTree import Element, ParseError, SubElement
 
 import numpy as np
 
-from ..errors import InputError, shortened
+from ..errors import InputError, NoStrokeError, shortened
 from ..input_limits import (
     LEAST_LENGTH,
     MAX_CURVES,
@@ -32,7 +32,7 @@ from ..input_limits import (
 from ..instance.angles import transform_vectors
 from ..instance.domain import Floats
 from .cascade import cascade_of
-from .colour import is_red
+from .colour import PAPER, is_red
 from .cover import Box
 from .curves import Curves, run_numbers
 from .labels import LabelMatcher, colour_label, labels_of
@@ -60,7 +60,7 @@ _SERVERS: Final = ("linearGradient", "radialGradient", "pattern")
 _UNPAGED: Final = (0.0, 0.0, 100.0, 100.0)  # the page to which percentages refer where there is none
 _REFERENCE: Final = re.compile(r"url\(\s*['\"]?#([^'\")]*)['\"]?\s*\)\s*(.*)")
 _SIDES: Final = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "bottom": "100%"}
-_WIDEST: Final = 0.1  # greatest width of a stroke as a share of the drawing
+_WIDEST: Final = 0.05  # greatest width of a filled stroke as a share of the drawing: others are areas
 _OWN_MARGIN: Final = 0.05  # of the drawing, around the picture of a drawing without a page
 
 
@@ -105,41 +105,63 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
         raise InputError(f"its root element is <{tag}>, not <svg>; expected an SVG drawing")
     page = _page_of(root)
     cascade = cascade_of("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
-    walk = _ElementWalk(_put_styles(root, cascade.declare(root)), matcher)
-    shapes = _trace_fills(list(walk.shapes(root, page)))
-    unread = (*_list_faults(walk.faults), *_list_unread(cascade.unread))
+    styles = cascade.declare(root)
+    pictures = _list_pictures(styles)
+    walk = _ElementWalk(_put_styles(root, styles), matcher)
+    shapes = _trace_fills(list(walk.shapes(root, page)), page, matcher)
+    unread = (*pictures, *_list_faults(walk.faults), *_list_unread(cascade.unread))
     if not sum(len(shape.points) for shape in shapes):
         reason = "; ".join(unread) or "it has no visible path, line or shape; export it again"
-        raise InputError(f"draws no stroke: {reason}")
+        raise NoStrokeError(f"draws no stroke: {reason}")
     _check_effort(root)
     window = page.window if page else _window_around(shapes)
     seen, notes = see_strokes(_framed(root, page, window), window, shapes)
     return _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
 
 
-def _trace_fills(shapes: list[Shape]) -> list[Shape]:
+def _trace_fills(shapes: list[Shape], page: _Page | None, matcher: LabelMatcher | None) -> list[Shape]:
     """The shapes with the centre lines of those that are only filled, and without lines for areas.
 
-    Areas show where the body ends if no stroke does, so their outlines then count as strokes.
+    Areas show where the body ends if no stroke does: where all strokes are curvature lines, the outlines of
+    the outer areas count as strokes.
     """
     filled = [number for number, shape in enumerate(shapes) if not shape.is_stroked and len(shape.points)]
     if not filled:
         return shapes
-    shapes = list(shapes)
+    traced, areas = list(shapes), []
     corners = np.concatenate([shape.points.reshape(-1, 2) for shape in shapes])
     widest = _WIDEST * float(np.ptp(corners, axis=0).max())
     outlines = [shapes[number].points for number in filled]
     even_odd = [shapes[number].is_even_odd for number in filled]
     for number, stroke in zip(filled, find_pen_strokes(outlines, widest, even_odd=even_odd), strict=True):
         points, width = (stroke.points, stroke.width) if stroke else (outlines[0][:0], 0.0)
-        shapes[number] = replace(shapes[number], points=points, width=width)
-    colours = np.array([opaque_colour(shape.paint) for shape in shapes if len(shape.points)]).reshape(-1, 3)
-    areas = [place for place, number in enumerate(filled) if not len(shapes[number].points)]
-    if areas and is_red(colours).all():
-        for place in find_silhouettes([outlines[area] for area in areas]):
-            number = filled[areas[place]]
-            shapes[number] = replace(shapes[number], points=outlines[areas[place]])
-    return shapes
+        traced[number] = replace(shapes[number], points=points, width=width)
+        if stroke is None and not _is_ground(shapes[number], page):
+            areas.append(number)
+    if areas and all(_is_curvature_line(shape, matcher) for shape in traced if len(shape.points)):
+        for place in find_silhouettes([shapes[number].points for number in areas]):
+            traced[areas[place]] = shapes[areas[place]]
+    return traced
+
+
+def _is_ground(shape: Shape, page: _Page | None) -> bool:
+    """Whether a filled shape is the ground of a drawing: as white as paper, or as large as the page."""
+    rgb = opaque_colour(shape.paint[:7])
+    opacity = int(shape.paint[7:], 16) / 255 if shape.paint[7:] and not np.isnan(rgb).any() else 1.0
+    if opacity * (1 - min(rgb)) < PAPER:
+        return True
+    if page is None:
+        return False
+    corners, start = shape.points.reshape(-1, 2), np.array(page.window[:2])
+    end, room = start + page.window[2:], 1e-3 * max(page.window[2:])
+    return bool((corners.min(axis=0) <= start + room).all() and (corners.max(axis=0) >= end - room).all())
+
+
+def _is_curvature_line(shape: Shape, matcher: LabelMatcher | None) -> bool:
+    """Whether the label or the paint of a shape makes it a curvature line."""
+    if matcher is not None:
+        return shape.chosen or f"colour={shape.paint}" in matcher.wanted
+    return bool(is_red(np.array(opaque_colour(shape.paint))))
 
 
 def _join_strokes(
@@ -172,6 +194,19 @@ def _list_faults(faults: Sequence[str]) -> tuple[str, ...]:
         return ()
     shapes = "1 shape is" if len(faults) == 1 else f"{len(faults)} shapes are"
     return (f"{shapes} faulty and left out from the fault on, first {faults[0]}; export the drawing again",)
+
+
+def _list_pictures(styles: Mapping[Element, Mapping[str, str]]) -> tuple[str, ...]:
+    """A note on the pictures in a drawing."""
+    names = [
+        name_of(element)
+        for element, style in styles.items()
+        if _tag(element) == "image" and style.get("display") != "none"
+    ]
+    if not names:
+        return ()
+    count = "1 picture is" if len(names) == 1 else f"{len(names)} pictures are"
+    return (f"{count} left out, first {names[0]}; give a picture as a file of its own to trace it",)
 
 
 def _list_unread(unread: Mapping[Element, str]) -> tuple[str, ...]:
@@ -217,7 +252,7 @@ def _put_styles(root: Element, styles: dict[Element, dict[str, str]]) -> dict[El
         if text := ";".join(f"{key}:{value}" for key, value in style.items() if key not in _MOVES):
             element.set("style", text)
         for child in list(element):
-            if _tag(child) in ("style", "script", "filter") or (_tag(child) == "image"):
+            if _tag(child) in ("style", "script", "filter", "image"):
                 element.remove(child)
     return styles
 

@@ -29,7 +29,7 @@ def test_every_program_can_be_imported(docs_module, name):
 def test_the_first_row_of_proofs_is_measured(docs_module, part, tmp_path, monkeypatch):
     proofs = docs_module("proofs")
     monkeypatch.setattr(proofs, "SIZE", 8)
-    _, row = next(iter(proofs.PARTS[part](proofs.Request((), 1.0, None, tmp_path))))
+    _, row = next(iter(proofs.PARTS[part](proofs.Request((), 60.0, None, tmp_path))))
     assert json.loads(json.dumps(row))["energy"] >= 0
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 from browsing import find, show
-from studio_pages import BOX, document, drag, pebble, settled, tool
+from studio_pages import BOX, document, drag, pebble, settled, tool, until
 from studios import PEBBLE
 
 pytestmark = pytest.mark.slow
@@ -15,7 +17,6 @@ const place = target.getBoundingClientRect();
 target.dispatchEvent(new PointerEvent(kind, { pointerId: 9, pointerType: "pen", bubbles: true,
   cancelable: true, clientX: place.x + x, clientY: place.y + y, ...options }));
 """
-PALM = 850  # milliseconds after which a touch is no longer taken for the palm
 
 
 @pytest.fixture
@@ -26,60 +27,56 @@ def tablet(empty):
     empty.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
 
 
-def touch(browser, kind, *points, canvas="#drawing"):
-    """Send a touch event with fingers at these points of a canvas."""
-    x, y = browser.execute_script(BOX, canvas)
-    fingers = [{"x": x + a, "y": y + b, "id": number} for number, (a, b) in enumerate(points)]
-    browser.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers})
+class Hand:
+    """A hand with a pen, on a browser; its events are 10 ms apart on a clock of their own."""
 
+    def __init__(self, browser):
+        self.browser = browser
+        self.time = time.time()
 
-def swipe(browser, begin, end, canvas="#drawing", steps=8):
-    """Move one finger over a canvas."""
-    points = [
-        tuple(a + (b - a) * step / steps for a, b in zip(begin, end, strict=True))
-        for step in range(steps + 1)
-    ]
-    # The page may scroll below the finger: the window stays where it is.
-    x, y = browser.execute_script(BOX, canvas)
-    kinds = ["touchStart", *["touchMove"] * steps]
-    for kind, (a, b) in zip(kinds, points, strict=True):
-        browser.execute_cdp_cmd(
-            "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x + a, "y": y + b}]}
-        )
-    touch(browser, "touchEnd")
-    return settled(browser)
+    def rest(self):
+        """Let so much time pass that a touch is no longer taken for the palm."""
+        self.time += 1
 
+    def _send(self, command, **event):
+        self.time += 0.01
+        self.browser.execute_cdp_cmd(f"Input.{command}", event | {"timestamp": self.time})
 
-def pen(browser, kind, point, force=0.5, canvas="#drawing"):
-    """Send an event of a pen at a point of a canvas."""
-    x, y = browser.execute_script(BOX, canvas)
-    browser.execute_cdp_cmd(
-        "Input.dispatchMouseEvent",
-        {
-            "type": kind,
-            "x": x + point[0],
-            "y": y + point[1],
-            "pointerType": "pen",
-            "force": force,
-            "button": "left",
-            "buttons": 0 if kind == "mouseReleased" else 1,
-            "clickCount": 1,
-        },
-    )
+    def touch(self, kind, *points, on="#drawing"):
+        """Touch an element with fingers at these points of it."""
+        x, y = self.browser.execute_script(BOX, on)
+        fingers = [{"x": x + a, "y": y + b, "id": number} for number, (a, b) in enumerate(points)]
+        self._send("dispatchTouchEvent", type=kind, touchPoints=fingers)
 
+    def tap(self, point, on="#drawing"):
+        self.touch("touchStart", point, on=on)
+        self.touch("touchEnd")
+        return settled(self.browser)
 
-def stroke(browser, *points, forces=None):
-    """Draw with the pen."""
-    forces = forces or [0.5] * len(points)
-    pen(browser, "mousePressed", points[0], forces[0])
-    for point, force in zip(points[1:], forces[1:], strict=True):
-        pen(browser, "mouseMoved", point, force)
-    pen(browser, "mouseReleased", points[-1])
-    return settled(browser)
+    def swipe(self, begin, end, on="#drawing", steps=8):
+        """Move one finger over an element, which may scroll below it."""
+        x, y = self.browser.execute_script(BOX, on)
+        for step in range(steps + 1):
+            a, b = (p + (q - p) * step / steps for p, q in zip(begin, end, strict=True))
+            kind = "touchMove" if step else "touchStart"
+            self._send("dispatchTouchEvent", type=kind, touchPoints=[{"x": x + a, "y": y + b}])
+        self.touch("touchEnd")
+        return settled(self.browser)
 
+    def pen(self, kind, point, force=0.5):
+        """Let the pen press, move or leave the drawing at a point."""
+        x, y = self.browser.execute_script(BOX, "#drawing")
+        place = {"x": x + point[0], "y": y + point[1], "force": force, "pointerType": "pen"}
+        buttons = {"button": "left", "buttons": 0 if kind == "mouseReleased" else 1, "clickCount": 1}
+        self._send("dispatchMouseEvent", type=kind, **place, **buttons)
 
-def wait(browser, milliseconds=PALM):
-    browser.execute_async_script("setTimeout(arguments[1], arguments[0])", milliseconds)
+    def stroke(self, *points, forces=None):
+        """Draw with the pen."""
+        for number, point in enumerate(points):
+            force = forces[number] if forces else 0.5
+            self.pen("mouseMoved" if number else "mousePressed", point, force)
+        self.pen("mouseReleased", points[-1])
+        return settled(self.browser)
 
 
 def spots(browser):
@@ -88,77 +85,83 @@ def spots(browser):
 
 
 def test_a_palm_before_beside_and_after_the_pen_draws_nothing(tablet):
-    touch(tablet, "touchStart", (300, 500))
-    pen(tablet, "mousePressed", (100, 300))
-    touch(tablet, "touchMove", (303, 505))
-    touch(tablet, "touchEnd")
-    touch(tablet, "touchStart", (310, 520))
+    hand = Hand(tablet)
+    hand.touch("touchStart", (300, 500))
+    hand.pen("mousePressed", (100, 300))
+    hand.touch("touchMove", (303, 505))
+    hand.touch("touchEnd")
+    hand.touch("touchStart", (310, 520))
     for step in range(1, 6):
-        pen(tablet, "mouseMoved", (100 + 30 * step, 300))
-        touch(tablet, "touchMove", (310 + 5 * step, 520 + 5 * step))
-    touch(tablet, "touchMove", (310, 520), (330, 560))
-    pen(tablet, "mouseReleased", (250, 300))
-    touch(tablet, "touchMove", (340, 560))
-    touch(tablet, "touchEnd")
-    swipe(tablet, (300, 500), (340, 560))
+        hand.pen("mouseMoved", (100 + 30 * step, 300))
+        hand.touch("touchMove", (310 + 5 * step, 520 + 5 * step))
+    hand.touch("touchMove", (310, 520), (330, 560))
+    hand.touch("touchEnd")
+    hand.touch("touchStart", (20, 10), on="[data-mark=ignored]")
+    hand.touch("touchEnd")
+    hand.touch("touchStart", (310, 520))
+    hand.pen("mouseReleased", (250, 300))
+    hand.touch("touchMove", (340, 560))
+    hand.touch("touchEnd")
+    hand.swipe((300, 500), (340, 560))
     (line,) = document(settled(tablet))["strokes"]
     assert len(line["points"]) > 8
     assert len({round(y) for y in line["points"][1::2]}) == 1
     assert line["weight"] == 0.5
+    assert find(tablet, "[data-mark=ignored]").get_attribute("aria-pressed") == "false"
 
 
 def test_after_the_pen_one_finger_draws_only_on_demand_and_two_zoom(tablet):
+    hand = Hand(tablet)
     show(tablet, width=768)
-    swipe(tablet, (60, 100), (200, 150))
+    hand.swipe((60, 100), (200, 150))
     assert len(spots(tablet)) == 1
     assert find(tablet, "#fingers").get_attribute("aria-pressed") == "true"
-    stroke(tablet, (60, 200), (200, 220), (260, 200))
+    hand.stroke((60, 200), (200, 220), (260, 200))
     assert find(tablet, "#fingers").get_attribute("aria-pressed") == "false"
-    wait(tablet)
-    swipe(tablet, (60, 250), (200, 280))
+    hand.rest()
+    hand.swipe((60, 250), (200, 280))
     assert len(spots(tablet)) == 2
 
-    touch(tablet, "touchStart", (100, 100))
-    touch(tablet, "touchStart", (100, 100), (200, 200))
+    hand.touch("touchStart", (100, 100))
+    hand.touch("touchStart", (100, 100), (200, 200))
     for step in range(1, 6):
-        touch(tablet, "touchMove", (100 - 5 * step, 100 - 5 * step), (200 + 5 * step, 200 + 5 * step))
-    touch(tablet, "touchEnd")
+        hand.touch("touchMove", (100 - 5 * step, 100 - 5 * step), (200 + 5 * step, 200 + 5 * step))
+    hand.touch("touchEnd")
     assert len(spots(tablet)) == 2
-    wide = [max(points[::2]) - min(points[::2]) for points in spots(stroke(tablet, (60, 200), (260, 200)))]
+    wide = [max(points[::2]) - min(points[::2]) for points in spots(hand.stroke((60, 200), (260, 200)))]
     assert wide[2] == pytest.approx(wide[1] * 100 / 150, rel=0.05)  # it is drawn closer
 
-    wait(tablet)
     find(tablet, "#fingers").click()
-    swipe(tablet, (60, 250), (200, 280))
+    hand.swipe((60, 250), (200, 280))
+    assert len(spots(tablet)) == 3  # it may be the palm
+    hand.rest()
+    hand.swipe((60, 250), (200, 280))
     assert len(spots(tablet)) == 4
 
 
 def test_a_page_of_a_phone_scrolls_under_a_finger(tablet, tmp_path):
+    hand = Hand(tablet)
     show(tablet, width=390, height=700)
     pebble(tablet, tmp_path)
-    top = "return [scrollY, document.querySelector('#surface').getBoundingClientRect().y]"
     tablet.execute_script("document.querySelector('#surface').scrollIntoView()")
-    before, _ = tablet.execute_script(top)
-    swipe(tablet, (180, 200), (185, 320), "#surface")
-    wait(tablet, 300)
-    assert tablet.execute_script(top)[0] < before - 50
+    before = tablet.execute_script("return scrollY")
+    hand.swipe((180, 200), (185, 320), on="#surface")
+    until(tablet, lambda _: tablet.execute_script("return scrollY") < before - 50)
     assert document(tablet)["hints"] == []
 
     tablet.execute_script("scrollTo(0, 0)")
     find(tablet, "#fingers").click()
-    swipe(tablet, (180, 300), (185, 150))
-    wait(tablet, 300)
-    assert tablet.execute_script(top)[0] > 50
+    hand.swipe((180, 300), (185, 150))
+    until(tablet, lambda _: tablet.execute_script("return scrollY") > 50)
     assert document(tablet)["strokes"] == PEBBLE["strokes"]
 
 
 def test_two_taps_on_the_surface_give_a_hint_and_one_takes_it_away(tablet, tmp_path):
+    hand = Hand(tablet)
     pebble(tablet, tmp_path)
 
     def tap(*point):
-        touch(tablet, "touchStart", point, canvas="#surface")
-        touch(tablet, "touchEnd", canvas="#surface")
-        return document(settled(tablet))["hints"]
+        return document(hand.tap(point, on="#surface"))["hints"]
 
     assert tap(150, 300) == []
     assert "Tap where" in find(tablet, "#status").text
@@ -194,14 +197,15 @@ return data.reduce((sum, red, k) => sum + (k % 4 === 0 && red > data[k + 1] + 80
 
 
 def test_a_stroke_is_as_wide_as_its_pressure(tablet):
+    hand = Hand(tablet)
     find(tablet, "[data-mark=line]").click()
-    stroke(tablet, *((80 + 8 * k, 300) for k in range(31)), forces=[0.05 + 0.03 * k for k in range(31)])
+    hand.stroke(*((80 + 8 * k, 300) for k in range(31)), forces=[0.05 + 0.03 * k for k in range(31)])
     (line,) = document(tablet)["strokes"]
     assert len(line["pressures"]) == len(line["points"]) / 2
     assert line["pressures"] == sorted(line["pressures"])
     assert line["weight"] == pytest.approx(0.5, abs=0.05)
     find(tablet, "input[value=none]").click()
-    wait(tablet, 100)
+    tablet.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
     thin, thick = (tablet.execute_script(WIDTH, x) for x in (100, 300))
     assert thick > 2 * thin > 1
 
