@@ -25,10 +25,11 @@ _BEYOND: Final = 0.01  # of the longer side: least length of a ruled line beyond
 _STRAIGHT: Final = 0.99  # least chord of a straight line as a share of its length
 _BIN: Final = np.radians(2.0)  # of the directions in the search for families
 _PARALLEL: Final = np.radians(4.0)  # greatest angle between a line and its family
-_BESIDE: Final = 0.5  # least common part of neighbours, and greatest spacing, as a share of the shorter one
+_BESIDE: Final = 0.5  # least part of a line beside its neighbour; greatest spacing as a share of their length
 _NEXT: Final = 8  # lines on each side with which a line is compared
 _TWICE: Final = 0.3  # of the spacing: closer lines are one line drawn twice
 _UNEVEN: Final = 0.4  # greatest deviation from an even spacing as a share of it
+_EXACT: Final = 0.02  # of the spacing: pieces of ruled lines lie on the lines, unlike the drawing
 _MOSTLY: Final = 0.75  # least share of even spacings, and of ruled lines that go beyond the drawing
 
 Indices = NDArray[np.intp]
@@ -55,8 +56,22 @@ class _Lines:
     start: Floats
     end: Floats
 
+    @property
+    def angle(self) -> Floats:
+        return np.asarray(np.arctan2(*(self.end - self.start).T[::-1]))
+
     def at(self, which: Indices) -> _Lines:
         return _Lines(self.curve[which], self.start[which], self.end[which])
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """Evenly spaced parallels: numbers of the lines, those drawn twice once in `count`."""
+
+    members: Indices
+    direction: float
+    count: int
+    spacing: float
 
 
 def leave_out_parallels(curves: Curves) -> Curves:
@@ -65,7 +80,7 @@ def leave_out_parallels(curves: Curves) -> Curves:
     notes = []
     for family in find_parallels(curves):
         members = np.isin(curves.curve, family.curve)
-        if curves.line[members].any():
+        if curves.line[members].mean() > 0.5:  # a red margin makes no curvature lines of ruled paper
             notes.append(
                 f"{family} look like {family.kind}, but count as curvature lines; "
                 "hide them in the drawing, or ignore them in crossfield studio"
@@ -94,18 +109,16 @@ def find_parallels(curves: Curves) -> list[Family]:
         return []
     left, top, right, bottom = curves.box
     side = max(right - left, bottom - top)
-    others = curves.points[~np.isin(curves.curve, lines.curve[np.concatenate([row for row, *_ in rows])])]
+    printed = [_printed_lines(lines, row) for row in rows]
+    others = curves.points[~np.isin(curves.curve, lines.curve[np.concatenate(printed)])].reshape(-1, 2)
     families = []
-    for row, count, spacing in rows:
-        members = lines.at(row)
-        kind: Literal["hatching", "ruled paper"] | None = None
-        if count >= HATCHED and spacing <= CLOSE * side:
-            kind = "hatching"
-        if len(others) and _goes_beyond(members, others.reshape(-1, 2), _BEYOND * side):
-            kind = "ruled paper"
-        if kind:
-            middle = (members.start + members.end).mean(axis=0) / 2
-            families.append(Family(members.curve, count, kind, middle))
+    for row, numbers in zip(rows, printed, strict=True):
+        members = lines.at(row.members)
+        middle = (members.start + members.end).mean(axis=0) / 2
+        if len(others) and _goes_beyond(members, row.direction, others, _BEYOND * side):
+            families.append(Family(lines.curve[numbers], row.count, "ruled paper", middle))
+        elif row.count >= HATCHED and row.spacing <= CLOSE * side:
+            families.append(Family(members.curve, row.count, "hatching", middle))
     return families
 
 
@@ -120,9 +133,9 @@ def _straight_lines(curves: Curves) -> _Lines:
     return _Lines(curves.curve[first][straight].astype(np.intp), start[straight], end[straight])
 
 
-def _even_rows(lines: _Lines) -> Iterator[tuple[Indices, int, float]]:
-    """Numbers of the lines in each evenly spaced row of parallels, with their number and spacing."""
-    angle = np.arctan2(*(lines.end - lines.start).T[::-1])
+def _even_rows(lines: _Lines) -> Iterator[_Row]:
+    """The evenly spaced rows of parallels."""
+    angle = lines.angle
     is_waiting = np.ones(len(angle), dtype=bool)
     bins = round(np.pi / _BIN)
     while is_waiting.sum() >= RULED:
@@ -131,16 +144,13 @@ def _even_rows(lines: _Lines) -> Iterator[tuple[Indices, int, float]]:
         best = int(np.argmax(wide))
         if wide[best] < RULED:
             break
-        off = (angle - (best + 0.5) * _BIN + np.pi / 2) % np.pi - np.pi / 2
+        off = _turn(angle, (best + 0.5) * _BIN)
         parallel = np.flatnonzero(is_waiting & (np.abs(off) <= _PARALLEL))
         is_waiting[parallel] = False
-        direction = (best + 0.5) * _BIN + float(np.median(off[parallel]))
-        yield from _rows_of_parallels(lines, parallel, direction)
+        yield from _rows_of_parallels(lines, parallel, (best + 0.5) * _BIN + float(np.median(off[parallel])))
 
 
-def _rows_of_parallels(
-    lines: _Lines, parallel: Indices, direction: float
-) -> Iterator[tuple[Indices, int, float]]:
+def _rows_of_parallels(lines: _Lines, parallel: Indices, direction: float) -> Iterator[_Row]:
     """The evenly spaced rows among lines of one direction."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -151,9 +161,10 @@ def _rows_of_parallels(
     low, high = _extents(lines.at(parallel), direction)
     pairs = []
     for step in range(1, min(_NEXT, len(parallel) - 1) + 1):
-        shorter = np.minimum((high - low)[step:], (high - low)[:-step])
+        lengths = (high - low)[step:], (high - low)[:-step]
+        shorter, longer = np.minimum(*lengths), np.maximum(*lengths)
         common = np.minimum(high[step:], high[:-step]) - np.maximum(low[step:], low[:-step])
-        beside = (common >= _BESIDE * shorter) & (offset[step:] - offset[:-step] <= _BESIDE * shorter)
+        beside = (common >= _BESIDE * longer) & (offset[step:] - offset[:-step] <= _BESIDE * shorter)
         pairs.append(np.flatnonzero(beside)[:, None] + [0, step])
     one, other = np.concatenate(pairs).T
     links = coo_array((np.ones(len(one)), (one, other)), shape=(len(parallel),) * 2)
@@ -166,17 +177,36 @@ def _rows_of_parallels(
             continue
         spacing = float(np.median(gaps))
         if (np.abs(gaps - spacing) <= _UNEVEN * spacing).mean() >= _MOSTLY:
-            yield parallel[members], len(gaps) + 1, spacing
+            yield _Row(parallel[members], direction, len(gaps) + 1, spacing)
 
 
-def _goes_beyond(lines: _Lines, others: Floats, least: float) -> bool:
-    """Whether parallels, on the whole, go beyond other points (k, 2) at both ends."""
-    way = lines.end - lines.start
-    direction = float(np.arctan2(*(way * np.sign(way @ way[0])[:, None]).sum(axis=0)[::-1]))
+def _printed_lines(lines: _Lines, row: _Row) -> Indices:
+    """Numbers of the lines of a row, of pieces of such lines, and of margins, which cross the whole row."""
+    across = row.direction + np.pi / 2
+    low, high = _extents(lines, across)
+    offset = np.sort(((low + high) / 2)[row.members])
+    offset = np.concatenate([[offset[0] - row.spacing], offset, [offset[-1] + row.spacing]])
+    place = np.searchsorted(offset, low).clip(1, len(offset) - 1)
+    off = np.minimum(np.abs(low - offset[place]), np.abs(low - offset[place - 1])) + high - low
+    turn = np.abs(_turn(lines.angle, row.direction))
+    is_long = vector_length(*(lines.end - lines.start).T) >= row.spacing
+    is_piece = is_long & (turn <= _PARALLEL) & (off <= _EXACT * row.spacing)
+    is_margin = (np.pi / 2 - turn <= _PARALLEL) & (low <= offset[1]) & (high >= offset[-2])
+    is_piece[row.members] = True
+    return np.flatnonzero(is_piece | is_margin)
+
+
+def _goes_beyond(lines: _Lines, direction: float, others: Floats, least: float) -> bool:
+    """Whether most lines of one direction go beyond other points (k, 2) at both ends."""
     low, high = _extents(lines, direction)
     along = _project(others, direction)
     beyond = (low <= along.min() - least) & (high >= along.max() + least)
     return bool(beyond.mean() >= _MOSTLY)
+
+
+def _turn(angle: Floats, direction: float) -> Floats:
+    """The angles from a direction to lines, in [-pi / 2, pi / 2)."""
+    return (angle - direction + np.pi / 2) % np.pi - np.pi / 2
 
 
 def _extents(lines: _Lines, direction: float) -> tuple[Floats, Floats]:

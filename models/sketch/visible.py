@@ -185,7 +185,12 @@ def _sample_lines(shapes: Sequence[Shape], window: Box, pixel: float) -> _Sample
     ways = np.where(np.diff(cubic) == 0, np.hypot(*np.diff(at, axis=0).T), 0.0) / pixel
     ways = np.r_[0.0, ways, 0.0]
     wide, high = (max(1, round(side / pixel)) for side in window[2:])
-    column, row = np.floor((at - window[:2]) / np.array(window[2:]) * (wide, high)).astype(np.intp).T
+    place = (at - window[:2]) / np.array(window[2:]) * (wide, high)
+    # A line on the edge of the page shows half of its width.
+    place = np.where(
+        (place >= -0.5) & (place <= (wide + 0.5, high + 0.5)), place.clip(0, (wide - 0.5, high - 0.5)), place
+    )
+    column, row = np.floor(place).astype(np.intp).T
     inside = (column >= 0) & (column < wide) & (row >= 0) & (row < high)
     return _Samples(
         number[cubic],

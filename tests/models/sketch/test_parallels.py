@@ -32,6 +32,9 @@ def drawing(*parts):
 HATCHING = rows((90, 180, 130, 200), (3, -3), 14, "gray")
 TWICE = HATCHING + rows((90.5, 180, 130.5, 201), (3, -3), 14, "gray")
 RULED = rows((0, 20, 300, 20), (0, 30), 9, "steelblue")
+NOTEBOOK = (
+    RULED + rows((36, 0, 36, 300), (0, 0), 1, "red") + rows((0, 290, 120, 290), (150, 0), 2, "steelblue")
+)
 SQUARED = RULED + rows((15, 0, 15, 300), (30, 0), 10, "steelblue")
 
 
@@ -41,6 +44,7 @@ SQUARED = RULED + rows((15, 0, 15, 300), (30, 0), 10, "steelblue")
         (HATCHING, ["hatching"]),
         (TWICE, ["hatching"]),
         (RULED, ["ruled paper"]),
+        (NOTEBOOK, ["ruled paper"]),
         (SQUARED, 2 * ["ruled paper"]),
     ],
 )
