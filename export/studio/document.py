@@ -89,7 +89,8 @@ class Document:
         try:
             return cls.from_json(parse_json(data.decode()))
         except (UnicodeDecodeError, InstanceError) as error:
-            raise InputError(f"the drawing is not a session of crossfield: {shortened(error)}") from error
+            reason = shortened(error) if isinstance(error, InstanceError) else "is not text"
+            raise InputError(f"the file is no session of crossfield: it {reason}") from error
 
     @classmethod
     def from_json(cls, content: Any) -> Document:
@@ -169,7 +170,7 @@ def _read_list(
     if not isinstance(entries, list) or len(entries) > MAX_ELEMENTS:
         raise InputError(f"{key} of the session must be a list of at most {MAX_ELEMENTS} entries")
     if not all(isinstance(entry, dict) for entry in entries):
-        raise InputError(f"an entry of {key} of the session is not an object")
+        raise InputError(f"an entry of {key} of the session is not an object; save the session again")
     return tuple(read(entry, f"{key}, entry {number}") for number, entry in enumerate(entries, start=1))
 
 

@@ -31,7 +31,7 @@ from ...models.processes.deadline import Over
 from ...models.sketch.samples import SAMPLES, sample_svg
 from ...templates import ENVIRONMENT
 from ..formats.registry import FORMATS
-from .desk import Desk
+from .desk import ClosedError, Desk
 from .document import SIZES
 from .files import DOWNLOADS, download
 from .opening import open_drawing
@@ -107,6 +107,7 @@ class Page:
         """All addresses below the token."""
         return [
             Route("/", self.index),
+            Route("/alive", self.alive),
             Route("/first", self.start),
             Route("/sample/{name}", self.sample),
             Route("/open", self.open, methods=["POST"]),
@@ -135,6 +136,10 @@ class Page:
         if name not in files:
             return PlainTextResponse("There is no such file.", 404)
         return Response(files[name].read_bytes(), media_type=_TYPES[files[name].suffix])
+
+    async def alive(self, _: Request) -> Response:
+        """An answer at once, also while all processes compute."""
+        return JSONResponse({})
 
     async def start(self, _: Request) -> Response:
         """The drawing that the page opens with."""
@@ -241,30 +246,44 @@ def _stream_response(steps: Iterator[dict[str, Any]]) -> Response:
         try:
             for step in steps:
                 yield json.dumps(step, allow_nan=False).encode() + b"\n"
+        except ClosedError:
+            return  # the page sees that the last line is missing
         except OvertakenError:
             yield b'{"stage": "overtaken"}\n'
         except CrossfieldError as error:
-            yield _error_line(str(error))
-        except MemoryError:
-            yield _error_line("there is not enough memory; choose a smaller size")
+            yield _error_line(error)
         except Exception as error:  # noqa: BLE001 - the page shows it, and keeps its drawing
-            yield _error_line(f"internal error, please report it: {type(error).__name__}: {shortened(error)}")
+            yield _error_line(error)
 
     return StreamingResponse(lines(), media_type="application/x-ndjson")
 
 
-def _error_line(message: str) -> bytes:
-    return json.dumps({"stage": "error", "message": message}).encode() + b"\n"
+def _error_line(error: Exception) -> bytes:
+    return json.dumps({"stage": "error", "message": _describe(error)}).encode() + b"\n"
+
+
+def _describe(error: Exception) -> str:
+    """The message of an error, with a remedy on the page."""
+    if isinstance(error, CrossfieldError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "there is not enough memory; choose a smaller size"
+    reason = f"{type(error).__name__}: {shortened(error)}"
+    return f"internal error, {reason}; save the drawing, and report it with the file"
 
 
 async def _refused(_: Request, error: Exception) -> Response:
-    return JSONResponse({"message": str(error)}, 422)
+    return JSONResponse({"message": _describe(error)}, 422)
 
 
 def build_application(desk: Desk, port: int, token: str, first: dict[str, Any] | None = None) -> ASGIApp:
     """The server behind its guard."""
     routes = [Mount(f"/{token}", routes=Page(desk, first).routes())]
-    return Guard(Starlette(routes=routes, exception_handlers={CrossfieldError: _refused}), port, token)
+    return Guard(
+        Starlette(routes=routes, exception_handlers={CrossfieldError: _refused, Exception: _refused}),
+        port,
+        token,
+    )
 
 
 def listen(port: int) -> socket.socket:

@@ -30,6 +30,7 @@ GRACE_SHARE: Final = 0.05
 PATIENCE: Final = 4.0
 """Seconds for work to answer Ctrl-C: the request is repeated half way, then the work is killed."""
 _TICK: Final = 0.1
+_CLOSED: Final = "the program ended before this work was done"
 _PROGRAM: Final = (
     "import sys; sys.path += [each for each in sys.argv[1:] if each not in sys.path]; "
     f"from {__package__}.child_program import main; main()"
@@ -58,12 +59,19 @@ class Child(AbstractContextManager["Child"]):
     """A process that runs functions of modules, one call at a time.
 
     folder: its current folder, this process' folder by default. one_thread: whether numerical libraries there
-    use one thread. The process starts with the first call, and restarts if it did not survive a call.
+    use one thread. remedy: advice after a kill for lack of memory. The process starts with the first call,
+    and restarts if it did not survive a call.
     """
 
-    def __init__(self, folder: Path | None = None, *, one_thread: bool = False) -> None:
+    def __init__(
+        self,
+        folder: Path | None = None,
+        *,
+        one_thread: bool = False,
+        remedy: str = "try fewer jobs or threads",
+    ) -> None:
         """Store the settings; no process starts yet."""
-        self._folder, self._one_thread = folder, one_thread
+        self._folder, self._one_thread, self._remedy = folder, one_thread, remedy
         self._process: subprocess.Popen[bytes] | None = None
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._lock = threading.Lock()
@@ -127,7 +135,7 @@ class Child(AbstractContextManager["Child"]):
         """Return the process, started if needed and ready for a call."""
         with self._lock:
             if self._closed:
-                raise WorkerError("the work was ended before its time")
+                raise WorkerError(_CLOSED)
             process = self._process
             fresh = process is None
             if process is None:
@@ -183,9 +191,9 @@ class Child(AbstractContextManager["Child"]):
     def _describe_end(self) -> str:
         process = self._process
         if process is None:
-            return "the work was ended before its time"
+            return _CLOSED
         code = process.wait()
-        remedy = ", probably for lack of memory; try fewer jobs or threads" if code == KILLED else ""
+        remedy = f", probably for lack of memory; {self._remedy}" if code == KILLED else ""
         return f"a process ended before its work was done: it {describe_exit(code)}{remedy}"
 
     def _ask_to_stop(self) -> None:

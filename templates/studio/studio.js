@@ -3,11 +3,12 @@
 import { History, check, decoded, emptyDocument } from "./document.js";
 import { View, paint, paintBase } from "./drawing.js";
 import { listen, watchPen } from "./pointer.js";
+import { Server, lined, sentence, trouble } from "./server.js";
 import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shading.js";
 import { clipped, erased, fitShift, isClosed, moved, rounded, strokeAt, strokesIn } from "./strokes.js";
 
 const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
-const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file", "picture"], RETRY = 3000;
+const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file", "picture"];
 const REACH = 9, FINGER = 18, STILL = 4, PASTED = 16; // pixels of the screen: near a stroke, also for a finger; in a click; between copies
 const state = {
   history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "cut", preset: true, next: "outline", live: null, brush: null, edit: 0,
@@ -107,49 +108,38 @@ function kept() {
 }
 
 // Requests. A newer edit aborts older ones, here and on the server.
-let waiting = null, lost = null, begun = 0;
-const ask = (path, options) => fetch(path, options).catch(error => {
-  if (error.name !== "AbortError") missing();
-  throw error;
-});
-function missing() {
-  banner("The server does not answer. Your drawing is safe on this page. Save it, start “crossfield studio” again, and open the saved session at the new address that it prints.", { kind: "lost", retry: true });
-  ready("no server"); clearTimeout(lost); lost = setTimeout(request, RETRY);
-}
-async function trouble(response) {
-  if (response.status === 403) return "The server was started again, and this page belongs to the earlier start. Save the drawing, go to the new address that “crossfield studio” printed, and open the saved session there.";
-  const text = await response.text();
-  try { return JSON.parse(text).message; } catch { return text.slice(0, 300) || `The server answered ${response.status}.`; }
-}
-async function* lined(response) {
-  let rest = "";
-  for await (const text of response.body.pipeThrough(new TextDecoderStream())) {
-    const parts = (rest + text).split("\n");
-    rest = parts.pop();
-    for (const part of parts) yield JSON.parse(part);
-  }
-}
+const SLOW = 20000; // milliseconds
+let waiting = null, begun = 0;
+const server = new Server({ back: () => request(), lost() {
+  waiting?.abort();
+  banner("The server does not answer. Your drawing is safe here, and this page goes on when the server is back. If “crossfield studio” has ended, save the drawing, start it again, and open the saved file at the new address that it prints.", { kind: "lost", retry: true });
+  ready("No server.");
+} });
 async function request() {
-  waiting?.abort(); clearTimeout(lost);
+  waiting?.abort();
   const doc = state.doc, edit = ++state.edit;
   document.documentElement.dataset.state = "busy"; begun = performance.now(); state.first = true;
   const hasLine = doc.strokes.some(stroke => stroke.mark === "line");
   if (!hasLine) { forget(); $("#times").textContent = ""; $("#numbers").replaceChildren(); clear("error"); refresh(); }
-  waiting = new AbortController(); status("computing …");
+  waiting = new AbortController(); status("Computing …");
   const wanted = new URLSearchParams({ page, edit, size: doc.size });
   if (state.mode === "lines") wanted.set("lines", 1);
+  const slow = setTimeout(() => { if (!bannerKind) banner(`Field and surface are not ready after ${SLOW / 1000} seconds. Wait, choose a smaller size, or try again.`, { kind: "slow", retry: true }); }, SLOW);
   try {
-    const response = await ask(`${hasLine ? "compute" : "next"}?${wanted}`, { method: "POST", body: computable(doc), signal: waiting.signal });
-    clear("lost");
-    if (!response.ok) { banner(await trouble(response)); ready(""); return; }
-    if (!hasLine) { take({ stage: "next", ...await response.json() }); return; }
-    for await (const found of lined(response)) if (edit === state.edit) take(found);
-  } catch (error) { if (error.name !== "AbortError" && edit === state.edit) missing(); }
+    await server.ask(`${hasLine ? "compute" : "next"}?${wanted}`, { method: "POST", body: computable(doc), signal: waiting.signal }, async response => {
+      clear("lost");
+      if (!response.ok) { banner(await trouble(response)); ready(""); return; }
+      if (!hasLine) { take({ stage: "next", ...await response.json() }); return; }
+      let last = null;
+      for await (const found of lined(response)) { last = found.stage; if (edit === state.edit) take(found); }
+      if (edit === state.edit && !["done", "error", "overtaken"].includes(last)) server.miss(); // it was stopped while it computed
+    });
+  } catch { /* a newer edit, or the server is lost, which is shown */ } finally { clearTimeout(slow); if (edit === state.edit) clear("slow"); }
 }
 const seconds = () => `${((performance.now() - begun) / 1000).toFixed(2)} s`;
 const numbered = mask => { let n = 0; return Int32Array.from(mask, inside => inside ? n++ : -1); };
 function take(found) {
-  if (found.stage === "error") { forget(); banner(found.message); refresh(); ready(""); return; }
+  if (found.stage === "error") { forget(); banner(sentence(found.message)); refresh(); ready(""); return; }
   if (found.stage === "overtaken") return;
   if (found.stage === "next") proceed(found.next);
   if (found.stage === "next" || found.stage === "done") { ready(""); return; }
@@ -203,11 +193,11 @@ function doubts() {
   for (const text of field?.warnings ?? []) item(`Mask: ${text}.`, action("Areas", () => choose("area")), action("Paint the mask", () => choose("paint")));
   const some = [...new Set([...field?.suspects ?? [], ...surface?.suspects ?? []])].filter(k => state.doc.strokes[k]?.mark === "line");
   state.suspects = new Set(some);
-  if (some.length) item(`${some.length === 1 ? "1 stroke does" : `${some.length} strokes do`} not fit. Probably they are not curvature lines; otherwise they may be hidden lines.`,
-    action("Select them", () => select(some)), action("Mark as cuts", () => { select(some); mark("cut"); }));
+  if (some.length) item(some.length === 1 ? "1 stroke does not fit. Probably it is not a curvature line; otherwise it may be a hidden line." : `${some.length} strokes do not fit. Probably they are not curvature lines; otherwise they may be hidden lines.`,
+    action(some.length === 1 ? "Select it" : "Select them", () => select(some)), action(some.length === 1 ? "Mark as cut" : "Mark as cuts", () => { select(some); mark("cut"); }));
   const settled = surface && state.next !== "across";
   for (const text of settled ? surface.doubts : []) item(`Surface: ${text}.`);
-  for (const text of settled ? surface.freedom : []) item(`Free: ${text}.`, ...text.startsWith("inside out") ? [action("Flip", flip)] : []);
+  for (const text of settled ? surface.freedom : []) item(`Your choice: ${text}.`, ...text.startsWith("inside out") ? [action("Flip", flip)] : []);
   if (!items.length) items.push(element("li", settled ? "None." : "The field is not determined yet."));
   $("#doubts").replaceChildren(...items);
 }
@@ -331,7 +321,7 @@ async function turn({ path }, done = false) {
   const view = [from[0] - (path[k] - path[0]) * left.scale / 3, Math.max(-89, Math.min(89, from[1] + (path[k + 1] - path[1]) * left.scale / 3))].map(Math.round);
   if (turning && !done) return;
   await turning;
-  turning = read(decoded.bytes(file.data), file.name, view.join(",")).finally(() => { turning = null; });
+  turning = readFile(decoded.bytes(file.data), file.name, view.join(",")).finally(() => { turning = null; });
   const found = await turning;
   if (!found || file !== state.doc.file) return;
   const doc = { ...state.history.now, page: found.page, strokes: found.strokes, mask: [], hints: [], view };
@@ -383,23 +373,21 @@ listen(right, arrows, { refresh, fingers: () => false, hover(event) {
 right.canvas.addEventListener("pointerleave", () => { state.lamp = LAMP_AT; refresh(false); });
 
 // Files.
-async function read(bytes, name, view) {
-  const query = new URLSearchParams({ name, ...view && { view } });
-  try {
-    const response = await ask(`open?${query}`, { method: "POST", body: bytes });
-    if (response.ok) return await response.json();
-    banner(`${name}: ${await trouble(response)}`);
-  } catch { /* the server is lost, which is shown */ }
+/** What the server reads, or null after a message. */
+async function read(path, name, body) {
+  const response = await server.ask(path, body && { method: "POST", body }).catch(() => null); // a lost server is shown
+  if (response?.ok) return await response.json();
+  if (response) banner(await trouble(response, name).then(text => text.startsWith(name) ? text : `${name}: ${text}`));
   return null;
 }
+const readFile = (file, name, view) => read(`open?${new URLSearchParams({ name, ...view && { view } })}`, name, file);
 /** The document of what the server read from a file. */
 const documentOf = ({ document: session, name, page, strokes, file, picture }) => ({ ...emptyDocument(), size: state.doc.size, ...session ?? { name: name || "drawing", page, strokes, file, picture } });
 const mayReplace = () => isSaved() || !state.doc.strokes.length || confirm("Replace this drawing? It has changes that are not in a saved file. Undo brings it back until this page is closed or loaded again.");
-async function open(file) {
-  if (!file || !mayReplace()) return;
-  const found = await read(file, file.name);
-  if (found) { banner((found.notes ?? []).map(note => `${note}.`).join(" "), { kind: "notes" }); replace(documentOf(found)); }
-}
+/** Shows what the server read, and its notes on what it left out. */
+function enter(found) { if (found) { replace(documentOf(found)); showNotes(found); } }
+const showNotes = ({ notes = [] }) => banner(notes.map(note => sentence(note)).join(" "), { kind: "notes" });
+const open = async file => { if (file && mayReplace()) enter(await readFile(file, file.name)); };
 function give(blob, name) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob); link.download = name; link.click();
@@ -407,16 +395,17 @@ function give(blob, name) {
 }
 function save() {
   give(new Blob([JSON.stringify(state.history.now)], { type: "application/json" }), `${state.doc.name}.studio.json`);
-  state.history.saved.add(state.history.now); keep(); status("saved");
+  state.history.saved.add(state.history.now); keep(); status("Saved.");
 }
 async function download(what) {
-  const query = new URLSearchParams({ what, formulation: $("#formulation").value, format: $("#format").value });
-  status(`writing ${what} …`);
+  const title = $(`[data-download=${what}]`).textContent, query = new URLSearchParams({ what, formulation: $("#formulation").value, format: $("#format").value });
+  status(`Writing ${title} …`);
   try {
-    const response = await ask(`download?${query}`, { method: "POST", body: computable(state.doc) });
-    if (!response.ok) { banner(await trouble(response)); status(""); return; }
-    give(await response.blob(), /filename="(.*)"/.exec(response.headers.get("content-disposition"))[1]);
-    ready(`${what} written`);
+    await server.ask(`download?${query}`, { method: "POST", body: computable(state.doc) }, async response => {
+      if (!response.ok) { banner(await trouble(response)); status(""); return; }
+      give(await response.blob(), /filename="(.*)"/.exec(response.headers.get("content-disposition"))[1]);
+      ready(`${title} is written.`);
+    });
   } catch { /* the server is lost, which is shown */ }
 }
 function dialog(title, ...content) { $("#dialog h2").textContent = title; $("#dialog div").replaceChildren(...content); $("#dialog").showModal(); }
@@ -427,7 +416,7 @@ const actions = {
   fingers: () => { state.fingers = !fingersDraw(); controls(); },
   help: () => dialog("Help", $("#help").content.cloneNode(true)),
   elsewhere: () => state.field ? dialog("The same without the page", element("p", "Download the drawing and the instance, then run in their folder:"),
-    element("pre", state.field.commands.join("\n").replace("milp-mccormick -F mps", `${$("#formulation").value} -F ${$("#format").value}`))) : status("There is no field yet."),
+    element("pre", state.field.commands.join("\n").replace("milp-mccormick -F mps", `${$("#formulation").value} -F ${$("#format").value}`))) : status("There is no field yet. Draw a curvature line first."),
 };
 const closeMenus = () => all(".menu[open]").forEach(each => { each.open = false; });
 document.addEventListener("click", event => {
@@ -439,7 +428,7 @@ document.addEventListener("click", event => {
   if (tool) choose(tool);
   if (kind) mark(kind);
   if (what) download(what);
-  if (sample && mayReplace()) ask(`sample/${sample}`).then(response => response.json()).then(found => replace(documentOf(found))).catch(() => {});
+  if (sample && mayReplace()) read(`sample/${sample}`, sample).then(found => enter(found));
 });
 $("#file").addEventListener("change", event => { open(event.target.files[0]).finally(() => { event.target.value = ""; }); });
 document.addEventListener("dragover", event => event.preventDefault());
@@ -489,9 +478,10 @@ addEventListener("beforeunload", event => { if (!isSaved()) event.preventDefault
 // What this tab had before it was loaded again, or the drawing of the command line.
 async function begin() {
   const mine = kept(), same = sessionStorage.getItem(`${KEPT}-at`) === location.pathname, saved = sessionStorage.getItem(`${KEPT}-saved`);
-  const given = await ask("first").then(response => response.json()).catch(() => null), first = documentOf(given ?? { document: { page: canvasPage() } });
+  const given = await read("first", "First drawing"), first = documentOf(given ?? { document: { page: canvasPage() } });
   state.history.reset(mine || first, { saved: !mine || saved === "yes" }); show(state.history.now);
-  if (mine && given && !same && !confirm("This tab has a drawing of an earlier page. Keep it instead of the new one?")) replace(first);
+  if (mine && given && !same && !confirm("This tab has a drawing from an earlier page. Keep it instead of the new one? If not, undo brings it back.")) replace(first);
   else if (mine) keep();
+  else if (given) showNotes(given);
 }
 controls(); doubts(); begin();

@@ -55,8 +55,17 @@ def tool(browser, name):
     find(browser, f"[data-tool={name}]").click()
 
 
-def load(browser, path, content):
+def write(path, content):
     path.write_bytes(content if isinstance(content, bytes) else json.dumps(content).encode())
+    return path
+
+
+def banner(browser):
+    return find(browser, "#banner span").text
+
+
+def load(browser, path, content):
+    write(path, content)
     browser.execute_script("document.documentElement.dataset.state = 'loading'")
     find(browser, "#file").send_keys(str(path))
     return settled(browser)

@@ -7,7 +7,7 @@ import math
 
 import pytest
 from browsing import CONTRAST, find, show, sideways
-from studio_pages import BOX, document, drag, load, opened, pebble, settled, tool, until
+from studio_pages import BOX, banner, document, drag, load, opened, pebble, settled, tool, until
 from studios import CONTRADICTING, PEBBLE, studio
 
 pytestmark = pytest.mark.slow
@@ -28,10 +28,6 @@ def given(browser, folder, pressed):
         browser, lambda _: [path for path in folder.iterdir() if path.suffix not in {".crdownload", ".tmp"}]
     )
     return kept[0]
-
-
-def banner(browser):
-    return find(browser, "#banner span").text
 
 
 def pixels(browser):
@@ -376,3 +372,7 @@ def test_a_doubt_is_followed_by_its_suggestion(empty, tmp_path):
     marks = [stroke["mark"] for stroke in document(settled(browser))["strokes"]]
     assert marks == ["cut", *["line"] * 7, "cut", "cut"]
     assert "do not fit" not in find(browser, "#doubts").text
+    find(browser, "[data-do=save]").click()
+    upright = [{"points": [x, 14, x, 86], "mark": "line", "weight": 1} for x in range(16, 110, 8)]
+    browser = pebble(browser, tmp_path, strokes=[*CONTRADICTING[:9], *upright], size=32)
+    assert "1 stroke does not fit. Probably it is not a curvature line" in find(browser, "#doubts").text
