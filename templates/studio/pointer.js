@@ -3,15 +3,15 @@
 
 const PALM = 800; // milliseconds after the pen in which a touch may be the palm
 const TAP = 10; // pixels of the screen that a finger moves at most in a tap
-const ERASER = 32; // in `buttons`: the other end of a pen
+const ERASER = { button: 5, buttons: 32 }; // the other end of a pen
 const pen = { down: false, at: -Infinity, seen: false };
 const isPalm = event => pen.down || event.timeStamp - pen.at < PALM;
 
 /** Watches for a pen on the pictures, and calls a function when it comes for the first time. */
 export function watchPen(first) {
   for (const kind of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) document.addEventListener(kind, event => {
-    if (event.pointerType !== "pen" || !event.target.matches("canvas")) return; // elsewhere, its release can be missed
-    pen.down = event.buttons > 0 && kind !== "pointercancel"; pen.at = event.timeStamp;
+    if (event.pointerType !== "pen" || event.target.localName !== "canvas") return; // elsewhere, its release can be missed
+    pen.down = kind === "pointerdown" || kind === "pointermove" && pen.down; pen.at = event.timeStamp;
     if (!pen.seen) first();
     pen.seen = true;
   }, true);
@@ -23,8 +23,8 @@ function stopTouches(target, isStopped) {
   for (const kind of ["touchstart", "touchmove"]) target.addEventListener(kind, event => { if (event.cancelable && isStopped(event)) event.preventDefault(); }, { passive: false });
 }
 
-const readContact = ({ pointerType, pressure, buttons }) => ({
-  pressure: pointerType === "pen" ? Math.max(0.05, pressure) : 1, erasing: (buttons & ERASER) > 0, coarse: pointerType === "touch",
+const readContact = ({ pointerType, pressure, button, buttons }) => ({
+  pressure: pointerType === "pen" ? Math.max(0.05, pressure) : 1, erasing: button === ERASER.button || (buttons & ERASER.buttons) > 0, coarse: pointerType === "touch",
 });
 
 /** Lets pointers and keys of a view use a tool.
@@ -46,7 +46,7 @@ export function listen(view, tool, { hover, refresh, fingers }) {
     try { canvas.setPointerCapture(event.pointerId); } catch { /* the pointer is gone */ }
     down.set(event.pointerId, event);
     if (down.size > 1 || event.button === 1) { stop(); gesture = true; }
-    else if (touch ? fingers() && !isPalm(event) : [0, 5].includes(event.button)) { user = event.pointerId; tool.begin(view.at(event), readContact(event)); }
+    else if (touch ? fingers() && !isPalm(event) : [0, ERASER.button].includes(event.button)) { user = event.pointerId; tool.begin(view.at(event), readContact(event)); }
   });
   canvas.addEventListener("pointermove", event => {
     const before = down.get(event.pointerId);
