@@ -376,9 +376,14 @@ def _extend_to_tip(points: Floats, cap: Floats, width: float, end_gap: float) ->
     is_before = vector_length(*(points - points[-1]).T) > end_gap / 2
     beyond = np.concatenate([cap, points[-1:]])
     points = points[: np.flatnonzero(is_before)[-1] + 1] if is_before[1:].any() else points
-    direction = _end_direction(points, width)
-    ahead = ((beyond - points[-1]) @ direction).max()
-    return np.concatenate([points, points[-1:] + ahead * direction])
+    # The parabola through three points continues the bend of the stroke.
+    along = np.append(0.0, np.cumsum(vector_length(*np.diff(points, axis=0).T)))
+    step = min(2 * _BASE * max(width, end_gap), along[-1]) / 2
+    places = along[-1] - step * np.arange(3)
+    end, middle, start = np.stack([np.interp(places, along, axis) for axis in points.T], axis=1)
+    slope, bend = (3 * end - 4 * middle + start) / 2, (end - 2 * middle + start) / 2
+    part = max(0.0, float(((beyond - end) @ slope).max() / max(float(slope @ slope), _TINY)))
+    return np.concatenate([points, [end + part * slope + part * part * bend]])
 
 
 def _end_direction(points: Floats, width: float) -> Floats:
