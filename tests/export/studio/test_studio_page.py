@@ -376,3 +376,12 @@ def test_a_doubt_is_followed_by_its_suggestion(empty, tmp_path):
     upright = [{"points": [x, 14, x, 86], "mark": "line", "weight": 1} for x in range(16, 110, 8)]
     browser = pebble(browser, tmp_path, strokes=[*CONTRADICTING[:9], *upright], size=32)
     assert "1 stroke does not fit. Probably it is not a curvature line" in find(browser, "#doubts").text
+
+
+def test_hatching_comes_ignored_with_a_note(empty, tmp_path):
+    hatching = "".join(f'<path d="M{20 + 2 * k} 30l9 20"/>' for k in range(12))
+    body = f'<svg fill="none" stroke="black"><circle cx="50" cy="50" r="45"/>{hatching}'
+    browser = load(empty, tmp_path / "body.svg", f'{body}<path d="M10 50H90" stroke="red"/></svg>'.encode())
+    assert "12 parallel lines round (35.5, 40) look like hatching" in banner(browser)
+    marks = [stroke["mark"] for stroke in document(browser)["strokes"]]
+    assert marks == ["cut", *12 * ["ignored"], "line"]
