@@ -27,10 +27,13 @@ PATIENCE: Final = 120
 
 def write_shot(page: Any, name: str, *selectors: str) -> None:
     """Click these controls, wait for the surface, and write a picture."""
+    ready = "return document.documentElement.dataset.state === 'ready'"
+    wait = WebDriverWait(page, PATIENCE)
+    wait.until(lambda shown: shown.execute_script(ready))
+    page.execute_script("document.documentElement.dataset.state = 'loading'")
     for selector in selectors:
         page.find_element("css selector", selector).click()
-    ready = "return document.documentElement.dataset.state === 'ready'"
-    WebDriverWait(page, PATIENCE).until(lambda shown: shown.execute_script(ready))
+    wait.until(lambda shown: shown.execute_script(ready))
     page.execute_script("document.querySelector('#times').textContent = ''")  # it differs from run to run
     page.execute_async_script("requestAnimationFrame(() => setTimeout(arguments[0], 300))")
     with Image.open(io.BytesIO(page.get_screenshot_as_png())) as image:

@@ -173,7 +173,7 @@ function proceed(next) {
 function showNext() {
   const step = STEPS[state.next], choice = step && step.mark !== state.mark ? `Choose ${$(`[data-mark=${step.mark}]`).textContent}. ` : "";
   $("#next").textContent = step ? choice + step.text : ""; $("#welcome").hidden = state.doc.strokes.length > 0;
-  $("#surface-note").textContent = !state.field ? "The surface appears here." : state.next === "across" ? "This surface is arbitrary until a curvature line crosses the others." : "Drag an arrow, or tap its two ends with a finger: there the normal leans.";
+  $("#surface-note").textContent = !state.field ? "The surface appears here." : state.next === "across" ? "This surface is arbitrary until a curvature line crosses the others." : "Drag an arrow, or tap its two ends, to state where the normal leans.";
 }
 
 // Numbers, doubts.
