@@ -40,7 +40,7 @@ _AHEAD: Final = 0.8  # least cosine between the end of a piece and the way to th
 _MOST_BODIES: Final = 1000  # larger areas with which an area is compared
 _NEAR: Final = 1e-3  # distance of the test for the fill from a sample as a share of the step
 _MOST_TESTS: Final = 10_000_000  # tests of curves for the loops of a shape
-_MOST_SAMPLES: Final = 100_000  # of a stroke; what would need more counts as an area
+_MOST_SAMPLES: Final = 200_000  # of a stroke; what would need more counts as an area
 _QUARTERS: Final = (0.0, 0.25, 0.5, 0.75)  # parameters of curves where the polygons of the test have corners
 _TINY: Final = 1e-300
 
@@ -236,7 +236,7 @@ def _sample_outline(cubics: Floats, loop: Indices, side: Floats, share: Floats) 
     place = np.repeat(start, count) + (2 * (np.arange(len(first)) - first) + 1) * half
     place = np.concatenate([place, place - half, place + half])
     curve = np.minimum(np.searchsorted(total, place), len(total) - 1)
-    points = evaluate_cubics(cubics[curve], 1 - (total[curve] - place) / share[curve])
+    points = evaluate_cubics(cubics[curve], 1 - (total[curve] - place) / np.maximum(share[curve], _TINY))
     at, before, after = np.split(points, 3)
     # A chord is less noisy than the derivative of a short curve, and hardly reaches beyond a corner.
     step = after - before
