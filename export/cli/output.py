@@ -206,8 +206,8 @@ def show_report(report: Report, folder: Path) -> None:
         print_line(f"  layers in the coordinates of the drawing: {folder / 'overlay.svg'}")
     if report.surface is not None:
         doubts = "; ".join(report.surface.doubts)
-        shaded = f"shaded surface: {folder / 'shaded.png'}"
-        print_line(_wrap(f"no shaded surface: {doubts}" if doubts else shaded))
+        layers = f"surface, as layers for the drawing: {folder / 'shaded.png'} and normals.png"
+        print_line(_wrap(f"no shaded surface: {doubts}; crossfield shade draws it" if doubts else layers))
     print_line(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
     stages = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in report.stages.items())
     print_line(_wrap(f"{report.seconds:.1f} s: {stages}"))

@@ -35,7 +35,8 @@ def test_a_surface_without_doubts_is_drawn_and_one_with_is_not(report, tmp_path,
         assert document["picture"] == (None if doubt else "shaded.png")
         show_report(with_surface, tmp_path)
         text = " ".join(capsys.readouterr().out.split())
-        assert ("no shaded surface: it is flat" if doubt else "shaded surface: ") in text
+        shown = "no shaded surface: it is flat; crossfield shade draws it" if doubt else "and normals.png"
+        assert shown in text
         assert ("no shaded surface" in text) == bool(doubt)
 
 
