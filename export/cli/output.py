@@ -309,13 +309,14 @@ _ONLY_IF_ANY: Final = (
 )
 
 
-def show_surface(surface: Surface, folder: Path) -> None:
-    """Print the fit of a surface, its undetermined parts, doubts about it, and the folder of its files."""
-    from ..surfaces.files import surface_facts
+def show_surface(surface: Surface, facts: dict[str, Any], folder: Path) -> None:
+    """Print the fit of a surface, its undetermined parts, doubts about it, and the folder of its files.
 
-    facts = surface_facts(surface)
-    sentences = ("doubts", "support", "freedom")
-    show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in sentences})
+    facts: its report.
+    """
+    show_facts(
+        surface.instance.summary, {key: value for key, value in facts.items() if isinstance(value, float)}
+    )
     for name, text in facts["support"].items():
         print_line(_wrap(f"{name}: {text}"))
     for text in surface.freedom:
@@ -326,6 +327,8 @@ def show_surface(surface: Surface, folder: Path) -> None:
         )
     for doubt in surface.doubts:
         print_notice(f"in doubt: {doubt}")
+    pictures = facts["pictures"]
+    print_line(_wrap(f"pictures show {pictures['show']}, {pictures['width']} x {pictures['height']} pixels"))
     print_line(f"pictures, heights, mesh: {folder}")
 
 

@@ -73,7 +73,8 @@ def shade_command(
         write_surface(solid, output, drawing=drawing, light=lamp, side=side, about=about)
         if saved is None:
             write_field(field, output / FIELD)
-    printing.show(surface_document(solid, view, about), lambda: show_surface(solid, output))
+    document = surface_document(solid, view, about)
+    printing.show(document, lambda: show_surface(solid, document, output))
 
 
 def _read_saved_field(source: str, on: Path | None) -> CrossField | None:

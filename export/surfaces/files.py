@@ -227,7 +227,9 @@ def surface_document(surface: Surface, view: View, about: Mapping[str, Any] | No
             "origin": list(instance.origin),
         },
         "pictures": {
-            "show": "the grid, as no page is known" if on_grid else "the page of the drawing",
+            "show": "the grid, as the page is unknown: give the drawing"
+            if on_grid
+            else "the page of the drawing",
             "page": [round(value, 6) for value in view.box],
             "width": view.width,
             "height": view.height,

@@ -33,6 +33,7 @@ def test_a_sample_gets_its_field_and_its_surface(tmp_path, capsys):
     assert "mouse: 12 x 11" in out
     assert "undetermined: inside out it has the same crosses" in out
     assert "--flip" in out
+    assert "pictures show the page of the drawing, 48 x 40 pixels" in out
     assert str(tmp_path / "out") in out
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "field.npz"}
     assert report(tmp_path / "out")["method"] == "bend"

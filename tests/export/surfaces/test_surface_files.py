@@ -106,7 +106,7 @@ def test_the_folder_has_every_file_the_same_twice_whatever_the_users_settings(tm
     facts = json.loads((first / "surface.json").read_text())
     assert facts["doubts"] == []
     assert "trusted" not in facts  # no check shows that a surface is right
-    assert facts["pictures"]["show"] == "the grid, as no page is known"
+    assert facts["pictures"]["show"] == "the grid, as the page is unknown: give the drawing"
     assert (facts["pictures"]["page"], facts["pictures"]["width"]) == ([0, 0, 12, 12], 2052)
     assert facts["instance"]["sha256"] == surface.instance.sha256
     assert not any("second" in key for key in facts)
