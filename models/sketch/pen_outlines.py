@@ -169,6 +169,8 @@ def _close_loops(outline: Floats) -> tuple[Floats, Indices]:
     first = np.flatnonzero(np.diff(loop, prepend=-1))
     last = np.append(first[1:], len(loop)) - 1
     is_open = (outline[last, 3] != outline[first, 0]).any(axis=1)
+    if not is_open.any():
+        return outline, loop
     first, last = first[is_open], last[is_open]
     closing = lines_as_cubics(outline[last, 3], outline[first, 0])
     return np.insert(outline, last + 1, closing, axis=0), np.insert(loop, last + 1, loop[last])
@@ -277,7 +279,10 @@ def _pair_samples(samples: _Samples, width: float) -> Indices | None:
     least = np.full(len(at), np.inf)
     np.minimum.at(least, one, across[0])
     np.minimum.at(least, other, across[1])
-    if (least > reach).mean() > _UNPAIRED:
+    is_wide = least > reach
+    # Areas beside the strokes in one shape, such as filled eyes, have loops of their own.
+    is_stroke = np.bincount(samples.first, is_wide)[samples.first] <= samples.count / 2
+    if not is_stroke.any() or is_wide[is_stroke].mean() > _UNPAIRED:
         return None
     faces = np.flatnonzero(np.maximum(*across) <= reach)
     faces = faces[(inward[one[faces]] * inward[other[faces]]).sum(axis=1) < _OPPOSITE]

@@ -127,6 +127,14 @@ def test_a_branch_reaches_the_stroke_that_it_leaves():
     assert np.abs(points_on(branch)[:, 1]).min() < 1.5
 
 
+def test_areas_in_the_shape_of_a_stroke_are_left_out():
+    pen = pen_outline(PATHS["wave"](ALONG), np.full(60, 1.0))
+    dots = [at + circle(radius) for radius, at in ((8, [50, 60]), (8, [80, 60]), (1.5, [20, 60]))]
+    (line,) = centre_lines([shape(pen, *dots)])
+    assert len(split_runs(line)) == 1
+    assert np.abs(points_on(line)[:, 1]).max() < 21
+
+
 def test_lattices_become_their_bars():
     bars = 10 + 20 * np.arange(4)
     lower, upper = np.append(-10, bars + 1), np.append(bars - 1, 90)
