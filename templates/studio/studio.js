@@ -162,8 +162,8 @@ function take(found) {
 // The next step, until the strokes determine a field.
 const STEPS = {
   outline: { mark: "cut", text: "Draw the outline of a shape, and close it." },
-  line: { mark: "line", text: "Draw a curvature line: a line along which the surface bends." },
-  across: { mark: "line", text: "Draw a curvature line across the others." },
+  line: { mark: "line", text: "Draw a line along which the surface bends." },
+  across: { mark: "line", text: "Draw a line across the others." },
 };
 function proceed(next) {
   state.next = next;
@@ -173,7 +173,7 @@ function proceed(next) {
 function showNext() {
   const step = STEPS[state.next], choice = step && step.mark !== state.mark ? `Choose ${$(`[data-mark=${step.mark}]`).textContent}. ` : "";
   $("#next").textContent = step ? choice + step.text : ""; $("#welcome").hidden = state.doc.strokes.length > 0;
-  $("#surface-note").textContent = !state.field ? "The surface appears here." : state.next === "across" ? "This surface is arbitrary until a curvature line crosses the others." : "Drag an arrow, or tap its two ends, to state where the normal leans.";
+  $("#surface-note").textContent = !state.field ? "The surface appears here." : state.next === "across" ? "This surface is arbitrary until a line crosses the others." : "Drag an arrow, or tap its two ends, to state where the normal leans.";
 }
 
 // Numbers, doubts.

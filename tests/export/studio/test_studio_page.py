@@ -93,7 +93,7 @@ def test_hints_lead_to_a_determined_field(empty):
     assert "across the others" in hint()
     assert "arbitrary" in find(empty, "#surface-note").text
     find(empty, "[data-mark=cut]").click()
-    assert "Choose Curvature line" in hint()
+    assert "Choose Curvature line. Draw a line" in hint()
     find(empty, "[data-mark=line]").click()
     drag(empty, [(240, 155), (225, 230), (225, 370), (240, 445)])
     assert hint() == ""
