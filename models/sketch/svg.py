@@ -1,10 +1,11 @@
 """Reader of SVG drawings: the strokes that their picture shows, as cubic Beziers.
 
-A drawing passes four steps. defusedxml parses it and refuses entities. `cascade.py` finds the style of every
+A drawing passes five steps. defusedxml parses it and refuses entities. `cascade.py` finds the style of every
 element. The walk below replaces each `use` by what it shows and places the outline of every painted shape,
-which `path_data.py` reads. `visible.py` lets resvg draw the result, and keeps of each stroke what the picture
-shows, in the colour that it shows. Pictures and `use` of other files are never loaded, text, dashes, markers
-and filters are ignored, and the work is bounded by the limits of `input_limits`.
+which `path_data.py` reads. `pen_outlines.py` finds pen strokes among shapes that are only filled.
+`visible.py` lets resvg draw the result, and keeps of each stroke what the picture shows, in the colour that
+it shows. Pictures and `use` of other files are never loaded, text, dashes, markers and filters are ignored,
+and the work is bounded by the limits of `input_limits`.
 """
 
 from __future__ import annotations
