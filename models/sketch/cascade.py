@@ -29,6 +29,12 @@ _KEYWORDS: Final = frozenset({"none", "currentcolor", "inherit", "context-fill",
 _INITIAL: Final = {"stroke": "none"}  # black for the others
 _DROPPED: Final = re.compile(r"filter|marker|stroke-dash|font|animation|transition|-")
 """Beginnings of properties that do not tell which strokes there are: filters, markers, dashes, text."""
+_UNUSED: Final = re.compile(
+    r"(?:clip-path|mask|mask-image):(?!url\(|none|inherit|initial)|transform-box:(?!view-box)"
+    r"|(?:rotate|scale|translate|offset-path):(?!none)"
+)
+"""Declarations of places and clips that neither this package nor resvg knows."""
+_LIGHT: Final = re.compile(r"light-dark\(\s*((?:[^(),]|\([^()]*\))*),.*\)", re.DOTALL)
 _VARIABLE: Final = re.compile(r"var\(\s*(--[\w-]+)\s*(?:,\s*((?:[^()]|\([^()]*\))*))?\)")
 _DEEPEST: Final = 10  # variables inside of variables
 
@@ -38,11 +44,16 @@ _Declared = tuple[str, str, bool]
 
 @dataclass(eq=False)
 class Cascade:
-    """The rules of a drawing. unread: an element and its colour, for each colour that cannot be read."""
+    """The rules of a drawing.
+
+    unread: an element and its colour, for each colour that cannot be read. unused: an element and a declaration,
+    for each that changes what the element shows and that neither this package nor the renderer knows.
+    """
 
     matcher: Any
     combinators: dict[int, int] = field(default_factory=dict)
     unread: dict[Element, str] = field(default_factory=dict)
+    unused: dict[Element, str] = field(default_factory=dict)
     checks: int = 0
 
     def declare(self, root: Element) -> dict[Element, dict[str, str]]:
@@ -103,6 +114,8 @@ class Cascade:
                     self.unread[element] = text
                     continue
                 value = colour
+            if _UNUSED.match(f"{name}:{value}"):
+                self.unused[element] = f"{name}: {value}"
             style[name] = value
         return style
 
@@ -189,10 +202,18 @@ def _replace_variables(text: str, variables: Mapping[str, str]) -> str:
     return text.strip()
 
 
+def background_of(style: Mapping[str, str]) -> str | None:
+    """The colour of the background that a style declares, as #rrggbb or #rrggbbaa; None without one."""
+    colours = (_paint_value("color", style.get(key, "")) for key in ("background-color", "background"))
+    return next((colour for colour in colours if colour and colour.startswith("#")), None)
+
+
 @lru_cache(maxsize=1024)
 def _paint_value(name: str, text: str) -> str | None:
     """A paint with its colour as #rrggbb or #rrggbbaa; None where it cannot be read."""
     lower = text.lower()
+    if light := _LIGHT.fullmatch(lower):
+        return _paint_value(name, light[1].strip())
     if lower in _KEYWORDS:
         return lower.replace("currentcolor", "currentColor")  # as resvg writes it
     if lower in ("unset", "revert", "initial"):

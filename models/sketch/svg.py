@@ -32,7 +32,7 @@ from ..input_limits import (
 )
 from ..instance.angles import transform_vectors
 from ..instance.domain import Floats
-from .cascade import cascade_of
+from .cascade import Cascade, background_of, cascade_of
 from .colour import PAPER, is_red
 from .cover import Box
 from .curves import Curves, run_numbers
@@ -108,9 +108,10 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     cascade = cascade_of("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
     styles = cascade.declare(root)
     pictures = _list_pictures(styles)
+    _paint_background(root, styles, page)
     walk = _ElementWalk(_put_styles(root, styles), matcher)
     shapes = _trace_fills(list(walk.shapes(root, page)), page, matcher)
-    unread = (*pictures, *_list_faults(walk.faults), *_list_unread(cascade.unread))
+    unread = (*pictures, *_list_faults(walk.faults), *_list_unread(cascade))
     if not sum(len(shape.points) for shape in shapes):
         reason = "; ".join(unread) or "it has no visible path, line or shape; export it again"
         raise NoStrokeError(f"draws no stroke: {reason}")
@@ -118,6 +119,18 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     window = page.window if page else _window_around(shapes)
     seen, notes = see_strokes(_framed(root, page, window), window, shapes)
     return _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
+
+
+def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page: _Page | None) -> None:
+    """Put the background that the style of a drawing declares behind its elements, as browsers do."""
+    colour = background_of(styles[root])
+    if page is not None and colour is not None:
+        sides = {
+            key: f"{value!r}" for key, value in zip(("x", "y", "width", "height"), page.view, strict=True)
+        }
+        sheet = Element(_SVG + "rect", sides)
+        styles[sheet] = {"fill": colour, "stroke": "none"}
+        root.insert(0, sheet)
 
 
 def _trace_fills(shapes: list[Shape], page: _Page | None, matcher: LabelMatcher | None) -> list[Shape]:
@@ -210,13 +223,16 @@ def _list_pictures(styles: Mapping[Element, Mapping[str, str]]) -> tuple[str, ..
     return (f"{count} left out, first {names[0]}; give a picture as a file of its own to trace it",)
 
 
-def _list_unread(unread: Mapping[Element, str]) -> tuple[str, ...]:
-    """A note on the colours that were not understood."""
-    if not unread:
-        return ()
-    element, text = next(iter(unread.items()))
-    colours = "1 colour is" if len(unread) == 1 else f"{len(unread)} colours are"
-    return (f"{colours} not understood, first {shortened(text, 40)!r} of {name_of(element)}; write #rrggbb",)
+def _list_unread(cascade: Cascade) -> Iterator[str]:
+    """Notes on the colours and other declarations that were not understood."""
+    for texts, noun, many, remedy in (
+        (cascade.unread, "colour", "colours", "write #rrggbb"),
+        (cascade.unused, "property", "properties", "apply it in the drawing program"),
+    ):
+        if texts:
+            element, text = next(iter(texts.items()))
+            count = f"1 {noun} is" if len(texts) == 1 else f"{len(texts)} {many} are"
+            yield f"{count} not understood, first {shortened(text, 40)!r} of {name_of(element)}; {remedy}"
 
 
 def _parse_xml(data: bytes) -> Element:
@@ -340,7 +356,7 @@ class _ElementWalk:
         )
         if _tag(target) in ("symbol", "svg"):
             copy.tag = _SVG + "svg"
-            copy.attrib.update(sides)
+            copy.attrib = {"width": "100%", "height": "100%"} | copy.attrib | sides
         moved = SubElement(element, _SVG + "g", {"transform": f"translate({moves[0]!r} {moves[1]!r})"})
         self.styles[moved] = {}
         moved.append(copy)

@@ -436,6 +436,12 @@ def test_strokes_in_colours_that_cannot_be_read_are_left_out_with_a_note(colour)
     assert re.search(r"1 colour is not understood, first '.*' of <path>; write #rrggbb", *curves.notes)
 
 
+@pytest.mark.parametrize("style", ["clip-path: inset(50%)", "transform-box: fill-box", "rotate: 90deg"])
+def test_places_and_clips_that_are_not_understood_are_reported(style):
+    curves = read_svg(svg(f'<path d="M10 10 60 80" {BLACK} style="{style}"/>'))
+    assert re.search(rf"1 property is not understood, first '{style[:10]}.*' of <path>", *curves.notes)
+
+
 def test_a_part_without_a_curvature_line_is_left_out():
     ring = (
         f'<circle cx="50" cy="50" r="40" {BLACK}/><circle cx="50" cy="50" r="15" {BLACK}/>'
