@@ -33,8 +33,9 @@ export class Server {
 /** The lines of an answer as objects, while they arrive. */
 export async function* lined(response) {
   let rest = "";
-  for await (const text of response.body.pipeThrough(new TextDecoderStream())) {
-    const parts = (rest + text).split("\n");
+  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader(); // Safari has no loop over streams
+  for (let { done, value } = await reader.read(); !done; { done, value } = await reader.read()) {
+    const parts = (rest + value).split("\n");
     rest = parts.pop();
     for (const part of parts) yield JSON.parse(part);
   }

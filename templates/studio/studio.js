@@ -46,7 +46,7 @@ function ready(text) { status(text); document.documentElement.dataset.state = "r
 function show(doc, { compute = true } = {}) {
   if (doc.page !== state.doc.page) {
     forget(); left.fit(pageBox(doc)); right.zoomed = false;
-    if (!doc.strokes.length) { state.mark = "cut"; state.preset = true; } else presetLine();
+    doc.strokes.length ? presetLine() : presetCut();
   }
   state.doc = doc; state.chosen = new Set([...state.chosen].filter(k => k < doc.strokes.length));
   if (state.tool === "turn" && !doc.file) state.tool = "draw";
@@ -57,7 +57,11 @@ function commit(change) {
   const next = typeof change === "function" ? change(state.history.now) : { ...state.history.now, ...change };
   state.history.commit(next); keep(); show(next);
 }
-function step(by) { if (state.history.step(by)) { state.chosen.clear(); keep(); show(state.history.now); } }
+function step(by) {
+  if (!state.history.step(by)) return;
+  if (!state.history.now.strokes.length) presetCut();
+  state.chosen.clear(); keep(); show(state.history.now);
+}
 /** Shows another drawing that is in a file. Undo brings the present one back, unless it is empty. */
 function replace(doc) {
   if (!state.history.now.strokes.length) state.history.at -= 1;
@@ -66,7 +70,8 @@ function replace(doc) {
 const forget = () => { state.field = state.lines = state.surface = state.arrow = null; state.suspects = new Set(); doubts(); };
 /** A page in the shape of the canvas. */
 const canvasPage = () => [0, 0, 800, Math.round(800 * left.high / left.wide)];
-/** The outline is there: the pen goes on to curvature lines, unless its kind was chosen. */
+/** The pen begins with the outline. Once that is there, it goes on to curvature lines, unless its kind was chosen. */
+const presetCut = () => { state.mark = "cut"; state.preset = true; };
 function presetLine() { if (state.preset) state.mark = "line"; state.preset = false; }
 const pageBox = ({ page: [x, y, w, h] }) => [x, y, x + w, y + h];
 /** The decoded picture under the strokes; it is painted again once it is decoded. */
@@ -213,7 +218,7 @@ function controls() {
   $("#size").value = doc.size; $("#size-value").textContent = `${doc.size} pixels`;
   $("#weight").value = Math.log10(Math.max(doc.stroke_weight, 0.1)); $("#weight-value").textContent = doc.stroke_weight.toPrecision(3);
   $("#opacity").parentElement.hidden = !doc.picture;
-  $("#silhouette").checked = doc.silhouette === "outer"; $("#brush-value").textContent = `${$("#brush").value} pixels`;
+  $("#silhouette").checked = doc.silhouette === "outer"; $("#brush-value").textContent = `${$("#brush").value} ${$("#brush").value === "1" ? "pixel" : "pixels"}`;
   const marks = new Set([...chosen].map(k => doc.strokes[k].mark)), shown = marks.size === 1 ? [...marks][0] : chosen.size ? "" : state.mark;
   all("[data-mark]").forEach(each => each.setAttribute("aria-pressed", each.dataset.mark === shown));
   all("[data-tool]").forEach(each => each.setAttribute("aria-pressed", each.dataset.tool === state.tool));

@@ -99,6 +99,10 @@ def test_hints_lead_to_a_determined_field(empty):
     assert hint() == ""
     assert "arbitrary" not in find(empty, "#surface-note").text
     assert [stroke["mark"] for stroke in document(empty)["strokes"]] == ["cut", "cut", "line", "line"]
+    for _ in range(4):
+        find(empty, "#undo").click()
+    settled(empty)
+    assert ("outline" in hint(), pressed()) == (True, "cut")
 
 
 def shown_at(browser, x, y):
