@@ -46,8 +46,8 @@ _Declared = tuple[str, str, bool]
 class Cascade:
     """The rules of a drawing.
 
-    unread: an element and its colour, for each colour that cannot be read. unused: an element and a declaration,
-    for each that changes what the element shows and that neither this package nor the renderer knows.
+    unread: an element and its colour, for each colour that cannot be read. unused: the same for declarations
+    that change what the element shows and that neither this package nor the renderer knows.
     """
 
     matcher: Any

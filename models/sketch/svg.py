@@ -109,7 +109,7 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     styles = cascade.declare(root)
     pictures = _list_pictures(styles)
     _paint_background(root, styles, page)
-    walk = _ElementWalk(_put_styles(root, styles), matcher)
+    walk = _ElementWalk(_put_styles(root, styles), cascade.unused, matcher)
     shapes = _trace_fills(list(walk.shapes(root, page)), page, matcher)
     unread = (*pictures, *_list_faults(walk.faults), *_list_unread(cascade))
     if not sum(len(shape.points) for shape in shapes):
@@ -278,10 +278,12 @@ def _put_styles(root: Element, styles: dict[Element, dict[str, str]]) -> dict[El
 class _ElementWalk:
     """A walk through a drawing.
 
-    styles: of every element, without what it inherits. faults: of shapes, with their names.
+    styles: of every element, without what it inherits. unused: an element and its declaration, for each that
+    is not understood. faults: of shapes, with their names.
     """
 
     styles: dict[Element, dict[str, str]]
+    unused: dict[Element, str]
     matcher: LabelMatcher | None
     outlines: dict[Any, Floats] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
@@ -327,7 +329,7 @@ class _ElementWalk:
         own = self.styles[element]
         inherited = {key: place.style[key] for key in _INHERITED if key in place.style}
         style = inherited | {key: value for key, value in own.items() if value != "inherit"}
-        matrix, transform = place.matrix, _transform(element, own, place.size)
+        matrix, transform = place.matrix, _transform(element, own, place.size, self.unused)
         if transform is not None:
             matrix = transform * matrix
             terms = (getattr(transform, key) for key in "abcdef")
@@ -412,8 +414,13 @@ class _ElementWalk:
         return np.asarray(placed[(placed != placed[:, :1]).any(axis=(1, 2))])
 
 
-def _transform(element: Element, style: Mapping[str, str], size: tuple[float, float]) -> Any:
-    """The matrix of an element's own transform, about its origin; None without one. Raises InputError."""
+def _transform(
+    element: Element, style: Mapping[str, str], size: tuple[float, float], unused: dict[Element, str]
+) -> Any:
+    """The matrix of an element's own transform, about its origin; None without one. Raises InputError.
+
+    As in browsers, a transform that cannot be read moves nothing; it is added to `unused`.
+    """
     from svgelements import Matrix
 
     text = style.get("transform", element.get("transform", ""))
@@ -425,8 +432,10 @@ def _transform(element: Element, style: Mapping[str, str], size: tuple[float, fl
         )
     try:
         matrix = Matrix(text)
-    except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError) as error:
-        raise InputError(f"{name_of(element)}: its transform {text[:40]!r} cannot be read") from error
+    except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError):
+        unused[element] = f"transform: {text}"
+        element.attrib.pop("transform", None)
+        return None
     if origin := style.get("transform-origin", ""):
         sides = [_SIDES.get(side.lower(), side) for side in origin.split()]
         if sides[0] in ("top", "bottom") or sides[1:] == ["left"]:
