@@ -29,7 +29,7 @@ function refresh(base = true) {
     if (dirty) paintBase(left, { ...state, doc: state.live?.shift ? shifted(state.live) : state.doc, picture: picture(), opacity: Number($("#opacity").value) });
     dirty = false;
     paint(left, state);
-    paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked, strokes: $("#ink").checked ? state.doc.strokes : [], hints: state.doc.hints, live: state.arrow });
+    paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked && isDetermined(), strokes: $("#ink").checked ? state.doc.strokes : [], hints: state.doc.hints, live: state.arrow });
   });
 }
 
@@ -152,7 +152,7 @@ function take(found) {
   if (found.stage === "field") {
     clear("error");
     state.field = { ...found, kinds: decoded.bytes(found.kinds), u: decoded.floats(found.u), v: decoded.floats(found.v), number: numbered(decoded.bytes(found.mask)) };
-    state.lines = null; state.suspects = new Set(found.suspects); if (state.first) { state.first = false; times.field = seconds(); times.fine = times.lines = times.surface = ""; } else times.fine = seconds();
+    state.lines = null; if (state.first) { state.first = false; times.field = seconds(); times.fine = times.lines = times.surface = ""; } else times.fine = seconds();
     if (!right.zoomed) { const { x, y, pixel, rows, columns } = found.frame; right.fit([x, y, x + pixel * columns, y + pixel * rows]); }
     numbers(found); proceed(found.next);
   } else if (found.stage === "lines") { state.lines = found.families; times.lines = seconds(); }
@@ -170,6 +170,7 @@ const STEPS = {
   line: { mark: "line", text: "Draw a line along which the surface bends." },
   across: { mark: "line", text: "Draw a line across the others." },
 };
+const isDetermined = () => state.next !== "across";
 function proceed(next) {
   state.next = next;
   if (next === "line") presetLine();
@@ -178,7 +179,7 @@ function proceed(next) {
 function showNext() {
   const step = STEPS[state.next], choice = step && step.mark !== state.mark ? `Choose ${$(`[data-mark=${step.mark}]`).textContent}. ` : "";
   $("#next").textContent = step ? choice + step.text : ""; $("#welcome").hidden = state.doc.strokes.length > 0;
-  $("#surface-note").textContent = !state.field ? "The surface appears here." : state.next === "across" ? "This surface is arbitrary until a line crosses the others." : "Drag an arrow, or tap its two ends, to state where the normal leans.";
+  $("#surface-note").textContent = !state.field ? "The surface appears here." : !isDetermined() ? "This surface is arbitrary until a line crosses the others." : "Drag an arrow, or tap its two ends, to state where the normal leans.";
 }
 
 // Numbers, doubts.
@@ -196,14 +197,14 @@ function doubts() {
   };
   const { field, surface } = state;
   for (const text of field?.warnings ?? []) item(`Mask: ${text}.`, action("Areas", () => choose("area")), action("Paint the mask", () => choose("paint")));
-  const some = [...new Set([...field?.suspects ?? [], ...surface?.suspects ?? []])].filter(k => state.doc.strokes[k]?.mark === "line");
+  const settled = surface && isDetermined(), known = isDetermined() ? [...field?.suspects ?? [], ...surface?.suspects ?? []] : [];
+  const some = [...new Set(known)].filter(k => state.doc.strokes[k]?.mark === "line");
   state.suspects = new Set(some);
   if (some.length) item(some.length === 1 ? "1 stroke does not fit. Probably it is not a curvature line; otherwise it may be a hidden line." : `${some.length} strokes do not fit. Probably they are not curvature lines; otherwise they may be hidden lines.`,
     action(some.length === 1 ? "Select it" : "Select them", () => select(some)), action(some.length === 1 ? "Mark as cut" : "Mark as cuts", () => { select(some); mark("cut"); }));
-  const settled = surface && state.next !== "across";
   for (const text of settled ? surface.doubts : []) item(`Surface: ${text}.`);
   for (const text of settled ? surface.freedom : []) item(`Your choice: ${text}.`, ...text.startsWith("inside out") ? [action("Flip", flip)] : []);
-  if (!items.length) items.push(element("li", settled ? "None." : "The field is not determined yet."));
+  if (!items.length) items.push(element("li", settled ? "None." : field && isDetermined() ? "Not computed yet." : "The field is not determined yet."));
   $("#doubts").replaceChildren(...items);
 }
 

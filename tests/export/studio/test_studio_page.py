@@ -89,17 +89,19 @@ def test_hints_lead_to_a_determined_field(empty):
     assert ("outline" in hint(), pressed()) == (True, "cut")
     drag(empty, circle(240, 300, 150)[20:])
     assert ("along which the surface bends" in hint(), pressed()) == (True, "line")
-    drag(empty, [(95, 300), (170, 340), (240, 350), (310, 340), (385, 300)])
+    drag(empty, [(95, 300), (170, 320), (240, 350), (310, 330), (385, 300)])
+    drag(empty, [(110, 370), (170, 385), (240, 400), (310, 385), (370, 370)])
     assert "across the others" in hint()
     assert "arbitrary" in find(empty, "#surface-note").text
+    assert find(empty, "#doubts").text == "The field is not determined yet."
     find(empty, "[data-mark=cut]").click()
     assert "Choose Curvature line. Draw a line" in hint()
     find(empty, "[data-mark=line]").click()
     drag(empty, [(240, 155), (225, 230), (225, 370), (240, 445)])
     assert hint() == ""
     assert "arbitrary" not in find(empty, "#surface-note").text
-    assert [stroke["mark"] for stroke in document(empty)["strokes"]] == ["cut", "cut", "line", "line"]
-    for _ in range(4):
+    assert [stroke["mark"] for stroke in document(empty)["strokes"]] == ["cut", "cut", *["line"] * 3]
+    for _ in range(5):
         find(empty, "#undo").click()
     settled(empty)
     assert ("outline" in hint(), pressed()) == (True, "cut")
