@@ -20,10 +20,9 @@ from ..field.field import CrossField, Norm
 from ..instance.file import instance_arrays, instance_of_arrays
 from ..instance.instance import Instance
 from ..storage import read_bytes, write_bytes
-from . import check_certificate
+from . import check_certificate, check_orthogonal
 from .check_certificate import ProvenClaim
-from .check_orthogonal import ProvenClaim as OrthogonalClaim
-from .orthogonal_certificate import OrthogonalProof, check_bytes, is_orthogonal
+from .orthogonal_certificate import OrthogonalProof
 from .record import Claim, LevelRecord, Proof
 
 REFUSALS: Final = (check_certificate.NotProvenError, check_certificate.UnreadableError)
@@ -49,7 +48,7 @@ class Certificate(Claim):
 
     """
 
-    proven: ProvenClaim | OrthogonalClaim
+    proven: ProvenClaim
 
     @property
     def norm(self) -> Norm:
@@ -224,23 +223,30 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
     return Certificate(field, field.energy(proven.norm).total, bound, proven)
 
 
-def _check_any(data: bytes, path: Path) -> tuple[CrossField, float, ProvenClaim | OrthogonalClaim]:
+def _check_any(data: bytes, path: Path) -> tuple[CrossField, float, ProvenClaim]:
     """Field, claimed bound and findings of the checker, for either kind of crosses."""
-    if is_orthogonal(data):
-        with naming(path):
-            return check_bytes(data)
-    arrays = check_certificate.unpack_arrays(data)
-    proven = check_certificate.check_arrays(arrays)
+    arrays = check_certificate.unpack_archive(data)
+    head = check_certificate.refuse_damage(check_certificate.json_of)(arrays, "head")
+    if head.get("format") == check_orthogonal.FORMAT:
+        proven: ProvenClaim = check_orthogonal.check_arrays(arrays)
+    else:
+        check_certificate.check_sizes(arrays, len(data))
+        proven = check_certificate.check_arrays(arrays)
     with naming(path):
-        return _field_of(arrays), check_certificate.head_of(arrays)["bound"], proven
+        return _field_of(arrays), head["bound"], proven
 
 
 def _field_of(arrays: Arrays) -> CrossField:
     """The field of a certificate; its instance must not round the arrays, which alone are proven."""
-    parts = {name.removeprefix(_PREFIX): array for name, array in arrays.items() if name.startswith(_PREFIX)}
-    field = CrossField(instance_of_arrays(parts), arrays["alpha"], arrays["beta"], arrays["p"])
-    written = instance_arrays(field.instance)
+    parts = {name: array for name, array in arrays.items() if name.startswith(_PREFIX)}
+    instance = instance_of_arrays({name.removeprefix(_PREFIX): array for name, array in parts.items()})
+    field = CrossField(
+        instance, arrays["alpha"], arrays.get("beta", np.zeros(instance.domain.size)), arrays["p"]
+    )
+    written = {_PREFIX + name: array for name, array in instance_arrays(instance).items()}
+    if instance.domain.kappa is not None:
+        parts["kappa"], written["kappa"] = arrays["kappa"], instance.domain.kappa
     for name, array in parts.items():
-        if not np.array_equal(array, written[name]):
-            raise InstanceError(f"array {_PREFIX + name!r} is not as crossfield writes it; prove it again")
+        if name not in written or not np.array_equal(array, written[name]):
+            raise InstanceError(f"array {name!r} is not as crossfield writes it; prove it again")
     return field

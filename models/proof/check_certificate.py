@@ -22,18 +22,21 @@ pi stands for the double next to it, as in the definition of the field.
 
 from __future__ import annotations
 
+import functools
 import io
 import json
 import math
 import sys
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 FORMAT, VERSION = "crossfield-certificate", 4
+CHECKERS = {FORMAT: "check_certificate.py", "crossfield-orthogonal-certificate": "check_orthogonal.py"}
 HALF, QUARTER = math.pi / 2, math.pi / 4
 OPTIMAL = 1e-8
 SPARE = 1e-10  # taken off a bound that is reported, relative to 1 + it: other processors round otherwise
@@ -74,51 +77,80 @@ class UnreadableError(Exception):
 # The archive -----------------------------------------------------------------------------------------------
 
 
-def read_arrays(path: str) -> dict[str, Array]:
-    """Read the arrays of a certificate."""
+def read_file(path: str) -> bytes:
+    """Read the bytes of a certificate."""
     try:
         with open(path, "rb") as stream:  # noqa: PTH123 - only built-in functions
-            data = stream.read(MOST_BYTES + 1)
+            return stream.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:
         raise UnreadableError(f"cannot be read ({type(error).__name__})") from error
-    return unpack_arrays(data)
+
+
+def read_arrays(path: str) -> dict[str, Array]:
+    """Read the arrays of a certificate."""
+    return unpack_arrays(read_file(path))
 
 
 def unpack_arrays(data: bytes) -> dict[str, Array]:
-    """Unpack the arrays of a certificate; names and sizes are checked before anything is unpacked."""
+    """Unpack the arrays of a certificate, and check their names and the memory for the check."""
+    arrays = unpack_archive(data)
+    check_sizes(arrays, len(data))
+    return arrays
+
+
+def unpack_archive(data: bytes) -> dict[str, Array]:
+    """Unpack the arrays of a .npz, whose sizes are checked before anything is unpacked."""
     arrays: dict[str, Array] = {}
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             total = sum(member.file_size for member in archive.infolist())
             too_large = total > MOST_BYTES or 4 * total > ROOM + MORE_ROOM * len(data)
-            _check_format(not too_large, "has larger arrays than a file of its size may have")
+            check_format(not too_large, "has larger arrays than a file of its size may have")
             for member in archive.infolist():
-                _check_format(member.compress_type in (0, 8), "is packed in another way than NumPy packs")
+                check_format(member.compress_type in (0, 8), "is packed in another way than NumPy packs")
                 name, ending = member.filename[:-4], member.filename[-4:]
-                _check_format(ending == ".npy" and name not in arrays, f"has a wrong member {name[:40]!r}")
+                check_format(ending == ".npy" and name not in arrays, f"has a wrong member {name[:40]!r}")
                 arrays[name] = parse_array(archive.read(member), name)
-        check_names(arrays)
-        check_memory(arrays, len(data))
-    except (UnreadableError, NotProvenError, MemoryError):
+    except (UnreadableError, MemoryError):
         raise
     except Exception as error:  # a damaged archive can raise anything
         raise UnreadableError(f"is no .npz that can be read ({type(error).__name__})") from error
     return arrays
 
 
+def refuse_damage(work: Callable[..., Any]) -> Callable[..., Any]:
+    """The function, which raises UnreadableError where damaged arrays let it fail."""
+
+    @functools.wraps(work)
+    def guarded(*arguments: Any) -> Any:
+        try:
+            return work(*arguments)
+        except (ValueError, TypeError, KeyError, IndexError, OverflowError, RecursionError) as error:
+            raise UnreadableError(f"is damaged ({type(error).__name__}: {str(error)[:80]})") from error
+
+    return guarded
+
+
 def parse_array(data: bytes, name: str) -> Array:
     """Return the array in the bytes of a .npy, whose header is checked before it is trusted; no pickles."""
     stream = io.BytesIO(data)
     version = np.lib.format.read_magic(stream)
-    _check_format(version == (1, 0), f"{name} is no array as certificates have it")
+    check_format(version == (1, 0), f"{name} is no array as certificates have it")
     shape, by_columns, kind = np.lib.format.read_array_header_1_0(stream)
     size = len(data) - stream.tell()
     fits = kind.kind in "biuf" and not by_columns and min(shape, default=0) >= 0
-    _check_format(fits and math.prod(shape) * kind.itemsize == size, f"{name} differs from its header")
+    check_format(fits and math.prod(shape) * kind.itemsize == size, f"{name} differs from its header")
     array = np.frombuffer(data, kind, offset=stream.tell()).reshape(shape)
     bits = kind.kind != "b" or array.view(np.uint8).max(initial=0) <= 1
-    _check_format(bits, f"{name} has bits that are neither 0 nor 1")
+    check_format(bits, f"{name} has bits that are neither 0 nor 1")
     return array
+
+
+@refuse_damage
+def check_sizes(arrays: dict[str, Array], size: int) -> None:
+    """Raise UnreadableError for other arrays than a certificate of that many bytes may have."""
+    check_names(arrays)
+    check_memory(arrays, size)
 
 
 def check_names(arrays: dict[str, Array]) -> None:
@@ -148,29 +180,31 @@ def check_memory(arrays: dict[str, Array], size: int) -> None:
         most = max(most, 8 * labels + 64 * shares + 96 * side * side + 32 * arrays[f"{at}table_steps"].size)
     most += 24 * mask.size + 1500 * int(mask.sum()) + sum(array.nbytes for array in arrays.values())
     enough = most <= ROOM + MORE_ROOM * size
-    _check_format(enough, f"takes {most >> 20} MB of memory to check, more than a file of its size may")
+    check_format(enough, f"takes {most >> 20} MB of memory to check, more than a file of its size may")
 
 
-def head_of(arrays: dict[str, Array]) -> dict[str, Any]:
-    """The text in the array `head`."""
+def head_of(arrays: dict[str, Array], known: str = FORMAT, version: int = VERSION) -> dict[str, Any]:
+    """The text in the array `head` of a certificate of a known format."""
     head = json_of(arrays, "head")
-    version = head.get("version")
-    known = head.get("format") == FORMAT and type(version) is int and version == VERSION
-    _check_format(known, f"is no {FORMAT} of version {VERSION}; make it again with crossfield prove")
+    form = str(head.get("format"))
+    same = form == known and type(head.get("version")) is int and head["version"] == version
+    others = form in CHECKERS and form != known
+    remedy = f"run {CHECKERS[form]}" if others else "make it again with crossfield prove"
+    check_format(same, f"is no {known} of version {version}; {remedy}")
     return head
 
 
 def norm_of(head: dict[str, Any]) -> Any:
     """The norm of the energy: 2, 1 or "mixed"."""
     norm = head.get("norm")
-    _check_format(type(norm) in (int, str) and norm in (1, 2, "mixed"), "is of an unknown norm")
+    check_format(type(norm) in (int, str) and norm in (1, 2, "mixed"), "is of an unknown norm")
     return norm
 
 
 def level_count(head: dict[str, Any]) -> int:
     """The number of levels that a certificate has."""
     count = number_in(head, "levels", 1, MOST_LEVELS)
-    _require(count == int(count), "levels", "is no whole number")
+    require(count == int(count), "levels", "is no whole number")
     return int(count)
 
 
@@ -179,33 +213,33 @@ def json_of(arrays: dict[str, Array], name: str) -> dict[str, Any]:
     text = json.loads(
         take_array(arrays, name, "|u1", None).tobytes().decode(), object_pairs_hook=_object_with_unique_keys
     )
-    _check_format(isinstance(text, dict), f"{name} is not a JSON object")
+    check_format(isinstance(text, dict), f"{name} is not a JSON object")
     return text  # type: ignore[no-any-return]
 
 
 def _object_with_unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """A JSON object without repeated keys, because programs differ on which of them counts."""
-    _check_format(len(dict(pairs)) == len(pairs), "has a text with a repeated key")
+    check_format(len(dict(pairs)) == len(pairs), "has a text with a repeated key")
     return dict(pairs)
 
 
 def number_in(head: dict[str, Any], name: str, least: float, most: float) -> float:
     """A number of a JSON object, within limits."""
     value: Any = head.get(name)
-    _require(type(value) in (int, float) and least <= value <= most, name, f"is not in [{least:g}, {most:g}]")
+    require(type(value) in (int, float) and least <= value <= most, name, f"is not in [{least:g}, {most:g}]")
     return float(value)
 
 
 def take_array(arrays: dict[str, Array], name: str, kind: str, *shape: int | None) -> Array:
     """The array of that name, of that kind and, where sides are given, of that shape; finite."""
-    _check_format(name in arrays, f"has no array {name}")
+    check_format(name in arrays, f"has no array {name}")
     array = arrays[name]
     fits = array.ndim == len(shape) and all(side in (None, size) for side, size in zip(shape, array.shape))
-    _check_format(
+    check_format(
         array.dtype == np.dtype(kind) and fits, f"{name} has another kind or shape than other arrays ask for"
     )
     if array.dtype.kind == "f":
-        _require(np.isfinite(array).all(), name, "holds something that is no number")
+        require(np.isfinite(array).all(), name, "holds something that is no number")
     return array
 
 
@@ -215,7 +249,7 @@ class NumberBlocks:
     def __init__(self, arrays: dict[str, Array], name: str, counts: Array) -> None:
         """counts: how many numbers each block has."""
         self.unit = take_array(arrays, f"{name}_unit", "<f8", len(counts))
-        _require((self.unit >= 0) & (self.unit <= MOST_UNIT), f"{name}_unit", "is not in [0, 1]")
+        require((self.unit >= 0) & (self.unit <= MOST_UNIT), f"{name}_unit", "is not in [0, 1]")
         self.ends = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
         self.steps = take_array(arrays, f"{name}_steps", "<i4", int(self.ends[-1]))
 
@@ -225,13 +259,13 @@ class NumberBlocks:
         return np.cumsum(steps, dtype=np.int32) * self.unit[block]
 
 
-def _check_format(holds: Any, otherwise: str) -> None:
+def check_format(holds: Any, otherwise: str) -> None:
     """Raise UnreadableError unless the condition holds."""
     if not holds:
         raise UnreadableError(otherwise)
 
 
-def _require(holds: Any, name: str, wrong: str) -> None:
+def require(holds: Any, name: str, wrong: str) -> None:
     """Raise NotProvenError, with the first place that fails, unless all of the condition holds."""
     holds = np.asarray(holds)
     if not holds.all():
@@ -298,38 +332,49 @@ def parity_sign(p: Array) -> Array:
 def terms_of(arrays: dict[str, Array]) -> tuple[EnergyTerms, Array]:
     """The instance, with directions moved into the gauge's own range, and its stroke pixels."""
     head = json_of(arrays, "instance_head")
-    _require("instance_crossings" not in arrays, "instance_crossings", "is not covered by certificates")
-    mask = take_array(arrays, "instance_mask", "|b1", None, None)
+    require("instance_crossings" not in arrays, "instance_crossings", "is not covered by certificates")
     take_array(arrays, "instance_origin", "<f8", 2)  # not part of the proof, but of the instance
-    _require(max(mask.shape) <= MOST_SIDE, "instance_mask", "has too long a side")
-    rows, columns = np.nonzero(mask)
-    n = len(rows)
-    _require(n > 0, "instance_mask", "has no pixel")
-    number = np.full((mask.shape[0] + 1, mask.shape[1] + 1), -1)
-    number[1:, :-1][mask] = np.arange(n)
-    neighbours = np.stack([number[rows, columns], number[rows + 1, columns + 1]], axis=1)  # upper, right
-    first, side = np.nonzero(neighbours >= 0)
-
-    theta = take_array(arrays, "instance_theta", "<f8", None)
-    w = take_array(arrays, "instance_w", "<f8", len(theta))
-    angles = take_array(arrays, "instance_stroke_pixels", "<i4", len(theta), 2).astype(np.int64)
+    white, first, second, at = pixels_of(arrays)
+    theta, w = strokes_of(arrays, head, at)
     gauge = head.get("gauge")
-    _require(gauge in ("strokes", "box"), "gauge", "is unknown")
-    _require((theta >= 0) & (theta < np.pi), "instance_theta", "is not in [0, pi)")
-    _require((w > 0) & (w <= 1), "instance_w", "is not in (0, 1]")
-    _require(((angles >= 0) & (angles < mask.shape)).all(axis=1), "instance_stroke_pixels", "is no pixel")
-    at = number[1:, :-1][tuple(angles.T)]
-    _require(at >= 0, "instance_stroke_pixels", "is outside the mask")
-    _require(np.diff(at) > 0, "instance_stroke_pixels", "is out of order")
-    weight, direction, lower = np.zeros((3, n))
-    weight[at] = number_in(head, "w_strokes", 0.0, MOST_WEIGHT) * w
+    require(gauge in ("strokes", "box"), "gauge", "is unknown")
+    weight, direction, lower = np.zeros((3, len(white)))
+    weight[at] = w
     if gauge == "strokes":
         direction[at], lower[at] = theta, theta - QUARTER
     else:
         direction[at] = np.where(theta >= 3 * QUARTER - 1e-9, np.maximum(theta - np.pi, -QUARTER), theta)
-    white, w_beta = (rows + columns) % 2 == 1, number_in(head, "w_beta", 0.0, MOST_WEIGHT)
-    ends, strokes = (first, neighbours[first, side]), (weight, direction, np.zeros(n), lower)
-    return EnergyTerms(norm_of(head_of(arrays)), *ends, white, *strokes, w_beta), at
+    strokes, w_beta = (
+        (weight, direction, np.zeros(len(white)), lower),
+        number_in(head, "w_beta", 0, MOST_WEIGHT),
+    )
+    return EnergyTerms(norm_of(head_of(arrays)), first, second, white, *strokes, w_beta), at
+
+
+def pixels_of(arrays: dict[str, Array]) -> tuple[Array, Array, Array, Array]:
+    """The checkerboard of the pixels, pairs with their upper, then right neighbours, and stroke pixels."""
+    mask = take_array(arrays, "instance_mask", "|b1", None, None)
+    place = take_array(arrays, "instance_stroke_pixels", "<i4", None, 2).astype(np.int64)
+    require(max(mask.shape) <= MOST_SIDE, "instance_mask", "has too long a side")
+    rows, columns = np.nonzero(mask)
+    require(len(rows) > 0, "instance_mask", "has no pixel")
+    number = np.full((mask.shape[0] + 1, mask.shape[1] + 1), -1)
+    number[1:, :-1][mask] = np.arange(len(rows))
+    neighbours = np.stack([number[rows, columns], number[rows + 1, columns + 1]], axis=1)
+    first, side = np.nonzero(neighbours >= 0)
+    require(((place >= 0) & (place < mask.shape)).all(axis=1), "instance_stroke_pixels", "is no pixel")
+    at = number[1:, :-1][tuple(place.T)]
+    require(at >= 0, "instance_stroke_pixels", "is outside the mask")
+    return (rows + columns) % 2 == 1, first, neighbours[first, side], at
+
+
+def strokes_of(arrays: dict[str, Array], head: dict[str, Any], at: Array) -> tuple[Array, Array]:
+    """The directions and weights W of the strokes at points that ascend."""
+    theta, w = (take_array(arrays, f"instance_{name}", "<f8", len(at)) for name in ("theta", "w"))
+    require((theta >= 0) & (theta < np.pi), "instance_theta", "is not in [0, pi)")
+    require((w > 0) & (w <= 1), "instance_w", "is not in (0, 1]")
+    require(np.diff(at) > 0, "strokes", "are out of order")
+    return theta, number_in(head, "w_strokes", 0, MOST_WEIGHT) * w
 
 
 def field_of(arrays: dict[str, Array], terms: EnergyTerms) -> tuple[Array, Array, Array]:
@@ -339,9 +384,9 @@ def field_of(arrays: dict[str, Array], terms: EnergyTerms) -> tuple[Array, Array
         take_array(arrays, *each) for each in (("alpha", "<f8", n), ("beta", "<f8", n), ("p", "<i4", m))
     )
     inside = (alpha >= terms.lower - SLIVER) & (alpha <= terms.lower + HALF + SLIVER)
-    _require(inside, "alpha", "is outside the window of the gauge")
-    _require(np.abs(beta) <= QUARTER + SLIVER, "beta", "is beyond pi/4")
-    _require(np.abs(p.astype(np.int64)) <= MOST_JUMP, "p", "is no jump")
+    require(inside, "alpha", "is outside the window of the gauge")
+    require(np.abs(beta) <= QUARTER + SLIVER, "beta", "is beyond pi/4")
+    require(np.abs(p.astype(np.int64)) <= MOST_JUMP, "p", "is no jump")
     return alpha, beta, p.astype(np.int64)
 
 
@@ -377,7 +422,7 @@ def terms_with_strokes(
     slope = np.zeros(len(pixels))
     if terms.norm != 2:
         slope = take_array(arrays, SLOPES, "<f8", len(pixels))
-        _require(np.abs(slope) <= (1.0 if terms.norm == 1 else HALF), SLOPES, "is too steep")
+        require(np.abs(slope) <= (1.0 if terms.norm == 1 else HALF), SLOPES, "is too steep")
     ends = anew[terms.first[pairs]], anew[terms.second[pairs]]
     strokes = terms.weight[pixels], terms.theta[pixels], slope, terms.lower[pixels]
     return EnergyTerms(terms.norm, *ends, terms.white[pixels], *strokes, terms.w_beta), pixels, pairs
@@ -449,28 +494,28 @@ def level_of(arrays: dict[str, Array], number: int, terms: EnergyTerms) -> Level
     """Level `number` of the certificate."""
     n, at = len(terms.white), f"level_{number}_"
     h = float(take_array(arrays, f"{at}h", "<f8", 1)[0])
-    _require(1e-5 <= h <= QUARTER + SLIVER, f"{at}h", "is no spacing")
+    require(1e-5 <= h <= QUARTER + SLIVER, f"{at}h", "is no spacing")
     alpha, beta = (take_array(arrays, f"centre_{name}", "<f8", n) for name in ("alpha", "beta"))
-    _require(np.abs(alpha) <= MOST_ANGLE, "centre_alpha", "is too large")
-    _require(np.abs(beta) <= MOST_ANGLE, "centre_beta", "is too large")
+    require(np.abs(alpha) <= MOST_ANGLE, "centre_alpha", "is too large")
+    require(np.abs(beta) <= MOST_ANGLE, "centre_beta", "is too large")
     if terms.norm != 2:  # section 9: one lattice for all pixels
-        _require(h * round(HALF / h) == HALF, f"{at}h", "does not divide pi/2")
-        _require(terms.norm == 1 or h <= HALF / 8, f"{at}h", "is too wide")
-        _require(alpha == h * np.round(alpha / h), "centre_alpha", "is no multiple of the spacing")
-        _require(beta == 0, "centre_beta", "is not 0")
+        require(h * round(HALF / h) == HALF, f"{at}h", "does not divide pi/2")
+        require(terms.norm == 1 or h <= HALF / 8, f"{at}h", "is too wide")
+        require(alpha == h * np.round(alpha / h), "centre_alpha", "is no multiple of the spacing")
+        require(beta == 0, "centre_beta", "is not 0")
     ranges = take_array(arrays, f"{at}ranges", "<i4", n, 4).astype(np.int64)
     least, shapes = ranges[:, ::2], ranges[:, 1::2]
-    _require(((shapes >= 2) & (shapes <= MOST_COUNT)).all(axis=1), f"{at}ranges", "has no cell, or too many")
-    _require((h * (np.abs(least) + shapes) <= MOST_ANGLE).all(axis=1), f"{at}ranges", "leads too far away")
+    require(((shapes >= 2) & (shapes <= MOST_COUNT)).all(axis=1), f"{at}ranges", "has no cell, or too many")
+    require((h * (np.abs(least) + shapes) <= MOST_ANGLE).all(axis=1), f"{at}ranges", "leads too far away")
     counts = shapes.prod(axis=1)
     labels = int(counts.sum())
-    _require(labels <= MOST_LABELS, f"{at}ranges", "has too many labels in all")
+    require(labels <= MOST_LABELS, f"{at}ranges", "has too many labels in all")
     bits = np.unpackbits(take_array(arrays, f"{at}allowed", "|u1", (labels + 7) // 8), count=labels).astype(
         bool
     )
     blocks = np.split(bits, np.cumsum(counts)[:-1])
     allowed = [block.reshape(shape) for block, shape in zip(blocks, shapes)]
-    _require(
+    require(
         [combine_corners(np.logical_and, x).any() for x in allowed], f"{at}allowed of pixel", "has no cell"
     )
     sizes = np.array([np.count_nonzero(x) for x in allowed], np.int64)
@@ -482,8 +527,8 @@ def level_of(arrays: dict[str, Array], number: int, terms: EnergyTerms) -> Level
 def quads_of(arrays: dict[str, Array], at: str, terms: EnergyTerms, sides: Array) -> list[Quad]:
     """The quads of a level that have tables. sides (n,): the number of alphas of each pixel."""
     lower_left = take_array(arrays, f"{at}quads", "<i4", None)
-    _require((lower_left >= 0) & (lower_left < len(sides)), f"{at}quads", "is no pixel")
-    _require(np.diff(lower_left) > 0, f"{at}quads", "is out of order")
+    require((lower_left >= 0) & (lower_left < len(sides)), f"{at}quads", "is no pixel")
+    require(np.diff(lower_left) > 0, f"{at}quads", "is out of order")
     pair_of = {ends: e for e, ends in enumerate(zip(terms.first.tolist(), terms.second.tolist()))}
     upper = {i: j for i, j in pair_of if j < i}
     right = {i: j for i, j in pair_of if j > i}
@@ -492,7 +537,7 @@ def quads_of(arrays: dict[str, Array], at: str, terms: EnergyTerms, sides: Array
     for a in lower_left.tolist():
         b, d = right.get(a, -1), upper.get(a, -1)
         c = right.get(d, -1)
-        _require(c >= 0 and upper.get(b, -1) == c, f"{at}quads", f"has no quad at pixel {a}")
+        require(c >= 0 and upper.get(b, -1) == c, f"{at}quads", f"has no quad at pixel {a}")
         ends = ((a, b), (b, c), (d, c), (a, d))
         quads.append(Quad([a, b, c, d], [pair_of[pair] for pair in ends], []))
         counts += [sides[[*pair]] for pair in ends]
@@ -512,10 +557,10 @@ def check_whole_strip(level: Level) -> None:
     """Raise NotProvenError unless the domain of each pixel holds every cross."""
     for i, allowed in enumerate(level.allowed):
         alpha, beta = level.angles(i)
-        _require(allowed.all(), f"level_0_allowed of pixel {i}", "leaves out labels")
-        _require(alpha[-1] - alpha[0] >= HALF - SLIVER, f"level_0_ranges[{i}]", "is less than pi/2 of alpha")
+        require(allowed.all(), f"level_0_allowed of pixel {i}", "leaves out labels")
+        require(alpha[-1] - alpha[0] >= HALF - SLIVER, f"level_0_ranges[{i}]", "is less than pi/2 of alpha")
         full = beta[0] <= -QUARTER + SLIVER and beta[-1] >= QUARTER - SLIVER
-        _require(full, f"level_0_ranges[{i}]", "is less than all of beta")
+        require(full, f"level_0_ranges[{i}]", "is less than all of beta")
 
 
 # Section 3, Lemma 1: discrete costs ------------------------------------------------------------------------
@@ -791,7 +836,7 @@ def check_covered(coarse: Level, cells: list[Array], fine: Level, number: int) -
     """
     times = 2 if fine.h == coarse.h / 2 else 1
     halves = times == 2 or fine.h == coarse.h
-    _require(halves, f"level_{number}_h", "is neither that of the level before nor half")
+    require(halves, f"level_{number}_h", "is neither that of the level before nor half")
     for i, left in enumerate(cells):
         cell = np.stack(np.nonzero(left), axis=1) + coarse.least[i]
         extra = np.arange(1 if times == 1 else 2 + int(2 * fine.offset[i]))
@@ -803,7 +848,7 @@ def check_covered(coarse: Level, cells: list[Array], fine: Level, number: int) -
         beta = fine.beta[i] + fine.h * (columns + fine.least[i, 1] + fine.offset[i])
         inside = (beta < QUARTER - SLIVER) & (beta + fine.h > -QUARTER + SLIVER)
         covered = (held | ~inside[:, None]).all(axis=(1, 2))
-        _require(covered, f"level {number}, pixel {i}, cell", "of the level before is not covered")
+        require(covered, f"level {number}, pixel {i}, cell", "of the level before is not covered")
 
 
 # Sections 6 and 9: the last step ---------------------------------------------------------------------------
@@ -944,20 +989,20 @@ def pieces_bound(terms: EnergyTerms, step: LastStep, arrays: dict[str, Array]) -
     has multipliers. Each piece comes before its parts.
     """
     size, cuts = 2 * (len(terms.first) + len(terms.white)), take_array(arrays, "cuts", "<i4", None)
-    _require(len(cuts) <= MOST_PIECES, "cuts", "has too many pieces")
-    _require((cuts >= -1) & (cuts < len(terms.white)), "cuts", "is no pixel")
+    require(len(cuts) <= MOST_PIECES, "cuts", "has too many pieces")
+    require((cuts >= -1) & (cuts < len(terms.white)), "cuts", "is no pixel")
     multipliers = take_array(arrays, "multipliers", "<f8", int((cuts < 0).sum()), size)
-    _require((np.abs(multipliers) <= MOST_WEIGHT).all(axis=1), "multipliers", "is too large")
+    require((np.abs(multipliers) <= MOST_WEIGHT).all(axis=1), "multipliers", "is too large")
     waiting, bounds = [step.whole_piece] if len(cuts) else [], list[float]()
     for at in cuts.tolist():
-        _require(waiting, "cuts", "has a piece too many")
+        require(waiting, "cuts", "has a piece too many")
         piece = waiting.pop()
         if at >= 0:
             waiting += reversed(piece.cut(at, step.theta))
         else:
             least = linear_bound(terms, step, piece, multipliers[len(bounds)])
             bounds.append(math.inf if (piece.boxes[:, 0] > piece.boxes[:, 1]).any() else least)
-    _require(not waiting, "cuts", "leaves a piece without multipliers")
+    require(not waiting, "cuts", "leaves a piece without multipliers")
     return min(bounds, default=-math.inf)
 
 
@@ -988,16 +1033,14 @@ class ProvenClaim:
     """Findings of the checker: the proven claim.
 
     bound: what a certificate may claim everywhere; it is less than what is proven here by a margin for other
-    processors. status: as `status_of` has it. boxes (n, 4): ranges of alpha and beta that hold the crosses of
-    every better field, by some of their labels. forced_pairs (m,): where its jumps are forced. levels: their
-    bounds.
+    processors. status: as `status_of` has it. forced_pairs (m,): where the jumps of every better field are
+    forced. levels: their bounds.
     """
 
     status: str
     norm: Any
     energy: float
     bound: float
-    boxes: Array
     forced_pairs: Array
     levels: list[float]
 
@@ -1005,6 +1048,16 @@ class ProvenClaim:
     def forced(self) -> int:
         """The number of forced jumps."""
         return int(self.forced_pairs.sum())
+
+
+@dataclass
+class ProvenBoxes(ProvenClaim):
+    """The claim with boxes (n, 4): ranges of alpha and beta that hold the crosses of every better field.
+
+    They hold some label of each cross.
+    """
+
+    boxes: Array
 
 
 def status_of(energy: float, bound: float) -> str:
@@ -1017,16 +1070,14 @@ def gap_of(energy: float, bound: float) -> float:
     return 0.0 if status_of(energy, bound) == "optimal" else (energy - bound) / energy
 
 
-def check_arrays(arrays: dict[str, Array]) -> ProvenClaim:
+@refuse_damage
+def check_arrays(arrays: dict[str, Array]) -> ProvenBoxes:
     """Check the arrays of a certificate and return what they prove.
 
     Raises NotProvenError when a level does not follow from the one before, or when less is proven than
     claimed, and UnreadableError for arrays that are not a certificate.
     """
-    try:
-        return check_last_step(arrays, pass_levels(arrays))
-    except (ValueError, TypeError, KeyError, IndexError, OverflowError, RecursionError) as error:
-        raise UnreadableError(f"is damaged ({type(error).__name__}: {str(error)[:80]})") from error
+    return check_last_step(arrays, pass_levels(arrays))
 
 
 def pass_levels(arrays: dict[str, Array]) -> PassedLevels:
@@ -1055,10 +1106,10 @@ def pass_levels(arrays: dict[str, Array]) -> PassedLevels:
     return PassedLevels(whole, terms, pixels, pairs, energy, error, slack, bounds, last)
 
 
-def check_last_step(arrays: dict[str, Array], passed: PassedLevels) -> ProvenClaim:
+def check_last_step(arrays: dict[str, Array], passed: PassedLevels) -> ProvenBoxes:
     """Do the last step, and compare what is proven with what the certificate claims."""
     terms, energy, last = passed.terms, passed.energy, passed.last
-    _require(last is not None, "the last level", "leaves nothing, not even the field")
+    require(last is not None, "the last level", "leaves nothing, not even the field")
     assert last is not None
     least = pieces_bound(terms, last, arrays) if is_convex(terms, last) else -math.inf
     proven = max(0.0, min(max(max(passed.bounds) - passed.slack, least), energy - passed.error))
@@ -1068,7 +1119,7 @@ def check_last_step(arrays: dict[str, Array], passed: PassedLevels) -> ProvenCla
     lower = passed.whole.lower  # in parts without strokes, anything is possible
     boxes[:, 0], boxes[:, 1], boxes[:, 2], boxes[:, 3] = lower, lower + HALF, -QUARTER, QUARTER
     boxes[passed.pixels], pairs[passed.pairs] = last.boxes, has_forced_jump(terms, last.p, last.boxes)
-    claim = ProvenClaim(status_of(energy, bound), terms.norm, energy, bound, boxes, pairs, passed.bounds)
+    claim = ProvenBoxes(status_of(energy, bound), terms.norm, energy, bound, pairs, passed.bounds, boxes)
     check_claim(head_of(arrays), claim, proven, passed.error)
     return claim
 
@@ -1077,25 +1128,30 @@ def check_claim(head: dict[str, Any], claim: ProvenClaim, most: float, error: fl
     """Raise NotProvenError unless the claim is proven. most: the greatest bound that is."""
     energy, bound = number_in(head, "energy", 0.0, math.inf), number_in(head, "bound", -math.inf, math.inf)
     close = abs(energy - claim.energy) <= error + 1e-12 * max(1.0, claim.energy)
-    _require(close, "energy", f"is claimed as {energy!r}, but the field has {claim.energy!r}")
-    _require(head.get("status") in ("optimal", "gap"), "status", "is neither 'optimal' nor 'gap'")
+    require(close, "energy", f"is claimed as {energy!r}, but the field has {claim.energy!r}")
+    require(head.get("status") in ("optimal", "gap"), "status", "is neither 'optimal' nor 'gap'")
     proven = f"only {most!r} is proven, for an energy of {claim.energy!r}"
-    _require(bound <= most, "bound", f"is claimed as {bound!r}, but {proven}")
+    require(bound <= most, "bound", f"is claimed as {bound!r}, but {proven}")
     if head["status"] == "optimal":
-        _require(claim.status == "optimal", "status", f"is claimed as optimal, but {proven}")
-        _require(
+        require(claim.status == "optimal", "status", f"is claimed as optimal, but {proven}")
+        require(
             status_of(energy, bound) == "optimal", "status", "is claimed as optimal, but not by the bound"
         )
 
 
-def main(arguments: list[str]) -> int:
+def check_bytes(data: bytes) -> ProvenClaim:
+    """Check the bytes of a certificate. Raises as `check_arrays`."""
+    return check_arrays(unpack_arrays(data))  # type: ignore[no-any-return]
+
+
+def main(arguments: list[str], check: Callable[[bytes], ProvenClaim] = check_bytes) -> int:
     """Print the verdict and return the exit code."""
     if len(arguments) != 1 or arguments[0].startswith("-"):
-        print("usage: python check_certificate.py FILE")
+        print(f"usage: python {Path(sys.argv[0]).name} FILE")
         return 2
     path = arguments[0]
     try:
-        claim = check_arrays(read_arrays(path))
+        claim = check(read_file(path))
     except NotProvenError as error:
         print(f"refused: {error}")
         return 1

@@ -8,18 +8,19 @@ clusters.
 
 from __future__ import annotations
 
+import heapq
 import math
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from scipy import sparse
+from numpy.typing import NDArray
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ..array_archive import Arrays
 from ..field.field import CrossField
-from ..instance.domain import Bools, Ints
+from ..instance.domain import Bools, Floats, Ints
 from ..instance.file import instance_arrays
 from ..instance.instance import Instance
 from ..orthogonal.energy import OrthogonalEnergy, field_of, integers_of
@@ -29,12 +30,15 @@ from ..search.search import search
 from ..search.starts import best_start
 from . import check_orthogonal as checker
 from .check_certificate import OPTIMAL
-from .check_orthogonal import Level, Problem
+from .check_orthogonal import CellLevel, CentredRows
 from .orthogonal_certificate import LevelFacts, OrthogonalProof, check_proof
-from .orthogonal_dual import Dual
+from .orthogonal_dual import RingDual
 
 if TYPE_CHECKING:
     from .descent import Termination
+
+Neighbours = list[list[tuple[int, int]]]
+"""Of each point, its neighbours and the pairs with them."""
 
 # Levels
 _COARSEST: Final = 15  # cells of a quarter turn
@@ -44,8 +48,9 @@ _NARROW: Final = 0.7  # share of the cells left below which the same spacing is 
 
 # Passes
 _MOST_PASSES: Final = 200
-_PASSES: Final = 5  # between looks at the bound
-_SLOW: Final = 0.08  # part of the gap: a smaller rise of five passes is slow
+_PASSES: Final = 5  # between looks at the bound, and updates of rings if there are any
+_SLOW: Final = (0.08, 0.02)  # part of the gap: a smaller rise is slow; without rings, with rings
+_BETWEEN: Final = 4  # passes between two updates of rings, which take longer
 _FEW: Final = 0.4  # share of labels left below which a record of the level pays
 _CLOSER: Final = 0.3  # part of the gap of the last record, from which another one makes rings cheaper
 _TINY: Final = 1e-3  # relative gap below which finer labels follow
@@ -75,15 +80,16 @@ def prove_orthogonal(
 
 
 @dataclass
-class _Chain:
+class _CentredLevels:
     """Levels round one centre, and what they prove. arrays: of a certificate, without head and field."""
 
-    problem: Problem
+    rows: CentredRows
     threshold: float
     arrays: Arrays
     levels: list[LevelFacts] = field(default_factory=list)
     forced: int = 0
     convex: float = -math.inf
+    gap: float = math.inf  # at the last level
 
     @property
     def bound(self) -> float:
@@ -91,55 +97,58 @@ class _Chain:
         return max([0.0, self.convex, *(level.bound for level in self.levels)])
 
 
-def two_colours(rows: checker.Rows, fixed: Bools) -> Ints:
+def two_colours(near: Neighbours, fixed: Bools) -> NDArray[np.uint8]:
     """0 or 1 of each point, such that most pairs have both, and 0 where it is fixed; (n,)."""
-    n, m = rows.size, rows.pairs
-    near: list[list[int]] = [[] for _ in range(n)]
-    for i, j in zip(rows.first[:m].tolist(), rows.second[:m].tolist(), strict=True):
-        near[i].append(j)
-        near[j].append(i)
-    colour = [-1] * n
-    for begin in [*np.nonzero(fixed[:n])[0].tolist(), *range(n)]:
-        waiting = [begin] if colour[begin] < 0 else []
-        colour[begin] = max(colour[begin], 0)
+    side = [0] * len(near)
+    for begin in [*np.nonzero(fixed)[0].tolist(), *range(len(near))]:
+        waiting = [] if side[begin] else [begin]
+        side[begin] = side[begin] or 1
         for i in waiting:
-            for j in near[i]:
-                if colour[j] < 0:
-                    colour[j] = 1 - colour[i]
-                    waiting.append(j)
-    changing = True
-    while changing:
-        changing = False
-        for i in range(n):
-            if not fixed[i] and 2 * sum(colour[j] == colour[i] for j in near[i]) > len(near[i]):
-                colour[i], changing = 1 - colour[i], True
-    return np.array(colour, dtype=np.int32)
+            after = [j for j, _ in near[i] if not side[j]]
+            waiting += after
+            for j in after:
+                side[j] = -side[i]
+    turning = True
+    while turning:
+        turning = False
+        for i in np.nonzero(~fixed)[0].tolist():
+            if side[i] * sum(side[j] for j, _ in near[i]) > 0:
+                side[i], turning = -side[i], True
+    return np.array([one < 0 for one in side], dtype=np.uint8)
+
+
+def spanning_forest(near: Neighbours, value: Floats) -> list[int]:
+    """Pairs of a forest, those of great value first, each with a point that is joined to those before."""
+    forest, reached = list[int](), set[int]()
+    for root in range(len(near)):
+        waiting = [(0.0, root, -1)]
+        while waiting:
+            _, point, pair = heapq.heappop(waiting)
+            if point not in reached:
+                reached.add(point)
+                forest.append(pair)
+                for step in near[point]:
+                    heapq.heappush(waiting, (-value[step[1]], *step))
+    return [pair for pair in forest if pair >= 0]
 
 
 def _rings_of(instance: Instance) -> Arrays:
-    """The rings of the domain that are closed walks over different points, as a certificate has them."""
-    rings, domain = instance.domain.rings, instance.domain
-    first, second, sign = domain.first[rings.pair], domain.second[rings.pair], rings.sign
-    begin = np.where(sign > 0, first, second)
-    blocks = [
-        (a, b)
-        for a, b in zip(rings.start[:-1].tolist(), rings.start[1:].tolist(), strict=True)
-        if 3 <= b - a <= checker.MOST_RING and len(set(begin[a:b].tolist())) == b - a
-    ]
-    steps = np.concatenate([np.arange(a, b) for a, b in blocks] or [np.zeros(0, dtype=np.int64)])
+    """The rings of the domain that a certificate may have."""
+    rings = instance.domain.rings
+    lengths = np.diff(rings.start)
+    kept = (lengths >= 3) & (lengths <= checker.MOST_RING)
+    steps = np.repeat(kept, lengths)
+    start = np.cumsum([0, *lengths[kept]]).astype(np.int32)
     return {
-        "ring_start": np.cumsum([0, *(b - a for a, b in blocks)]).astype(np.int32),
-        "ring_pair": rings.pair[steps].astype(np.int32),
-        "ring_sign": sign[steps].astype(np.int8),
+        "ring_start": start,
+        "ring_pair": rings.pair[steps],
+        "ring_sign": rings.sign[steps].astype(np.int8),
     }
 
 
 @dataclass
 class _Prover:
-    """The best field, and the chain of levels that proves most.
-
-    z: the integers of the best field. least: its energy. pruned: the gap at the last record.
-    """
+    """The best field, and the chain that proves most. z: integers of the field; least: its energy."""
 
     instance: Instance
     energy: OrthogonalEnergy
@@ -147,41 +156,31 @@ class _Prover:
     ends: Termination
     progress: Progress
     seed: int = 0
-    proven: _Chain | None = None
-    pruned: float = math.inf
 
     def __post_init__(self) -> None:
-        arrays = instance_arrays(self.instance).items()
+        n, arrays = self.instance.domain.size, instance_arrays(self.instance).items()
         self.arrays: Arrays = {f"instance_{name}": array for name, array in arrays} | _rings_of(self.instance)
         if self.instance.domain.kappa is not None:
             self.arrays["kappa"] = self.instance.domain.kappa
-        self.rows = checker.rows_of(self.arrays)
-        self.limit = checker.limits_of(self.rows)
-        self.half = two_colours(self.rows, self.rows.fixed_points()).astype(np.uint8)
-        m, n = self.rows.pairs, self.rows.size
-        first, second = self.rows.first[:m], self.rows.second[:m]
-        graph = sparse.csr_array((np.ones(2 * m), (np.r_[first, second], np.r_[second, first])), (n, n))
-        self.order = reverse_cuthill_mckee(graph, symmetric_mode=True).astype(np.int64)
-        self.least = self.energy.least_total(self.z)
+        self.arrays |= {"centre": np.zeros(n), "half": np.zeros(n, dtype=np.uint8)}
+        rows, links = checker.CentredRows(self.arrays), self.energy.links
+        self.near: Neighbours = [[] for _ in range(n)]
+        for pair, (i, j) in enumerate(rows.ends[: rows.pairs]):
+            self.near[i].append((j, pair))
+            self.near[j].append((i, pair))
+        self.order = reverse_cuthill_mckee(links + links.T, symmetric_mode=True).astype(np.int64)
+        self.arrays["half"] = two_colours(self.near, rows.fixed[:-1])
+        self.limit, self.least = rows.limit, self.energy.least_total(self.z)
+        self.proven = self._begin_chain()
 
     def proof(self, ended: str, began: float) -> OrthogonalProof:
         """The proof so far, not checked."""
         best, chain = field_of(self.instance, self.z, self.energy), self.proven
-        arrays: Arrays = {} if chain is None else dict(chain.arrays)
-        arrays |= {"alpha": best.alpha, "p": best.p}
-        if chain is not None:
-            arrays["divisions"] = np.array([level.divisions for level in chain.levels], dtype=np.int32)
-        energy = best.energy().total
+        energy, arrays = best.energy().total, chain.arrays | {"alpha": best.alpha, "p": best.p}
         return OrthogonalProof(
-            best, energy, min(self.bound, energy), 0 if chain is None else chain.forced,
-            () if chain is None else tuple(chain.levels), time.monotonic() - began, ended, arrays,
-            energy if chain is None else chain.threshold,
+            best, energy, min(chain.bound, energy), chain.forced, tuple(chain.levels),
+            time.monotonic() - began, ended, arrays, chain.threshold,
         )  # fmt: skip
-
-    @property
-    def bound(self) -> float:
-        """The greatest bound of all chains."""
-        return 0.0 if self.proven is None else self.proven.bound
 
     def run(self) -> str:
         """Go through chains of levels until a limit is met or nothing helps; return the reason."""
@@ -193,67 +192,67 @@ class _Prover:
         """Go through the levels round the best field; the reason of the end, empty for a better field."""
         if reason := self.ends.reason():
             return reason
-        if self.rows.pairs * (_COARSEST + 1) ** 2 > _MOST_COSTS:
+        if len(self.instance.domain.first) * (_COARSEST + 1) ** 2 > _MOST_COSTS:
             return "labels"
-        chain = self._first_chain()
-        problem, rings, self.pruned = chain.problem, list[int](), math.inf
-        level, before = checker.first_level(problem, _COARSEST), None
+        chain = self._begin_chain()
+        rows, rings, level, before = chain.rows, list[int](), checker.first_level(chain.rows, _COARSEST), None
         while True:
-            costs = checker.costs_of(problem, level)
-            dual = Dual(problem, level, costs, self.order, rings)
+            costs = checker.costs_of(rows, level)
+            dual = RingDual(rows, level, costs, self.order, rings)
             if before is not None:
                 dual.interpolate(before)
-            closing = self._ascend(dual, chain.threshold)
+            closing = self._ascend(dual, chain)
             if self._find_better_field(dual) and not self.ends.over():
                 return ""
             least = self.least
-            kept = self._record(chain, dual, costs)
-            if chain.bound >= self.bound:
+            squares = self._record(chain, dual, costs)
+            if chain.bound >= self.proven.bound:
                 self.proven = chain
             reason = self._reason_to_end(chain)
             wide = len(chain.levels) == 1 and self.least - chain.bound > _WIDE * self.least
             if reason or self.least < least or (wide and self._search(_SEARCH * self.ends.deadline.left())):
                 return reason
             more = self._more_rings(dual)
-            factor = 1 if closing else self._next_factor(level, kept[0], more=bool(more))
+            factor = 1 if closing else self._next_factor(rows, level, squares, more=bool(more))
             if not factor:
                 return "labels"
             rings = rings + more
-            level, before = checker.next_level(problem, level, *kept, factor), dual
+            level, before = checker.next_level(rows, level, squares, factor), dual
 
-    def _first_chain(self) -> _Chain:
+    def _begin_chain(self) -> _CentredLevels:
         """A chain round the best field, without levels."""
         best = field_of(self.instance, self.z, self.energy)
-        energy, error = checker.energy_of({"alpha": best.alpha, "p": best.p}, self.rows)
-        arrays = self.arrays | {"centre": self.energy.fit_angles(self.z), "half": self.half}
-        problem = checker.problem_of(arrays, self.rows, self.limit)
-        return _Chain(problem, energy * (1 + _BETTER) + 2 * error, arrays)
+        arrays = self.arrays | {"centre": self.energy.fit_angles(self.z), "divisions": np.zeros(0, np.int32)}
+        rows = checker.CentredRows(arrays, self.limit)
+        energy, error = checker.energy_of({"alpha": best.alpha, "p": best.p}, rows)
+        return _CentredLevels(rows, energy * (1 + _BETTER) + 2 * error, arrays)
 
-    def _ascend(self, dual: Dual, most: float) -> bool:
+    def _ascend(self, dual: RingDual, chain: _CentredLevels) -> bool:
         """Passes until the bound rises slowly, or few labels are left; whether rings close much of it."""
-        reached, rings, closing = -math.inf, bool(dual.ring_numbers), False
+        reached, rings, closing, most = -math.inf, bool(dual.ring_numbers), False, chain.threshold
         if rings:
-            dual.update_rings(_CAP * max(most - self.bound, 0.0) + 0.1, backward=False)
+            dual.update_rings(_CAP * max(most - self.proven.bound, 0.0) + 0.1, backward=False)
         for number in range(_MOST_PASSES):
-            dual.pass_over(most, forward=True)
-            bound, left = dual.pass_over(most, forward=False)
+            for _ in range(_BETWEEN if rings else 1):
+                dual.pass_over(most, forward=True)
+                bound, left = dual.pass_over(most, forward=False)
             if rings:
                 dual.update_rings(max(most - bound, 0.0), backward=bool(number % 2))
-            closing = rings and number > 1 and _TINY * most < most - bound < _CLOSER * self.pruned
+            closing = rings and number > 1 and _TINY * most < most - bound < _CLOSER * chain.gap
             if self.ends.over() or closing:
                 break
             if number % _PASSES == _PASSES - 1:
-                if bound - reached < _SLOW * (most - bound) or left < _FEW:
+                if bound - reached < _SLOW[rings] * (most - bound) or left < _FEW:
                     break
                 reached = bound
         dual.pass_over(most, forward=True)
         bound, _ = dual.pass_over(most, forward=False)
         labels = len(dual.state.unary)
         self.ends.labels += labels
-        self.progress(f"energy {self.least:.5g}, bound {max(bound, self.bound):.5g}, {labels} labels")
+        self.progress(f"energy {self.least:.5g}, bound {max(bound, self.proven.bound):.5g}, {labels} labels")
         return closing
 
-    def _find_better_field(self, dual: Dual) -> bool:
+    def _find_better_field(self, dual: RingDual) -> bool:
         """Whether the shares suggest a better field, which then is the best one."""
         improved = False
         for forward in (True, False):
@@ -264,14 +263,15 @@ class _Prover:
 
     def _search(self, seconds: float) -> bool:
         """Whether a search finds a better field; without a limit of time, in some rounds."""
-        timed = math.isfinite(self.ends.deadline.left())
+        limits = Limits().until(self.ends.deadline.within(seconds)) if math.isfinite(seconds) else None
+        start, rounds = field_of(self.instance, self.z, self.energy), None if limits else _ROUNDS
         result = search(
             self.instance,
-            limits=Limits().until(self.ends.deadline.within(seconds)) if timed else None,
-            rounds=None if timed else _ROUNDS,
+            limits=limits,
+            rounds=rounds,
             seed=self.seed,
             jobs=1,
-            start=field_of(self.instance, self.z, self.energy),
+            start=start,
             stop=self.ends.stop,
         )
         return self._offer(integers_of(result.field))
@@ -284,54 +284,54 @@ class _Prover:
             self.z, self.least = z, total
         return better
 
-    def _record(self, chain: _Chain, dual: Dual, costs: Any) -> tuple[list[Bools], list[Bools]]:
-        """Add a level to its chain; what the checker finds that it leaves, and a little more.
+    def _record(self, chain: _CentredLevels, dual: RingDual, costs: Any) -> list[Bools]:
+        """Add a level to its chain; the squares that the checker finds that it leaves, and a little more.
 
         Other processors round differently, and must not find more.
         """
-        number, level, problem = len(chain.levels), dual.level, chain.problem
-        self.pruned = chain.threshold - dual.bound
-        gap = max(self.pruned, 1e-6 * (1 + chain.threshold))
-        chain.arrays |= {f"level_{number}_{name}": array for name, array in dual.arrays(gap).items()}
-        excess = checker.excess_of(
-            problem, costs, *checker.stored_shares(chain.arrays, number, problem, level)
-        )
-        kept = checker.kept_of(problem, level, excess, chain.threshold * (1 + _BETTER) + 1e-12)
-        for name, bits in zip(("cells", "squares"), kept, strict=True):
-            packed = np.packbits(np.concatenate([of_one.ravel() for of_one in bits]))
-            chain.arrays[f"level_{number}_{name}"] = packed
-        labels = sum(map(len, level.labels[:-1]))
-        chain.levels.append(LevelFacts(level.divisions, labels, excess.bound))
-        turns = checker.possible_turns(problem, level, *kept)
-        chain.forced = sum(of_row == [0] for of_row in turns[: self.rows.pairs])
-        nearest = np.round(-self.rows.residuals(problem.centre) / np.pi * 2).astype(np.int32)
-        cases = [nearest + np.array(case, dtype=np.int32) for case in checker.cases_of(turns)]
-        angles = np.array([self.energy.fit_angles(z) for z in cases]).reshape(-1, self.rows.size)
+        prefix, level, rows = f"level_{len(chain.levels)}_", dual.level, chain.rows
+        chain.gap, most = chain.threshold - dual.bound, chain.threshold * (1 + _BETTER) + 1e-12
+        numbers = dual.arrays(max(chain.gap, 1e-6 * (1 + chain.threshold)))
+        chain.arrays |= {prefix + name: array for name, array in numbers.items()}
+        shares = checker.stored_shares(chain.arrays, len(chain.levels), rows, level)
+        excess = checker.Excess(rows, costs, *shares)
+        spare = max(most - excess.bound, 0.0)
+        value = np.array([np.minimum(of_pair, spare).mean() for of_pair in excess.pairs])
+        other = value * np.random.default_rng(0).uniform(size=len(value))
+        forests = np.array([spanning_forest(self.near, v) for v in (value, other)], dtype=np.int32)
+        squares = checker.kept_of(rows, level, excess, forests, most)
+        bits = np.concatenate([np.zeros(0, dtype=bool), *(square.ravel() for square in squares)])
+        chain.arrays |= {f"{prefix}forests": forests, f"{prefix}squares": np.packbits(bits)}
+        chain.arrays["divisions"] = np.append(chain.arrays["divisions"], np.int32(level.divisions))
+        chain.levels.append(LevelFacts(np.pi / 2 / level.divisions, len(dual.state.unary), excess.bound))
+        turns = checker.possible_turns(rows, level, squares)
+        chain.forced = sum(of_row == [0] for of_row in turns[: rows.pairs])
+        cases = [(rows.nearest + np.array(case)).astype(np.int32) for case in checker.cases_of(turns)]
+        angles = np.array([self.energy.fit_angles(z) for z in cases]).reshape(-1, rows.size)
         chain.arrays["cases"] = angles
-        chain.convex = checker.cases_bound(problem, turns, angles)
+        chain.convex = checker.cases_bound(rows, turns, angles)
         for z in cases:
             self._offer(z)
-        return kept
+        return squares
 
-    def _reason_to_end(self, chain: _Chain) -> str:
+    def _reason_to_end(self, chain: _CentredLevels) -> str:
         """The reason why the work ends; empty if it goes on."""
         if self.least - chain.bound <= OPTIMAL / 2 * max(1.0, self.least):
             return "optimal"
-        return "gap" if self.least - self.bound <= self.ends.gap * self.least else self.ends.reason()
+        return "gap" if self.least - self.proven.bound <= self.ends.gap * self.least else self.ends.reason()
 
-    def _more_rings(self, dual: Dual) -> list[int]:
+    def _more_rings(self, dual: RingDual) -> list[int]:
         """Rings whose pairs cost more at the centre than their shares, and that are not in use."""
         gaps = dual.ring_gaps()
         gaps[dual.ring_numbers] = 0.0
         numbers = np.argsort(-gaps, kind="stable")
         return [int(number) for number in numbers if gaps[number] > 1e-6 * max(self.least, 1.0)]
 
-    def _next_factor(self, level: Level, cells: list[Bools], *, more: bool) -> int:
+    def _next_factor(self, rows: CentredRows, level: CellLevel, squares: list[Bools], *, more: bool) -> int:
         """How many parts each cell has on the next level; 0 if no level helps."""
-        counts = np.array([3.0 * cell.sum() + 1 for cell in cells])
-        ends = self.rows.ends[: self.rows.pairs]
-        finer = sum(counts[i] * counts[j] for i, j in ends)
-        narrow = counts.sum() < _NARROW * 3 * sum(int(cell.sum()) for cell in level.cells)
+        counts = np.array([3.0 * cells.sum() + 1 for cells in checker.cells_of(rows, level, squares)])
+        finer = sum(counts[i] * counts[j] for i, j in rows.ends[: rows.pairs])
+        narrow = counts.sum() < _NARROW * 3 * sum(map(len, level.cells))
         if more and level.divisions == _COARSEST:
             return 1
         if level.divisions < _FINEST and finer <= (_MOST_COSTS / 20 if narrow else _MOST_COSTS):

@@ -10,7 +10,7 @@ from ..instance.angles import HALF, QUARTER
 from ..instance.domain import Bools
 from ..instance.terms import parity_sign
 from .certificate import Certificate
-from .check_certificate import ProvenClaim
+from .check_certificate import ProvenBoxes
 
 _MARGIN = 1e-9  # radians by which windows are wider than the boxes, to allow for rounding in solvers
 
@@ -25,7 +25,7 @@ def remaining_windows(certificate: Certificate) -> Windows:
     certificate of orthogonal crosses.
     """
     field, proven = certificate.field, certificate.proven
-    if not isinstance(proven, ProvenClaim):
+    if not isinstance(proven, ProvenBoxes):
         raise InputError("certificates of orthogonal crosses hold no windows; export without one")
     instance, grid = field.instance, field.instance.grid
     steps = np.round((field.alpha - proven.boxes[:, :2].mean(axis=1)) / HALF).astype(np.int32)

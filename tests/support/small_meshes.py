@@ -123,26 +123,23 @@ def keeps_optimum(instance, best, proof):
     best: integers of an optimal field, all of whose points are joined to strokes.
     """
     energy, arrays = OrthogonalEnergy.of(instance), proof.certificate()
-    rows = checker.rows_of(arrays)
-    problem = checker.problem_of(arrays, rows, checker.limits_of(rows))
-    turn = np.append(energy.fit_angles(best), 0.0) - problem.centre
-    level, cells, squares = checker.first_level(problem, proof.levels[0].divisions), [], []
-    for number, facts in enumerate(proof.levels):
+    rows = checker.CentredRows(arrays)
+    turn = np.append(energy.fit_angles(best), 0.0) - rows.centre
+    divisions = arrays["divisions"].tolist()
+    level, squares = checker.first_level(rows, divisions[0]), []
+    for number, count in enumerate(divisions):
         if number:
-            factor = facts.divisions // level.divisions
-            level = checker.next_level(problem, level, cells, squares, factor)
-        cells, squares = checker.stored_cells(arrays, number, level)
-        steps = turn / (np.pi / 2 / facts.divisions) - problem.half / 2
+            level = checker.next_level(rows, level, squares, count // level.divisions)
+        squares = checker.stored_squares(arrays, number, level)
+        steps = turn / (np.pi / 2 / count) - rows.half / 2
         within = [
-            cell
-            & (
-                np.abs((step - labels - 0.5 + facts.divisions / 2) % facts.divisions - facts.divisions / 2)
-                <= 0.5 + 1e-9
-            )
-            for step, labels, cell in zip(steps, level.labels, level.cells, strict=True)
+            np.abs((step - cells - 0.5 + count / 2) % count - count / 2) <= 0.5 + 1e-9
+            for step, cells in zip(steps, level.cells, strict=True)
         ]
+        kept = checker.cells_of(rows, level, squares)
+        if not all((cells & here).any() for cells, here in zip(kept, within, strict=True)):
+            return False
         ends = zip(rows.ends[: rows.pairs], squares, strict=True)
-        held = all((cell & here).any() for cell, here in zip(cells, within, strict=True))
-        if not held or not all((square & within[i][:, None] & within[j]).any() for (i, j), square in ends):
+        if not all((square & within[i][:, None] & within[j]).any() for (i, j), square in ends):
             return False
     return True

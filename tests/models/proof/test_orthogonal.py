@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import shutil
+import subprocess
+import sys
 from dataclasses import replace
 
 import crossfield as cf
@@ -15,8 +19,9 @@ from crossfield.models.errors import InputError
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.mesh import Mesh
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, integers_of
+from crossfield.models.proof import check_certificate
 from crossfield.models.proof import check_orthogonal as checker
-from crossfield.models.proof.orthogonal_certificate import unpack_arrays
+from crossfield.models.proof.check_certificate import NotProvenError, UnreadableError, unpack_archive
 from small_meshes import (
     beyond_forest,
     keeps_optimum,
@@ -26,7 +31,7 @@ from small_meshes import (
     worse_integers,
 )
 
-REFUSALS = (checker.NotProvenError, checker.UnreadableError)
+REFUSALS = (NotProvenError, UnreadableError)
 MOST_FREE = 6  # integers that are tried
 
 
@@ -76,14 +81,14 @@ def test_partial_sums_on_rings_that_are_cut_off_lose_the_optimum(monkeypatch):
     _, z = try_all_integers(instance)
     complete, sums = checker.kept_of, checker.min_plus
 
-    def kept_of(problem, level, excess, most):
+    def kept_of(rows, level, excess, forests, most):
         def cut(one, other):
             total = sums(one, other)
             return np.where(total > most - excess.bound, np.inf, total)
 
         with monkeypatch.context() as patch:
             patch.setattr(checker, "min_plus", cut)
-            return complete(problem, level, excess, most)
+            return complete(rows, level, excess, forests, most)
 
     monkeypatch.setattr(checker, "kept_of", kept_of)
     assert not keeps_optimum(instance, z, prove_from(instance, z))
@@ -91,12 +96,13 @@ def test_partial_sums_on_rings_that_are_cut_off_lose_the_optimum(monkeypatch):
 
 def test_a_single_pair_of_labels_is_kept_with_its_square():
     # a cross between two labels is rounded to both, so one that may stay keeps all squares that it touches
+    level = checker.CellLevel(3, np.array([False, False]), [np.arange(3), np.arange(3)], [])
     allowed = np.zeros((4, 4), dtype=bool)
     allowed[1, 2] = True
-    assert np.argwhere(checker.spread(allowed, -1)).tolist() == [[0, 1], [0, 2], [1, 1], [1, 2]]
-    square = np.zeros((4, 4), dtype=bool)
+    assert np.argwhere(level.with_corner(allowed, 0, 1)).tolist() == [[0, 1], [0, 2], [1, 1], [1, 2]]
+    square = np.zeros((3, 3), dtype=bool)
     square[1, 2] = True
-    assert np.argwhere(checker.spread(square, 1)).tolist() == [[1, 2], [1, 3], [2, 2], [2, 3]]
+    assert np.argwhere(level.corners_of(square, 0, 1)).tolist() == [[1, 2], [1, 3], [2, 2], [2, 3]]
 
 
 def minimise_by_gurobi(instance):
@@ -154,6 +160,31 @@ def test_a_fan_is_proven_and_its_certificate_read(tmp_path):
     assert np.array_equal(again.field.alpha, proof.field.alpha)
     cf.write_certificate(cf.prove(fan()), tmp_path / "again.npz")
     assert path.read_bytes() == (tmp_path / "again.npz").read_bytes()
+
+
+def test_the_checker_runs_without_crossfield(tmp_path):
+    certificate = tmp_path / "fan.npz"
+    claim = cf.write_certificate(cf.prove(fan()), certificate)
+    for module in (checker, check_certificate):
+        shutil.copy(module.__file__, tmp_path)
+    (tmp_path / "absent").mkdir()
+    (tmp_path / "absent" / "crossfield.py").write_text("raise ImportError\n")
+
+    def run(program, file):
+        command = [sys.executable, tmp_path / program, file]
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path / "absent")}
+        return subprocess.run(command, check=False, capture_output=True, text=True, env=environment)
+
+    done = run("check_orthogonal.py", certificate)
+    assert done.returncode == 0, done.stderr
+    assert f"bound  {claim.bound!r}" in done.stdout
+    assert "optimal: no field has less" in done.stdout
+    done = run("check_certificate.py", certificate)
+    assert (done.returncode, done.stdout.strip()[-25:]) == (2, "; run check_orthogonal.py")
+    forged = pack_arrays(with_head(unpack_archive(certificate.read_bytes()), bound=2 * claim.energy))
+    certificate.write_bytes(forged)
+    done = run("check_orthogonal.py", certificate)
+    assert (done.returncode, done.stdout[:23]) == (1, "refused: bound is claimed"[:23])
 
 
 def test_turned_frames_and_meshes_have_the_same_optimum():
@@ -269,4 +300,4 @@ def test_files_that_are_no_certificate_are_refused(forgeable, tmp_path):
     path.write_bytes(pack_arrays({name: array for name, array in best.items() if name != "centre"}))
     with pytest.raises(InputError, match="centre"):
         cf.read_certificate(path)
-    assert set(unpack_arrays(data)) == set(best)
+    assert set(unpack_archive(data)) == set(best)
