@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ....models.formulations.catalogue import FORMULATIONS
-from ....models.proof import check_certificate
+from ....models.proof import check_certificate, check_orthogonal
 from ....models.storage import read_bytes, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, program_version
@@ -35,7 +35,6 @@ from ..plan.spec import RUNGS, Spec
 from .table import TABLE, table
 
 CHECKER: Final = "check_point.py"
-CERTIFICATES: Final = "check_certificate.py"
 SOLU: Final = "library.solu"
 TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md")
 
@@ -77,8 +76,10 @@ def general_files(
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
     checkers = {CHECKER: standalone_program(Path(check_point.__file__))}
-    if context["certified"]:
-        checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
+    for program, key in ((check_certificate, "certified"), (check_orthogonal, "orthogonal")):
+        if context[key]:
+            path = Path(str(program.__file__))
+            checkers[path.name] = read_bytes(path)
     index = _index_document(spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
     facts = {SOLU: _solu_content(sidecars), TABLE: table(folder, sidecars)}
     return texts | drawings | checkers | facts | {INDEX: document_bytes(index)}
@@ -89,6 +90,9 @@ def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, A
         _rung_facts(name, [sidecar for sidecar in sidecars if sidecar["rung"] == name]) for name in RUNGS
     ]
     written = {file["format"] for sidecar in sidecars for file in sidecar["files"]}
+    certified = {
+        sidecar["rung"] for sidecar in sidecars if any("certificate" in bound for bound in sidecar["bounds"])
+    }
     return {
         "spec": spec,
         "generator": program_version(),
@@ -104,7 +108,8 @@ def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, A
         "formats": [entry for name, entry in FORMATS.items() if name in written],
         "packed": any(file["name"].endswith(".gz") for sidecar in sidecars for file in sidecar["files"]),
         "tightened": sum("tightened" in sidecar for sidecar in sidecars),
-        "certified": any("certificate" in bound for sidecar in sidecars for bound in sidecar["bounds"]),
+        "certified": bool(certified),
+        "orthogonal": any(rung.orthogonal for rung in spec.rungs if rung.name in certified),
         "proven_by": _formulations_by_norm(spec),
         "example": sidecars[0],
     }

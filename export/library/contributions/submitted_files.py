@@ -72,7 +72,7 @@ def kind_of(path: Path) -> FileKind:
 def _is_certificate(data: bytes) -> bool:
     with suppress(InstanceError):
         head = ArrayArchive(data).arrays({"head": ExpectedArray(1, MAX_HEAD, "u")})["head"].tobytes()
-        return check_certificate.FORMAT.encode() in head
+        return any(known.encode() in head for known in check_certificate.CHECKERS)
     return False
 
 
