@@ -320,7 +320,9 @@ def test_a_wrong_file_gets_a_message_and_nothing_is_lost(empty, tmp_path, name, 
     path = tmp_path / name
     path.write_bytes(content)
     find(browser, "#file").send_keys(str(path))
+    place = browser.execute_script(BOX, "#drawing")
     until(browser, lambda _: name in banner(browser))
+    assert browser.execute_script(BOX, "#drawing") == place  # a stroke under the pen does not jump
     assert document(browser) == PEBBLE
 
 
