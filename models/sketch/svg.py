@@ -437,10 +437,11 @@ def _transform(
         element.attrib.pop("transform", None)
         return None
     if origin := style.get("transform-origin", ""):
-        sides = [_SIDES.get(side.lower(), side) for side in origin.split()]
-        if sides[0] in ("top", "bottom") or sides[1:] == ["left"]:
-            sides.reverse()
-        x, y = (_length_of(side, 0.0, whole) for side, whole in zip([*sides, "50%"][:2], size, strict=True))
+        words = [*origin.lower().split(), "center"][:2]
+        if words[0] in ("top", "bottom") or words[1] in ("left", "right"):
+            words.reverse()
+        sides = (_SIDES.get(word, word) for word in words)
+        x, y = (_length_of(side, 0.0, whole) for side, whole in zip(sides, size, strict=True))
         matrix = Matrix.translate(-x, -y) * matrix * Matrix.translate(x, y)
     return matrix
 

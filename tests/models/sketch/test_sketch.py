@@ -127,6 +127,7 @@ SAME_LINE = {
         '<g transform="translate(5 5)"><g transform="scale(2) rotate(90)">'
         f'<path d="M2.5 -2.5L42.5 -42.5" {BLACK}/></g></g>'
     ),
+    "origin": f'<path d="M90 190 10 110" transform="rotate(180)" transform-origin="bottom" {BLACK}/>',
     "use": (
         f'<defs><path id="l" d="M0 0L80 80" {BLACK}/></defs>'
         '<use xlink:href="#l" x="5" y="5" transform="translate(5 5)"/>'
