@@ -15,6 +15,7 @@ MAX_TAGS: Final = 1_000_000  # tags and attributes of a drawing
 MAX_ELEMENTS: Final = 100_000  # elements drawn, counting every repetition by `use`
 MAX_USES: Final = 10_000  # copies made by `use`
 MAX_DEPTH: Final = 50  # elements inside of one another, counting copies; the renderer nests its calls as deep
+MAX_LAYERS: Final = 5000  # clips, masks and opacities, each as a share of the page
 MAX_DATA: Final = 10_000_000  # characters of path data, point lists, styles and transforms of elements
 MAX_CURVES: Final = 500_000  # segments of all shapes, counting every repetition by `use`
 MAX_OUTLINE_SAMPLES: Final = 2_000_000  # samples of the outlines of all shapes that are only filled

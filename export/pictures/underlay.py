@@ -76,14 +76,12 @@ def read_underlay(source: str | Path, *, on: Instance) -> Underlay:
 
 
 def _underlay_of_curves(curves: Curves, data: bytes) -> Underlay:
-    left, top, right, bottom = curves.box
-    x, y, width, height = curves.page or (0.0, 0.0, 0.0, 0.0)
-    if curves.page is None or (right - x > (1 + _EDGE) * width or bottom - y > (1 + _EDGE) * height
-                               or x - left > _EDGE * width or y - top > _EDGE * height):  # fmt: skip
-        left, top = min(left, x), min(top, y)
-        page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
-    else:
-        page = curves.page
+    low, high = np.reshape(curves.box, (2, 2))
+    start, side = np.reshape(curves.page or (0.0, 0.0, 0.0, 0.0), (2, 2))
+    low = np.where(low < start - _EDGE * side, low, start)
+    high = np.where(high > start + (1 + _EDGE) * side, high, start + side)
+    (left, top), (width, height) = low.tolist(), (high - low).tolist()
+    page = (left, top, width, height)
     starts = np.flatnonzero(np.diff(run_numbers(curves.points, curves.curve), prepend=-1))
     runs_by_colour: dict[str, list[Floats]] = {name: [] for name in INK}
     for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):

@@ -27,8 +27,8 @@ ATTRIBUTES: Final = frozenset(
 _COLOURS: Final = frozenset({"stroke", "fill", "color", "stop-color"})
 _KEYWORDS: Final = frozenset({"none", "currentcolor", "inherit", "context-fill", "context-stroke"})
 _INITIAL: Final = {"stroke": "none"}  # black for the others
-_DROPPED: Final = re.compile(r"filter|marker|stroke-dash|font|animation|transition|-")
-"""Beginnings of properties that do not tell which strokes there are: filters, markers, dashes, text."""
+UNSHOWN: Final = re.compile(r"filter|marker|stroke-dash|mix-blend|isolation|font|animation|transition|-")
+"""Beginnings of properties that the pictures of a drawing do without."""
 _UNUSED: Final = re.compile(
     r"(?:clip-path|mask|mask-image):(?!url\(|none|inherit|initial)|transform-box:(?!view-box)"
     r"|(?:rotate|scale|translate|offset-path):(?!none)"
@@ -105,7 +105,7 @@ class Cascade:
         """The values that can be read, colours as #rrggbb or #rrggbbaa."""
         style: dict[str, str] = {}
         for name, text, _ in declared:
-            if _DROPPED.match(name):
+            if UNSHOWN.match(name):
                 continue
             value = _replace_variables(text, variables) if "var(" in text else text.strip()
             if name in _COLOURS:

@@ -21,7 +21,6 @@ import numpy as np
 
 from ..errors import InputError, NoStrokeError, shortened
 from ..input_limits import (
-    LEAST_LENGTH,
     MAX_CURVES,
     MAX_DATA,
     MAX_DEPTH,
@@ -32,18 +31,27 @@ from ..input_limits import (
 )
 from ..instance.angles import transform_vectors
 from ..instance.domain import Floats
-from .cascade import Cascade, background_of, cascade_of
+from .cascade import UNSHOWN, Cascade, background_of, cascade_of
 from .colour import PAPER, is_red
-from .cover import Box
 from .curves import Curves, run_numbers
 from .labels import LabelMatcher, colour_label, labels_of
-from .path_data import SHAPES, length_in_pixels, shape_curves, too_many_curves
+from .path_data import SHAPES, shape_curves, too_many_curves
 from .pen_outlines import find_pen_strokes, find_silhouettes
+from .svg_effort import choose_side
+from .svg_elements import (
+    GROUP,
+    HREFS,
+    SVG,
+    chosen_attributes,
+    length_of,
+    length_of_attribute,
+    name_of,
+    number_of,
+    tag_of,
+)
+from .svg_page import GREATEST, UNPAGED, Page, fit_view, frame_drawing, page_of, view_box, window_around
 from .visible import Seen, Shape, opaque_colour, see_strokes
 
-_GREATEST: Final = 1e9
-_SVG: Final = "{http://www.w3.org/2000/svg}"
-_HREFS: Final = ("href", "{http://www.w3.org/1999/xlink}href")
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
 _INHERITED: Final = (
     "stroke",
@@ -53,29 +61,14 @@ _INHERITED: Final = (
     "stroke-width",
     "stroke-opacity",
     "fill-opacity",
+    "fill-rule",
 )
 _START: Final = {"stroke": "none", "fill": "#000000", "visibility": "visible", "color": "#000000"}
-_GROUP: Final = ("id", "style", "transform")  # attributes of an element that its group keeps
 _MOVES: Final = ("transform", "transform-origin")
 _SERVERS: Final = ("linearGradient", "radialGradient", "pattern")
-_UNPAGED: Final = (0.0, 0.0, 100.0, 100.0)  # the page to which percentages refer where there is none
 _REFERENCE: Final = re.compile(r"url\(\s*['\"]?#([^'\")]*)['\"]?\s*\)\s*(.*)")
 _SIDES: Final = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "bottom": "100%"}
 _WIDEST: Final = 0.05  # greatest width of a filled stroke as a share of the drawing: others are areas
-_OWN_MARGIN: Final = 0.05  # of the drawing, around the picture of a drawing without a page
-
-
-@dataclass(frozen=True)
-class _Page:
-    """The page of a drawing.
-
-    view: its viewBox, or width and height from (0, 0). box: the same in the units of the result, which differ
-    where a page is stretched. window: what of these units is shown.
-    """
-
-    view: Box
-    box: Box
-    window: Box
 
 
 @dataclass(frozen=True)
@@ -101,39 +94,40 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     matcher: matches the labels of curvature lines; None: colours decide.
     """
     root = _parse_xml(data)
-    if _tag(root) != "svg":
+    if tag_of(root) != "svg":
         tag = root.tag.split("}")[-1][:30]
         raise InputError(f"its root element is <{tag}>, not <svg>; expected an SVG drawing")
-    page = _page_of(root)
-    cascade = cascade_of("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
+    page = page_of(root)
+    cascade = cascade_of("".join(element.itertext()) for element in root.iter() if tag_of(element) == "style")
     styles = cascade.declare(root)
     pictures = _list_pictures(styles)
     _paint_background(root, styles, page)
     walk = _ElementWalk(_put_styles(root, styles), cascade.unused, matcher)
-    shapes = _trace_fills(list(walk.shapes(root, page)), page, matcher)
+    painted = list(walk.shapes(root, page))
     unread = (*pictures, *_list_faults(walk.faults), *_list_unread(cascade))
+    shapes = _trace_fills(painted, page, matcher)
     if not sum(len(shape.points) for shape in shapes):
         reason = "; ".join(unread) or "it has no visible path, line or shape; export it again"
         raise NoStrokeError(f"draws no stroke: {reason}")
-    _check_effort(root)
-    window = page.window if page else _window_around(shapes)
-    seen, notes = see_strokes(_framed(root, page, window), window, shapes)
+    window = page.window if page else window_around(painted)
+    side = choose_side(root, window, painted)
+    seen, notes = see_strokes(frame_drawing(root, page, window), window, shapes, side)
     return _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
 
 
-def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page: _Page | None) -> None:
+def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page: Page | None) -> None:
     """Put the background that the style of a drawing declares behind its elements, as browsers do."""
     colour = background_of(styles[root])
     if page is not None and colour is not None:
         sides = {
             key: f"{value!r}" for key, value in zip(("x", "y", "width", "height"), page.view, strict=True)
         }
-        sheet = Element(_SVG + "rect", sides)
+        sheet = Element(SVG + "rect", sides)
         styles[sheet] = {"fill": colour, "stroke": "none"}
         root.insert(0, sheet)
 
 
-def _trace_fills(shapes: list[Shape], page: _Page | None, matcher: LabelMatcher | None) -> list[Shape]:
+def _trace_fills(shapes: list[Shape], page: Page | None, matcher: LabelMatcher | None) -> list[Shape]:
     """The shapes with the centre lines of those that are only filled, and without lines for areas.
 
     Areas show where the body ends if no stroke does: where all strokes are curvature lines, the outlines of
@@ -158,7 +152,7 @@ def _trace_fills(shapes: list[Shape], page: _Page | None, matcher: LabelMatcher 
     return traced
 
 
-def _is_ground(shape: Shape, page: _Page | None) -> bool:
+def _is_ground(shape: Shape, page: Page | None) -> bool:
     """Whether a filled shape is the ground of a drawing: as white as paper, or as large as the page."""
     rgb = opaque_colour(shape.paint[:7])
     opacity = int(shape.paint[7:], 16) / 255 if shape.paint[7:] and not np.isnan(rgb).any() else 1.0
@@ -181,7 +175,7 @@ def _is_curvature_line(shape: Shape, matcher: LabelMatcher | None) -> bool:
 def _join_strokes(
     shapes: Sequence[Shape],
     seen: Sequence[Seen],
-    page: _Page | None,
+    page: Page | None,
     matcher: LabelMatcher | None,
     notes: tuple[str, ...],
 ) -> Curves:
@@ -215,7 +209,7 @@ def _list_pictures(styles: Mapping[Element, Mapping[str, str]]) -> tuple[str, ..
     names = [
         name_of(element)
         for element, style in styles.items()
-        if _tag(element) == "image" and style.get("display") != "none"
+        if tag_of(element) == "image" and style.get("display") != "none"
     ]
     if not names:
         return ()
@@ -249,7 +243,7 @@ def _parse_xml(data: bytes) -> Element:
         raise InputError(f"is not well-formed XML: {error}; save the drawing again") from error
     for element in root.iter():
         if "}" not in element.tag:  # a drawing without a namespace
-            element.tag = _SVG + element.tag
+            element.tag = SVG + element.tag
     return root
 
 
@@ -262,14 +256,14 @@ def _put_styles(root: Element, styles: dict[Element, dict[str, str]]) -> dict[El
             raise InputError(
                 f"has more than {MAX_DATA} characters of paths, styles and transforms; simplify the drawing"
             )
-        for key in ("filter", "stroke-dasharray", "marker-start", "marker-mid", "marker-end", "style"):
-            element.attrib.pop(key, None)
+        for key in [name for name in element.attrib if name == "style" or UNSHOWN.match(name)]:
+            del element.attrib[key]
         style = styles[element]
         element.attrib.update((key, style[key]) for key in _MOVES if key in style)
         if text := ";".join(f"{key}:{value}" for key, value in style.items() if key not in _MOVES):
             element.set("style", text)
         for child in list(element):
-            if _tag(child) in ("style", "script", "filter", "image"):
+            if tag_of(child) in ("style", "script", "filter", "image"):
                 element.remove(child)
     return styles
 
@@ -292,16 +286,16 @@ class _ElementWalk:
     used: int = 0
     curves: int = 0
 
-    def shapes(self, root: Element, page: _Page | None) -> Iterator[Shape]:
+    def shapes(self, root: Element, page: Page | None) -> Iterator[Shape]:
         """Every painted shape in drawing order. Replaces each `use` by a group of what it shows."""
         from svgelements import Matrix
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
-        view, box = (page.view, page.box) if page else (_UNPAGED, _UNPAGED)
+        view, box = (page.view, page.box) if page else (UNPAGED, UNPAGED)
         stack = [_Place(root, _START, Matrix.scale(box[2] / view[2], box[3] / view[3]), view[2:])]
         while stack:
             place = self._apply_style(stack.pop())
-            tag, element = _tag(place.element), place.element
+            tag, element = tag_of(place.element), place.element
             self.visited += 1
             if self.visited > MAX_ELEMENTS:
                 raise InputError(f"draws more than {MAX_ELEMENTS} elements; simplify the drawing")
@@ -309,7 +303,7 @@ class _ElementWalk:
                 raise InputError(
                     f"has elements nested more than {MAX_DEPTH} deep, counting <use>; ungroup them"
                 )
-            if place.style.get("display") == "none" or _number(place.style.get("opacity")) == 0:
+            if place.style.get("display") == "none" or number_of(place.style.get("opacity")) == 0:
                 continue
             if tag in SHAPES:
                 yield from self._painted_shape(place, named)
@@ -335,7 +329,7 @@ class _ElementWalk:
             terms = (getattr(transform, key) for key in "abcdef")
             element.set("transform", f"matrix({' '.join(f'{term:.12g}' for term in terms)})")
             element.attrib.pop("transform-origin", None)
-        taken = self.matcher is not None and self.matcher.matches(labels_of(_tag(element), element.attrib))
+        taken = self.matcher is not None and self.matcher.matches(labels_of(tag_of(element), element.attrib))
         return replace(place, style=style, matrix=matrix, chosen=taken or place.chosen)
 
     def _expand_use(self, place: _Place, named: Mapping[str, Element]) -> _Place:
@@ -344,11 +338,14 @@ class _ElementWalk:
         if self.used > MAX_USES:
             raise InputError(f"draws more than {MAX_USES} <use> elements; expand them in the drawing program")
         element, style = place.element, self.styles[place.element]
-        link = next((element.get(key, "") for key in _HREFS if key in element.attrib), "")
-        moves = [_length(element, key, 0.0, side) for key, side in zip(("x", "y"), place.size, strict=True)]
-        sides, kept = (_chosen_attributes(element, keys) for keys in (("width", "height"), _GROUP))
+        link = next((element.get(key, "") for key in HREFS if key in element.attrib), "")
+        moves = [
+            length_of_attribute(element, key, 0.0, side)
+            for key, side in zip(("x", "y"), place.size, strict=True)
+        ]
+        sides, kept = (chosen_attributes(element, keys) for keys in (("width", "height"), GROUP))
         element.clear()
-        element.tag, element.attrib = _SVG + "g", kept
+        element.tag, element.attrib = SVG + "g", kept
         target = named.get(link[1:]) if link.startswith("#") else None
         if target is None or link in place.links:
             return place
@@ -356,10 +353,10 @@ class _ElementWalk:
         self.styles.update(
             (new, self.styles[old]) for new, old in zip(copy.iter(), target.iter(), strict=True)
         )
-        if _tag(target) in ("symbol", "svg"):
-            copy.tag = _SVG + "svg"
+        if tag_of(target) in ("symbol", "svg"):
+            copy.tag = SVG + "svg"
             copy.attrib = {"width": "100%", "height": "100%"} | copy.attrib | sides
-        moved = SubElement(element, _SVG + "g", {"transform": f"translate({moves[0]!r} {moves[1]!r})"})
+        moved = SubElement(element, SVG + "g", {"transform": f"translate({moves[0]!r} {moves[1]!r})"})
         self.styles[moved] = {}
         moved.append(copy)
         self.styles[element] = style
@@ -372,7 +369,7 @@ class _ElementWalk:
         if style["visibility"] in ("hidden", "collapse") or not (stroke or fill):
             return
         scale = float(np.sqrt(abs(place.matrix.determinant)))
-        width = _length_of(style.get("stroke-width", "1"), 1.0, float(np.hypot(*place.size) / np.sqrt(2)))
+        width = length_of(style.get("stroke-width", "1"), 1.0, float(np.hypot(*place.size) / np.sqrt(2)))
         fixed = style.get("vector-effect") == "non-scaling-stroke"
         yield Shape(
             place.element,
@@ -389,7 +386,7 @@ class _ElementWalk:
 
     def _place_shape(self, place: _Place) -> Floats:
         """Control points (k, 4, 2) of a shape in the units of the result."""
-        attributes, tag = place.element.attrib, _tag(place.element)
+        attributes, tag = place.element.attrib, tag_of(place.element)
         key = (
             tag,
             place.size,
@@ -406,9 +403,9 @@ class _ElementWalk:
         with np.errstate(over="ignore", invalid="ignore"):
             turn, shift = np.array([[m.a, m.c], [m.b, m.d]], dtype=float), np.array([m.e, m.f], dtype=float)
             placed: Floats = transform_vectors(points, turn) + shift
-        if not (np.abs(placed) <= _GREATEST).all():
+        if not (np.abs(placed) <= GREATEST).all():
             self.faults.append(
-                f"{name_of(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"
+                f"{name_of(place.element)}: a coordinate is not a finite number below {GREATEST:g}"
             )
             return placed[:0]
         return np.asarray(placed[(placed != placed[:, :1]).any(axis=(1, 2))])
@@ -441,7 +438,7 @@ def _transform(
         if words[0] in ("top", "bottom") or words[1] in ("left", "right"):
             words.reverse()
         sides = (_SIDES.get(word, word) for word in words)
-        x, y = (_length_of(side, 0.0, whole) for side, whole in zip(sides, size, strict=True))
+        x, y = (length_of(side, 0.0, whole) for side, whole in zip(sides, size, strict=True))
         matrix = Matrix.translate(-x, -y) * matrix * Matrix.translate(x, y)
     return matrix
 
@@ -449,12 +446,12 @@ def _transform(
 def _paint(style: Mapping[str, str], kind: str, named: Mapping[str, Element]) -> str | None:
     """The stroke or fill as #rrggbb, #rrggbbaa or url(#id); None if it paints nothing."""
     widths = ("stroke-opacity", "stroke-width") if kind == "stroke" else ("fill-opacity",)
-    if any(_number(style.get(name)) == 0 for name in widths):
+    if any(number_of(style.get(name)) == 0 for name in widths):
         return None
     paint = style[kind]
     if reference := _REFERENCE.match(paint):
         server = named.get(reference[1])
-        if server is not None and _tag(server) in _SERVERS:
+        if server is not None and tag_of(server) in _SERVERS:
             return f"url(#{reference[1]})"
         paint = reference[2] or "none"
     paint = style["color"] if paint == "currentColor" else paint
@@ -467,154 +464,15 @@ def _inner_view(place: _Place) -> _Place:
     from svgelements import Matrix
 
     element = place.element
-    x, y = (_length(element, key, 0.0, side) for key, side in zip("xy", place.size, strict=True))
+    x, y = (length_of_attribute(element, key, 0.0, side) for key, side in zip("xy", place.size, strict=True))
     wide, high = (
-        _length(element, key, side, side) for key, side in zip(("width", "height"), place.size, strict=True)
+        length_of_attribute(element, key, side, side)
+        for key, side in zip(("width", "height"), place.size, strict=True)
     )
-    view = _view_box(element)
+    view = view_box(element)
     if view is None:
         return replace(place, matrix=Matrix.translate(x, y) * place.matrix, size=(wide, high))
-    across, down, right, below = _fit_view(view, wide, high, element.get("preserveAspectRatio", ""))
+    across, down, right, below = fit_view(view, wide, high, element.get("preserveAspectRatio", ""))
     matrix = Matrix.translate(-view[0], -view[1]) * Matrix.scale(across, down)
     matrix *= Matrix.translate(x + right, y + below) * place.matrix
     return replace(place, matrix=matrix, size=view[2:])
-
-
-def _fit_view(view: Box, wide: float, high: float, rule: str) -> tuple[float, float, float, float]:
-    """Scales across and down, and shifts, that fit a viewBox into a width and height; rule: its aspect."""
-    across, down = wide / view[2], high / view[3]
-    if rule.strip().startswith("none"):
-        return across, down, 0.0, 0.0
-    scale = max(across, down) if "slice" in rule else min(across, down)
-    shares = [
-        next((share for word, share in (("Min", 0.0), ("Max", 1.0)) if axis + word in rule), 0.5)
-        for axis in ("x", "Y")
-    ]
-    return scale, scale, shares[0] * (wide - scale * view[2]), shares[1] * (high - scale * view[3])
-
-
-def _page_of(root: Element) -> _Page | None:
-    """The page of a drawing; None if it states neither a viewBox nor a width and height."""
-    view = _view_box(root)
-    wide, high = (_length(root, key, 0.0) for key in ("width", "height"))
-    has_size = min(wide, high) >= LEAST_LENGTH
-    if view is None:
-        box = (0.0, 0.0, wide, high)
-        return _Page(box, box, box) if has_size else None
-    if not has_size:
-        return _Page(view, view, view)
-    across, down, right, below = _fit_view(view, wide, high, root.get("preserveAspectRatio", ""))
-    stretch = down / across
-    box = (view[0], view[1] * stretch, view[2], view[3] * stretch)
-    window = (box[0] - right / across, box[1] - below / across, wide / across, high / across)
-    return _Page(view, box, window)
-
-
-def _window_around(shapes: Sequence[Shape]) -> Box:
-    """The box of all shapes with a margin, for a drawing without a page."""
-    corners = np.concatenate([shape.points.reshape(-1, 2) for shape in shapes])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    margin = _OWN_MARGIN * max(float((high - low).max()), LEAST_LENGTH)
-    (left, top), (wide, tall) = (low - margin).tolist(), (high - low + 2 * margin).tolist()
-    return left, top, wide, tall
-
-
-def _framed(root: Element, page: _Page | None, window: Box) -> Element:
-    """The drawing inside a root whose viewBox is the window."""
-    view, box = (page.view, page.box) if page else (_UNPAGED, _UNPAGED)
-    frame = Element(_SVG + "svg", {"viewBox": _join(window), "preserveAspectRatio": "none"})
-    sides = {key: f"{value!r}" for key, value in zip(("x", "y", "width", "height"), box, strict=True)}
-    inner = SubElement(
-        frame,
-        _SVG + "svg",
-        {**sides, "viewBox": _join(view), "preserveAspectRatio": "none", "overflow": "visible"},
-    )
-    SubElement(inner, _SVG + "g", _chosen_attributes(root, _GROUP)).extend(list(root))
-    return frame
-
-
-def _chosen_attributes(element: Element, names: Sequence[str]) -> dict[str, str]:
-    return {name: element.attrib[name] for name in names if name in element.attrib}
-
-
-def _join(box: Box) -> str:
-    return " ".join(f"{value!r}" for value in box)
-
-
-def _check_effort(root: Element) -> None:
-    """Raise InputError if clips, masks and patterns draw too many elements, or nest them too deep."""
-    named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
-    efforts: dict[Element, tuple[int, int]] = {}
-    stack, around = [(root, False)], set[Element]()
-    while stack:
-        element, is_left = stack.pop()
-        inner = [*element, *_drawn_references(element, named)]
-        if is_left:
-            around.discard(element)
-            known = [efforts[part] for part in inner if part in efforts]
-            count, depth = 1 + sum(one for one, _ in known), 1 + max((deep for _, deep in known), default=0)
-            if count > MAX_ELEMENTS or depth > 2 * MAX_DEPTH:
-                raise InputError(
-                    f"draws more than {MAX_ELEMENTS} elements, or more than {2 * MAX_DEPTH} inside of one "
-                    "another, by its clips, masks and patterns; flatten it in the drawing program"
-                )
-            efforts[element] = count, depth
-        elif element not in efforts and element not in around:
-            around.add(element)
-            stack += [(element, True), *((part, False) for part in inner)]
-
-
-def _drawn_references(element: Element, named: Mapping[str, Element]) -> Iterator[Element]:
-    """The clips, masks, patterns and copies that an element draws."""
-    texts = [element.get(key, "") for key in ("style", "clip-path", "mask", "fill", "stroke")]
-    if _tag(element) == "use":
-        texts += [f"url({element.get(key, '')})" for key in _HREFS]
-    for text in texts:
-        for name in re.findall(r"url\(\s*['\"]?#([^'\")]*)", text) if "url(" in text else ():
-            target = named.get(name)
-            if target is not None and not _tag(target).endswith("Gradient"):
-                yield target
-
-
-def _view_box(element: Element) -> Box | None:
-    fields = re.split(r"[\s,]+", element.get("viewBox", "").strip())
-    if fields == [""]:
-        return None
-    try:
-        x, y, width, height = (float(field) for field in fields)
-    except ValueError as error:
-        raise InputError(
-            f"{name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} is not four numbers"
-        ) from error
-    if not (np.abs([x, y, width, height]) <= _GREATEST).all() or min(width, height) < LEAST_LENGTH:
-        raise InputError(f"{name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} has no area")
-    return x, y, width, height
-
-
-def _length(element: Element, key: str, default: float, whole: float | None = None) -> float:
-    """A length in CSS pixels, a percentage of `whole`; `default` when it is missing or unreadable."""
-    return _length_of(element.get(key, ""), default, whole)
-
-
-def _length_of(text: str, default: float, whole: float | None) -> float:
-    if text.endswith("%") and whole is not None:
-        return whole * _number(text) / 100
-    pixels = length_in_pixels(text)
-    return default if pixels is None else pixels
-
-
-def _number(text: str | None) -> float:
-    """The number at the start of a style value; 1 without one."""
-    match = re.match(r"[+-]?(?:\d+\.?\d*|\.\d+)", text or "")
-    return float(match[0]) if match else 1.0
-
-
-def _tag(element: Element) -> str:
-    """The tag of an SVG element without its namespace; empty for elements of other languages."""
-    return element.tag.removeprefix(_SVG) if element.tag.startswith(_SVG) else ""
-
-
-def name_of(element: Element) -> str:
-    """An element as a message names it."""
-    name = element.get("id")
-    return f"<{_tag(element)}" + (f' id="{name[:40]}">' if name else ">")

@@ -91,12 +91,17 @@ class _Samples:
     length: Floats
 
 
-def see_strokes(root: Element, window: Box, shapes: Sequence[Shape]) -> tuple[list[Seen], tuple[str, ...]]:
+def see_strokes(
+    root: Element, window: Box, shapes: Sequence[Shape], side: int = SIDE
+) -> tuple[list[Seen], tuple[str, ...]]:
     """What is seen of each shape, and notes on what is left out. Raises InputError.
 
     root: the drawing, whose viewBox is the window; its shapes get other styles. window: x, y, width, height.
+    side: pixels on the longer side of the pictures.
     """
-    pixel = max(window[2:]) / SIDE
+    pixel = max(window[2:]) / side
+    wide, high = (max(1, round(length / pixel)) for length in window[2:])
+    root.attrib.update(width=str(wide), height=str(high))
     samples = _sample_lines(shapes, window, pixel)
     styles = [shape.element.get("style", "") for shape in shapes]
     for shape, style in zip(shapes, styles, strict=True):
@@ -146,10 +151,6 @@ def _render(root: Element) -> NDArray[np.uint8]:
     import resvg_py
     from PIL import Image
 
-    _, _, width, height = (float(number) for number in root.get("viewBox", "").split())
-    scale = SIDE / max(width, height)
-    wide, high = (max(1, round(scale * side)) for side in (width, height))
-    root.attrib.update(width=str(wide), height=str(high))
     try:
         data = resvg_py.svg_to_bytes(
             svg_string=tostring(root, encoding="unicode"),

@@ -46,7 +46,7 @@ COSTLY_SVG = {
         + "".join(f'<path class="c{k}" d="M5 5 L{k % 55} 35"/>' for k in range(5000))
     ).encode(),
     "rules of one class": SVG.format(
-        "<style>" + "".join(f".c.d{k}{{stroke:red}}" for k in range(5000)) + "</style>"
+        "<style>" + "".join(f".d{k}.c{{stroke:red}}" for k in range(5000)) + "</style>"
         + "".join(f'<path class="c e{k}" d="M5 5 L{k % 55} 35"/>' for k in range(5000))
     ).encode(),
     "closed subpaths": drawn('<path stroke="black" d="M5 5' + "L3 4z" * 20_000 + '"/>'),
@@ -54,6 +54,27 @@ COSTLY_SVG = {
     "a colour of digits": drawn('<path stroke="rgb(' + "1" * 50_000 + '" d="M5 5L9 9"/>'),
     "a transform that never closes": drawn(
         '<path stroke="black" transform="' + "translate(" * 40_000 + '" d="M5 5L9 9"/>'
+    ),
+    "opacities of pages": drawn(f'<g opacity=".5">{STROKES}</g>', 20_000),
+    "masks of many": drawn(
+        '<mask id="m">' + '<rect width="60" height="40" fill="white"/>' * 200 + "</mask>"
+        + f'<g mask="url(#m)">{STROKES}</g>' * 900
+    ),
+    "masks of uses of uses": drawn(
+        f'<mask id="m"><g id="a0">{STROKES}</g>'
+        + "".join(f'<g id="a{k + 1}"><use href="#a{k}"/><use href="#a{k}"/></g>' for k in range(40))
+        + f'</mask><g mask="url(#m)">{STROKES}</g>'
+    ),
+    "a mask of itself": drawn(
+        f'<mask id="m"><g mask="url(#m)">{STROKES}</g></mask>{STROKES}<g mask="url(#m)">{STROKES}</g>'
+    ),
+    "selectors of many ancestors": SVG.format(
+        "<style>" + "".join(f"g g g g g path.c{k % 7}{{stroke:red}}" for k in range(2000)) + "</style>"
+        + "<g>" * 40 + '<path class="c0 c1 c2" d="M5 5 L50 35"/>' * 2000 + "</g>" * 40
+    ).encode(),
+    "variables of variables": styled(
+        "svg{" + "".join(f"--a{k + 1}:var(--a{k})var(--a{k});" for k in range(40)) + "--a0:red}"
+        + "path{stroke:var(--a40)}"
     ),
     "uses of uses": SVG.format(
         f'<g id="a0">{STROKES}</g>'
@@ -144,8 +165,11 @@ def test_costly_drawings_are_read_or_refused_in_little_time(tmp_path):
     refused = {name: message for name, message in zip(COSTLY_SVG, messages, strict=True) if message}
     assert set(refused) == {
         "rules of one class", "a point list without blanks", "a colour of digits",
-        "a transform that never closes", "uses of uses",
+        "a transform that never closes", "uses of uses", "opacities of pages", "masks of many",
+        "masks of uses of uses", "selectors of many ancestors",
     }  # fmt: skip
+    assert f"more than {input_limits.MAX_LAYERS} clips" in refused["opacities of pages"]
+    assert f"more than {input_limits.MAX_ELEMENTS} elements" in refused["masks of uses of uses"]
     assert f"nested more than {input_limits.MAX_DEPTH} deep" in refused["uses of uses"]
     assert f"more than {input_limits.MAX_RULE_CHECKS} comparisons" in refused["rules of one class"]
     assert f"more than {input_limits.MAX_TRANSFORM} characters" in refused["a transform that never closes"]

@@ -1,0 +1,109 @@
+"""The page of an SVG drawing: its units, and what of them is shown."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from ..errors import InputError
+from ..input_limits import LEAST_LENGTH
+from .cover import Box
+from .svg_elements import GROUP, SVG, chosen_attributes, length_of_attribute, name_of
+from .visible import Shape
+
+GREATEST: Final = 1e9
+"""Greatest coordinate."""
+UNPAGED: Final = (0.0, 0.0, 100.0, 100.0)
+"""The page to which percentages refer where there is none."""
+_OWN_MARGIN: Final = 0.05  # of the drawing, around the picture of a drawing without a page
+
+
+@dataclass(frozen=True)
+class Page:
+    """The page of a drawing.
+
+    view: its viewBox, or width and height from (0, 0). box: the same in the units of the result, which differ
+    where a page is stretched. window: what of these units is shown.
+    """
+
+    view: Box
+    box: Box
+    window: Box
+
+
+def page_of(root: Element) -> Page | None:
+    """The page of a drawing; None if it states neither a viewBox nor a width and height."""
+    view = view_box(root)
+    wide, high = (length_of_attribute(root, key, 0.0) for key in ("width", "height"))
+    has_size = min(wide, high) >= LEAST_LENGTH
+    if view is None:
+        box = (0.0, 0.0, wide, high)
+        return Page(box, box, box) if has_size else None
+    if not has_size:
+        return Page(view, view, view)
+    across, down, right, below = fit_view(view, wide, high, root.get("preserveAspectRatio", ""))
+    stretch = down / across
+    box = (view[0], view[1] * stretch, view[2], view[3] * stretch)
+    window = (box[0] - right / across, box[1] - below / across, wide / across, high / across)
+    return Page(view, box, window)
+
+
+def window_around(shapes: Sequence[Shape]) -> Box:
+    """The box of all shapes with a margin, for a drawing without a page."""
+    corners = np.concatenate([shape.points.reshape(-1, 2) for shape in shapes])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    margin = _OWN_MARGIN * max(float((high - low).max()), LEAST_LENGTH)
+    (left, top), (wide, tall) = (low - margin).tolist(), (high - low + 2 * margin).tolist()
+    return left, top, wide, tall
+
+
+def frame_drawing(root: Element, page: Page | None, window: Box) -> Element:
+    """The drawing inside a root whose viewBox is the window."""
+    view, box = (page.view, page.box) if page else (UNPAGED, UNPAGED)
+    frame = Element(SVG + "svg", {"viewBox": _join(window), "preserveAspectRatio": "none"})
+    sides = {key: f"{value!r}" for key, value in zip(("x", "y", "width", "height"), box, strict=True)}
+    inner = SubElement(
+        frame,
+        SVG + "svg",
+        {**sides, "viewBox": _join(view), "preserveAspectRatio": "none", "overflow": "visible"},
+    )
+    SubElement(inner, SVG + "g", chosen_attributes(root, GROUP)).extend(list(root))
+    return frame
+
+
+def fit_view(view: Box, wide: float, high: float, rule: str) -> tuple[float, float, float, float]:
+    """Scales across and down, and shifts, that fit a viewBox into a width and height; rule: its aspect."""
+    across, down = wide / view[2], high / view[3]
+    if rule.strip().startswith("none"):
+        return across, down, 0.0, 0.0
+    scale = max(across, down) if "slice" in rule else min(across, down)
+    shares = [
+        next((share for word, share in (("Min", 0.0), ("Max", 1.0)) if axis + word in rule), 0.5)
+        for axis in ("x", "Y")
+    ]
+    return scale, scale, shares[0] * (wide - scale * view[2]), shares[1] * (high - scale * view[3])
+
+
+def view_box(element: Element) -> Box | None:
+    """The viewBox of an element, None without one. Raises InputError for one without an area."""
+    fields = re.split(r"[\s,]+", element.get("viewBox", "").strip())
+    if fields == [""]:
+        return None
+    try:
+        x, y, width, height = (float(field) for field in fields)
+    except ValueError as error:
+        raise InputError(
+            f"{name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} is not four numbers"
+        ) from error
+    if not (np.abs([x, y, width, height]) <= GREATEST).all() or min(width, height) < LEAST_LENGTH:
+        raise InputError(f"{name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} has no area")
+    return x, y, width, height
+
+
+def _join(box: Box) -> str:
+    return " ".join(f"{value!r}" for value in box)
