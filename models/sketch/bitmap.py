@@ -1,6 +1,6 @@
 """Reader of bitmaps: ink on paper, and stroke directions by a structure tensor.
 
-The paper may have any colour lighter than the strokes, and any light on it. Directions are found at the
+The paper may have any colour and any light on it, and may lie on a table. Directions are found at the
 picture's own resolution and then averaged over grid pixels by the double angle, weighted by darkness and
 coherence, so that junctions and corners drop out (docs/mathematics.md, 1).
 """
@@ -22,18 +22,13 @@ from ..input_limits import MAX_PIXELS, MAX_SIDE
 from ..instance.domain import Bools, Floats
 from .colour import REDDISH, ink_of, redness
 from .cover import Box, Cover, Covers, Frame, block_means
-
-Ink = NDArray[np.float32]
+from .paper import Ink, reduce_pixels, relative_to_paper
+from .sheet import SIDE, Sheet, find_sheet
 
 FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
 """Formats that Pillow decodes by itself, without starting other programs."""
 _ENOUGH: Final = 8  # picture pixels per grid pixel; finer pictures are reduced by whole factors
 _WORKING_SIDE: Final = 2048
-_DARKEST_PAPER: Final = 64.0  # of 255
-_LIGHT_SIDE: Final = 256  # blocks on the longer side in which the light on the paper is found
-_SHADOW: Final = 0.1  # of the longer side: darker and wider regions are shadows, not ink
-_DARKEST_SHADOW: Final = 0.25  # of the paper's level: darker and wide regions are solid ink after all
-_EVEN: Final = 1.05  # light that differs by less counts as even, and the picture is not changed
 _MOST_INK: Final = 0.5  # of the picture; strokes leave more paper
 _FAINTEST: Final = 0.08  # contrast below which a picture is empty paper
 _NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and compression, above it full
@@ -42,7 +37,14 @@ _BAND: Final = 1 << 20  # pixels of a picture that are processed together
 _BLUR: Final = 1.0  # pixels, of the gradient
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
 _INK: Final = 0.3  # least ink of a pixel that belongs to a stroke
-_COLOUR_SHARE: Final = 0.03  # of all ink, for red and for other strokes, before the two are separated
+_FAINT: Final = 0.85  # of the ink of other strokes: fainter red ones count as much as they do
+_RICH: Final = 0.6  # redness of the reddest strokes of a picture whose colours are whole
+_PALE: Final = 0.5  # of the redness of the reddest strokes: in other pictures, paler ones are red, too
+_PALEST: Final = 0.15  # part of the ink that must be red even if no stroke is redder
+_THIN: Final = 0.7  # of the width of all strokes: a pen that is thinner has a width of its own
+_RIM: Final = 3  # pixels beside strokes of another colour that say nothing of colours
+_SHORTEST: Final = 0.03  # of the longer side of the drawing: length of what is a stroke and no speck
+_LEAST_LENGTH: Final = 0.1  # of that side: of red strokes, and of others, that are meant to be told apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +53,8 @@ class Bitmap:
 
     ink: [h, w], 0 for paper to 1 for ink as dark as the strokes. red: [h, w] in [0, 1], the part of the ink
     that is red. pixels: uint8 [h, w, 1 or 3], the picture on white. reduction: pixels of the file per pixel
-    of these arrays in each direction. width, height: in pixels of the file. notes: what was left out or
-    changed while reading, one line each.
+    of these arrays in each direction. width, height: in pixels of the file. sheet: the sheet in a photograph;
+    all else then refers to the straightened sheet.
     """
 
     ink: Ink
@@ -61,7 +63,12 @@ class Bitmap:
     reduction: int
     width: int
     height: int
-    notes: tuple[str, ...] = ()
+    sheet: Sheet | None = None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was changed while reading, one line each."""
+        return () if self.sheet is None else (self.sheet.describe(),)
 
     @property
     def page(self) -> Box:
@@ -78,34 +85,58 @@ class Bitmap:
 
     @cached_property
     def stroke_width(self) -> float:
-        """Typical width of a stroke in pixels of the arrays, at least 1: twice area over length of edges."""
-        down, right = np.diff(self.ink, axis=0) ** 2, np.diff(self.ink, axis=1) ** 2
-        # The mean over both sides of a 2 x 2 block is equal for every orientation of the picture.
-        edges = float(np.sqrt((down[:, :-1] + down[:, 1:] + right[:-1] + right[1:]) / 2).sum())
-        return max(1.0, 2 * float(self.ink.sum()) / edges) if edges > 0 else 1.0
+        """Typical width of a stroke in pixels of the arrays, at least 1."""
+        return measure_width(self.ink)
+
+    @cached_property
+    def has_two_colours(self) -> bool:
+        """Whether red strokes and other strokes are both long enough to be meant."""
+        from scipy import ndimage
+
+        left, top, right, bottom = self.box
+        longer = max(right - left, bottom - top) / self.reduction
+        is_red, is_ink = self.red > 0.5, self.ink > _INK
+        if not _LEAST_LENGTH * longer <= (is_red & is_ink).sum():
+            return False
+        for colour in (is_red, ~is_red):
+            # The rim of a stroke often looks as if it had another colour.
+            beside = ndimage.maximum_filter(is_ink & ~colour, 2 * _RIM + 1)
+            label, _ = ndimage.label(is_ink & colour & ~beside, np.ones((3, 3)))
+            sides = [[part.stop - part.start for part in place] for place in ndimage.find_objects(label)]
+            length = np.hypot(*np.array(sides, dtype=float).reshape(-1, 2).T) / longer
+            if length[length > _SHORTEST].sum() < _LEAST_LENGTH:
+                return False
+        return True
 
     def covers(self, frame: Frame) -> Covers:
         """The covers by curvature lines and by other strokes, separated where red and others occur."""
         width = self.stroke_width * self.reduction / frame.pixel
-        red = self.ink * self.red
-        share = float(red.sum() / self.ink.sum())
-        if _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
-            black = self.ink * (1 - self.red)
-            return Covers(
-                self._cover_by_ink(red, frame, width), self._cover_by_ink(black, frame, width), width
-            )
+        if self.has_two_colours:
+            red, black = self.ink * self.red, self.ink * (1 - self.red)
+            return Covers(self._cover_by_ink(red, frame), self._cover_by_ink(black, frame), width)
         nothing = Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
-        return Covers(self._cover_by_ink(self.ink, frame, width), nothing, width)
+        return Covers(self._cover_by_ink(self.ink, frame), nothing, width)
 
-    def _cover_by_ink(self, ink: Ink, frame: Frame, width: float) -> Cover:
+    def _cover_by_ink(self, ink: Ink, frame: Frame) -> Cover:
+        # A thin pen beside a bold one counts by the length of its strokes.
+        width = self.stroke_width if ink is self.ink else measure_width(ink)
+        width = width if width < _THIN * self.stroke_width else self.stroke_width
         rows, columns = (edges / self.reduction for edges in frame.edges)
-        tangent = stroke_directions(ink, self.stroke_width)
+        tangent = stroke_directions(ink, width)
         dark = block_means(ink, rows, columns)
         direction = (
             block_means(ink[..., None] * tangent, rows, columns) / np.where(dark > 0, dark, 1)[..., None]
         )
         # A stroke straight across a grid pixel darkens a part width / pixel of it.
-        return Cover(dark / min(1.0, width), direction)
+        return Cover(dark / min(1.0, width * self.reduction / frame.pixel), direction)
+
+
+def measure_width(ink: Ink) -> float:
+    """Typical width of strokes in pixels, at least 1: twice area over length of edges."""
+    down, right = np.diff(ink, axis=0) ** 2, np.diff(ink, axis=1) ** 2
+    # The mean over both sides of a 2 x 2 block is equal for every orientation of the picture.
+    edges = float(np.sqrt((down[:, :-1] + down[:, 1:] + right[:-1] + right[1:]) / 2).sum())
+    return max(1.0, 2 * float(ink.sum()) / edges) if edges > 0 else 1.0
 
 
 def stroke_directions(ink: Ink, width: float) -> Ink:
@@ -130,26 +161,41 @@ def read_bitmap(data: bytes, size: int) -> Bitmap:
     """The ink of a bitmap, fine enough for a grid of `size` pixels. Raises InputError for other content."""
     image = _open_image(data)
     width, height = image.size
+    # The sheet must not depend on the size, so that all grids are on one page.
+    factor = -(-max(width, height) // SIDE)
+    sheet = find_sheet(_reduce_image(image, factor), factor, image.size)
     reduction = max(1, max(width, height) // max(_WORKING_SIDE, _ENOUGH * size))
-    pixels = np.concatenate([_reduce(band, reduction) for band in _split_into_bands(image, reduction)])
+    pixels = _reduce_image(image, reduction)
     del image  # the file's pixels take the most memory at any time
-    rgb = _relative_to_paper(pixels)
+    if sheet is not None:
+        pixels = sheet.cut_out(pixels, reduction)
+        width, height = sheet.size or (width, height)
+    rgb = relative_to_paper(pixels)
     raw = ink_of(rgb)
     strongest = float(raw.max())
     if strongest < _FAINTEST:
-        raise InputError("shows no stroke: it is paper all over; expected dark strokes on lighter paper")
-    level = float(np.median(raw[raw > strongest / 2]))
+        raise InputError(
+            "shows no stroke: it is paper all over; expected strokes that are darker or lighter than it"
+        )
+    red = _find_red(rgb, raw)
+    level = _typical_ink(raw)
+    # A pen of another colour, or a thinner one, is fainter.
+    red_level = _typical_ink(raw[red])
+    if _FAINTEST < red_level < _FAINT * level:
+        raw = np.where(red, raw * (level / red_level), raw)
     ink = np.clip((raw / level - _NOISE) / (_FULL - _NOISE), 0, 1).astype(np.float32)
     ink[_find_specks(ink)] = 0
     if not (ink > _INK).any():
-        raise InputError("shows no stroke but a few specks; expected dark strokes on lighter paper")
+        raise InputError(
+            "shows no stroke but a few specks; expected strokes that are darker or lighter than the paper"
+        )
     covered = float((ink > 0.5).mean())
     if covered >= _MOST_INK:
         raise InputError(
             f"shows ink on {covered:.0%} of the paper, and strokes would leave most of it bare; "
             "crop it to the drawing, take the picture in brighter light, or thin the strokes"
         )
-    return Bitmap(ink, _find_red(rgb, raw), pixels, reduction, width, height)
+    return Bitmap(ink, red.astype(np.float32), pixels, reduction, width, height, sheet)
 
 
 def read_white_pixels(data: bytes) -> Bools:
@@ -217,56 +263,9 @@ def _as_eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
     return pixels[..., None] if pixels.ndim == 2 else pixels
 
 
-def _reduce(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
-    """The means over blocks of that many rows and columns."""
-    from PIL import Image
-
-    if factor == 1:
-        return pixels
-    channels = pixels.shape[-1]
-    small = Image.fromarray(pixels if channels == 3 else pixels[..., 0]).reduce(factor)
-    return np.asarray(small).reshape(small.height, small.width, channels)
-
-
-def _relative_to_paper(pixels: NDArray[np.uint8]) -> Floats:
-    """Colours [h, w, 1 or 3] relative to the paper, in [0, 1]."""
-    # At least a quarter of a drawing is bare paper, so the upper quartile is a level of the paper.
-    paper = np.percentile(pixels.reshape(-1, pixels.shape[-1]), 75, axis=0).astype(np.float32)
-    if paper.max() < _DARKEST_PAPER:
-        raise InputError("is dark all over; expected dark strokes on lighter paper, invert the picture")
-    colours: Floats = pixels.astype(np.float32)
-    colours /= np.maximum(paper, 1)
-    light = _estimate_light(colours)
-    if max(float(light.max()), 1 / float(light.min())) > _EVEN:
-        colours /= light[..., None]
-    return np.minimum(colours, 1, out=colours)
-
-
-def _estimate_light(colours: Floats) -> Ink:
-    """The light on the paper [h, w], 1 where it equals the light of the whole picture."""
-    from scipy import ndimage
-
-    # A grey closing lets lighter surroundings cover darker regions narrower than _SHADOW, in linear time. So
-    # strokes vanish, and shadows stay, whether gradual or sharp. Means over blocks remove noise first.
-    height, width = colours.shape[:2]
-    block = max(1, max(height, width) // _LIGHT_SIDE)
-    rows, columns = (np.append(np.arange(0, side, block), side) for side in (height, width))
-    coarse = block_means(colours.mean(axis=-1), rows, columns)
-    closed = ndimage.grey_closing(coarse, size=int(_SHADOW * max(coarse.shape)) | 1, mode="nearest")
-    smooth = ndimage.gaussian_filter(np.maximum(closed, _DARKEST_SHADOW), 1.0, mode="nearest")
-    places = [
-        np.interp(np.arange(side) + 0.5, (edges[:-1] + edges[1:]) / 2, np.arange(len(edges) - 1.0))
-        for side, edges in ((height, rows), (width, columns))
-    ]
-    return _interpolate_rows(_interpolate_rows(smooth.astype(np.float32), places[0]).T, places[1]).T
-
-
-def _interpolate_rows(rows: Ink, place: Floats) -> Ink:
-    """Rows at fractional places, interpolated linearly between the rows of an array."""
-    below = np.minimum(place.astype(np.intp), max(len(rows) - 2, 0))
-    above = np.minimum(below + 1, len(rows) - 1)
-    part = (place - below).astype(np.float32)[:, None]
-    return np.asarray(rows[below] * (1 - part) + rows[above] * part)
+def _reduce_image(image: Any, factor: int) -> NDArray[np.uint8]:
+    """The picture as uint8 [h, w, 1 or 3], reduced by a factor."""
+    return np.concatenate([reduce_pixels(band, factor) for band in _split_into_bands(image, factor)])
 
 
 def _find_specks(ink: Ink) -> Bools:
@@ -278,11 +277,24 @@ def _find_specks(ink: Ink) -> Bools:
     return np.asarray(weight[label] < _SPECK)
 
 
-def _find_red(rgb: Floats, ink: Floats) -> Ink:
-    """1 where the blurred ink is red, else 0: colour is coarser than brightness in JPEG."""
+def _typical_ink(raw: Floats) -> float:
+    """The ink in the middle of most strokes."""
+    return float(np.median(raw[raw > raw.max() / 2])) if raw.any() else 0.0
+
+
+def _find_red(rgb: Floats, ink: Floats) -> Bools:
+    """Where the blurred ink is red: colour is coarser than brightness in JPEG."""
     from scipy import ndimage
 
     if rgb.shape[-1] == 1:
-        return np.zeros(ink.shape, dtype=np.float32)
-    red, all_ink = (ndimage.gaussian_filter(part, 1.5) for part in (redness(rgb), ink))
-    return np.asarray((red > REDDISH * all_ink).astype(np.float32))
+        return np.zeros(ink.shape, dtype=bool)
+    amount, all_ink = (ndimage.gaussian_filter(part, 1.5) for part in (redness(rgb), ink))
+    is_red = amount > REDDISH * all_ink
+    share = amount / np.maximum(all_ink, _FAINTEST)
+    reddest = _typical_ink(share)
+    if not _PALEST < reddest < _RICH:
+        return np.asarray(is_red)
+    # Compression takes the colour of thin lines. Pale ones are red only if they have red's own hue, as orange
+    # and brown contain some red as well.
+    hue = np.abs(ndimage.gaussian_filter(rgb[..., 1] - rgb[..., 2], 3.0)) / np.maximum(all_ink, _FAINTEST)
+    return np.asarray(is_red | (share - 1.5 * hue > max(_PALE * reddest, _PALEST)))

@@ -19,7 +19,7 @@ from ..errors import InputError, NoStrokeError, naming, printable, shortened
 from ..instance.angles import line_of
 from ..instance.domain import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading, name_from_text
-from .bitmap import read_white_pixels
+from .bitmap import Bitmap, read_white_pixels
 from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
 from .curves import Curves
 from .doubts import (
@@ -66,9 +66,10 @@ def read_sketch(
     size
         Pixels on the longer side of the grid, 1 to 4096.
     mask
-        Picture that is white where the field is wanted, of the size of the bitmap or page. The grid is then
-        the white part, and a pixel belongs to it from half of its area on. By default the grid is the drawing
-        with a margin of 4 %, and the mask its inside; an open drawing has the whole rectangle.
+        Picture that is white where the field is wanted, of the size of the bitmap or page; for a photograph
+        whose sheet is straightened, of the size of the photograph or of the sheet. The grid is then the white
+        part, and a pixel belongs to it from half of its area on. By default the grid is the drawing with a
+        margin of 4 %, and the mask its inside; an open drawing has the whole rectangle.
     gauge
         Window of alpha, as in `Instance`.
     name
@@ -110,7 +111,7 @@ def read_sketch(
             white = None
             if mask is not None:
                 with naming(mask):
-                    white = read_mask(read_file(Path(mask)), drawing.page)
+                    white = read_mask(read_file(Path(mask)), drawing)
             instance = instance_of_drawing(
                 drawing,
                 size,
@@ -248,9 +249,15 @@ def instance_of_mask(
     )
 
 
-def read_mask(data: bytes, page: Box | None) -> Bools:
-    """The white part of a mask picture, which must have the size of the page. Raises InputError."""
-    white = read_white_pixels(data)
+def read_mask(data: bytes, drawing: Drawing) -> Bools:
+    """The white part of a mask picture, which must have the size of the page. Raises InputError.
+
+    A mask of the size of a photograph is straightened as its sheet was.
+    """
+    white, page = read_white_pixels(data), drawing.page
+    sheet = drawing.sheet if isinstance(drawing, Bitmap) else None
+    if sheet is not None and sheet.size is not None and white.shape[::-1] == sheet.picture:
+        white = sheet.straighten(255 * white.astype(np.uint8)[..., None], 1)[..., 0] >= 128
     if page is None:
         raise InputError("cannot be placed: the sketch has neither a viewBox nor a width and height; add one")
     size, wanted = white.shape[::-1], (round(page[2]), round(page[3]))

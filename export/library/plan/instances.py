@@ -49,7 +49,7 @@ def _sample_instance(recipe: InstanceRecipe) -> Instance:
 def _drawing_instance(recipe: InstanceRecipe) -> Instance:
     sketch = recipe.sketch
     drawing = parse_drawing(sketch.drawing, Path(sketch.what).suffix, recipe.size)
-    white = read_mask(sketch.mask, drawing.page) if sketch.mask else None
+    white = read_mask(sketch.mask, drawing) if sketch.mask else None
     gauge = cast("Gauge", recipe.gauge)
     return instance_of_drawing(
         drawing, recipe.size, white=white, name=recipe.name, source=sketch.what, gauge=gauge

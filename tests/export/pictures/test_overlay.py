@@ -20,6 +20,7 @@ from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import power_field
 from defusedxml import ElementTree
 from layered import SVG, layers_of, lines_in, numbers
+from photographs import draw_sheet, encode, photograph
 from PIL import Image, ImageDraw
 
 BOXES = """<g fill="none" stroke="#000" stroke-width="2"><path d="M20 30H120V90H20Z"/>
@@ -213,3 +214,12 @@ def test_a_run_lays_its_best_field_over_the_drawing(tmp_path):
     assert "drawing" in layers
     assert (tmp_path / "run" / "overlay.png").read_bytes().startswith(b"\x89PNG")
     assert json.loads((tmp_path / "run" / "report.json").read_text())["interrupted"] is None
+
+
+def test_the_sheet_of_a_photograph_lies_below_its_field(tmp_path):
+    path = tmp_path / "photo.jpg"
+    path.write_bytes(encode(photograph(draw_sheet("mouse"), "wood", turn=20, pitch=15)))
+    instance = read_sketch(path, size=40)
+    underlay = read_underlay(path, on=instance)
+    assert underlay.page == instance.reading.page
+    assert underlay.ink.shape == (round(underlay.page[3]), round(underlay.page[2]))

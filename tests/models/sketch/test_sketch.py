@@ -295,6 +295,7 @@ PICTURES = {
         Image.merge("RGBA", (*[Image.new("L", im.size, 0)] * 3, ImageOps.invert(im)))
     ),
     "16 bit": lambda im: png(Image.fromarray(np.asarray(im).astype(np.uint16) * 257)),
+    "light on dark": lambda im: png(ImageOps.invert(im)),
     "grey paper": lambda im: png(im.point(lambda v: 40 + v * 0.6)),
     "beige paper": lambda im: png(
         Image.merge("RGB", (im, im.point(lambda v: v * 0.95), im.point(lambda v: v * 0.8)))
@@ -638,7 +639,7 @@ REFUSED = {
     "text.png": (b"just text", "is not a whole picture"),
     "cut.png": (png(drawn(200))[:900], "is not a whole picture"),
     "paper.png": (png(Image.new("RGB", (90, 90), "#eee")), "shows no stroke"),
-    "night.png": (png(ImageOps.invert(drawn(200))), "is dark all over"),
+    "night.png": (png(Image.new("RGB", (90, 90), "#000")), "shows ink on 100% of the paper"),
     "bomb.png": (declared(60_000, 60_000), "absurdly many pixels"),
     "large.png": (declared(10_000, 10_000), "declares 10000 x 10000 pixels"),
     "nothing.svg": (svg(""), "draws no stroke"),

@@ -86,7 +86,15 @@ def test_ink_on_half_of_the_paper_is_refused_with_a_remedy(black):
     pixels[: round(black * HEIGHT)] = 20
     with pytest.raises(InputError, match=r"shows ink on (55|70)% of the paper.*crop it to the drawing"):
         picture(pixels)
-    pixels = np.full((HEIGHT, WIDTH), 250.0)
-    pixels[:, np.arange(WIDTH) % 20 < 20 * black] = 20
+
+
+def test_what_is_most_frequent_is_paper():
+    """Stripes are ink if they are narrow, and have no meaning if neither colour prevails."""
+    stripes = [np.full((HEIGHT, WIDTH), 250.0) for _ in range(3)]
+    for pixels, black in zip(stripes, (6, 11, 14), strict=True):
+        pixels[:, np.arange(WIDTH) % 20 < black] = 20
+    dark, light = picture(stripes[0]).ink > 0.5, picture(stripes[2]).ink > 0.5
+    assert (dark == (stripes[0] < 100)).all()
+    assert (light == (stripes[2] > 100))[:, :-20].all()  # the border is light
     with pytest.raises(InputError, match=r"shows ink on \d\d% of the paper"):
-        picture(pixels)
+        picture(stripes[1])

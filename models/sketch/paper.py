@@ -1,0 +1,153 @@
+"""Colours relative to the paper: what the picture would show on white paper in even light.
+
+Paper is what is most frequent. Strokes are darker than it, or lighter as chalk on a board is, or both as on
+brown paper. Lighter strokes come out black, and red if they are red.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..instance.domain import Floats
+from .colour import redness
+from .cover import block_means
+
+Ink = NDArray[np.float32]
+
+_LIGHT_SIDE: Final = 256  # blocks on the longer side in which the light on the paper is found
+_SHADOW: Final = 0.1  # of the longer side: darker and wider regions are shadows, not ink
+_DARKEST_SHADOW: Final = 0.25  # of the paper's level: darker and wide regions are solid ink after all
+_EVEN: Final = 1.05  # light that differs by less counts as even, and the picture is not changed
+_PAPER_SIDE: Final = 64  # blocks on the longer side whose most frequent colour is that of the paper
+_LEAST_BLOCK: Final = 8.0  # pixels on a side of a block
+_SAMPLE: Final = 16  # pixels of a block in each direction that are looked at
+_PAPER_NEAR: Final = 5  # blocks side by side whose median that colour is
+_WEIGHED_SIDE: Final = 1024  # pixels on the longer side of the picture whose strokes are weighed
+_CLEAR: Final = 0.04  # least difference of brightness from the paper, of 1, that is no grain
+_GRAIN: Final = 6.0  # times the median difference: differences up to it are grain, too
+_SOLID: Final = 0.35  # difference of brightness from the usual paper of what is solid ink
+_LEAST_CONTRAST: Final = 32.0  # of 255, between paper and white
+_BOTH: Final = 0.25  # least ratio of lighter and darker strokes, either way, if both count
+
+
+def relative_to_paper(pixels: NDArray[np.uint8]) -> Floats:
+    """Colours [h, w, 1 or 3] relative to the paper, in [0, 1]: 1 for paper and less for strokes."""
+    paper = _find_usual_colours(pixels)
+    dark, light = _weigh_strokes(pixels, paper)
+    if light <= _BOTH * dark:
+        return _relative_to_light_paper(pixels)
+    colours = _darken_lighter_strokes(pixels, paper)
+    if dark > _BOTH * light:
+        for channel in range(pixels.shape[-1]):
+            scale = np.maximum(_enlarge(paper[..., channel], pixels.shape[:2]), 1)
+            np.minimum(colours[..., channel], pixels[..., channel] / scale, out=colours[..., channel])
+    return colours
+
+
+def _find_usual_colours(pixels: NDArray[np.uint8]) -> Ink:
+    """The most frequent colours round each of some blocks, [rows, columns, channels]."""
+    from scipy import ndimage
+
+    sides = pixels.shape[:2]
+    block = max(max(sides) / _PAPER_SIDE, _LEAST_BLOCK)
+    counts = [max(1, round(side / block)) for side in sides]
+    rows, columns = (
+        ((np.arange(_SAMPLE * count) + 0.5) * side / (_SAMPLE * count)).astype(int)
+        for side, count in zip(sides, counts, strict=True)
+    )
+    sample = pixels[rows[:, None], columns].reshape(counts[0], _SAMPLE, counts[1], _SAMPLE, -1)
+    usual = np.median(sample, axis=(1, 3)).astype(np.float32)
+    return np.asarray(ndimage.median_filter(usual, (_PAPER_NEAR, _PAPER_NEAR, 1), mode="nearest"))
+
+
+def _weigh_strokes(pixels: NDArray[np.uint8], paper: Ink) -> tuple[float, float]:
+    """How much is darker, and how much is lighter, than the paper round it."""
+    small = (
+        reduce_pixels(pixels, -(-max(pixels.shape) // _WEIGHED_SIDE)).mean(axis=-1, dtype=np.float32) / 255
+    )
+    bright = paper.mean(axis=-1) / 255
+    usual = _enlarge(bright, small.shape)
+    lighter = (small - usual)[np.abs(usual - np.median(bright)) < _SOLID]
+    clear = max(_CLEAR, _GRAIN * float(np.median(np.abs(lighter))))
+    return float(np.maximum(-lighter - clear, 0).sum()), float(np.maximum(lighter - clear, 0).sum())
+
+
+def reduce_pixels(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+    """The means [h, w, channels] over blocks of that many rows and columns."""
+    from PIL import Image
+
+    if factor == 1:
+        return pixels
+    channels = pixels.shape[-1]
+    small = Image.fromarray(pixels if channels == 3 else pixels[..., 0]).reduce(factor)
+    return np.asarray(small).reshape(small.height, small.width, channels)
+
+
+def _darken_lighter_strokes(pixels: NDArray[np.uint8], paper: Ink) -> Floats:
+    """Colours on white paper whose strokes are as dark as those of the picture are lighter than its paper."""
+    shape = pixels.shape[:2]
+    # Nearly black paper says little of the light on it.
+    bright = paper.mean(axis=-1) + _LEAST_CONTRAST
+    light = _enlarge(np.clip(bright / np.quantile(bright, 0.95), _DARKEST_SHADOW, 1), shape)
+    ground = np.stack([_enlarge(channel, shape) for channel in np.moveaxis(paper, -1, 0)], axis=-1)
+    excess: Floats = np.subtract(pixels, ground)
+    most = np.linalg.norm(255 * light[..., None] - ground, axis=-1)
+    ink = np.linalg.norm(np.maximum(excess, 0), axis=-1) / np.maximum(most, _LEAST_CONTRAST)
+    ink = np.minimum(ink, 1)
+    colours = np.repeat(1 - ink[..., None], pixels.shape[-1], axis=-1)
+    if pixels.shape[-1] > 1:
+        excess += ink[..., None] * ground  # the colour of the stroke, times its share of the pixel
+        colours[..., 0] += ink * np.clip(redness(excess) / np.maximum(excess.max(axis=-1), 1), 0, 1)
+    return colours
+
+
+def _relative_to_light_paper(pixels: NDArray[np.uint8]) -> Floats:
+    """Colours of darker strokes relative to the paper."""
+    # At least a quarter of a drawing is bare paper, so the upper quartile is a level of the paper.
+    level = np.percentile(pixels.reshape(-1, pixels.shape[-1]), 75, axis=0).astype(np.float32)
+    colours: Floats = pixels.astype(np.float32)
+    colours /= np.maximum(level, 1)
+    light = _estimate_light(colours)
+    if max(float(light.max()), 1 / float(light.min())) > _EVEN:
+        colours /= light[..., None]
+    return np.minimum(colours, 1, out=colours)
+
+
+def _estimate_light(colours: Floats) -> Ink:
+    """The light on the paper [h, w], 1 where it equals the light of the whole picture."""
+    from scipy import ndimage
+
+    # A grey closing lets lighter surroundings cover darker regions narrower than _SHADOW, in linear time. So
+    # strokes vanish, and shadows stay, whether gradual or sharp. Means over blocks remove noise first.
+    height, width = colours.shape[:2]
+    block = max(1, max(height, width) // _LIGHT_SIDE)
+    rows, columns = (np.append(np.arange(0, side, block), side) for side in (height, width))
+    coarse = block_means(colours.mean(axis=-1), rows, columns)
+    closed = ndimage.grey_closing(coarse, size=int(_SHADOW * max(coarse.shape)) | 1, mode="nearest")
+    smooth = ndimage.gaussian_filter(np.maximum(closed, _DARKEST_SHADOW), 1.0, mode="nearest")
+    places = [
+        np.interp(np.arange(side) + 0.5, (edges[:-1] + edges[1:]) / 2, np.arange(len(edges) - 1.0))
+        for side, edges in ((height, rows), (width, columns))
+    ]
+    return _interpolate_rows(_interpolate_rows(smooth.astype(np.float32), places[0]).T, places[1]).T
+
+
+def _enlarge(blocks: Floats | Ink, shape: tuple[int, ...]) -> Ink:
+    """Values of equal blocks [rows, columns], interpolated linearly at the pixels of a picture."""
+    from PIL import Image
+
+    enlarged = Image.fromarray(blocks.astype(np.float32)).resize(
+        (shape[1], shape[0]), Image.Resampling.BILINEAR
+    )
+    return np.asarray(enlarged)
+
+
+def _interpolate_rows(rows: Ink, place: Floats) -> Ink:
+    """Rows at fractional places, interpolated linearly between the rows of an array."""
+    below = np.minimum(place.astype(np.intp), max(len(rows) - 2, 0))
+    above = np.minimum(below + 1, len(rows) - 1)
+    part = (place - below).astype(np.float32)[:, None]
+    return np.asarray(rows[below] * (1 - part) + rows[above] * part)

@@ -1,0 +1,128 @@
+"""Photographs: the sheet on a table, light strokes on dark paper, thin colours; the drawing is known."""
+
+import numpy as np
+import pytest
+from crossfield.models.errors import InputError
+from crossfield.models.sketch.bitmap import read_bitmap
+from crossfield.models.sketch.read import read_sketch
+from photographs import (
+    BLACK,
+    RED,
+    WHITE,
+    assert_same_drawing,
+    draw_sheet,
+    encode,
+    light_on,
+    photograph,
+    read_clean,
+)
+from PIL import Image, ImageDraw
+from small_drawings import png, read
+
+TABLES = {
+    "dark table, turned": ("bottle", "dark", {"turn": 28, "pitch": 20, "light": "gradient"}),
+    "wood, a shadow across": ("cylinder_bend", "wood", {"turn": -15, "yaw": 18, "light": "shadow"}),
+    "cutting mat, a lamp": ("bottle", "mat", {"turn": 12, "pitch": -30, "light": "lamp"}),
+    "cloth, steep": ("cylinder_bend", "cloth", {"turn": -8, "pitch": 35}),
+    "grey table": ("mouse", "grey", {"turn": 22, "pitch": 15, "yaw": -15, "light": "gradient"}),
+}
+
+
+@pytest.mark.parametrize("case", TABLES)
+def test_a_sheet_on_a_table_is_straightened(case):
+    sample, table, view = TABLES[case]
+    instance = read(encode(photograph(draw_sheet(sample), table, **view), quality=88), 40, "a.jpg")
+    assert_same_drawing(instance, read_clean(sample))
+    (note,) = instance.reading.warnings
+    assert note.startswith("the sheet in the photo was straightened (corners at (")
+    sheet = draw_sheet(sample).shape
+    width, height = instance.reading.page[2:]
+    assert width / height == pytest.approx(sheet[1] / sheet[0], rel=0.03)
+
+
+def test_a_sheet_that_the_picture_cuts_off_loses_its_surroundings():
+    pixels = photograph(draw_sheet("mouse"), "wood", shift=(0.1, 0.1), fill=1, light="gradient")
+    instance = read(encode(pixels), 40, "a.jpg")
+    assert_same_drawing(instance, read_clean("mouse"))
+    assert "take a picture of the whole sheet" in instance.reading.warnings[0]
+    assert instance.reading.page == (0, 0, 1000, 750)
+
+
+PAPERS = {
+    "blueprint": ("blue", WHITE, WHITE),
+    "chalk": ("black", WHITE, WHITE),
+    "chalk and red chalk": ("black", WHITE, (220, 70, 60)),
+    "white on brown": ("kraft", WHITE, WHITE),
+    "black and red on brown": ("kraft", BLACK, RED),
+}
+
+
+@pytest.mark.parametrize("case", PAPERS)
+def test_strokes_are_lighter_or_darker_than_their_paper(case):
+    paper, ink, red = PAPERS[case]
+    sheet = draw_sheet("bottle", paper=paper, ink=ink, red=red)
+    pixels = sheet * light_on("gradient", *sheet.shape[:2])
+    pixels += np.random.default_rng(0).normal(0, 3, sheet.shape)
+    instance = read(encode(pixels, quality=88), 40, "a.jpg")
+    assert_same_drawing(instance, read_clean("bottle", one_colour=ink == red))
+
+
+def test_black_and_white_strokes_on_brown_paper_both_count():
+    sheet = draw_sheet("bottle", paper="kraft", ink=BLACK, red=WHITE)
+    assert_same_drawing(read(encode(sheet), 40, "a.jpg"), read_clean("bottle", one_colour=True))
+
+
+def test_a_blueprint_on_a_table_is_straightened():
+    pixels = photograph(draw_sheet("mouse", paper="blue", ink=WHITE), "wood", turn=-20, pitch=20)
+    assert_same_drawing(read(encode(pixels), 40, "a.jpg"), read_clean("mouse"))
+
+
+@pytest.mark.parametrize("widths, quality", [((24, 1.5), 85), ((30, 2), 60), ((1.5, 1.5), 75)])
+def test_thin_red_strokes_count_by_their_length(widths, quality):
+    data = encode(draw_sheet("bottle", widths=widths), quality=quality)
+    assert_same_drawing(read(data, 40, "a.jpg"), read_clean("bottle", widths=widths))
+
+
+def test_red_specks_are_no_red_strokes():
+    image = Image.fromarray(draw_sheet("mouse").astype(np.uint8))
+    pen = ImageDraw.Draw(image)
+    for x, y in np.random.default_rng(3).uniform(0.3, 0.7, (12, 2)) * image.size:
+        pen.ellipse((x - 5, y - 5, x + 5, y + 5), RED)
+    assert not read_bitmap(png(image, "JPEG"), 40).has_two_colours
+    pen.line((150, 300, 450, 320), RED, 3)
+    assert read_bitmap(png(image, "JPEG"), 40).has_two_colours
+
+
+@pytest.mark.parametrize("light", ["even", "gradient", "shadow"])
+@pytest.mark.parametrize("boxed", [False, True])
+def test_paper_to_the_border_is_left_as_it_is(light, boxed):
+    pixels = draw_sheet("cylinder_bend")
+    if boxed:  # the paper goes on behind a frame
+        pixels[60:-60, 60:-60][[0, -1]] = pixels[60:-60, 60:-60][:, [0, -1]] = 0
+        pixels[30:44, 30:-30] = pixels[-44:-30, 30:-30] = pixels[30:-30, 30:44] = pixels[30:-30, -44:-30] = 20
+    pixels = pixels * light_on(light, *pixels.shape[:2])
+    bitmap = read_bitmap(encode(pixels), 40)
+    assert bitmap.sheet is None
+    assert bitmap.page == (0, 0, pixels.shape[1], pixels.shape[0])
+
+
+def test_page_and_masks_of_a_straightened_sheet(tmp_path):
+    """All grids are on one page, and a mask may have the pixels of the sheet or of the photograph."""
+    pixels = photograph(draw_sheet("mouse"), "dark", turn=15, pitch=20)
+    path = tmp_path / "photo.jpg"
+    path.write_bytes(encode(pixels, quality=90))
+    coarse, fine = read_sketch(path, size=24), read_sketch(path, size=300)
+    assert coarse.reading.page == fine.reading.page
+    width, height = map(round, coarse.reading.page[2:])
+    bitmap = read_bitmap(path.read_bytes(), 24)
+    assert bitmap.width == width
+    masks = {"sheet": Image.new("L", (width, height), 255), "photo": Image.new("L", (1000, 750))}
+    ImageDraw.Draw(masks["photo"]).polygon([tuple(corner) for corner in bitmap.sheet.corners], 255)
+    instances = []
+    for name, mask in masks.items():
+        mask.save(tmp_path / f"{name}.png")
+        instances.append(read_sketch(path, size=40, mask=tmp_path / f"{name}.png"))
+    assert_same_drawing(*instances)
+    Image.new("L", (999, 750), 255).save(tmp_path / "other.png")
+    with pytest.raises(InputError, match=rf"999 x 750 pixels, but the sketch {width} x {height}"):
+        read_sketch(path, mask=tmp_path / "other.png")
