@@ -211,6 +211,7 @@ def background_of(style: Mapping[str, str]) -> str | None:
 @lru_cache(maxsize=1024)
 def _paint_value(name: str, text: str) -> str | None:
     """A paint with its colour as #rrggbb or #rrggbbaa; None where it cannot be read."""
+    text = text.partition(" icc-color(")[0]  # Inkscape writes it after the colour for screens
     lower = text.lower()
     if light := _LIGHT.fullmatch(lower):
         return _paint_value(name, light[1].strip())

@@ -28,8 +28,8 @@ _BASIC: Final = {
     "rect": ("Rect", ("x", "y", "width", "height", "rx", "ry")),
 }
 SHAPES: Final = frozenset({"path", "polyline", "polygon", *_BASIC})
-_ABSENT: Final = {"rect": {"width": 0, "height": 0}, "circle": {"r": 0}, "ellipse": {"rx": 0, "ry": 0}}
-"""Sizes that a shape does not state; svgelements would take 1."""
+_ABSENT: Final = {"rect": ("width", "height"), "circle": ("r",), "ellipse": ("rx", "ry")}
+"""Sizes that are 0 where a shape does not state them; svgelements would take 1."""
 _SIZES: Final = frozenset({"r", "rx", "ry", "width", "height"})  # lengths that cannot be negative
 _QUOTED: Final = 20  # characters of faulty data that are quoted
 _ALIEN: Final = re.compile(r"[^-+.\d\seE,]")  # in a list of points
@@ -121,7 +121,9 @@ def _trace_basic(
             return f"its {key} {shortened(texts[key], _QUOTED)!r} cannot be read"
         if key in _SIZES and str(length).startswith("-"):
             return f"its {key} is {shortened(texts[key], _QUOTED)}"
-    shape = getattr(svgelements, kind)({**_ABSENT.get(tag, {}), **lengths})
+    if tag == "ellipse" and len(lengths.keys() & _SIZES) == 1:
+        lengths["rx"] = lengths["ry"] = lengths.get("rx", lengths.get("ry"))
+    shape = getattr(svgelements, kind)({**dict.fromkeys(_ABSENT.get(tag, ()), 0), **lengths})
     shape.render(ppi=PPI, width=page[0], height=page[1])
     for segment in shape.segments():
         drawn.add(segment)

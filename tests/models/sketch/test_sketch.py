@@ -188,6 +188,7 @@ def test_documents_of_many_programs_are_read(data):
 CIRCLES = {
     "circle": f'<circle cx="50" cy="50" r="40" {BLACK}/>',
     "ellipse": f'<ellipse cx="25" cy="50" rx="20" ry="40" transform="matrix(2 0 0 1 0 0)" {BLACK}/>',
+    "ellipse with one radius": f'<ellipse cx="50" cy="50" ry="40" {BLACK}/>',
     "arcs": f'<path d="M10 50a40 40 0 0180 0 40 40 0 01-80 0z" {BLACK}/>',
     "rounded rectangle": f'<rect x="10" y="10" width="80" height="80" rx="40" {BLACK}/>',
 }
@@ -418,6 +419,8 @@ def test_a_sketch_in_one_colour_is_all_curvature_lines(colour):
         "oklch(62.8% 0.2577 29.23)",
         "lab(54 80 70)",
         "rgb(255 none 0)",
+        "red icc-color(coated, 0, 1, 1, 0)",
+        "light-dark(rgb(255, 0, 0), pink)",
     ],
 )
 def test_red_is_red_in_every_notation_of_css(colour):
