@@ -35,6 +35,7 @@ _NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and c
 _WHITE: Final = 65535.0  # of greys with 16 bits
 _BAND: Final = 1 << 20  # pixels of a picture that are processed together
 _BLUR: Final = 1.0  # pixels, of the gradient
+_CORE: Final = 0.8  # least ink in the core of a stroke
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
 _INK: Final = 0.3  # least ink of a pixel that belongs to a stroke
 _FAINT: Final = 0.85  # of the ink of other strokes: fainter red ones count as much as they do
@@ -184,7 +185,7 @@ def read_bitmap(data: bytes, size: int) -> Bitmap:
     if _FAINTEST < red_level < _FAINT * level:
         raw = np.where(red, raw * (level / red_level), raw)
     ink = np.clip((raw / level - _NOISE) / (_FULL - _NOISE), 0, 1).astype(np.float32)
-    ink[_find_specks(ink)] = 0
+    ink[_find_specks(ink, measure_width(ink))] = 0
     if not (ink > _INK).any():
         raise InputError(
             "shows no stroke but a few specks; expected strokes that are darker or lighter than the paper"
@@ -268,13 +269,14 @@ def _reduce_image(image: Any, factor: int) -> NDArray[np.uint8]:
     return np.concatenate([reduce_pixels(band, factor) for band in _split_into_bands(image, factor)])
 
 
-def _find_specks(ink: Ink) -> Bools:
-    """The marks that hold less ink than a small dot: dust and noise."""
+def _find_specks(ink: Ink, width: float) -> Bools:
+    """The marks that hold less ink than a small dot, or less than two and no core: dust and noise."""
     from scipy import ndimage
 
     label, count = ndimage.label(ink > 0, structure=np.ones((3, 3)))
-    weight = np.bincount(label.ravel(), ink.ravel(), count + 1)
-    return np.asarray(weight[label] < _SPECK)
+    weight, core = (np.bincount(label.ravel(), part.ravel(), count + 1) for part in (ink, ink > _CORE))
+    is_speck = (weight < _SPECK) | ((weight < 2 * width**2) & (core < width**2 / 4))
+    return np.asarray(is_speck[label])
 
 
 def _typical_ink(raw: Floats) -> float:
