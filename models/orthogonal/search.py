@@ -1,8 +1,8 @@
 """Search for integers of low energy: perturb, descend over single integers, keep what is lower.
 
 A perturbation changes what a field is made of: a singularity walks to another ring, a pair of opposite ones
-appears, or integers of neighbouring rows change. Where perturbations fail for long, the search begins again:
-at the next start, and after the last one at the best integers after many perturbations.
+appears, the crosses turn round a handle or a hole, or integers of neighbouring rows change. Where
+perturbations fail for long, the search begins again: at the next start, after the last one at random angles.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from .energy import LOWER, MOST_DENSE, OrthogonalEnergy
 
 _KICKS: Final = 500  # perturbations per round
 _TIRED: Final = 1  # perturbations per point without success after which the search begins again
-_STRONG: Final = 20  # points per perturbation where it begins again
 _PATCH: Final = 1500  # points; a change of one integer costs 30 microseconds
 _ROWS: Final = 0.3  # share of the perturbations that change neighbouring rows
 _NEIGHBOURS: Final = 5  # such rows, at most
+_LOOPS: Final = 0.1  # share of the perturbations that follow a closed path of rings
 _LONGEST: Final = 24  # rings of a walk
 _SINGULAR: Final = 0.7  # share of the walks that begin at a singularity
 
@@ -60,7 +60,7 @@ class IntegerSearch:
             point = self._explore_patch(rng, over)
         else:
             if self._tired > _TIRED * self._energy.size:
-                self._present, self._tired = self._begin_again(rng, self._moves, over), 0
+                self._present, self._tired = self._begin_again(rng, over), 0
             point = self._moves.lower(self._present, rng, over)
         self._tired = 0 if point.total < self._present.total - LOWER else self._tired + _KICKS
         self.fruitless = 0 if point.total < self.best.total - LOWER else self.fruitless + _KICKS
@@ -68,13 +68,11 @@ class IntegerSearch:
         self.best = self.best if self.fruitless else point
         self.round += not over()
 
-    def _begin_again(self, rng: np.random.Generator, moves: _Moves, over: Over) -> Point:
+    def _begin_again(self, rng: np.random.Generator, over: Over) -> Point:
         if self._starts:
             return self._starts.pop()
-        z, residual, _ = self.best
-        for _ in range(1 + self._energy.size // _STRONG):
-            z, residual = moves.perturb(rng, z, residual)
-        return Point.of(self._energy, self._energy.descend(z, over, residual)[0])
+        z = self._energy.nearest(rng.uniform(0, HALF, self._energy.size))
+        return Point.of(self._energy, self._energy.descend(z, over)[0])
 
     def _explore_patch(self, rng: np.random.Generator, over: Over) -> Point:
         """Explore the points nearest to a row, alternately a random one and one of high energy."""
@@ -121,8 +119,11 @@ class _Moves:
         steps: Counter[int] = Counter()
         if not len(z):
             return z, residual
-        if not len(self._rings.defect) or rng.random() < _ROWS:
+        kind = rng.random()
+        if not len(self._rings.defect) or kind < _ROWS:
             self._change_neighbours(rng, steps)
+        elif kind < _ROWS + _LOOPS:
+            self._turn_inside(rng, steps)
         else:
             self._walk(rng, z, steps)
         rows, change = np.array(list(steps), dtype=np.int32), np.array(list(steps.values()), dtype=np.int32)
@@ -137,6 +138,20 @@ class _Moves:
             steps[row] += int(rng.choice((-1, 1)))
             point = rng.choice([end[row] for end in ends if end[row] < self._energy.size])
             row = int(self._at_point[rng.integers(self._start[point], self._start[point + 1])])
+
+    def _turn_inside(self, rng: np.random.Generator, steps: Counter[int]) -> None:
+        """Change the rows that a random closed path of rings crosses, such as one around a handle or a hole."""
+        rings, path, row = self._rings, dict[int, tuple[int, int]](), -1
+        ring, quarter = int(rng.integers(len(rings.defect))), int(rng.choice((-1, 1)))
+        while ring >= 0 and ring not in path:
+            around = slice(rings.start[ring], rings.start[ring + 1])
+            at = int(rng.choice(np.nonzero(rings.pair[around] != row)[0])) + around.start
+            row, sign = int(rings.pair[at]), int(rings.sign[at])
+            path[ring] = row, quarter * sign
+            ring = int(self._beside[row, int(sign > 0)])
+        changes = list(path.values())
+        for row, change in changes[list(path).index(ring) if ring >= 0 else 0 :]:
+            steps[row] += change
 
     def _walk(self, rng: np.random.Generator, z: Ints, steps: Counter[int]) -> None:
         """Move a quarter of a turn from a ring, a singular one or any, along a random path of rings."""

@@ -103,6 +103,12 @@ def test_search_finds_what_all_integers_together_have_as_their_best(name):
     assert cf.power_field(instance).energy().total >= least - 1e-8
 
 
+def test_search_finds_the_proven_optimum_of_a_torus_without_strokes():
+    assert cf.search(cf.sample("doughnut"), rounds=20).field.energy().total == pytest.approx(
+        2.0605952, abs=1e-6
+    )
+
+
 @pytest.mark.parametrize(
     "mesh, count, energy", [(tetrahedron(), 4, 0.0), (box(2), 8, 0.0), (icosahedron(), 8, None)]
 )
