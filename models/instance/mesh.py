@@ -153,8 +153,7 @@ class Mesh(Domain):
     @property
     def pair_vertices(self) -> Ints:
         """Lower and higher vertex of each pair's edge, shape (m, 2)."""
-        start, end = self._edges
-        return np.stack([start[self.pair_edges], end[self.pair_edges]], axis=1)
+        return self.edge_vertices(self.pair_edges)
 
     @property
     def boundary(self) -> Ints:
@@ -174,8 +173,7 @@ class Mesh(Domain):
     @cached_property
     def _cross(self) -> Floats:
         """Normal of each face times twice its area, shape (n, 3)."""
-        one, other = self._edge_vectors(0), -self._edge_vectors(2)
-        return np.stack([one[:, a] * other[:, b] - one[:, b] * other[:, a] for a, b in _AXES], axis=1)
+        return _cross_product(self._edge_vectors(0), -self._edge_vectors(2))
 
     @cached_property
     def normals(self) -> Floats:
@@ -190,9 +188,8 @@ class Mesh(Domain):
     @cached_property
     def frames(self) -> Floats:
         """Unit x and y axis of each face, shape (n, 2, 3)."""
-        x, z = _unit(self._edge_vectors(0)), self.normals
-        y = np.stack([z[:, a] * x[:, b] - z[:, b] * x[:, a] for a, b in _AXES], axis=1)
-        return np.stack([x, y], axis=1)
+        x = _unit(self._edge_vectors(0))
+        return np.stack([x, _cross_product(self.normals, x)], axis=1)
 
     @cached_property
     def centres(self) -> Floats:
@@ -223,9 +220,7 @@ class Mesh(Domain):
     @cached_property
     def dihedral(self) -> Floats:
         """Angle between the normals of each pair of faces, in [0, pi], shape (m,)."""
-        one, other = self.normals[self.first], self.normals[self.second]
-        cross = np.stack([one[:, a] * other[:, b] - one[:, b] * other[:, a] for a, b in _AXES], axis=1)
-        return arctangent(np.sqrt(_dot(cross, cross)), _dot(one, other))
+        return _angle_between(self.normals[self.first], self.normals[self.second])
 
     @cached_property
     def dual_weights(self) -> Floats:
@@ -240,11 +235,8 @@ class Mesh(Domain):
     @cached_property
     def defect(self) -> Floats:
         """2 pi less the angles of the faces around each vertex, in radians, shape (v,)."""
-        angles = np.zeros((self.size, 3))
-        for corner in range(3):
-            one, other = self._edge_vectors(corner), -self._edge_vectors((corner + 2) % 3)
-            cross = np.stack([one[:, a] * other[:, b] - one[:, b] * other[:, a] for a, b in _AXES], axis=1)
-            angles[:, corner] = arctangent(np.sqrt(_dot(cross, cross)), _dot(one, other))
+        edges = [self._edge_vectors(corner) for corner in range(3)]
+        angles = np.stack([_angle_between(edges[corner], -edges[corner - 1]) for corner in range(3)], axis=1)
         around = np.bincount(self.faces.ravel(), angles.ravel(), len(self.vertices))
         return np.asarray(2 * np.pi - around)
 
@@ -337,8 +329,16 @@ class Mesh(Domain):
         return [len(self.vertices), self.size], [], arrays
 
 
-_AXES: Final = ((1, 2), (2, 0), (0, 1))
-"""The two other axes, for each component of a cross product."""
+def _cross_product(one: Floats, other: Floats) -> Floats:
+    """Cross products of vectors (k, 3), shape (k, 3)."""
+    axes = ((1, 2), (2, 0), (0, 1))
+    return np.stack([one[:, a] * other[:, b] - one[:, b] * other[:, a] for a, b in axes], axis=1)
+
+
+def _angle_between(one: Floats, other: Floats) -> Floats:
+    """Angles between vectors (k, 3) in [0, pi], shape (k,)."""
+    cross = _cross_product(one, other)
+    return arctangent(np.sqrt(_dot(cross, cross)), _dot(one, other))
 
 
 def _dot(one: Floats, other: Floats) -> Floats:

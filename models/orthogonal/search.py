@@ -140,7 +140,7 @@ class _Moves:
             row = int(self._at_point[rng.integers(self._start[point], self._start[point + 1])])
 
     def _turn_inside(self, rng: np.random.Generator, steps: Counter[int]) -> None:
-        """Change the rows that a random closed path of rings crosses, such as one around a handle or a hole."""
+        """Change the rows that a random closed path of rings crosses, for example around a handle."""
         rings, path, row = self._rings, dict[int, tuple[int, int]](), -1
         ring, quarter = int(rng.integers(len(rings.defect))), int(rng.choice((-1, 1)))
         while ring >= 0 and ring not in path:
