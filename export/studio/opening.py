@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+from collections import Counter
 from typing import Any, Final
 
 import numpy as np
@@ -29,6 +30,7 @@ _RED: Final = 0.5
 _QUALITY: Final = 80  # of a JPEG
 _SMOOTH: Final = 2.0  # pixels over which a traced line is smoothed
 _SHORTEST: Final = 6  # pixels of a traced line; shorter ones are burrs of the thinning
+_SHORTEST_LINK: Final = 4  # pixels of a traced line between two junctions
 _AROUND: Final = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
 
 _Pixel = tuple[int, int]
@@ -116,15 +118,26 @@ def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
     red = block_means(picture.red * picture.ink, rows, columns) / np.maximum(small, 1e-6)
     line = thin_shape(small * max(1.0, reduced / picture.stroke_width) > _INK)
     ways = [np.array(way) for way in _trace_ways(line)]
-    ways = [way for way in ways if len(way) >= _SHORTEST] or ways
+    ends = Counter(tuple(end) for way in ways for end in way[[0, -1]].tolist())
+    ways = [way for way in ways if len(way) >= _SHORTEST or _is_link(way, ends)] or ways
     is_red = np.array([np.median(red[tuple(way.T)]) > _RED for way in ways], dtype=bool)
-    as_lines = is_red if is_red.any() and not is_red.all() else np.ones(len(ways), dtype=bool)
-    scale = reduced * picture.reduction
+    as_lines = is_red if picture.has_two_colours and is_red.any() else np.ones(len(ways), dtype=bool)
+    lines = [_smooth(way)[:, ::-1] for way in ways]
+    # Middle lines end half a pen before their ink. On the box of the ink, they are read on the same grid.
+    low, high = (end(np.concatenate(lines), axis=0) for end in (np.min, np.max))
+    ink = np.reshape(picture.box, (2, 2))
+    scale = (ink[1] - ink[0]) / np.where(high > low, high - low, np.inf)
+    middle = ink.mean(axis=0) - scale * (low + high) / 2
     strokes = [
-        _stroke_document(scale * (_smooth(way)[:, ::-1] + 0.5), "line" if marked else "cut")
-        for way, marked in zip(ways, as_lines, strict=True)
+        _stroke_document(scale * line + middle, "line" if marked else "cut")
+        for line, marked in zip(lines, as_lines, strict=True)
     ]
     return (0.0, 0.0, float(picture.width), float(picture.height)), strokes
+
+
+def _is_link(way: NDArray[np.int64], ends: Counter[_Pixel]) -> bool:
+    """Whether a short way lies between two junctions, where it closes a gap."""
+    return len(way) >= _SHORTEST_LINK and all(ends[row, column] > 1 for row, column in way[[0, -1]].tolist())
 
 
 def _smooth(way: NDArray[np.int64]) -> Floats:

@@ -19,6 +19,7 @@ from crossfield.export.studio.opening import open_drawing
 from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, hints_on_mask, read_drawn
 from crossfield.export.studio.views import field_step
 from crossfield.models.sketch.samples import sample_svg
+from photographs import assert_same_drawing, draw_sheet, encode, photograph
 from PIL import Image, ImageDraw
 from studios import CONTRADICTING, PEBBLE, changed
 
@@ -289,3 +290,28 @@ def test_hatching_comes_ignored_unless_nothing_else_is_a_curvature_line():
     assert session["notes"][0].startswith("12 parallel lines round (35.5, 40) look like hatching")
     session = open_drawing(f'<svg fill="none" stroke="black">{hatch}</svg>'.encode(), "hatch.svg")
     assert {stroke["mark"] for stroke in session["strokes"]} == {"line"}
+
+
+@pytest.mark.parametrize("kind", ["svg", "png", "photo"])
+def test_page_and_command_line_read_the_same_instance(kind, tmp_path):
+    data, name = {
+        "svg": lambda: (sample_svg("bottle").encode(), "bottle.svg"),
+        "png": lambda: (encode(draw_sheet("bottle"), "PNG"), "bottle.png"),
+        "photo": lambda: (encode(photograph(draw_sheet("bottle"), "wood", turn=20, pitch=20)), "bottle.jpg"),
+    }[kind]()
+    (tmp_path / name).write_bytes(data)
+    instance = cf.read_sketch(tmp_path / name, size=40)
+    opened = open_drawing(data, name)
+    parts = {key: opened[key] for key in ("name", "page", "strokes")}
+    drawn = read_drawn(document(**parts, mask=[], hints=[], size=40)).instance
+    assert drawn.reading.page == instance.reading.page
+    assert_same_drawing(drawn, instance)
+    assert opened["notes"] == [note for note in instance.reading.warnings if "sheet" in note]
+
+
+def test_red_specks_of_a_picture_are_no_curvature_lines():
+    image = Image.open(io.BytesIO(picture())).convert("L").convert("RGB")
+    ImageDraw.Draw(image).ellipse([60, 40, 66, 46], fill=(220, 0, 0))
+    stream = io.BytesIO()
+    image.save(stream, "PNG")
+    assert {stroke["mark"] for stroke in open_drawing(stream.getvalue(), "a.png")["strokes"]} == {"line"}
