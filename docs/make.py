@@ -328,6 +328,7 @@ def gallery_row(folder: Path, row: dict[str, Any]) -> list[str]:
         reported = " ".join(f"{line}." for line in cf.read_sketch(path, **options).reading.warnings)
     except InputError as error:
         reported = f"error: {error}".replace(f"{path}: ", "")
+    reported = re.sub(r"(<[^>]+>|--[a-z]+)", r"`\1`", reported)
     where = f"../{folder.relative_to(DOCS.parent).as_posix()}"
     answer = f"![{row['picture']}]({where}/expected/{row['picture']}.png)" if "picture" in row else "none"
     drawing = f"![{row['file']}]({where}/{row['file']})" if "picture" in row else f"`{row['file']}`"
