@@ -1,25 +1,38 @@
-"""The figures of docs/mathematics.md: `python docs/make.py figures`.
+"""The figures of docs/cross-field.md and docs/mathematics.md: `python docs/make.py figures`.
 
-Every figure is computed.
+Every figure is computed. Lines, strokes and singularities have the colours of all pictures of fields.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+import crossfield as cf
 import matplotlib as mpl
 import numpy as np
+from crossfield.export.pictures.canvas import paint, set_coordinates
 from crossfield.export.pictures.draw import fixed_settings
+from crossfield.export.pictures.marks import BORDER, FAINT, FAMILIES, POSITIVE, STROKE
+from crossfield.export.pictures.panels import PanelContent, draw_surface
+from crossfield.export.pictures.streamlines import align_labels
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
+from crossfield.models.smooth.polyvector import HOLDS
 from matplotlib.figure import Figure
 
-U, V, GREY, FILL = "#c0392b", "#2563a8", "#7a7a7a", "#dfe9f5"
-STYLE: Final = {"font.family": "DejaVu Sans", "font.size": 11}
+U, V = FAMILIES
+GREY, FILL = "#7a7a7a", "#dfe9f5"
+STYLE: Final = {"font.family": "DejaVu Sans"}
+PAGE: Final = 340.0
+"""Points of the width of a picture of docs/cross-field.md, whose words stay legible on a phone."""
+CLOSE: Final = 68.0
+"""Points of a pixel in the picture of the singularity."""
 
 
 def line(axes: Any, angle: float, colour: str, name: str = "", at: tuple[float, float] = (0.0, 0.0)) -> None:
@@ -27,7 +40,7 @@ def line(axes: Any, angle: float, colour: str, name: str = "", at: tuple[float, 
     step = 0.42 * np.array([np.cos(angle), np.sin(angle)])
     begin, end = np.array(at) - step, np.array(at) + step
     axes.plot(*zip(begin, end, strict=True), color=colour, linewidth=2.6, solid_capstyle="round")
-    axes.text(*(np.array(at) + 1.16 * step), name, color=colour, ha="center", va="center")
+    axes.text(*(np.array(at) + 1.22 * step), name, color=colour, ha="center", va="center")
 
 
 def arc(axes: Any, begin: float, end: float, radius: float, name: str) -> None:
@@ -35,7 +48,7 @@ def arc(axes: Any, begin: float, end: float, radius: float, name: str) -> None:
     angles = np.linspace(begin, end, 60)
     axes.plot(radius * np.cos(angles), radius * np.sin(angles), color=GREY, linewidth=1.2)
     middle = (begin + end) / 2
-    axes.text(1.28 * radius * np.cos(middle), 1.28 * radius * np.sin(middle), name, ha="center", va="center")
+    axes.text(1.6 * radius * np.cos(middle), 1.6 * radius * np.sin(middle), name, ha="center", va="center")
 
 
 def bare(axes: Any, title: str, *, equal: bool = True) -> None:
@@ -46,30 +59,95 @@ def bare(axes: Any, title: str, *, equal: bool = True) -> None:
         axes.set_aspect("equal")
 
 
-def cross(figure: Figure) -> None:
-    """A cross and its angles; and two labels of one cross with the jump between them."""
-    alpha, beta = np.radians(22), np.radians(14)
-    left, right = figure.subplots(1, 2, width_ratios=(1, 1.35))
-    bare(left, "a cross: two angles, two lines")
-    left.plot([-0.46, 0.5], [0, 0], color=GREY, linewidth=0.8)
+@cache
+def mouse(size: int) -> CrossField:
+    """The bend field of the sample `mouse`."""
+    return cf.bend_field(cf.polyvector_field(cf.sample("mouse", size), hold=max(HOLDS)))
+
+
+def panel(figure: Figure, field: CrossField, width: float, top: float = 0.0) -> tuple[Any, PanelContent]:
+    """Axes at the left of a figure, in points, y down, and a panel of that width below a margin."""
+    content = PanelContent(field.instance, field, width)
+    page = 72 * figure.get_size_inches()
+    high = content.unit * field.instance.grid.height
+    axes = figure.add_axes((0.0, 1 - (top + high) / page[1], width / page[0], high / page[1]))
+    set_coordinates(axes, 0.0, 0.0, width, high)
+    axes.set_clip_on(False)
+    return axes, content
+
+
+def strokes(figure: Figure) -> None:
+    """The stroke pixels of a drawing, each with its direction."""
+    axes, content = panel(figure, mouse(20), PAGE)
+    frame = content.frame
+    paint(axes, [frame.sides("#e4e4e4", 0.6, between=True), frame.sides(BORDER, 0.9)])
+    paint(axes, frame.strokes(STROKE, 3.0))
+
+
+def crosses(figure: Figure) -> None:
+    """A cross at every pixel, and the two angles of one."""
+    axes, content = panel(figure, mouse(20), 0.6 * PAGE, 16)
+    paint(axes, content.frame.strokes(FAINT, 3.0))
+    paint(axes, content.frame.crosses(content.crosses, 1.5))
+    single = figure.add_axes((0.59, 0.0, 0.41, 1.0))
+    bare(single, "")
+    alpha, beta = np.radians(24), np.radians(20)
+    single.plot([-0.3, 0.55], [0, 0], color=GREY, linewidth=0.9)
     for angle in (alpha, alpha + HALF):
-        left.plot(
-            [0, 0.5 * np.cos(angle)], [0, 0.5 * np.sin(angle)], color=GREY, linewidth=0.9, linestyle="--"
-        )
-    line(left, alpha + beta, U, "u")
-    line(left, alpha + HALF - beta, V, "v")
-    arc(left, 0, alpha, 0.26, "α")
-    arc(left, alpha, alpha + beta, 0.34, "β")
-    arc(left, alpha + HALF - beta, alpha + HALF, 0.34, "β")
-    bare(right, "the same lines under two labels: jump p = 1")
-    for x, (a, b) in ((0, (alpha, beta)), (1.35, (alpha + HALF, -beta))):
-        line(right, a + b, U, "u", (x, 0))
-        line(right, a + HALF - b, V, "v", (x, 0))
+        single.plot([0, 0.52 * np.cos(angle)], [0, 0.52 * np.sin(angle)], color=GREY, lw=1, linestyle="--")
+    line(single, alpha + beta, U, "u")
+    line(single, alpha + HALF - beta, V, "v")
+    arc(single, 0, alpha, 0.24, "α")
+    arc(single, alpha, alpha + beta, 0.24, "β")
+    arc(single, alpha + HALF - beta, alpha + HALF, 0.24, "β")
+    single.set(xlim=(-0.5, 0.62), ylim=(-0.5, 0.62))
+
+
+def jump(figure: Figure) -> None:
+    """The same two lines under two labels, and the jump from one label to the other."""
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    bare(axes, "")
+    alpha, beta = np.radians(22), np.radians(14)
+    for x, name, (a, b) in ((0, "i", (alpha, beta)), (1.8, "j", (alpha + HALF, -beta))):
+        axes.add_patch(mpl.patches.Rectangle((x - 0.6, -0.6), 1.2, 1.2, fill=False, edgecolor="#c9c9c9"))
+        line(axes, a + b, U, "u", (x, 0))
+        line(axes, a + HALF - b, V, "v", (x, 0))
+        axes.text(x - 0.5, 0.46, name, style="italic", ha="center", va="center")
         words = f"α = {np.degrees(a):.0f}°, β = {np.degrees(b):.0f}°".replace("-", "−")
-        right.text(x, -0.62, words, ha="center")
-    right.annotate("", (0.9, 0), (0.45, 0), arrowprops={"arrowstyle": "->", "color": GREY})
-    right.text(0.675, 0.07, "p = 1", ha="center")
-    right.set(ylim=(-0.7, 0.62))
+        axes.text(x, -0.76, words, ha="center", va="center")
+    axes.annotate("", (1.14, 0), (0.66, 0), arrowprops={"arrowstyle": "->", "color": GREY, "lw": 1.6})
+    axes.text(0.9, 0.13, "p = 1", ha="center", va="center")
+    axes.set(xlim=(-0.65, 2.45), ylim=(-0.9, 0.64))
+
+
+def singularity(figure: Figure) -> None:
+    """The crosses round a singularity, and the jumps between the four next to it."""
+    field = align_labels(mouse(20))
+    grid, singular = field.instance.grid, field.singularities
+    axes, content = panel(figure, field, CLOSE * grid.width)
+    paint(axes, content.frame.crosses(field, 2.6))
+    paint(axes, content.frame.singularities(field, 6.0))
+    for pair in grid.quads[singular.ring[0]]:
+        ends = np.array([(grid.columns[k], -grid.rows[k]) for k in (grid.first[pair], grid.second[pair])])
+        points = content.frame.at(ends)
+        axes.plot(*points.T, color=GREY, linewidth=1.2, linestyle=":")
+        words, box = (
+            f"{field.p[pair]}".replace("-", "−"),
+            {"facecolor": "white", "edgecolor": "none", "pad": 2.0},
+        )
+        axes.text(*points.mean(axis=0), words, ha="center", va="center", bbox=box)
+    centre = content.frame.at(np.array([singular.column[0] + 0.5, -singular.row[0] - 0.5]))
+    axes.set_position((0.0, 0.0, 1.0, 1.0))
+    half = 36 * figure.get_size_inches()
+    set_coordinates(axes, *(centre - half), *(2 * half))
+
+
+def surface(figure: Figure) -> None:
+    """The surface, with the lines of the field on it."""
+    field = mouse(48)
+    axes, content = panel(figure, field, PAGE)
+    draw_surface(axes, replace(content, surface=cf.surface(field)))
+    paint(axes, content.frame.streamlines(field, 1.2, 14.0))
 
 
 def strip(figure: Figure) -> None:
@@ -174,24 +252,30 @@ def singular(figure: Figure) -> None:
                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
             )
         for index in field.singularities.index:
-            axes.plot(0.5, 0.5, "o", color="#d62728", markersize=9)
+            axes.plot(0.5, 0.5, "o", color=POSITIVE, markersize=9)
             axes.text(0.5, 0.38, f"+{index:g}", ha="center", va="top", fontsize=10)
         axes.set(xlim=(-0.55, 1.55), ylim=(-0.55, 1.55))
 
 
-FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float]]] = {
-    "cross": (cross, 7.6, 3.0),
-    "strip": (strip, 8.6, 3.4),
-    "facets": (facets, 7.6, 2.9),
-    "singularities": (singular, 6.0, 3.1),
+FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float, float]]] = {
+    "first_strokes": (strokes, PAGE / 72, 4.03, 13),
+    "first_crosses": (crosses, PAGE / 72, 2.8, 13),
+    "first_jump": (jump, PAGE / 72, 2.35, 13),
+    "first_singularity": (singularity, PAGE / 72, 3.8, 13),
+    "first_surface": (surface, PAGE / 72, 3.95, 13),
+    "math_strip": (strip, 8.6, 3.4, 11),
+    "math_facets": (facets, 7.6, 2.9, 11),
+    "math_singularities": (singular, 6.0, 3.1, 11),
 }
-"""Name -> drawing function, width and height in inches."""
+"""File -> drawing function, width and height in inches, points of its words."""
 
 
 def draw(folder: Path) -> None:
     """Write every figure as SVG, with equal bytes each time."""
-    for name, (paint, width, height) in FIGURES.items():
-        with fixed_settings(STYLE):
-            figure = Figure(figsize=(width, height), layout="constrained")
-            paint(figure)
-            figure.savefig(folder / f"math_{name}.svg", metadata={"Date": None, "Creator": None})
+    for name, (paint_figure, width, height, points) in FIGURES.items():
+        with fixed_settings(STYLE | {"font.size": points}):
+            figure = Figure(
+                figsize=(width, height), layout="constrained" if name.startswith("math") else "none"
+            )
+            paint_figure(figure)
+            figure.savefig(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})

@@ -30,7 +30,6 @@ from crossfield.models.smooth.polyvector import HOLDS
 from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
-README = DOCS.parent / "README.md"
 
 
 def markdown(columns: tuple[str, ...], rows: list[list[str]]) -> str:
@@ -68,8 +67,13 @@ def write_formulations() -> None:
         )
         facts = " ".join(f"{words[0].upper()}{words[1:]}." for words in about)
         parts += [f"## `{name}`", facts, f"$$\n{latex(formulation)}\n$$"]
+    _, formats = tables()["formulations"]
+    shown = ("name", "short", "paper", "class", *DEFAULTS)
     columns, rows = tables()["solvers"]
     parts += [
+        "## Formulations and formats",
+        LIFTED,
+        markdown(shown, [[str(row[column]) for column in shown] for row in formats]),
         "## Formulations and bundled solvers",
         markdown(columns, [[str(row[column]) for column in columns] for row in rows]),
     ]
@@ -90,11 +94,14 @@ def kinds_in_short() -> str:
     )
 
 
-INTRODUCTION = r"""[The mathematics](mathematics.md) derives the model. A cross at pixel $i$ has the line
-$u$ at the angle $\alpha_i + \beta_i$ and the line $v$ at $\alpha_i + \pi/2 - \beta_i$. $I$ is the set of
-pixels of the mask. $S_c$ is the set of stroke pixels, with direction $\theta_i$ and weight $w_i$. $E$ is
-the set of ordered pairs $(i, j)$ in which $j$ is the upper or the right neighbour of $i$. Angles are in
-radians, counter-clockwise, with $y$ up.
+LIFTED = """*Lifted, exact*: each product of an integer and a continuous variable becomes one column and
+four rows, without loss. `crossfield list` prints the other formats, too."""
+
+INTRODUCTION = r"""[A cross field in 60 seconds](cross-field.md) explains crosses and jumps, and [the
+mathematics](mathematics.md) derives the model. $I$ is the set of pixels of the mask. $S_c$ is the set of
+stroke pixels, with direction $\theta_i$ and weight $w_i$. $E$ is the set of ordered pairs $(i, j)$ in
+which $j$ is the upper or the right neighbour of $i$. Angles are in radians, counter-clockwise, with $y$
+up.
 
 The window $[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is data. Under the gauge `strokes` it is
 $[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0, \pi/2]$ elsewhere. Under `box` it is $[0, \pi/2]$
@@ -280,7 +287,7 @@ def draw_solved_field() -> None:
 
 
 def draw_mouse_surface() -> None:
-    """Draw docs/pictures/mouse_surface.png, in the README: the surface over the bend field of the mouse."""
+    """Draw docs/pictures/mouse_surface.png: the surface over the bend field of the mouse."""
     import surface_pictures
 
     surface = cf.surface(cf.bend_field(cf.polyvector_field(cf.sample("mouse", 48), hold=max(HOLDS))))
@@ -337,23 +344,6 @@ def gallery_row(folder: Path, row: dict[str, Any]) -> list[str]:
     return [drawing, answer, f"{row['shows']} ({row['program']}{set_by})", reported]
 
 
-def write_readme() -> None:
-    """Replace the table of formulations inside README.md, between its markers."""
-    _, rows = tables()["formulations"]
-    shown = ("name", "short", "paper", "class", *DEFAULTS)
-    replace_between(
-        README,
-        "formulations",
-        markdown(
-            shown,
-            [
-                [f"`{row['name']}`", f"`{row['short']}`", *(str(row[column]) for column in shown[2:])]
-                for row in rows
-            ],
-        ),
-    )
-
-
 def write_editions() -> None:
     """Replace the limits of free editions inside docs/guides/solvers.md."""
     rows = [
@@ -364,7 +354,7 @@ def write_editions() -> None:
 
 
 def draw_figures() -> None:
-    """Draw docs/pictures/math_*.svg: the figures of docs/mathematics.md."""
+    """Draw docs/pictures/first_*.svg and math_*.svg: docs/cross-field.md and docs/mathematics.md."""
     import diagrams
 
     diagrams.draw(DOCS / "pictures")
@@ -408,7 +398,6 @@ PAGES: dict[str, Callable[[], None]] = {
     "figures": draw_figures,
     "traps": write_traps,
     "architecture": write_architecture,
-    "readme": write_readme,
     "editions": write_editions,
 }
 

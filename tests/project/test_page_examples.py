@@ -23,7 +23,7 @@ DOCS = places.ROOT / "docs"
 PAGES = [places.ROOT / "README.md", *sorted(DOCS.glob("tutorials/*.md")), *sorted(DOCS.glob("guides/*.md"))]
 FENCE = re.compile(r"(?:<!-- needs: (\S+) -->\n)?```(\w+)\n(.*?)```", re.DOTALL)
 SAVED = re.compile(r"Save this as `([\w.]+)`")
-ELSEWHERE = ("pip install", "sphinx-build", "python3 -m venv", ". .venv")
+ELSEWHERE = ("pip install", "sphinx-build", "python3 -m venv", ". .venv", "python -m pytest")
 """Commands that change the environment, which other tests run."""
 
 
@@ -44,12 +44,12 @@ def is_there(program: str) -> bool:
 
 
 def run_line(line: str, folder: Path) -> None:
-    words = shlex.split(line, comments=True)
-    if words and not line.startswith(ELSEWHERE):
-        command = [sys.executable, "-m", *words] if words[0] == "crossfield" else words
-        subprocess.run(
-            command, cwd=folder, check=True, stdout=subprocess.DEVNULL, env=os.environ | {"PATH": programs()}
-        )
+    for part in line.split(" && "):
+        words = shlex.split(part, comments=True)
+        if words and not part.startswith(ELSEWHERE):
+            command = [sys.executable, "-m", *words] if words[0] == "crossfield" else words
+            environment = os.environ | {"PATH": programs()}
+            subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL, env=environment)
 
 
 def run_block(language: str, text: str, folder: Path) -> None:
@@ -84,7 +84,12 @@ def test_every_block_of_a_page_runs_in_turn(page, tmp_path):
 def commands(text: str) -> list[list[str]]:
     """The words of every command of crossfield in a page, in blocks and within lines."""
     inline = re.findall(r"`(crossfield [^`]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
-    lines = [line for _, _, block in FENCE.findall(text) for line in block.splitlines()]
+    lines = [
+        part
+        for *_, block in FENCE.findall(text)
+        for line in block.splitlines()
+        for part in line.split(" && ")
+    ]
     return [shlex.split(line, comments=True) for line in (*inline, *lines) if line.startswith("crossfield ")]
 
 
