@@ -26,7 +26,6 @@ from crossfield.models.formulations.symbols import VARIABLES
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from crossfield.models.instance.symmetries import turned
 from crossfield.models.sketch.samples import SAMPLES
-from crossfield.models.smooth.polyvector import HOLDS
 from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
@@ -286,16 +285,6 @@ def draw_solved_field() -> None:
     draw_overview(cf.solve(problem, solver="highs").field, DOCS / "pictures" / "ellipsoid_milp.png")
 
 
-def draw_mouse_surface() -> None:
-    """Draw docs/pictures/mouse_surface.png: the surface over the bend field of the mouse."""
-    import surface_pictures
-
-    surface = cf.surface(cf.bend_field(cf.polyvector_field(cf.sample("mouse", 48), hold=max(HOLDS))))
-    if surface.doubts:
-        raise SystemExit(f"the mouse is not to be shown: {'; '.join(surface.doubts)}")
-    surface_pictures.strip(surface, "mouse", DOCS / "pictures" / "mouse_surface.png")
-
-
 def samples_in_short() -> str:
     """Numbers of samples by kind, and the content of the pictures."""
     known = [entry.kind for entry in SAMPLES.values()].count("analytic")
@@ -394,7 +383,6 @@ PAGES: dict[str, Callable[[], None]] = {
     "samples": write_samples,
     "gallery": write_gallery,
     "solved": draw_solved_field,
-    "shaded": draw_mouse_surface,
     "figures": draw_figures,
     "traps": write_traps,
     "architecture": write_architecture,

@@ -1,4 +1,4 @@
-"""Pictures of surfaces, for docs/surface.md and the README: strokes, normal map, shaded surface in a row.
+"""Pictures of surfaces, for docs/surface.md: strokes, normal map, shaded surface in a row.
 
 `python docs/surface_pictures.py` draws docs/pictures/surface_known.png and surface_samples.png anew.
 
@@ -8,7 +8,6 @@ A row is a surface; a known true surface is shaded next to it. All rows have the
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -16,8 +15,8 @@ from typing import Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.pictures.underlay import read_underlay
-from crossfield.export.shading.colours import colour_normals, matcap, shade_by_light, to_eight_bit
-from crossfield.export.shading.raster import Raster, View, raster, view_of_grid
+from crossfield.export.shading.colours import colour_normals, shade_by_light, to_eight_bit
+from crossfield.export.shading.raster import View, raster, view_of_grid
 from crossfield.export.surfaces.files import draw_strokes, lay_over
 from crossfield.export.surfaces.outline import find_outline
 from crossfield.models.instance.domain import Floats
@@ -35,8 +34,6 @@ HEADINGS: Final = ("strokes", "normal map", "shaded", "the true surface")
 
 
 SIZE: Final = 48
-WIDTH: Final = 1600
-"""Pixels of a strip."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,19 +83,8 @@ def _view(row: Row) -> View:
     return view_of_grid(instance, max(1, round(2 * CELL * DOTS / max(instance.mask.shape))))
 
 
-def strip(surface: Surface, drawing: str | Path, path: Path) -> Path:
-    """Draw a PNG of a surface four times, strokes, normals, lamp, matcap, and return its path."""
-    row = Row("", surface, drawing)
-    scale = max(1, WIDTH // (4 * surface.instance.grid.width))
-    view = view_of_grid(surface.instance, scale)
-    joined = np.concatenate(_cells(row, view, matcap), axis=1)
-    picture = Image.fromarray(lay_over(joined, np.full_like(joined, 255))[..., :3])
-    picture.save(path, optimize=True)
-    return path
-
-
-def _cells(row: Row, view: View, *materials: Callable[[Raster], Floats]) -> list[NDArray[np.uint8]]:
-    """The pictures of a row, uint8 (h, w, 4) each, in a view of the grid, at last in other materials."""
+def _cells(row: Row, view: View) -> list[NDArray[np.uint8]]:
+    """The pictures of a row, uint8 (h, w, 4) each, in a view of the grid."""
     instance = row.surface.instance
     drawing = None if row.drawing is None else read_underlay(row.drawing, on=instance)
     outline = None if drawing is None else find_outline(instance, drawing)
@@ -108,7 +94,7 @@ def _cells(row: Row, view: View, *materials: Callable[[Raster], Floats]) -> list
     cells = [
         lay_over(draw_strokes(instance, drawing, view), faint),
         to_eight_bit(colour_normals(shaded)),
-        *(to_eight_bit(colour(shaded)) for colour in (shade_by_light, *materials)),
+        to_eight_bit(shade_by_light(shaded)),
     ]
     if row.truth is None:
         return cells
