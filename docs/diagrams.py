@@ -1,4 +1,4 @@
-"""The figures of docs/cross-field.md and docs/mathematics.md: `python docs/make.py figures`.
+"""The figures of README, docs/cross-field.md and docs/mathematics.md: `python docs/make.py figures`.
 
 Every figure is computed. Lines, strokes and singularities have the colours of all pictures of fields.
 """
@@ -14,11 +14,14 @@ from typing import Any, Final
 import crossfield as cf
 import matplotlib as mpl
 import numpy as np
-from crossfield.export.pictures.canvas import paint, set_coordinates
+from crossfield.export.pictures.canvas import draw_smooth_image, paint, set_coordinates
 from crossfield.export.pictures.draw import fixed_settings
 from crossfield.export.pictures.marks import BORDER, FAINT, FAMILIES, POSITIVE, STROKE
 from crossfield.export.pictures.panels import PanelContent, draw_surface
 from crossfield.export.pictures.streamlines import align_labels
+from crossfield.export.pictures.underlay import read_underlay
+from crossfield.export.shading.raster import view_of_grid
+from crossfield.export.surfaces.files import draw_strokes
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
@@ -65,23 +68,46 @@ def mouse(size: int) -> CrossField:
     return cf.bend_field(cf.polyvector_field(cf.sample("mouse", size), hold=max(HOLDS)))
 
 
-def panel(figure: Figure, field: CrossField, width: float, top: float = 0.0) -> tuple[Any, PanelContent]:
-    """Axes at the left of a figure, in points, y down, and a panel of that width below a margin."""
+def panel(
+    figure: Figure, field: CrossField, width: float, top: float = 0.0, left: float = 0.0
+) -> tuple[Any, PanelContent]:
+    """Axes in a figure, in points, y down, and a panel of that width, with margins above and to the left."""
     content = PanelContent(field.instance, field, width)
     page = 72 * figure.get_size_inches()
     high = content.unit * field.instance.grid.height
-    axes = figure.add_axes((0.0, 1 - (top + high) / page[1], width / page[0], high / page[1]))
+    axes = figure.add_axes((left / page[0], 1 - (top + high) / page[1], width / page[0], high / page[1]))
     set_coordinates(axes, 0.0, 0.0, width, high)
     axes.set_clip_on(False)
     return axes, content
 
 
+def draw_mouse(axes: Any, content: PanelContent) -> None:
+    """The drawing from which the instance of a panel was read."""
+    instance = content.instance
+    ink = draw_strokes(
+        instance, read_underlay("mouse", on=instance), view_of_grid(instance, round(2 * content.unit))
+    )
+    draw_smooth_image(axes, ink, content.extent)
+
+
 def strokes(figure: Figure) -> None:
-    """The stroke pixels of a drawing, each with its direction."""
+    """The drawing, and its stroke pixels, each with its direction."""
     axes, content = panel(figure, mouse(20), PAGE)
     frame = content.frame
+    draw_mouse(axes, content)
     paint(axes, [frame.sides("#e4e4e4", 0.6, between=True), frame.sides(BORDER, 0.9)])
     paint(axes, frame.strokes(STROKE, 3.0))
+
+
+def front(figure: Figure) -> None:
+    """The drawing, the lines of the field, and the surface, for README and home page: without words."""
+    field = mouse(48)
+    width, pitch = 0.64 * PAGE, 0.68 * PAGE
+    panels = [panel(figure, field, width, 4, number * pitch) for number in range(3)]
+    (drawing, content), (lines, _), (shape, _) = panels
+    draw_mouse(drawing, content)
+    paint(lines, content.frame.streamlines(field, 1.1, 7.0))
+    draw_surface(shape, replace(content, surface=cf.surface(field)))
 
 
 def crosses(figure: Figure) -> None:
@@ -258,6 +284,7 @@ def singular(figure: Figure) -> None:
 
 
 FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float, float]]] = {
+    "front": (front, 2 * PAGE / 72, 2.65, 13),
     "first_strokes": (strokes, PAGE / 72, 4.03, 13),
     "first_crosses": (crosses, PAGE / 72, 2.8, 13),
     "first_jump": (jump, PAGE / 72, 2.35, 13),

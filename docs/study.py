@@ -70,12 +70,9 @@ def main() -> None:
             plan, options.data, jobs=options.jobs, scheduler=options.scheduler, folder=options.sketches,
             parts=options.parts, progress=lambda line: print(line, file=sys.stderr, flush=True),
         )  # fmt: skip
-    from make import replace_between
-    from studying.page import read, short_summary, write_page
+    from studying.page import write_page
 
     write_page(options.data, DOCS if options.data == DATA else options.data, plan)
-    if options.data == DATA:
-        replace_between(DOCS / "index.md", "answers", short_summary(read(DATA), plan))
 
 
 if __name__ == "__main__":

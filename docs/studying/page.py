@@ -70,9 +70,9 @@ def findings(rows_of: RowsByPart) -> dict[str, list[str]]:
     }
 
 
-def paragraphs(sentences: dict[str, list[str]], most: int | None = None) -> str:
-    """Questions and answers as paragraphs, each of that many sentences at most."""
-    return "\n\n".join(f"**{question}** {' '.join(lines[:most])}" for question, lines in sentences.items())
+def paragraphs(sentences: dict[str, list[str]]) -> str:
+    """Questions and answers as paragraphs."""
+    return "\n\n".join(f"**{question}** {' '.join(lines)}" for question, lines in sentences.items())
 
 
 def difference_by_others() -> str:
@@ -173,8 +173,3 @@ def write_page(data: Path, target: Path, plan: Plan) -> None:
             plain = [[cell.replace("`", "").replace("**", "") for cell in line] for line in (heads, *lines)]
             csv.writer(file, lineterminator="\n").writerows(plain)
     (target / "evidence.md").write_text(page(rows_of, plan))
-
-
-def short_summary(rows_of: RowsByPart, plan: Plan) -> str:
-    """The first sentence of each answer, for the index of all pages."""
-    return paragraphs(findings(rows_in_order(rows_of, plan)), most=1)

@@ -37,8 +37,6 @@ def test_the_page_and_its_tables_are_made_from_the_rows(study, tmp_path):
     assert len(list((tmp_path / "evidence").iterdir())) == len(names) - 1
     for name in names:
         assert (tmp_path / name).read_text() == (DOCS / name).read_text(), name
-    short = study.page.short_summary(study.page.read(DATA), study.plan.FULL)
-    assert f" -->\n{short}\n<!-- end of answers -->" in (DOCS / "index.md").read_text()
 
 
 def test_no_run_has_two_rows(study):
