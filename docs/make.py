@@ -330,7 +330,7 @@ def gallery_row(folder: Path, row: dict[str, Any]) -> list[str]:
     drawing = f"![{row['file']}]({where}/{row['file']})" if "picture" in row else f"`{row['file']}`"
     texts = {key: value if key == "size" else shlex.join(value) for key, value in options.items()}
     set_by = "".join(f", `--{key} {text}`" for key, text in texts.items())
-    return [drawing, answer, f"{row['shows']} ({row['program']}{set_by})", reported.replace("<", "\\<")]
+    return [drawing, answer, f"{row['shows']} ({row['program']}{set_by})", reported]
 
 
 def write_editions() -> None:
