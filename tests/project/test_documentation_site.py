@@ -93,7 +93,9 @@ def test_a_model_has_every_line_of_its_declaration(browser, address):
     ]
 
 
-@pytest.mark.parametrize("page", ["index", "tutorials/drawing", "guides/solvers", "reference/api"])
+@pytest.mark.parametrize(
+    "page", ["index", "cross-field", "tutorials/drawing", "guides/solvers", "reference/api"]
+)
 def test_a_phone_shows_a_page_without_scrolling_sideways(browser, address, page):
     show(browser, width=390, height=844)
     browser.get(f"{address}/{page}.html")
