@@ -49,16 +49,17 @@ _NARROW: Final = 0.7  # share of the cells left below which the same spacing is 
 # Passes
 _MOST_PASSES: Final = 200
 _PASSES: Final = 5  # between looks at the bound, and updates of rings if there are any
-_SLOW: Final = (0.08, 0.02)  # part of the gap: a smaller rise is slow; without rings, with rings
+_SLOW: Final = (0.08, 0.02)  # part of the gap: a smaller rise is slow; the latter for rings and wide gaps
 _BETWEEN: Final = 4  # passes between two updates of rings, which take longer
 _FEW: Final = 0.4  # share of labels left below which a record of the level pays
 _CLOSER: Final = 0.3  # part of the gap of the last record, from which another one makes rings cheaper
+_ENOUGH: Final = 0.1  # the same for a tiny gap
 _TINY: Final = 1e-3  # relative gap below which finer labels follow
 _CAP: Final = 3.0  # gaps from which sums on rings count alike, before a bound counts
 
-_WIDE: Final = 0.01  # relative gap of the first level above which a search for a better field follows
+_WIDE: Final = 0.01  # relative gap; at the first level, a search for a better field follows
 _SEARCH: Final = 0.05  # share of the time left for it
-_ROUNDS: Final = 1  # of that search without a limit of time
+_ROUNDS: Final = 10  # of that search
 _BETTER: Final = 1e-9  # relative: a better field; also what a level keeps more than the checker asks for
 
 
@@ -238,11 +239,12 @@ class _Prover:
                 bound, left = dual.pass_over(most, forward=False)
             if rings:
                 dual.update_rings(max(most - bound, 0.0), backward=bool(number % 2))
-            closing = rings and number > 1 and _TINY * most < most - bound < _CLOSER * chain.gap
-            if self.ends.over() or closing:
+            gap = most - bound
+            closing = rings and number > 1 and _TINY * most < gap < _CLOSER * chain.gap
+            if self.ends.over() or closing or (rings and gap < _ENOUGH * chain.gap):
                 break
             if number % _PASSES == _PASSES - 1:
-                if bound - reached < _SLOW[rings] * (most - bound) or left < _FEW:
+                if bound - reached < _SLOW[rings and gap > _WIDE * most] * gap or left < _FEW:
                     break
                 reached = bound
         dual.pass_over(most, forward=True)
@@ -262,17 +264,11 @@ class _Prover:
         return improved
 
     def _search(self, seconds: float) -> bool:
-        """Whether a search finds a better field; without a limit of time, in some rounds."""
+        """Whether a short search finds a better field."""
         limits = Limits().until(self.ends.deadline.within(seconds)) if math.isfinite(seconds) else None
-        start, rounds = field_of(self.instance, self.z, self.energy), None if limits else _ROUNDS
+        start, stop = field_of(self.instance, self.z, self.energy), self.ends.stop
         result = search(
-            self.instance,
-            limits=limits,
-            rounds=rounds,
-            seed=self.seed,
-            jobs=1,
-            start=start,
-            stop=self.ends.stop,
+            self.instance, limits=limits, rounds=_ROUNDS, seed=self.seed, jobs=1, start=start, stop=stop
         )
         return self._offer(integers_of(result.field))
 
