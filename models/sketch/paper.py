@@ -94,13 +94,17 @@ def _darken_lighter_strokes(pixels: NDArray[np.uint8], paper: Ink) -> Floats:
     light = _enlarge(np.clip(bright / np.quantile(bright, 0.95), _DARKEST_SHADOW, 1), shape)
     ground = np.stack([_enlarge(channel, shape) for channel in np.moveaxis(paper, -1, 0)], axis=-1)
     excess: Floats = np.subtract(pixels, ground)
-    most = np.linalg.norm(255 * light[..., None] - ground, axis=-1)
-    ink = np.linalg.norm(np.maximum(excess, 0), axis=-1) / np.maximum(most, _LEAST_CONTRAST)
-    ink = np.minimum(ink, 1)
-    colours = np.repeat(1 - ink[..., None], pixels.shape[-1], axis=-1)
+    lighter, contrast = (
+        np.einsum("ijk,ijk->ij", part, part)  # many times as fast as norms
+        for part in (np.maximum(excess, 0), 255 * light[..., None] - ground)
+    )
+    ink = np.sqrt(np.minimum(lighter / np.maximum(contrast, _LEAST_CONTRAST**2), 1))
+    colours: Floats = np.empty_like(excess)
+    colours[...] = 1 - ink[..., None]
     if pixels.shape[-1] > 1:
         excess += ink[..., None] * ground  # the colour of the stroke, times its share of the pixel
-        colours[..., 0] += ink * np.clip(redness(excess) / np.maximum(excess.max(axis=-1), 1), 0, 1)
+        brightest = np.maximum(np.maximum(excess[..., 0], excess[..., 1]), excess[..., 2])
+        colours[..., 0] += ink * np.clip(redness(excess) / np.maximum(brightest, 1), 0, 1)
     return colours
 
 
