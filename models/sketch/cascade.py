@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Final
 from xml.etree.ElementTree import Element
 
@@ -46,12 +47,13 @@ _Declared = tuple[str, str, bool]
 class Cascade:
     """The rules of a drawing.
 
-    unread: an element and its colour, for each colour that cannot be read. unused: the same for declarations
-    that change what the element shows and that neither this package nor the renderer knows.
+    combinators: of each selector, by its order, how often it tries all ancestors and all siblings. unread: an
+    element and its colour, for each colour that cannot be read. unused: the same for declarations that change
+    what the element shows and that neither this package nor the renderer knows.
     """
 
     matcher: Any
-    combinators: dict[int, int] = field(default_factory=dict)
+    combinators: dict[int, tuple[int, int]] = field(default_factory=dict)
     unread: dict[Element, str] = field(default_factory=dict)
     unused: dict[Element, str] = field(default_factory=dict)
     checks: int = 0
@@ -74,7 +76,7 @@ class Cascade:
     def _declarations(self, wrapper: Any) -> Iterator[_Declared]:
         """All declarations for an element, the ones that count most last."""
         element = wrapper.etree_element
-        yield from ((key, element.attrib[key], False) for key in ATTRIBUTES & element.attrib.keys())
+        yield from ((key, element.attrib[key], False) for key in sorted(ATTRIBUTES & element.attrib.keys()))
         declared: list[_Declared] = []
         if self.combinators:
             self._count(wrapper)
@@ -85,7 +87,7 @@ class Cascade:
 
     def _count(self, wrapper: Any) -> None:
         """Count the comparisons for an element. Raises InputError beyond MAX_RULE_CHECKS."""
-        steps = 1 + sum(1 for _ in wrapper.ancestors) + wrapper.index
+        ancestors, siblings = 1 + sum(1 for _ in wrapper.ancestors), 1 + wrapper.index
         matcher = self.matcher
         lists = [
             matcher.other_selectors,
@@ -93,7 +95,8 @@ class Cascade:
         ]
         lists += [matcher.class_selectors.get(name, ()) for name in wrapper.classes]
         lists.append(matcher.id_selectors.get(wrapper.id, ()))
-        self.checks += sum(steps ** self.combinators[entry[2]] for entries in lists for entry in entries)
+        tries = (self.combinators[entry[2]] for entries in lists for entry in entries)
+        self.checks += sum(ancestors**up * siblings**along for up, along in tries)
         if self.checks > MAX_RULE_CHECKS:
             raise InputError(
                 f"its style sheets take more than {MAX_RULE_CHECKS} comparisons; export it without"
@@ -148,19 +151,25 @@ def _add_rules(cascade: Cascade, rules: Iterable[Any]) -> None:
                 inner = tinycss2.parse_rule_list(rule.content, skip_comments=True, skip_whitespace=True)
                 _add_rules(cascade, inner)
         elif rule.type == "qualified-rule" and (declared := _declared(rule.content)):
+            if ":has(" in _text(rule.prelude):  # which tries all elements inside
+                continue
             try:
                 selectors = cssselect2.compile_selector_list(rule.prelude)
             except (cssselect2.SelectorError, RecursionError, MemoryError, SyntaxError):
                 continue
-            text = _text(rule.prelude)
-            for selector in selectors:
+            commas = [place for place, part in enumerate(rule.prelude) if part == ","]
+            for selector, (start, end) in zip(
+                selectors, pairwise([-1, *commas, len(rule.prelude)]), strict=True
+            ):
                 cascade.matcher.add_selector(selector, declared)
+                text = _text(rule.prelude[start + 1 : end])
                 cascade.combinators[cascade.matcher.order] = _combinators(text)
 
 
-def _combinators(selector: str) -> int:
-    """A bound on the number of combinators of a selector, whose comparisons are tried for every ancestor."""
-    return len(re.findall(r"[\s>+~]+|:has", selector.strip()))
+def _combinators(selector: str) -> tuple[int, int]:
+    """Bounds on how often a selector tries all ancestors, and all siblings, of an element."""
+    found = [sign for sign in re.findall(r"\s*([>+~])\s*|\s+", selector.strip()) if sign not in ("+", ">")]
+    return found.count(""), found.count("~")
 
 
 @lru_cache(maxsize=1024)
