@@ -8,18 +8,22 @@ direction changes little from one to the next.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, cg
 
 from ..arguments import check_arguments, check_positive
 from ..field.field import CrossField
 from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.domain import Floats, Ints
+from ..instance.grid import Grid
 from ..processes.deadline import Over, Stop, stop_function
-from .sparse_systems import SimilarSystems, nested_dissection_order, one_thread
+from .sparse_systems import one_thread
+from .two_levels import approximate_inverse
 
 _Places = NDArray[np.intp]
 
@@ -30,8 +34,9 @@ HOLD: Final = 0.25  # factor of the stroke weights; from 0.3 on, 3 degrees of no
 _LEAST_HARMONIC: Final = 0.01  # smallest deviation from clean strokes
 _SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size
 _ROUNDS: Final = 20  # 2 to 6 are usual
-_RESIDUAL: Final = 0.1  # relative, of systems that are not factored
-_STEPS: Final = 5  # of conjugate gradients; where they do not suffice, a system is factored
+_FIRST: Final = 0.01  # relative residual of the system of the first round, whose step is the longest
+_RESIDUAL: Final = 0.05  # of later ones
+_STEPS: Final = 50  # of conjugate gradients; 5 to 15 are usual
 _FALL: Final = 1e-4  # least share of the energy that a round has to remove before another one
 
 
@@ -53,10 +58,10 @@ def bend_field(
     are fixed. The start therefore determines the singularities. The method `bend` starts from the PolyVector
     field with the hardest hold.
 
-    Each round fixes the unit vectors and minimises over the angles: one sparse system. The system of the
-    first round is factored. Its factors precondition conjugate gradients in later rounds, until a round needs
-    more than five steps; its system is then factored. Rounds end when the energy hardly decreases, and after
-    20 rounds at the latest; a round that increases it is discarded. Labels are then moved into the windows of
+    Each round fixes the unit vectors and minimises over the angles: one sparse system, which conjugate
+    gradients solve to a residual of 1 % in the first round and of 5 % in later ones. Their preconditioner
+    (two_levels.py) is made for the first round. Rounds end when the energy hardly decreases, and after 20
+    rounds at the latest; a round that increases it is discarded. Labels are then moved into the windows of
     the instance, as by `CrossField.from_lines`. Deterministic unless `stop` ends it.
 
     Parameters
@@ -89,19 +94,15 @@ def bend_field(
     over = stop_function(stop)
     if over():
         return start
-    grid = start.instance.grid
-    places = nested_dissection_order(grid.rows, grid.columns, reach=1)
-    order = np.stack([places, places + grid.size], axis=1).ravel()
-    solver = SimilarSystems(order, residual=_RESIDUAL, steps=_STEPS)
     x = np.concatenate([start.u_angle, start.v_angle])
-    x = _Bend.of(start, HARMONIC if harmonic is None else harmonic, hold).least(x, solver, over)
+    x = _Bend.of(start, HARMONIC if harmonic is None else harmonic, hold).least(x, over)
     field = CrossField.from_lines(start.instance, *np.split(x, 2))
     if harmonic is not None:
         return field
     wanted = max(HARMONIC * (tremble(field) / TREMBLE) ** 2, _LEAST_HARMONIC)
     if wanted >= HARMONIC or over():
         return field
-    x = _Bend.of(start, wanted, hold).least(x, solver, over)
+    x = _Bend.of(start, wanted, hold).least(x, over)
     return CrossField.from_lines(start.instance, *np.split(x, 2))
 
 
@@ -115,11 +116,15 @@ def tremble(field: CrossField) -> float:
 class _Bend:
     """The energy of line angles x = (u, v), shape (2n,), as squares: bend, and linear ones (rows x - goal).
 
-    difference x - offset are the differences of pairs, (2m,): row e for u of the first pixel of pair e, row
-    m + e for its v. Bend has a square for each quadrant (pixel, line, a horizontal and a vertical neighbour):
+    links are the lines, as places in x, that the jumps of m pairs compare: (2m,) of first pixels, and of
+    second ones. difference x - offset are the differences of pairs, (2m,): row e for u of the first pixel of
+    pair e, row m + e for its v. Bend has a square for each quadrant (pixel, line, a horizontal and a vertical
+    neighbour):
     across (q,) is the place in x of the pixel's other line, sideways and upward (q,) are rows of differences.
     """
 
+    grid: Grid
+    links: tuple[Ints, Ints]
     difference: Any
     offset: Floats
     across: _Places
@@ -131,7 +136,7 @@ class _Bend:
     @classmethod
     def of(cls, start: CrossField, harmonic: float, hold: float) -> _Bend:
         """The energy with the jumps and stroke lines of a field."""
-        difference, offset = _differences(start)
+        links, difference, offset = _differences(start)
         carried, theta, weight = _strokes(start, hold)
         squared, every = np.sqrt(weight), sparse.eye_array(start.instance.grid.size)
         strokes = sparse.csr_array(
@@ -140,13 +145,22 @@ class _Bend:
         even, skew = np.sqrt(2 * harmonic), np.sqrt(start.instance.skew_coefficient)
         rows = [even * difference, strokes, skew / 2 * sparse.hstack([every, -every])]
         goal = [even * offset, squared * theta, np.full(every.shape[0], -skew * QUARTER)]
-        return cls(difference, offset, *_quadrants(start), sparse.vstack(rows).tocsr(), np.concatenate(goal))
+        return cls(
+            start.instance.grid,
+            links,
+            difference,
+            offset,
+            *_quadrants(start),
+            sparse.vstack(rows).tocsr(),
+            np.concatenate(goal),
+        )
 
-    def least(self, x: Floats, solver: SimilarSystems, over: Over) -> Floats:
+    def least(self, x: Floats, over: Over) -> Floats:
         """Angles of low energy, in rounds that begin at x."""
         energy, slope, along = self.at(x)
-        for _ in range(_ROUNDS):
-            moved = x - self._step(along, slope, solver)
+        inverse = self._invert(along)
+        for number in range(_ROUNDS):
+            moved = x - self._step(along, slope, inverse, _RESIDUAL if number else _FIRST)
             there = self.at(moved)
             fallen = energy - there[0]
             if fallen > 0:
@@ -162,19 +176,28 @@ class _Bend:
         slope = self.difference.T @ (along.T @ bend) + self.rows.T @ linear
         return float(np.sum(bend**2) + np.sum(linear**2)), slope, along
 
-    def _step(self, along: Any, slope: Floats, solver: SimilarSystems) -> Floats:
-        """Minus the step to the least energy for fixed unit vectors."""
+    @cached_property
+    def squares(self) -> Any:
+        """The matrix (2n, 2n) of the linear squares."""
+        return (self.rows.T @ self.rows).tocsr()
 
-        def matrix() -> Any:
-            bend = along @ self.difference
-            return bend.T @ bend + self.rows.T @ self.rows
+    def _invert(self, along: Any) -> LinearOperator:
+        """The approximate inverse of the system for fixed unit vectors."""
+        bend = along @ self.difference
+        matrix = bend.T @ bend + self.squares
+        return LinearOperator(matrix.shape, approximate_inverse(matrix, self.grid, *self.links), dtype=float)
+
+    def _step(self, along: Any, slope: Floats, inverse: LinearOperator, residual: float) -> Floats:
+        """Minus the step to about the least energy for fixed unit vectors, by conjugate gradients."""
 
         def product(v: Floats) -> Floats:
             bend = self.difference.T @ (along.T @ (along @ (self.difference @ v)))
-            total: Floats = bend + self.rows.T @ (self.rows @ v)
+            total: Floats = bend + self.squares @ v
             return total
 
-        return solver.solve(matrix, product, slope)
+        times = LinearOperator(inverse.shape, product, dtype=np.float64)
+        step: Floats = cg(times, slope, rtol=residual, maxiter=_STEPS, M=inverse)[0]
+        return step
 
     def _along(self, x: Floats) -> Any:
         """The matrix (q, 2m) from differences to derivatives along the other line; a quadrant counts 1/4."""
@@ -185,8 +208,8 @@ class _Bend:
         return sparse.csr_array((parts, beside, begin), shape=(count, len(self.offset)))
 
 
-def _differences(field: CrossField) -> tuple[Any, Floats]:
-    """Matrix (2m, 2n) and offset (2m,) of the differences, -(A + B) and -(A - B), that the jumps compare."""
+def _differences(field: CrossField) -> tuple[tuple[Ints, Ints], Any, Floats]:
+    """Links, difference and offset of `_Bend`: the differences -(A + B) and -(A - B) of lines."""
     grid, size, pairs = field.instance.grid, field.instance.grid.size, len(field.p)
     odd = field.p & 1
     first = np.concatenate([grid.first, grid.first + size])
@@ -195,7 +218,7 @@ def _differences(field: CrossField) -> tuple[Any, Floats]:
     places = (np.concatenate([row, row]), np.concatenate([second, first]))
     matrix = sparse.csr_array((np.concatenate([values, -values]), places), shape=(2 * pairs, 2 * size))
     terms = field.instance.pair_terms
-    return matrix, np.concatenate([terms.offset(field.p + odd), terms.offset(field.p - odd)])
+    return (first, second), matrix, np.concatenate([terms.offset(field.p + odd), terms.offset(field.p - odd)])
 
 
 def _quadrants(field: CrossField) -> tuple[_Places, _Places, _Places]:

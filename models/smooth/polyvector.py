@@ -13,20 +13,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import LinearOperator, cg
 
 from ..arguments import check_arguments, check_positive
 from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps, label_of
 from ..instance.angles import HALF
 from ..instance.domain import Floats
+from ..instance.grid import Grid
 from ..instance.instance import Instance
 from .sparse_systems import Solve, factor_matrix, one_thread, smoothness, solve_locally, stroke_weight
+from .two_levels import FEW, approximate_inverse
 
 _Complex = NDArray[np.complex128]
 
 HOLDS: Final = (0.1, 1.0, 100.0)  # factors of the stroke weights worth trying: loose, as in the energy, hard
 _HARDEST: Final = 1e4  # weight of a stroke, far above the 2 of a pair; `PULL` still counts in 16 digits
 _ITERATIONS: Final = 100  # of inverse iteration: the next eigenvalues are close, and their vectors good, too
+_EXACT: Final = 1e-12  # relative residual of the polynomials of more pixels than `FEW`
+_STEPS: Final = 200  # of conjugate gradients; 20 to 40 are usual
 _DECIMALS: Final = 9  # of line angles in quarter turns: rounding errors must not decide jumps
 
 
@@ -90,8 +95,21 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
     once = sums(weight * root)
     matrix = _couple_coefficients(alike, once, instance.skew_coefficient)
     right = np.concatenate([-sums(weight * root**2), -once])
-    x = factor_matrix(matrix)(right) if tolerance is None else solve_locally(matrix, right, tolerance)
+    if tolerance is not None:
+        x = solve_locally(matrix, right, tolerance)
+    elif size <= FEW:
+        x = factor_matrix(matrix)(right)
+    else:
+        x = _solve_large(matrix, right, instance.grid)
     return x[:size], x[size:]
+
+
+def _solve_large(matrix: Any, right: _Complex, grid: Grid) -> _Complex:
+    """The solution up to rounding, without factors of the matrix unless conjugate gradients are late."""
+    links = (np.concatenate([ends, ends + grid.size]) for ends in (grid.first, grid.second))
+    inverse = LinearOperator(matrix.shape, approximate_inverse(matrix, grid, *links), dtype=matrix.dtype)
+    x, late = cg(matrix, right, rtol=_EXACT, maxiter=_STEPS, M=inverse)
+    return np.asarray(factor_matrix(matrix)(right) if late else x)
 
 
 def _couple_coefficients(alike: Any, cross: _Complex, skew: float) -> Any:

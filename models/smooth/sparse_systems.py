@@ -135,28 +135,22 @@ class SimilarSystems:
 
     """
 
-    def __init__(self, order: Ints, *, residual: float, steps: int, few: int = 0) -> None:
+    def __init__(self, order: Ints, *, residual: float, steps: int, few: int) -> None:
         self._order, self._residual, self._steps, self._few = order, residual, steps, few
         self._factors: Solve | None = None
 
-    def solve(self, matrix: Any, product: Solve, right: Floats) -> Floats:
-        """The solution of a positive semidefinite system.
-
-        matrix: of the system, or a function that returns it. product: times a vector.
-        """
+    def solve(self, matrix: Any, right: Floats) -> Floats:
+        """The solution of a positive semidefinite system."""
         if self._factors is not None and len(right) > self._few:
-            shape = (len(right), len(right))
-            times, inverse = (
-                LinearOperator(shape, function, dtype=right.dtype) for function in (product, self._factors)
-            )
+            inverse = LinearOperator(matrix.shape, self._factors, dtype=right.dtype)
             with one_thread():
                 solution, late = cg(
-                    times, right, rtol=self._residual, atol=_ROUNDING, maxiter=self._steps, M=inverse
+                    matrix, right, rtol=self._residual, atol=_ROUNDING, maxiter=self._steps, M=inverse
                 )
             if not late:
                 found: Floats = solution
                 return found
-        self._factors = factor_matrix(matrix() if callable(matrix) else matrix, self._order)
+        self._factors = factor_matrix(matrix, self._order)
         return self._factors(right)
 
 

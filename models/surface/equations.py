@@ -245,7 +245,7 @@ def descend(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]
         diagonal = sparse.diags_array(curvature.diagonal())
         for _ in range(_TRIALS):
             damped = curvature + damping * diagonal
-            tried = z - solver.solve(damped, damped.__matmul__, slope)
+            tried = z - solver.solve(damped, slope)
             reached = equations.energy(tried)
             if reached < energy:
                 break
