@@ -114,4 +114,5 @@ def _paint_area(axes: Any, part: Area) -> None:
 def _add_path(axes: Any, path: Any, **style: Any) -> None:
     from matplotlib.patches import PathPatch
 
-    axes.add_patch(PathPatch(path, clip_on=False, **style))
+    # Unlike `add_patch`, it does not compute limits of the axes, which are fixed.
+    axes.add_artist(PathPatch(path, clip_on=False, **style))
