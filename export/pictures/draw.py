@@ -6,7 +6,7 @@ Most kinds are panels with words round them; `layers` is the bare field in the c
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -156,7 +156,8 @@ def draw(
             with fixed_settings():
                 return write_bytes(path, _save_figure(_draw_on_mesh(subject, underlay), suffix))
         if kind == LAYERS and isinstance(subject, CrossField):
-            return write_bytes(path, _draw_layers(subject, suffix, underlay))
+            draw_layers(subject, [path], underlay)
+            return path
         if underlay is not None:
             raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}")
     with fixed_settings():
@@ -194,14 +195,18 @@ def _default_kind(subject: CrossField | Instance, suffix: str, *, underlaid: boo
     return LAYERS if suffix == ".svg" or underlaid else "field"
 
 
-def _draw_layers(field: CrossField, suffix: str, underlay: str | Path | Underlay | None) -> bytes:
+def draw_layers(field: CrossField, paths: Iterable[Path], underlay: str | Path | Underlay | None) -> None:
+    """Draw a field in the coordinates of its drawing into files, whose layers are computed once."""
     if isinstance(underlay, str | Path):
         underlay = read_underlay(underlay, on=field.instance)
     layers = field_sheet(field, underlay)
-    if suffix == ".svg":
-        return sheet_svg(layers)
-    with fixed_settings():
-        return _save_figure(draw_sheet(layers), suffix)
+    for path in paths:
+        suffix = path.suffix.lower()
+        if suffix == ".svg":
+            write_bytes(path, sheet_svg(layers))
+        else:
+            with fixed_settings():
+                write_bytes(path, _save_figure(draw_sheet(layers), suffix))
 
 
 @contextmanager

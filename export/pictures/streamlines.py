@@ -159,8 +159,7 @@ class _Crosses:
         down, across = 1 - z.imag - top, 1 + z.real - left
         place = top + _CORNERS[0], left + _CORNERS[1]
         weight = np.where(_CORNERS[0], down, 1 - down) * np.where(_CORNERS[1], across, 1 - across)
-        chosen = np.take_along_axis(self.directions[place], self.nearest(place, before)[..., None], axis=-1)
-        total = np.sum(weight * chosen[..., 0], axis=0)
+        total = np.sum(weight * self.directions[(*place, self.nearest(place, before))], axis=0)
         return np.asarray(total / np.maximum(np.abs(total), 1e-12))
 
     def is_allowed(self, z: Positions, target: Positions) -> Bools:
@@ -279,7 +278,8 @@ class _Cover:
     def _raster(self, z: Positions) -> tuple[_Array, _Array]:
         places = np.stack([0.5 - z.imag, 0.5 + z.real]) * self.fine
         row, column = np.floor(places).astype(np.int64)
-        return np.clip(row, 0, self.shape[0] - 1), np.clip(column, 0, self.shape[1] - 1)
+        last_row, last_column = self.shape[0] - 1, self.shape[1] - 1
+        return np.minimum(np.maximum(row, 0), last_row), np.minimum(np.maximum(column, 0), last_column)
 
     def is_blocked(self, z: Positions, family: Labels) -> Bools:
         """True where a line of a family at z would be too near to another one."""

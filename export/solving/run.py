@@ -258,7 +258,7 @@ def _draw_field(
     report: Report, folder: Path, underlay: Underlay | None, progress: Progress, stop: Over
 ) -> Report:
     """Draw the kept field; return the report, marked where Ctrl-C or the caller ended that."""
-    from ..pictures.draw import LAYERS, ON_MESHES, draw
+    from ..pictures.draw import ON_MESHES, draw, draw_layers
 
     ended = replace(report, interrupted="drawing")
     on_mesh = isinstance(report.instance.domain, Mesh)
@@ -269,11 +269,11 @@ def _draw_field(
             progress(f"drawing {kind}")
             subject = report.instance if kind == "instance" else report.kept.field
             draw(subject, folder / picture_name(kind), kind=kind)
-        for name in () if on_mesh else OVERLAY:
-            if stop():
-                return ended
-            progress(f"drawing {name}")
-            draw(report.kept.field, folder / name, kind=LAYERS, underlay=underlay)
+        if stop():
+            return ended
+        if not on_mesh:
+            progress("drawing overlay")
+            draw_layers(report.kept.field, [folder / name for name in OVERLAY], underlay)
     except KeyboardInterrupt:
         return ended
     return report
