@@ -110,7 +110,8 @@ def pytest_collection_finish(session):
     if session.items and not option.collectonly and not option.markexpr.startswith("smoke"):
         from crossfield.models.proof.compiling import compile_all
 
-        compile_all()
+        for orthogonal in (False, True):
+            compile_all(orthogonal)
 
 
 def pytest_sessionfinish(session):

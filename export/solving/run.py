@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -122,20 +123,18 @@ def run(
     limits, folder = Limits.finite_or_default(limits), make_folder(folder)
     progress(plan_sentence(limits, instance))
     watch = Stopwatch()
-    progress("greedy field")
-    start = first_field(instance)
-    watch.lap(START)
-    from ...models.proof.compiling import compile_in_background  # it loads Numba
-
-    with compile_in_background():
+    with _compiling_in_background(instance):
+        progress("greedy field")
+        start = first_field(instance)
+        watch.lap(START)
         manifests = _write_models(instance, folder, start, progress)
         watch.lap("models")
         request = Request(instance, folder / "solve", limits, start, progress=progress, stop=should_stop)
         results = _Results([Candidate(START, start, watch.stages[START])])
-        results.interrupted = _compile_functions(request)
+        _find_fields(results, request, watch, timed=False)
+        results.interrupted = results.interrupted or _compile_functions(request)
         watch.lap(COMPILING)
-    if not results.interrupted:
-        _find_fields(results, request, watch)
+    _find_fields(results, request, watch, timed=True)
     report = Report(instance, results.ranked, manifests, results.failures, results.interrupted)
     names = _write_fields(report, folder)
     watch.lap("fields")
@@ -185,14 +184,24 @@ class _Results:
         )
 
 
+def _compiling_in_background(instance: Instance) -> AbstractContextManager[None]:
+    """Compiles the functions of proofs beside what needs none of them, where the methods of a run prove."""
+    if METHODS["prove"] not in methods_of(instance):
+        return nullcontext()
+    from ...models.proof.compiling import compile_in_background  # it loads Numba
+
+    return compile_in_background(orthogonal=instance.orthogonal)
+
+
 def _compile_functions(request: Request) -> str:
     """Compile what methods need, so that a first run finds what later ones find; the stage if interrupted."""
     if METHODS["prove"] not in methods_of(request.instance):
         return ""
     from ...models.proof.compiling import compile_proofs
 
+    orthogonal = request.instance.orthogonal
     try:
-        return "" if compile_proofs(request.progress, request.stop) else COMPILING
+        return "" if compile_proofs(request.progress, request.stop, orthogonal=orthogonal) else COMPILING
     except KeyboardInterrupt:
         return COMPILING
     except SolverError as error:  # the method `prove` tries again, and its failure is in the report
@@ -200,9 +209,13 @@ def _compile_functions(request: Request) -> str:
     return ""
 
 
-def _find_fields(results: _Results, request: Request, watch: Stopwatch) -> None:
-    """Add the fields that the methods of a run find in turn, until one is interrupted."""
+def _find_fields(results: _Results, request: Request, watch: Stopwatch, *, timed: bool) -> None:
+    """Add the fields that the methods with or without a time limit find, until one is interrupted."""
     for method in methods_of(request.instance):
+        if results.interrupted:
+            break
+        if method.timed != timed:
+            continue
         try:
             for candidate in method.find(request):
                 results.candidates.append(candidate)
@@ -214,8 +227,6 @@ def _find_fields(results: _Results, request: Request, watch: Stopwatch) -> None:
         if request.stop():
             results.interrupted = results.interrupted or method.name
         watch.lap(method.name)
-        if results.interrupted:
-            break
 
 
 def _write_certificate(report: Report, path: Path) -> Report:

@@ -38,20 +38,39 @@ def compiled_in_any_order(work: _Work) -> _Work:
     return _make_dispatcher(work, fastmath=_ANY_ORDER)
 
 
-def _make_dispatcher(work: _Work, *, fastmath: bool | set[str]) -> _Work:
-    dispatcher: Any = numba.njit(error_model="numpy", nogil=True, fastmath=fastmath)(work)
+def compiled_inside(work: _Work) -> _Work:
+    """As `compiled`, for calls by compiled functions alone, without code that unpacks its arguments."""
+    return _make_dispatcher(work, fastmath=False, no_cpython_wrapper=True)
+
+
+def inlined(work: _Work) -> _Work:
+    """The function as a part of each compiled function that calls it, without code of its own.
+
+    Numba optimises and translates all code below a function again with the function, so each level of calls
+    costs as much as the first.
+    """
+    return cast("_Work", numba.njit(inline="always")(work))
+
+
+def _make_dispatcher(work: _Work, *, fastmath: bool | set[str], no_cpython_wrapper: bool = False) -> _Work:
+    options: Any = {"no_cfunc_wrapper": True, "no_cpython_wrapper": no_cpython_wrapper}
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True, fastmath=fastmath, **options)(work)
     with suppress(RuntimeError):  # no folder is writable
         dispatcher.enable_caching()
     _DISPATCHERS.append(dispatcher)
     return cast("_Work", dispatcher)
 
 
-def is_all_compiled() -> bool:
-    """Whether each function of `compiled` is cached on disk where possible: it then only has to be loaded."""
+def is_all_compiled(modules: Callable[[str], bool] = lambda _: True) -> bool:
+    """Whether each function of `compiled` is cached on disk where possible: it then only has to be loaded.
+
+    modules: returns whether the functions of a module, named in full, count.
+    """
+    chosen = [dispatcher for dispatcher in _DISPATCHERS if modules(dispatcher.py_func.__module__)]
     _CACHED.update(
-        dispatcher for dispatcher in _DISPATCHERS if dispatcher not in _CACHED and _is_cached(dispatcher)
+        dispatcher for dispatcher in chosen if dispatcher not in _CACHED and _is_cached(dispatcher)
     )
-    return len(_CACHED) == len(_DISPATCHERS)
+    return _CACHED.issuperset(chosen)
 
 
 def cache_folder() -> Path:

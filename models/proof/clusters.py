@@ -31,17 +31,16 @@ from numpy.typing import NDArray
 
 from ..instance.domain import Floats, Ints
 from ..instance.grid import Grid
-from ..processes.compilation import compiled
+from ..processes.compilation import compiled, compiled_inside, inlined
 from .lattice import Lattice, block_starts
 from .min_plus import (
     RaggedMatrix,
     beta_lines,
     fill_product_over_beta,
     least_beta_cost,
-    least_value,
     min_plus,
 )
-from .passes import alpha_costs, reparametrised_costs, row_ends, shares_at
+from .passes import alpha_costs, fill_reparametrised, least_of_rows, row_ends, shares_at
 from .state import Clusters, Indices, RowEnds, State
 
 IndexTable = NDArray[np.int64]  # of two axes
@@ -130,7 +129,7 @@ def quad_slacks(lattice: Lattice, state: State, angles: tuple[Floats, Floats]) -
     grid = lattice.instance.grid
     corners = _corners(lattice, *angles)
     theta = np.empty(lattice.start[-1])
-    _fill_reparametrised(state, theta)
+    fill_reparametrised(0, len(state.least), state, theta)
     begin = lattice.start[:-1]
     least = np.minimum.reduceat(theta, begin)
     at_pixel = np.mean([theta[begin + corner.label] for corner in corners], axis=0) - least
@@ -167,13 +166,6 @@ def _corners(lattice: Lattice, alpha: Floats, beta: Floats) -> list[_Corner]:
     ]
 
 
-@compiled
-def _fill_reparametrised(state: State, theta: Floats) -> None:
-    """Fill in the cost of each label plus the shares of all pairs there."""
-    for i in range(state.least.size):
-        theta[state.start[i] : state.start[i + 1]] = reparametrised_costs(i, state)
-
-
 def _pair_slacks(lattice: Lattice, state: State, corner: _Corner) -> Floats:
     """The costs of pairs with their tables, less their shares, at a corner of both ends."""
     i, j = state.first, state.second
@@ -194,36 +186,30 @@ def _pair_slacks(lattice: Lattice, state: State, corner: _Corner) -> Floats:
 
 
 @compiled
-def update_clusters(numbers: Indices, state: State) -> None:
-    """Update some clusters, one after the other; their least values are then 0."""
+def visit_clusters(numbers: Indices, state: State, update: bool, least: Floats) -> None:
+    """Update some clusters, one after the other; their least values are then 0. Or fill in these as they are.
+
+    The least value is that of - sum lambda over the allowed alphas.
+    """
     for number in numbers:
         rows = _allowed_alphas(number, state)
         table = 4 * number
-        f0, f1 = _reduced_costs(table, rows, state), _reduced_costs(table + 1, rows, state)
-        f2, f3 = _reduced_costs(table + 2, rows, state), _reduced_costs(table + 3, rows, state)
+        f0, f1 = _table_costs(table, rows, state, update), _table_costs(table + 1, rows, state, update)
+        f2, f3 = _table_costs(table + 2, rows, state, update), _table_costs(table + 3, rows, state, update)
         upper, lower = min_plus(f0, f1), min_plus(f3, f2)
-        _store_table(table, rows, state, f0, min_plus(lower, _transposed(f1)))
-        _store_table(table + 1, rows, state, f1, min_plus(_transposed(f0), lower))
-        _store_table(table + 2, rows, state, f2, min_plus(_transposed(f3), upper))
-        _store_table(table + 3, rows, state, f3, min_plus(upper, _transposed(f2)))
+        if update:
+            _store_table(table, rows, state, f0, min_plus(lower, _transposed(f1)))
+            _store_table(table + 1, rows, state, f1, min_plus(_transposed(f0), lower))
+            _store_table(table + 2, rows, state, f2, min_plus(_transposed(f3), upper))
+            _store_table(table + 3, rows, state, f3, min_plus(upper, _transposed(f2)))
+        else:
+            least[number] = np.inf
+            for x in range(upper.shape[0]):
+                for z in range(upper.shape[1]):
+                    least[number] = min(least[number], upper[x, z] + lower[x, z])
 
 
-@compiled
-def least_of_clusters(begin: int, end: int, state: State, least: Floats) -> None:
-    """Fill in the least of - sum lambda of some clusters over the allowed alphas."""
-    for number in range(begin, end):
-        rows = _allowed_alphas(number, state)
-        table = 4 * number
-        upper = min_plus(_negative_table(table, rows, state), _negative_table(table + 1, rows, state))
-        lower = min_plus(_negative_table(table + 3, rows, state), _negative_table(table + 2, rows, state))
-        lowest = np.inf
-        for x in range(upper.shape[0]):
-            for z in range(upper.shape[1]):
-                lowest = min(lowest, upper[x, z] + lower[x, z])
-        least[number] = lowest
-
-
-@compiled
+@inlined
 def _allowed_alphas(number: int, state: State) -> IndexTable:
     """The number of alphas with an allowed label at the pixels a, b, c, d of a quad, then these alphas."""
     bottom, top = state.clusters.quads[number, 0], state.clusters.quads[number, 2]
@@ -246,9 +232,15 @@ def _allowed_alphas(number: int, state: State) -> IndexTable:
     return alphas
 
 
-@compiled
-def _reduced_costs(table: int, rows: IndexTable, state: State) -> Floats:
-    """The least of a pair's cost - shares over betas and jumps, without this table; by allowed alphas."""
+@compiled_inside
+def _table_costs(table: int, rows: IndexTable, state: State, update: bool) -> Floats:
+    """Minus a table, by allowed alphas.
+
+    For its update instead: the least of its pair's cost - shares over betas and jumps, without this table.
+    """
+    negative = _negative_table(table, rows, state)
+    if not update:
+        return negative
     column = table % 4
     pair = state.clusters.quads[table // 4, column]
     i, j = state.first[pair], state.second[pair]
@@ -259,7 +251,7 @@ def _reduced_costs(table: int, rows: IndexTable, state: State) -> Floats:
     half = np.empty((shares_j.shape[0], shares_i.shape[1]))
     best = np.empty((shares_i.shape[0], shares_j.shape[0]))
     best[:] = np.inf
-    least, reached = least_value(shares_i.reshape(-1)) + least_value(shares_j.reshape(-1)), np.inf
+    least, reached = least_of_rows(shares_i) + least_of_rows(shares_j), np.inf
     for turn in range(2):
         odd = (state.odd[pair] + turn) % 2 == 1
         betas_i, betas_j = beta_lines(pair, i, state, odd)
@@ -268,11 +260,11 @@ def _reduced_costs(table: int, rows: IndexTable, state: State) -> Floats:
         if cheapest + least < reached:
             fill_product_over_beta(ragged, betas_i, betas_j, state.power, half)
             reached = _lower_to(best, min_plus(shares_i, _transposed(half)), in_alpha, (rows_i, rows_j))
-    _add_matrix(best, _negative_table(table, rows, state), -state.h * state.h)
+    _add_matrix(best, negative, -state.h * state.h)
     return best
 
 
-@compiled
+@inlined
 def _lower_to(best: Floats, sums: Floats, in_alpha: Floats, rows: tuple[Indices, Indices]) -> float:
     """Lower the best sums to those of two tables, the second by all alphas; return the greatest."""
     (rows_i, rows_j), greatest = rows, -np.inf
@@ -283,7 +275,7 @@ def _lower_to(best: Floats, sums: Floats, in_alpha: Floats, rows: tuple[Indices,
     return greatest
 
 
-@compiled
+@inlined
 def _chosen_row_ends(i: int, rows: Indices, state: State) -> RowEnds:
     """The ends of some rows of a pixel, as of `row_ends`."""
     begin, end = row_ends(i, state)
@@ -293,14 +285,14 @@ def _chosen_row_ends(i: int, rows: Indices, state: State) -> RowEnds:
     return some
 
 
-@compiled
+@inlined
 def _add_matrix(matrix: Floats, addend: Floats, constant: float) -> None:
     for x in range(matrix.shape[0]):
         for y in range(matrix.shape[1]):
             matrix[x, y] += addend[x, y] + constant
 
 
-@compiled
+@compiled_inside
 def _negative_shares(pair: int, i: int, rows: Indices, state: State) -> Floats:
     """Minus the shares of a pair at the allowed alphas of its end i; inf at labels that are not allowed."""
     columns = state.beta_count[i]
@@ -313,7 +305,7 @@ def _negative_shares(pair: int, i: int, rows: Indices, state: State) -> Floats:
     return negative
 
 
-@compiled
+@inlined
 def _negative_table(table: int, rows: IndexTable, state: State) -> Floats:
     """Minus a table of a cluster, at the allowed alphas."""
     column = table % 4
@@ -327,7 +319,7 @@ def _negative_table(table: int, rows: IndexTable, state: State) -> Floats:
     return negative
 
 
-@compiled
+@compiled_inside
 def _store_table(table: int, rows: IndexTable, state: State, f: Floats, rest: Floats) -> None:
     """Set a table to a quarter of the least of all four f, f + rest, less its own f, at allowed alphas."""
     column = table % 4

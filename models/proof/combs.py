@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 
 from ..instance.domain import Floats
-from ..processes.compilation import Crew, compiled
-from .passes import add_to, copy_to, fill_product, reparametrised_costs, shares_at
+from ..processes.compilation import Crew
+from .passes import COMB, fill_reparametrised, work_on
 from .state import State
 
 _COLUMN: Final = (0, 2)  # of `State.around`: the neighbours before and after a pixel in its column
@@ -29,12 +29,20 @@ def comb_excesses(state: State, crew: Crew) -> Iterator[Floats]:
 
     Before: a forward pass. Numbers at labels that are not allowed have no meaning.
     """
-    single = np.zeros(len(state.unary))
-    crew.run(
-        lambda part: _fill_excesses(part.start, part.stop, state, single), crew.equal_parts(len(state.least))
-    )
+    single = reparametrised_costs(state, crew)
+    single -= np.repeat(np.minimum.reduceat(single, state.start[:-1]), np.diff(state.start))
     for teeth, spine in ((_COLUMN, _ROW), (_ROW, _COLUMN)):
         yield _along(spine, _along(teeth, single, state, crew), state, crew)
+
+
+def reparametrised_costs(state: State, crew: Crew) -> Floats:
+    """The cost of each label plus the shares of all pairs there, flat."""
+    theta = np.empty(len(state.unary))
+    crew.run(
+        lambda part: fill_reparametrised(part.start, part.stop, state, theta),
+        crew.equal_parts(len(state.least)),
+    )
+    return theta
 
 
 def _along(line: tuple[int, int], excesses: Floats, state: State, crew: Crew) -> Floats:
@@ -42,51 +50,8 @@ def _along(line: tuple[int, int], excesses: Floats, state: State, crew: Crew) ->
     sums = excesses.copy()
     for before, after in (line, line[::-1]):
         first = np.flatnonzero(state.around[:, before] < 0)
-        crew.run(lambda i: _follow(i, after, state, excesses, sums), first.tolist())  # noqa: B023
+        crew.run(
+            lambda pixel: work_on(COMB, pixel, after, state, excesses, sums),  # noqa: B023
+            np.split(first, len(first)),
+        )
     return sums
-
-
-@compiled
-def _fill_excesses(begin: int, end: int, state: State, excesses: Floats) -> None:
-    """Fill in D + shares less the least, at the labels of some pixels."""
-    for i in range(begin, end):
-        theta = reparametrised_costs(i, state)
-        least = theta.min()
-        for x in range(theta.size):
-            excesses[state.start[i] + x] = theta[x] - least
-
-
-@compiled
-def _follow(i: int, after: int, state: State, excesses: Floats, sums: Floats) -> None:
-    """Add to the labels of a column or row, which begins at pixel i, the least excesses before each pixel.
-
-    after: the place of the next pixel in `State.around`.
-    """
-    carried = excesses[state.start[i] : state.start[i + 1]].copy()
-    while state.around[i, after] >= 0:
-        pair = state.around[i, after]
-        j = state.first[pair] + state.second[pair] - i
-        carried = _message(pair, i, carried, state)
-        add_to(sums[state.start[j] : state.start[j + 1]], carried)
-        add_to(carried, excesses[state.start[j] : state.start[j + 1]])
-        i = j
-
-
-@compiled
-def _message(pair: int, i: int, carried: Floats, state: State) -> Floats:
-    """The least of the carried excess at end i plus c - shares of a pair, at labels of its share_j end."""
-    j = state.first[pair] + state.second[pair] - i
-    share_i, share_j = shares_at(pair, i, state), shares_at(pair, j, state)
-    before, message = share_i.copy(), share_j.copy()
-    _subtract(share_i, carried)
-    fill_product(pair, j, state, message)
-    copy_to(before, share_i)
-    _subtract(message, share_j)
-    return message
-
-
-@compiled
-def _subtract(target: Floats, values: Floats) -> None:
-    """Subtract the values from the target."""
-    for x in range(target.size):
-        target[x] -= values[x]

@@ -21,6 +21,7 @@ from ..processes.child_program import WorkerError
 from ..processes.compilation import cache_folder, crew, is_all_compiled
 from ..processes.deadline import Deadline, Over, Progress, never, silent
 from ..sketch.samples import sample
+from . import orthogonal_dual
 from .certificate import write_certificate
 from .descent import Descent, Termination
 from .dual import Dual
@@ -29,34 +30,35 @@ from .orthogonal import prove_orthogonal
 
 
 @contextmanager
-def compile_in_background() -> Iterator[None]:
+def compile_in_background(*, orthogonal: bool) -> Iterator[None]:
     """Compile the functions of proofs in the background, unless they are; stop at the end of the context."""
-    if is_all_compiled():
+    if _is_compiled(orthogonal):
         yield
         return
     with Child() as child:
-        threading.Thread(target=_compile_in, args=(child,), daemon=True).start()
+        threading.Thread(target=_compile_in, args=(child, orthogonal), daemon=True).start()
         yield
 
 
-def _compile_in(child: Child) -> None:
+def _compile_in(child: Child, orthogonal: bool) -> None:
     with suppress(CrossfieldError):  # the child was ended, or fails again when a proof needs the functions
-        child.call(compile_all)
+        child.call(compile_all, orthogonal)
 
 
-def compile_proofs(progress: Progress, stop: Over = never) -> bool:
+def compile_proofs(progress: Progress, stop: Over = never, *, orthogonal: bool) -> bool:
     """Compile the functions of proofs unless they are; return False where `stop` or Ctrl-C ended that.
 
-    It takes up to a minute, and no time limit includes it. What is compiled by the end stays. progress:
-    receives a line if there is something to compile. Raises SolverError when the work fails.
+    orthogonal: whether of crosses with right angles, which have proofs of their own. It takes up to half a
+    minute, and no time limit includes it. What is compiled by the end stays. progress: receives a line if
+    there is something to compile. Raises SolverError when the work fails.
     """
-    if is_all_compiled():
+    if _is_compiled(orthogonal):
         return True
     progress("compiling the functions of proofs, once on this machine, before the time limit begins")
     with TemporaryDirectory() as folder, Child() as child:
         log = Path(folder) / "log"
         try:
-            return not child.call(compile_all, log=log, stop=stop).interrupted
+            return not child.call(compile_all, orthogonal, log=log, stop=stop).interrupted
         except KilledError:
             return False
         except WorkerError as error:
@@ -65,16 +67,18 @@ def compile_proofs(progress: Progress, stop: Over = never) -> bool:
             raise SolverError(f"the functions of proofs were not compiled: {words}") from error
 
 
-def compile_all() -> None:
+def compile_all(orthogonal: bool) -> None:
     """Compile the functions of proofs, by certificates of a few pixels and by a pass with a cluster."""
-    if is_all_compiled():
+    if _is_compiled(orthogonal):
         return
     with FileLock(cache_folder() / "compiling.lock"):
-        if is_all_compiled():
+        if _is_compiled(orthogonal):
             return
-        instance = sample("mouse", 4).with_gauge("strokes")
+        instance = replace(sample("mouse", 4).with_gauge("strokes"), orthogonal=orthogonal)
         ends = Termination(Deadline(), never, gap=0.0, work=math.inf)
-        prove_orthogonal(replace(instance, orthogonal=True), None, ends, silent)
+        if orthogonal:
+            prove_orthogonal(instance, None, ends, silent)
+            return
         with crew(1) as thread:
             first = Descent.first_field(instance, 2, None, never)
             descent = Descent(2, instance, first, ends, thread, 0, 1, silent)
@@ -84,3 +88,8 @@ def compile_all() -> None:
             dual.ascend(1)
         with TemporaryDirectory() as folder:
             write_certificate(proof, Path(folder) / "certificate.npz")
+
+
+def _is_compiled(orthogonal: bool) -> bool:
+    """Whether the functions of one of the two kinds of proofs are; they are in separate modules."""
+    return is_all_compiled(lambda module: (module == orthogonal_dual.__name__) == orthogonal)

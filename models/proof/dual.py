@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -27,7 +26,7 @@ from ..array_archive import Arrays
 from ..field.field import CrossField
 from ..instance.domain import Bools, Floats
 from ..instance.grid import Grid
-from ..processes.compilation import Crew, compiled
+from ..processes.compilation import Crew
 from ..processes.deadline import Over, never
 from ..smooth.sparse_systems import stroke_weight
 from . import check_certificate
@@ -35,16 +34,15 @@ from .clusters import (
     copy_tables,
     independent_clusters,
     interpolate_clusters,
-    least_of_clusters,
     quad_slacks,
     table_work,
-    update_clusters,
+    visit_clusters,
     zero_clusters,
 )
-from .combs import comb_excesses
+from .combs import comb_excesses, reparametrised_costs
 from .encoding import share_arrays, table_arrays
 from .lattice import Lattice, nearest_labels
-from .passes import pair_minimum, reparametrised_costs, visit_pixel
+from .passes import MINIMA, PASS, work_on
 from .pruning import RemainingCells, bound_by_boxes, interpolate_shares, surviving_cells
 from .state import Clusters, Indices, State, state_on
 
@@ -125,10 +123,10 @@ class Dual:
 
     def _pass(self, earlier: int, over: Over) -> float:
         """The bound after a pass; earlier: 0 forwards, 2 backwards."""
-        began, way = time.monotonic(), 1 if earlier == 0 else -1
+        began, way, nothing = time.monotonic(), 1 if earlier == 0 else -1, np.zeros(0)
 
         def visit(pixels: Indices) -> None:
-            _pass_pixels(pixels, earlier, self.state)
+            work_on(PASS, pixels, earlier, self.state, nothing, nothing)
 
         if self.lattice.start[-1] < _ALONE:
             visit(np.concatenate(self._fronts[::way]))
@@ -161,26 +159,22 @@ class Dual:
         if not len(self.quads):
             return
         began = time.monotonic()
+        self._least_of_clusters = np.zeros(len(self.quads))
         for front in self._cluster_fronts[::way]:
             self._crew.run(
-                lambda numbers: update_clusters(numbers, self.state),
+                lambda numbers: visit_clusters(numbers, self.state, True, self._least_of_clusters),  # noqa: FBT003
                 [front[k : k + 1] for k in range(len(front))],
             )
-        self._least_of_clusters = np.zeros(len(self.quads))
         self._table_seconds = time.monotonic() - began
 
     def _find_least_of_clusters(self) -> Floats:
         """The least of the negative tables of each cluster."""
-        least = np.zeros(len(self.quads))
-        self._fill_in_parallel(least_of_clusters, least)
-        return least
-
-    def _fill_in_parallel(self, fill: Callable[[int, int, State, Floats], None], values: Floats) -> None:
-        """Fill in values, one for each pixel, pair or cluster, by all threads."""
+        least, numbers = np.zeros(len(self.quads)), np.arange(len(self.quads))
         self._crew.run(
-            lambda part: fill(part.start, part.stop, self.state, values),
-            self._crew.equal_parts(len(values)),
+            lambda part: visit_clusters(numbers[part], self.state, False, least),  # noqa: FBT003 - compiled
+            self._crew.equal_parts(len(least)),
         )
+        return least
 
     def expected_seconds(self, lattice: Lattice) -> tuple[float, float]:
         """Expected seconds of a pass, and of an update of the clusters, estimated from the last ones here."""
@@ -216,9 +210,13 @@ class Dual:
 
     def bound(self) -> float:
         """The bound that any shares prove, as `LevelRecord` defines it."""
-        pixels, pairs = np.zeros(len(self.lattice.count)), np.zeros(len(self.lattice.p))
-        self._fill_in_parallel(_pixel_minima, pixels)
-        self._fill_in_parallel(_pair_minima, pairs)
+        pairs, numbers = np.zeros(len(self.lattice.p)), np.arange(len(self.lattice.p))
+        self._crew.run(
+            lambda part: work_on(MINIMA, numbers[part], 0, self.state, pairs, pairs),
+            self._crew.equal_parts(len(pairs)),
+        )
+        theta = reparametrised_costs(self.state, self._crew)
+        pixels = np.minimum.reduceat(theta, self.lattice.start[:-1])
         return math.fsum([*pixels, *pairs, *self._find_least_of_clusters(), -self._rounding_margins()[0]])
 
     def _rounding_margins(self) -> tuple[float, float]:
@@ -282,24 +280,3 @@ def antidiagonals(grid: Grid) -> list[Indices]:
 def _greatest_size(values: Floats) -> float:
     """The greatest size, without an array of all sizes."""
     return float(max(values.max(initial=0.0), -values.min(initial=0.0)))
-
-
-@compiled
-def _pass_pixels(pixels: Indices, earlier: int, state: State) -> None:
-    """Do a pass over some pixels, one after the other; earlier: 0 forwards, 2 backwards."""
-    for i in pixels:
-        visit_pixel(i, earlier, state)
-
-
-@compiled
-def _pair_minima(begin: int, end: int, state: State, least: Floats) -> None:
-    """Fill in the least c - shares of some pairs."""
-    for pair in range(begin, end):
-        least[pair] = pair_minimum(pair, state)
-
-
-@compiled
-def _pixel_minima(begin: int, end: int, state: State, least: Floats) -> None:
-    """Fill in the least D + sum of the shares of some pixels."""
-    for i in range(begin, end):
-        least[i] = reparametrised_costs(i, state).min()

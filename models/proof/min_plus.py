@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.domain import Floats
-from ..processes.compilation import compiled, compiled_in_any_order
+from ..processes.compilation import compiled, compiled_in_any_order, inlined
 from .state import RowEnds, State
 
 _NEAR: Final = 1  # terms on both sides of the best one of a row that come before the others
@@ -28,25 +28,31 @@ class RightMatrix(NamedTuple):
 
 
 @compiled
-def lower_rows(targets: Floats, left: Floats, terms: RightMatrix, at: tuple[int, int]) -> float:
+def lower_rows(targets: Floats, left: Floats, terms: RightMatrix, begin: int, end: int) -> float:
     """Lower four rows to the least of left[:, y] + rows[y], without y that cannot lower any of them.
 
-    targets (4, t), left (4, n), of terms (n, ...) with n >= 4. at: the columns of the terms that belong to
-    the first columns of the targets. Returns the greatest of these that is left; a target of -inf stays.
+    targets (4, t), left (4, n), of terms (n, ...) with n >= 4. begin, end: the columns of the terms that
+    belong to the first columns of the targets. Returns the greatest of these that is left; a target of -inf
+    stays.
     """
-    sums, many, width = terms.sums, terms.least.size, at[1] - at[0]
+    sums, many, width, zero = (
+        terms.sums,
+        terms.least.size,
+        end - begin,
+        int(np.int64(0)),
+    )  # a literal would be compiled for itself
     lowest, reached = _add_up_least(left, terms.least, sums), _most_of_rows(targets, width)
     if lowest >= reached:
         return reached
     best = 0
     while sums[best] > lowest:
         best += 1
-    _lower_four(targets, left, terms.rows, (0, max(0, min(best - _NEAR, many - 4))), (0, *at))
+    _lower_four(targets, left, terms.rows, zero, max(0, min(best - _NEAR, many - 4)), begin, end)
     reached = _most_of_rows(targets, width)
-    for begin in range(0, many, 4):
-        y = min(begin, many - 4)
+    for first in range(0, many, 4):
+        y = min(first, many - 4)
         if min(sums[y], sums[y + 1], sums[y + 2], sums[y + 3]) < reached:
-            _lower_four(targets, left, terms.rows, (0, y), (0, *at))
+            _lower_four(targets, left, terms.rows, zero, y, begin, end)
     return _most_of_rows(targets, width)
 
 
@@ -56,7 +62,7 @@ def min_plus(left: Floats, right: Floats) -> Floats:
 
     Four rows with four terms at a time, so that few numbers are loaded and stored.
     """
-    out = np.empty((left.shape[0], right.shape[1]))
+    out, zero = np.empty((left.shape[0], right.shape[1])), int(np.int64(0))
     out[:] = np.inf
     rows, terms = left.shape
     if rows < 4 or terms < 4:
@@ -68,11 +74,11 @@ def min_plus(left: Floats, right: Floats) -> Floats:
         row = min(begin, rows - 4)
         first, end = _finite_columns(left, row)
         for y in range(first, end, 4):
-            _lower_four(out, left, right, (row, min(y, terms - 4)), (0, 0, right.shape[1]))
+            _lower_four(out, left, right, row, min(y, terms - 4), zero, right.shape[1])
     return out
 
 
-@compiled
+@inlined
 def _finite_columns(left: Floats, row: int) -> tuple[int, int]:
     """The first column with a number below inf in four rows of a matrix, and the one after the last."""
     first, end = left.shape[1], 0
@@ -125,18 +131,15 @@ def _add_up_least(rows: Floats, others: Floats, sums: Floats) -> float:
 
 
 @compiled_in_any_order
-def _lower_four(
-    out: Floats, left: Floats, right: Floats, place: tuple[int, int], at: tuple[int, int, int]
+def _lower_four(  # noqa: PLR0917 - a tuple would be compiled once for each literal in it
+    out: Floats, left: Floats, right: Floats, row: int, y: int, begin: int, end: int
 ) -> None:
-    """Lower a part of four rows of a product to four of its terms, which needs few loads and stores.
+    """Lower the first columns of four rows of a product to four of its terms: few loads and stores.
 
-    place: the first row and the first term. at: the first column of `out`, that of `right`, and the one
-    after its last.
+    row, y: the first row and the first term. begin, end: the columns of `right`.
     """
-    (row, y), (first, begin, end) = place, at
     width = end - begin
-    o0, o1 = out[row, first : first + width], out[row + 1, first : first + width]
-    o2, o3 = out[row + 2, first : first + width], out[row + 3, first : first + width]
+    o0, o1, o2, o3 = out[row, :width], out[row + 1, :width], out[row + 2, :width], out[row + 3, :width]
     r0, r1, r2, r3 = (
         right[y, begin:end], right[y + 1, begin:end], right[y + 2, begin:end], right[y + 3, begin:end]
     )  # fmt: skip
@@ -176,14 +179,14 @@ class _Room(NamedTuple):
     slopes: Floats
 
 
-@compiled
+@inlined
 def beta_lines(pair: int, i: int, state: State, odd: bool) -> tuple[Line, Line]:
     """The betas of end i of a pair, and those of the other end, negative for odd jumps."""
     first = state.beta[state.first[pair] + state.second[pair] - i]
     return (state.beta[i], state.h), ((-first, -state.h) if odd else (first, state.h))
 
 
-@compiled
+@inlined
 def least_beta_cost(line_i: Line, line_j: Line, counts: tuple[int, int], power: int) -> float:
     """A lower bound of 2 B^2 or 2 |B| over all betas, of which there are so many."""
     high, end = line_i[0] + line_i[1] * (counts[0] - 1), line_j[0] + line_j[1] * (counts[1] - 1)
@@ -202,7 +205,7 @@ def fill_product_over_beta(labels: RaggedMatrix, line_i: Line, line_j: Line, pow
         _fill_over_sizes(labels, (first - line_i[0]) / h, 2 * h, backwards, out)
 
 
-@compiled
+@inlined
 def _fill_over_squares(
     labels: RaggedMatrix, apart: float, weight: float, backwards: bool, out: Floats
 ) -> None:
@@ -223,7 +226,7 @@ def _fill_over_squares(
             out[row] = np.inf
 
 
-@compiled
+@inlined
 def _find_envelope(room: _Room, first: int, end: int) -> int:
     """Find those of some parabolas of finite value that are the least somewhere; return their number."""
     values, envelope, begins = room.values, room.envelope, room.begins
@@ -245,7 +248,7 @@ def _find_envelope(room: _Room, first: int, end: int) -> int:
     return count
 
 
-@compiled
+@inlined
 def _fill_from_envelope(room: _Room, apart: float, weight: float, out: Floats) -> None:
     """Fill in the envelope."""
     piece = 0
@@ -256,7 +259,7 @@ def _fill_from_envelope(room: _Room, apart: float, weight: float, out: Floats) -
         out[x] = room.values[room.envelope[piece]] + weight * away * away
 
 
-@compiled
+@inlined
 def _fill_over_sizes(labels: RaggedMatrix, apart: float, weight: float, backwards: bool, out: Floats) -> None:
     """Fill in the least over y of labels[row, y] + weight |x - y - apart|, counting y backwards or not."""
     columns, ends = labels.values.shape[1], labels.ends

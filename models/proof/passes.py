@@ -4,7 +4,7 @@ For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha an
 product is one over beta (models/proof/min_plus.py) and then one over alpha: O(N^3) for N^2 labels. A^2 is
 the least over all jumps of that parity: A is taken modulo pi.
 
-The first call compiles for some 20 s; cached code loads in 0.3 s. Cached code is not renewed when only
+The first call compiles for some 15 s of CPU; cached code loads in 0.3 s. Cached code is not renewed when only
 functions in other files that it calls have changed: delete `*.nbi` then. The names of `State` and
 `Clusters` are part of the cache: after renaming them, old files cannot be read.
 """
@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ..instance.domain import Floats
-from ..processes.compilation import compiled
+from ..processes.compilation import compiled, compiled_inside, inlined
 from .min_plus import (
     RaggedMatrix,
     RightMatrix,
@@ -26,7 +26,11 @@ from .min_plus import (
     least_value,
     lower_rows,
 )
-from .state import RowEnds, State
+from .state import Indices, RowEnds, State
+
+PASS: Final = 0
+MINIMA: Final = 1
+COMB: Final = 2
 
 _HALF: Final = float(np.pi / 2)
 _PI: Final = float(np.pi)
@@ -41,6 +45,25 @@ class RaggedLabels(NamedTuple):
 
 
 @compiled
+def work_on(  # noqa: PLR0917
+    task: int, numbers: Indices, place: int, state: State, excesses: Floats, values: Floats
+) -> None:
+    """Do a task on some pixels or pairs, one after the other.
+
+    One function for all tasks, because each would contain the code of `fill_product`. task: PASS over pixels,
+    with `place` 0 forwards and 2 backwards; MINIMA of pairs, filled in; or COMB, with its line from each
+    pixel, as of `_follow`, to `place` of `State.around`, added to the values.
+    """
+    for number in numbers:
+        if task == PASS:
+            visit_pixel(number, place, state)
+        elif task == MINIMA:
+            values[number] = pair_minimum(number, state)
+        else:
+            _follow(number, place, state, excesses, values)
+
+
+@inlined
 def visit_pixel(i: int, earlier: int, state: State) -> None:
     """Take from pairs to earlier pixels, columns from `earlier` of `around`; pass on to the other two."""
     begin, end = state.start[i], state.start[i + 1]
@@ -68,7 +91,7 @@ def visit_pixel(i: int, earlier: int, state: State) -> None:
             )
 
 
-@compiled
+@inlined
 def _copy_used(values: Floats, ends: RowEnds, columns: int, target: Floats) -> None:
     """Fill in the used part of the target."""
     for row in range(ends[0].size):
@@ -76,7 +99,7 @@ def _copy_used(values: Floats, ends: RowEnds, columns: int, target: Floats) -> N
             target[x] = values[x]
 
 
-@compiled
+@inlined
 def _add_used(values: Floats, ends: RowEnds, columns: int, target: Floats) -> None:
     """Add the values to the used part of the target."""
     for row in range(ends[0].size):
@@ -84,7 +107,7 @@ def _add_used(values: Floats, ends: RowEnds, columns: int, target: Floats) -> No
             target[x] += values[x]
 
 
-@compiled
+@inlined
 def _least_used(values: Floats, ends: RowEnds, columns: int) -> float:
     """The least value that is used."""
     least = np.inf
@@ -96,7 +119,7 @@ def _least_used(values: Floats, ends: RowEnds, columns: int) -> float:
     return least
 
 
-@compiled
+@inlined
 def _give_to_later(
     theta: Floats, ends: RowEnds, columns: int, least_and_part: tuple[float, float], share: Floats
 ) -> None:
@@ -124,16 +147,17 @@ def shares_at(pair: int, i: int, state: State) -> Floats:
 
 
 @compiled
-def reparametrised_costs(i: int, state: State) -> Floats:
-    """The cost of each label of a pixel plus the shares of all its pairs."""
-    theta = state.unary[state.start[i] : state.start[i + 1]].copy()
-    for pair in state.around[i]:
-        if pair >= 0:
-            add_to(theta, shares_at(pair, i, state))
-    return theta
+def fill_reparametrised(begin: int, end: int, state: State, theta: Floats) -> None:
+    """Fill in the cost of each label of some pixels plus the shares of all pairs there."""
+    for i in range(begin, end):
+        costs = theta[state.start[i] : state.start[i + 1]]
+        copy_to(state.unary[state.start[i] : state.start[i + 1]], costs)
+        for pair in state.around[i]:
+            if pair >= 0:
+                add_to(costs, shares_at(pair, i, state))
 
 
-@compiled
+@inlined
 def pair_minimum(pair: int, state: State) -> float:
     """The least c - shares of a pair over the allowed labels."""
     i = state.first[pair]
@@ -148,6 +172,42 @@ def pair_minimum(pair: int, state: State) -> float:
             if unary[x] < np.inf:
                 least = min(least, most[x] - share[x])
     return least
+
+
+@inlined
+def _follow(i: int, after: int, state: State, excesses: Floats, sums: Floats) -> None:
+    """Add to the labels of a column or row, which begins at pixel i, the least excesses before each pixel.
+
+    after: the place of the next pixel in `State.around`.
+    """
+    carried = excesses[state.start[i] : state.start[i + 1]].copy()
+    while state.around[i, after] >= 0:
+        pair = state.around[i, after]
+        j = state.first[pair] + state.second[pair] - i
+        carried = _message(pair, i, carried, state)
+        add_to(sums[state.start[j] : state.start[j + 1]], carried)
+        add_to(carried, excesses[state.start[j] : state.start[j + 1]])
+        i = j
+
+
+@inlined
+def _message(pair: int, i: int, carried: Floats, state: State) -> Floats:
+    """The least of the carried excess at end i plus c - shares of a pair, at labels of its share_j end."""
+    j = state.first[pair] + state.second[pair] - i
+    share_i, share_j = shares_at(pair, i, state), shares_at(pair, j, state)
+    before, message = share_i.copy(), share_j.copy()
+    _subtract(share_i, carried)
+    fill_product(pair, j, state, message)
+    copy_to(before, share_i)
+    _subtract(message, share_j)
+    return message
+
+
+@inlined
+def _subtract(target: Floats, values: Floats) -> None:
+    """Subtract the values from the target."""
+    for x in range(target.size):
+        target[x] -= values[x]
 
 
 @compiled
@@ -189,30 +249,31 @@ def fill_product(pair: int, i: int, state: State, out: Floats) -> None:
             out[x] = out[x] - less if unary[x] < np.inf else 0.0
 
 
-@compiled
+@inlined
 def _lower_all(out: RaggedLabels, in_alpha: tuple[Floats, Floats], terms: RightMatrix) -> float:
     """Lower all rows to costs in alpha plus the terms; return the greatest that is left.
 
     in_alpha: the costs of each row, or without any row, those by steps.
     """
     rows, many, (of_rows, of_steps) = out.ends[0].size, terms.least.size, in_alpha
-    left, targets, reached = np.full((4, many), np.inf), np.empty((4, out.columns)), -np.inf
+    left, targets, reached = np.empty((4, many)), np.empty((4, out.columns)), -np.inf
+    left[:] = np.inf
     for first in range(0, rows, 4):
-        at = _take_rows(out, first, targets)
-        if at[0] < at[1]:
+        low, high = _take_rows(out, first, targets)
+        if low < high:
             for row in range(first, min(first + 4, rows)):
                 steps = of_steps[rows - 1 - row : of_steps.size - row]
                 copy_to(of_rows[row] if of_rows.shape[0] else steps, left[row - first])
-            reached = max(reached, lower_rows(targets, left, terms, at))
-            _put_back_rows(out, first, targets, at[0])
+            reached = max(reached, lower_rows(targets, left, terms, low, high))
+            _put_back_rows(out, first, targets, low)
     return reached
 
 
-@compiled
+@inlined
 def _take_rows(rows: RaggedLabels, first: int, targets: Floats) -> tuple[int, int]:
     """Copy the used part of four rows to the targets, -inf elsewhere; return its columns."""
     (begin, end), last = rows.ends, min(first + 4, rows.ends[0].size)
-    low, high = rows.columns, 0
+    low, high = int(np.int64(rows.columns)), int(np.int64(0))  # types that do not change below
     for row in range(first, last):
         if begin[row] < end[row]:
             low, high = min(low, begin[row]), max(high, end[row])
@@ -223,7 +284,7 @@ def _take_rows(rows: RaggedLabels, first: int, targets: Floats) -> tuple[int, in
     return low, high
 
 
-@compiled
+@inlined
 def _put_back_rows(rows: RaggedLabels, first: int, targets: Floats, low: int) -> None:
     """Copy the targets back to the used part of four rows, of which the first column is `low`."""
     begin, end = rows.ends
@@ -232,14 +293,14 @@ def _put_back_rows(rows: RaggedLabels, first: int, targets: Floats, low: int) ->
             rows.values[row * rows.columns + x] = targets[row - first, x - low]
 
 
-@compiled
+@inlined
 def row_ends(i: int, state: State) -> RowEnds:
     """The first allowed label of each row of a pixel, and the one after the last."""
     low, high = state.row_start[i], state.row_start[i + 1]
     return state.begin[low:high], state.end[low:high]
 
 
-@compiled
+@inlined
 def _fill_negative_shares(pair: int, j: int, state: State, ragged: RaggedMatrix, least: Floats) -> None:
     """Fill in minus the shares of a pair at its end j, inf at labels that are not allowed.
 
@@ -255,19 +316,19 @@ def _fill_negative_shares(pair: int, j: int, state: State, ragged: RaggedMatrix,
             least[row] = min(least[row], values[row, y])
 
 
-@compiled
+@inlined
 def size_of(residual: float, power: int) -> float:
     """The square or the absolute value of a residual."""
     return residual * residual if power == 2 else abs(residual)
 
 
-@compiled
+@inlined
 def least_a(a: float) -> float:
     """The A of least size over all jumps of one parity, from the A of one of them."""
-    return float(a - _PI * np.round(a / _PI))
+    return float(a - _PI * np.rint(a / _PI))
 
 
-@compiled
+@compiled_inside
 def step_costs(pair: int, i: int, state: State, odd: bool, of_steps: Floats) -> float:
     """Fill in 2 A^2 or 2 |A| for labels x of end i and y of the other end; return the least.
 
@@ -282,7 +343,7 @@ def step_costs(pair: int, i: int, state: State, odd: bool, of_steps: Floats) -> 
     return least_value(of_steps)
 
 
-@compiled
+@compiled_inside
 def alpha_costs(pair: int, i: int, state: State, odd: bool, cost: Floats) -> float:
     """Fill in 2 A^2 or 2 |A|, plus the tables of the pair, at labels x of end i and y of the other end.
 
@@ -297,21 +358,27 @@ def alpha_costs(pair: int, i: int, state: State, odd: bool, cost: Floats) -> flo
         number = state.clusters.of_pair[pair, place]
         if number >= 0:
             _add_table(number, state.first[pair] == i, state, cost)
-    return least_value(cost.reshape(-1))
+    return least_of_rows(cost)
 
 
-@compiled
+@inlined
+def least_of_rows(matrix: Floats) -> float:
+    """The least number of a matrix."""
+    least = np.inf
+    for x in range(matrix.shape[0]):
+        least = min(least, least_value(matrix[x]))
+    return least
+
+
+@inlined
 def _add_table(number: int, upright: bool, state: State, cost: Floats) -> None:
     """Add a table to the costs, turned if their rows are the labels of the pair's second pixel."""
     start = state.clusters.start
     table = state.clusters.tables[start[number] : start[number + 1]]
-    if upright:
-        add_to(cost.reshape(-1), table)
-        return
     rows, columns = cost.shape
     for x in range(rows):
         for y in range(columns):
-            cost[x, y] += table[y * rows + x]
+            cost[x, y] += table[x * columns + y if upright else y * rows + x]
 
 
 @compiled

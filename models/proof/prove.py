@@ -117,7 +117,7 @@ def prove(
 
         end = chosen.deadline()
         seconds = end.left()
-        compile_proofs(progress, over)
+        compile_proofs(progress, over, orthogonal=instance.orthogonal)
         began = time.monotonic()
         ends = Termination(Deadline.after(seconds, end.clock), over, chosen.gap, work or math.inf)
         if instance.orthogonal:

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..instance.angles import QUARTER
 from ..instance.domain import Bools, Floats, Ints
-from ..processes.compilation import compiled
+from ..processes.compilation import compiled, inlined
 from .lattice import Lattice, Starts, beta_range, block_starts, ranges
 
 
@@ -74,6 +74,9 @@ def surviving_cells(lattice: Lattice, survives: Bools) -> Bools:
     return cells
 
 
+# Copies keep one layout of arrays, for which functions are compiled once.
+
+
 def finer_lattice(left: RemainingCells) -> Lattice:
     """The lattice of half the spacing on the cells that are left."""
     lattice = left.lattice
@@ -82,14 +85,14 @@ def finer_lattice(left: RemainingCells) -> Lattice:
     ends = 2 * _vertex_ranges(lattice, left.cells)
     ends[:, 1] += half
     ends[:, 2], ends[:, 3] = np.maximum(ends[:, 2], lowest), np.minimum(ends[:, 3] + half, highest)
-    new = replace(lattice, h=h, **ranges(*ends.T))
+    new = replace(lattice, h=h, **ranges(*ends.T.copy()))
     return _allow_vertices(left, new, 2, 3 + half)
 
 
 def smaller_lattice(left: RemainingCells) -> Lattice:
     """The vertices of the cells that are left, as a lattice of the same spacing."""
     lattice = left.lattice
-    new = replace(lattice, **ranges(*_vertex_ranges(lattice, left.cells).T))
+    new = replace(lattice, **ranges(*_vertex_ranges(lattice, left.cells).T.copy()))
     return _allow_vertices(left, new, 1, np.full(len(lattice.count), 2, np.int32))
 
 
@@ -232,7 +235,7 @@ def _interpolate(
                     ) + up * ((1 - right) * coarse[row + 1, column] + right * coarse[row + 1, column + 1])
 
 
-@compiled
+@inlined
 def _between(step: int, offset: float, ratio: float, first: int, count: int) -> tuple[int, float]:
     """The old label below a new one, and the fraction from there to the next: 0 to 1."""
     place = min(max((step + offset) * ratio - offset - first, 0.0), count - 1.0)

@@ -15,7 +15,7 @@ from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps
 from ..instance.angles import QUARTER
 from ..instance.domain import Bools, Floats
-from ..processes.compilation import compiled
+from ..processes.compilation import compiled, inlined
 from ..processes.deadline import Over, never
 from ..search.box_qp import FreeField
 from ..search.energy import LinearSolver
@@ -93,13 +93,16 @@ def _decode(order: Indices, state: State, alpha: Floats, beta: Floats, fixed: Bo
                 _add_distance(i, state, alpha[j], beta[j], cost)
             else:
                 add_to(cost, shares_at(pair, i, state))
-        x = np.argmin(cost)
+        x = 0
+        for label in range(1, cost.size):
+            if cost[label] < cost[x]:
+                x = label
         alpha[i] = state.alpha[i] + state.h * (x // state.beta_count[i])
         beta[i] = state.beta[i] + state.h * (x % state.beta_count[i])
         fixed[i] = True
 
 
-@compiled
+@inlined
 def _add_distance(i: int, state: State, alpha: float, beta: float, cost: Floats) -> None:
     """Add the cost of a pair of pixel i with a fixed cross."""
     columns = state.beta_count[i]

@@ -143,7 +143,7 @@ def _certificate(run: Run, folder: Path) -> Path:
 
 def _proven(run: Run, watch: Watch, certificates: Path) -> Row:
     """The row of a proof, its certificate included."""
-    compile_all()
+    compile_all(orthogonal=False)
     cf.prove(
         make_instance(*QUICK.turned), norm=_norm(run), limits=cf.Limits(gap=0), jobs=1
     )  # loads the functions
