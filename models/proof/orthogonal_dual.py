@@ -239,7 +239,7 @@ def _pass_over(state: DualArrays, spare: float, forward: bool) -> tuple[float, i
             own[own == np.inf] = 0.0
         least = cost.min()
         total += least
-        left += (cost - least <= spare).sum()
+        left += int((cost - least <= spare).sum())
         unary[cost == np.inf] = np.inf
         for slot in state.around[state.around_start[i] : state.around_start[i + 1]]:
             if (state.rank[state.point[slot ^ 1]] < state.rank[i]) != forward:
