@@ -6,6 +6,7 @@ The browser keeps the document, and sends all of it with every request. The serv
 from __future__ import annotations
 
 import base64
+import hashlib
 import io
 import math
 from collections.abc import Callable, Mapping
@@ -34,6 +35,7 @@ VERSION: Final = 1
 SIZES: Final = (8, 256)  # least and most pixels of the longer side that the page offers
 FARTHEST: Final = 1e6  # coordinates
 PICTURE_SIDE: Final = 1600  # most pixels of the longer side of the picture under the strokes
+MOST_SENT: Final = 4_000_000  # bytes of an opened file that is sent with every request
 _MOST_ATTACHED: Final = 40_000_000  # characters of a picture or file in a session
 _MOST_WEIGHT: Final = 1e3  # of the strokes
 
@@ -69,9 +71,21 @@ class PlacedHint:
     tilt: float
 
 
+@dataclass(frozen=True)
+class Source:
+    """The file from which strokes were read: its name, its content, and the digest of these strokes."""
+
+    name: str
+    data: bytes
+    digest: str
+
+
 @dataclass(frozen=True, eq=False)
 class Document:
-    """Everything that determines field and surface."""
+    """Everything that determines field and surface.
+
+    source: the file that was opened. It replaces its strokes as long as they are unchanged.
+    """
 
     name: str
     page: Box
@@ -82,6 +96,7 @@ class Document:
     size: int
     stroke_weight: float
     silhouette: Silhouette
+    source: Source | None = None
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Document:
@@ -105,10 +120,11 @@ class Document:
         _check_picture(content.get("picture"))
         _check_file(content.get("file"))
         low, high = SIZES
+        strokes, source = read_strokes(content), _read_source(content.get("source"))
         document = cls(
             name=name_from_text(str(content.get("name", ""))[:200]) or "drawing",
             page=_read_page(content.get("page")),
-            strokes=_read_list(content, "strokes", _read_stroke),
+            strokes=strokes,
             mask=_read_list(content, "mask", _read_edit),
             hints=_read_list(content, "hints", _read_hint),
             flip=content.get("flip") is True,
@@ -117,6 +133,7 @@ class Document:
                 content.get("stroke_weight", STROKE_WEIGHT), "stroke_weight", 0.0, _MOST_WEIGHT
             ),
             silhouette=_read_choice(content.get("silhouette", "none"), "silhouette", Silhouette),
+            source=source if source and source.digest == digest_of(strokes) else None,
         )
         if sum(len(stroke.points) for stroke in document.strokes) > MAX_SEGMENTS:
             raise InputError(f"the drawing has more than {MAX_SEGMENTS} points; simplify it")
@@ -161,6 +178,20 @@ class Document:
     def weights(self) -> Floats:
         """Weight of each stroke, shape (number of strokes,)."""
         return np.array([stroke.weight for stroke in self.strokes])
+
+
+def read_strokes(content: Mapping[str, Any]) -> tuple[Stroke, ...]:
+    """The strokes of a parsed document. Raises InputError that names the faulty entry."""
+    return _read_list(content, "strokes", _read_stroke)
+
+
+def digest_of(strokes: tuple[Stroke, ...]) -> str:
+    """64 hexadecimal digits of strokes; equal only for equal strokes."""
+    digest = hashlib.sha256()
+    for stroke in strokes:
+        digest.update(f"{stroke.mark} {stroke.weight!r} {stroke.points.size}\n".encode())
+        digest.update((stroke.points + 0.0).astype("<f8").tobytes())  # browsers write -0 as 0
+    return digest.hexdigest()
 
 
 def _read_list(
@@ -244,6 +275,14 @@ def _check_file(value: Any) -> None:
     if not isinstance(value, dict) or not isinstance(value.get("name"), str):
         raise InputError("file of the session must have a name and data; open the file itself again")
     _decode(value.get("data"), "file")
+
+
+def _read_source(value: Any) -> Source | None:
+    if value is None:
+        return None
+    if not isinstance(value, dict) or not all(isinstance(value.get(key), str) for key in ("name", "digest")):
+        raise InputError("source of the session must have a name, data and a digest; open the file again")
+    return Source(value["name"][:200], _decode(value.get("data"), "source"), value["digest"])
 
 
 def _decode(value: Any, where: str) -> bytes:

@@ -21,7 +21,7 @@ from ...models.sketch.curves import Curves, flatten, run_numbers
 from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
 from ...models.sketch.parallels import find_parallels
 from ...models.sketch.thinning import thin_shape
-from .document import PICTURE_SIDE, Document, Mark
+from .document import MOST_SENT, PICTURE_SIDE, Document, Mark, digest_of, read_strokes
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
 _THINNED: Final = 700  # pixels on the longer side of a picture while it is traced
@@ -40,7 +40,8 @@ _Way = list[_Pixel]
 def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[str, Any]:
     """A session under `document`, or else name, page and strokes of a drawing. Raises InputError.
 
-    A picture is added as `picture`, upright and reduced, as JPEG in base64; it lies on the page.
+    A picture is added as `picture`, upright and reduced, as JPEG in base64; it lies on the page. A flat file
+    is added as `source`, because the page computes from the file itself until a stroke is changed.
 
     view: direction of a .curves file, as for `read_sketch`. Without it, such a file is added as `file` with
     name and data in base64, because the page reads it again from other sides. `notes` are lines on what was
@@ -78,6 +79,12 @@ def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[s
         opened["picture"] = _encode_picture(drawing.pixels)
     if spatial and view is None:
         opened["file"] = {"name": file_name, "data": base64.b64encode(data).decode()}
+    if not spatial and len(data) <= MOST_SENT:
+        opened["source"] = {
+            "name": file_name,
+            "data": base64.b64encode(data).decode(),
+            "digest": digest_of(read_strokes(opened)),
+        }
     return opened
 
 

@@ -5,9 +5,11 @@ They run in child processes. A process keeps its last fields and surfaces for re
 
 from __future__ import annotations
 
+import hashlib
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -19,13 +21,16 @@ from ...models.instance.domain import Bools, Floats, Ints
 from ...models.instance.instance import SKEW_WEIGHT, Instance
 from ...models.processes.child_program import is_stopped
 from ...models.sketch.cover import LEAST_WEIGHT, Frame, curve_pixels, fit_frame
+from ...models.sketch.curves import Curves
+from ...models.sketch.drawing_file import Drawing, parse_drawing
+from ...models.sketch.parallels import leave_out_parallels
 from ...models.sketch.read import drop_silhouette, find_mask, instance_of_mask
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.surface.hints import Hint
 from ...models.surface.lift import surface
 from ...models.surface.surface import Surface
-from .document import Document, MaskEdit
+from .document import SIZES, Document, MaskEdit, Source
 
 _Result = TypeVar("_Result")
 
@@ -51,18 +56,27 @@ class DrawnInstance:
 
 
 def read_drawn(document: Document, size: int | None = None) -> DrawnInstance:
-    """The instance of a document. size: instead of that of the document. Raises InputError."""
-    curves = document.curves()
-    frame = fit_frame(curves.box, size or document.size, margin=True)
-    covers = curves.covers(frame)
-    mask, reading = find_mask(curves, covers, frame)
+    """The instance of a document. size: instead of that of the document. Raises InputError.
+
+    Until a stroke is changed, it is the instance that `read_sketch` reads from the file that was opened.
+    """
+    curves, source = document.curves(), document.source
+    drawing = _read_source(source) if source else curves
+    frame = fit_frame(drawing.box, size or document.size, margin=True)
+    covers = drawing.covers(frame)
+    mask, reading = find_mask(drawing, covers, frame)
     edited = _edit_mask(document.mask, mask, covers.walls, frame)
     left_out = edited | _enclosed_parts(~edited & ~covers.walls)
     mask = edited & ~covers.cuts
     if document.silhouette == "outer":
         covers, mask = drop_silhouette(covers, mask)
     instance = instance_of_mask(
-        frame, covers.lines, mask, reading, name=document.name, source=f"{document.name}.svg"
+        frame,
+        covers.lines,
+        mask,
+        reading,
+        name=document.name,
+        source=source.name if source else f"{document.name}.svg",
     ).with_weights(stroke_weight=document.stroke_weight, skew_weight=SKEW_WEIGHT)
     segments, curve, line = curves.segments(frame)
     owner, row, column = curve_pixels(segments[line], curve[line], frame, LEAST_WEIGHT)
@@ -72,6 +86,16 @@ def read_drawn(document: Document, size: int | None = None) -> DrawnInstance:
     pairs = pairs[pairs[:, 1] >= 0].astype(np.int32)
     kinds = np.select([covers.cuts, mask, left_out], [STROKE, IN, LEFT_OUT], OUT).astype(np.int32)
     return DrawnInstance(_scale_weights(instance, document.weights, pairs), kinds, pairs)
+
+
+def _read_source(source: Source) -> Drawing:
+    """The drawing in the file that was opened, as `read_sketch` reads it for every size of the page."""
+
+    def read() -> Drawing:
+        drawing = parse_drawing(source.data, Path(source.name).suffix, SIZES[1])
+        return leave_out_parallels(drawing) if isinstance(drawing, Curves) else drawing
+
+    return _DRAWINGS.get_or_compute((hashlib.sha256(source.data).digest(), source.name), read)
 
 
 def _scale_weights(instance: Instance, weights: Floats, pairs: Ints) -> Instance:
@@ -155,6 +179,7 @@ class _ResultCache(OrderedDict[object, Any]):
         return latest
 
 
+_DRAWINGS: Final = _ResultCache()
 _FIELDS: Final = _ResultCache()
 _SURFACES: Final = _ResultCache()
 

@@ -8,7 +8,7 @@ import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shad
 import { clipped, erased, fitShift, isClosed, moved, rounded, strokeAt, strokesIn } from "./strokes.js";
 
 const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
-const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file", "picture"];
+const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file", "picture", "source"];
 const REACH = 9, FINGER = 18, STILL = 4, PASTED = 16; // pixels of the screen: near a stroke, also for a finger; in a click; between copies
 const state = {
   history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "cut", preset: true, next: "outline", live: null, brush: null, edit: 0,
@@ -88,8 +88,9 @@ function picture() {
 }
 const isSaved = () => state.history.saved.has(state.history.now);
 
-// What survives a reload of the page. The large parts change rarely: they are stored apart, and computing needs none.
-const computable = doc => JSON.stringify({ ...doc, ...Object.fromEntries(PARTS.map(part => [part, undefined])) });
+// What survives a reload of the page. The large parts change rarely: they are stored apart, and computing needs only the source.
+const strokesOnly = doc => JSON.stringify({ ...doc, ...Object.fromEntries(PARTS.map(part => [part, undefined])) });
+const computable = doc => JSON.stringify({ ...doc, file: undefined, picture: undefined });
 const stored = new Map();
 function store(name, value, text = String) {
   if (stored.has(name) && stored.get(name) === value) return true;
@@ -99,7 +100,7 @@ function store(name, value, text = String) {
 function keep() {
   const { now } = state.history, whole = PARTS.map(part => store(`${KEPT}-${part}`, now[part], JSON.stringify)).every(Boolean);
   store(`${KEPT}-at`, location.pathname); store(`${KEPT}-saved`, isSaved() && "yes");
-  if (!store(KEPT, now, computable)) banner("This drawing is too large to survive a reload of this page. Save it as a file.", { kind: "large" });
+  if (!store(KEPT, now, strokesOnly)) banner("This drawing is too large to survive a reload of this page. Save it as a file.", { kind: "large" });
   else if (!whole) banner("A reload of this page keeps the strokes, but not the picture or file that they come from, which is too large. Save the drawing.", { kind: "large" });
 }
 function kept() {
@@ -388,7 +389,7 @@ async function read(path, name, body) {
 }
 const readFile = (file, name, view) => read(`open?${new URLSearchParams({ name, ...view && { view } })}`, name, file);
 /** The document of what the server read from a file. */
-const documentOf = ({ document: session, name, page, strokes, file, picture }) => ({ ...emptyDocument(), size: state.doc.size, ...session ?? { name: name || "drawing", page, strokes, file, picture } });
+const documentOf = ({ document: session, name, page, strokes, file, picture, source }) => ({ ...emptyDocument(), size: state.doc.size, ...session ?? { name: name || "drawing", page, strokes, file, picture, source } });
 const mayReplace = () => isSaved() || !state.doc.strokes.length || confirm("Replace this drawing? It has changes that are not in a saved file. Undo brings it back until this page is closed or loaded again.");
 /** Shows what the server read, and its notes on what it left out. */
 function enter(found) { if (found) { replace(documentOf(found)); showNotes(found); } }

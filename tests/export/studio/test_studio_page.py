@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import math
 
+import crossfield as cf
 import pytest
+from crossfield.models.sketch.samples import sample_svg
 from browsing import CONTRAST, find, show, sideways
 from studio_pages import BOX, banner, document, drag, load, opened, pebble, settled, tool, until
 from studios import CONTRADICTING, PEBBLE, studio
@@ -157,6 +159,29 @@ def test_a_picture_lies_under_its_traced_strokes(empty, tmp_path):
     assert not find(settled(browser), "#opacity").is_displayed()
     find(browser, "#undo").click()
     assert find(settled(browser), "#opacity").is_displayed()
+
+
+def test_page_and_command_line_read_the_same_instance_until_a_stroke_is_changed(empty, tmp_path):
+    data = sample_svg("bottle").encode()
+    browser = load(empty, tmp_path / "bottle.svg", data)
+    (tmp_path / "bottle.svg").write_bytes(data)
+    read = cf.read_sketch(tmp_path / "bottle.svg", size=48).sha256
+
+    def downloaded(folder):
+        folder.mkdir()
+        find(browser, "#download-menu summary").click()
+        return cf.read_instance(given(browser, folder, find(browser, "[data-download=instance]").click)).sha256
+
+    assert downloaded(tmp_path / "opened") == read
+    tool(browser, "erase")
+    drag(browser, [(240, 300), (245, 330)])
+    tool(browser, "draw")
+    drag(browser, [(300, 300), (360, 340)])
+    assert downloaded(tmp_path / "changed") != read
+    find(browser, "#undo").click()
+    find(browser, "#undo").click()
+    settled(browser)
+    assert downloaded(tmp_path / "undone") == read
 
 
 def test_every_edit_is_undone_and_done_again(empty, tmp_path):

@@ -302,10 +302,14 @@ def test_page_and_command_line_read_the_same_instance(kind, tmp_path):
     (tmp_path / name).write_bytes(data)
     instance = cf.read_sketch(tmp_path / name, size=40)
     opened = open_drawing(data, name)
-    parts = {key: opened[key] for key in ("name", "page", "strokes")}
-    drawn = read_drawn(document(**parts, mask=[], hints=[], size=40)).instance
-    assert drawn.reading.page == instance.reading.page
-    assert_same_drawing(drawn, instance)
+    parts = {key: opened[key] for key in ("name", "page", "strokes", "source")} | {"mask": [], "hints": []}
+    drawn = read_drawn(document(**parts, size=40)).instance
+    assert drawn.sha256 == instance.sha256
+    assert drawn.reading == instance.reading
+    parts["strokes"] = [*parts["strokes"], {"points": [1, 1, 1, 1], "mark": "ignored", "weight": 1}]
+    changed = read_drawn(document(**parts, size=40)).instance
+    assert changed.source == "bottle.svg"
+    assert_same_drawing(changed, instance)
     assert opened["notes"] == [note for note in instance.reading.warnings if "sheet" in note]
 
 
