@@ -7,8 +7,8 @@ import math
 
 import crossfield as cf
 import pytest
-from crossfield.models.sketch.samples import sample_svg
 from browsing import CONTRAST, find, show, sideways
+from crossfield.models.sketch.samples import sample_svg
 from studio_pages import BOX, banner, document, drag, load, opened, pebble, settled, tool, until
 from studios import CONTRADICTING, PEBBLE, studio
 
@@ -170,7 +170,9 @@ def test_page_and_command_line_read_the_same_instance_until_a_stroke_is_changed(
     def downloaded(folder):
         folder.mkdir()
         find(browser, "#download-menu summary").click()
-        return cf.read_instance(given(browser, folder, find(browser, "[data-download=instance]").click)).sha256
+        return cf.read_instance(
+            given(browser, folder, find(browser, "[data-download=instance]").click)
+        ).sha256
 
     assert downloaded(tmp_path / "opened") == read
     tool(browser, "erase")
