@@ -35,7 +35,7 @@ VERSION: Final = 1
 SIZES: Final = (8, 256)  # least and most pixels of the longer side that the page offers
 FARTHEST: Final = 1e6  # coordinates
 PICTURE_SIDE: Final = 1600  # most pixels of the longer side of the picture under the strokes
-MOST_SENT: Final = 4_000_000  # bytes of an opened file that is sent with every request
+MOST_SENT: Final = 12_000_000  # bytes of an opened file that is sent with requests
 _MOST_ATTACHED: Final = 40_000_000  # characters of a picture or file in a session
 _MOST_WEIGHT: Final = 1e3  # of the strokes
 

@@ -88,9 +88,13 @@ function picture() {
 }
 const isSaved = () => state.history.saved.has(state.history.now);
 
-// What survives a reload of the page. The large parts change rarely: they are stored apart, and computing needs only the source.
+// What survives a reload of the page. The large parts change rarely: they are stored apart. Computing needs the source of unchanged strokes.
 const strokesOnly = doc => JSON.stringify({ ...doc, ...Object.fromEntries(PARTS.map(part => [part, undefined])) });
-const computable = doc => JSON.stringify({ ...doc, file: undefined, picture: undefined });
+const strokesOf = new WeakMap();
+const computable = doc => {
+  const { source } = doc, changed = strokesOf.has(source) && strokesOf.get(source) !== doc.strokes;
+  return JSON.stringify({ ...doc, file: undefined, picture: undefined, source: changed ? undefined : source });
+};
 const stored = new Map();
 function store(name, value, text = String) {
   if (stored.has(name) && stored.get(name) === value) return true;
@@ -392,7 +396,12 @@ const readFile = (file, name, view) => read(`open?${new URLSearchParams({ name, 
 const documentOf = ({ document: session, name, page, strokes, file, picture, source }) => ({ ...emptyDocument(), size: state.doc.size, ...session ?? { name: name || "drawing", page, strokes, file, picture, source } });
 const mayReplace = () => isSaved() || !state.doc.strokes.length || confirm("Replace this drawing? It has changes that are not in a saved file. Undo brings it back until this page is closed or loaded again.");
 /** Shows what the server read, and its notes on what it left out. */
-function enter(found) { if (found) { replace(documentOf(found)); showNotes(found); } }
+function enter(found) {
+  if (!found) return;
+  const doc = documentOf(found);
+  if (found.source) strokesOf.set(doc.source, doc.strokes);
+  replace(doc); showNotes(found);
+}
 const showNotes = ({ notes = [] }) => banner(notes.map(note => sentence(note)).join(" "), { kind: "notes" });
 const open = async file => { if (file && mayReplace()) enter(await readFile(file, file.name)); };
 function give(blob, name) {
