@@ -38,7 +38,7 @@ _MARGIN: Final = 2e-9  # radians by which the boxes are wider here; those of the
 class BoxMinimum(NamedTuple):
     """The least energy on the last boxes: its field, a bound, and the arrays of a certificate that prove it.
 
-    cuts, multipliers: as docs/files.md describes them.
+    cuts, multipliers: as docs/files/certificate.csv describes them.
     """
 
     field: CrossField

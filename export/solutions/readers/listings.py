@@ -1,6 +1,6 @@
 """The table of layouts that programs print, and of lists of names and values with a sign between them.
 
-docs/files.md states the program and version that wrote the test file of each.
+docs/files/answers.csv states the program and version that wrote the test file of each.
 """
 
 from __future__ import annotations
