@@ -1,19 +1,18 @@
-"""The pictures of docs/proofs.md: the crosses left at every level of a proof."""
+"""The picture of docs/proofs.md: the crosses left at every level of a proof."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any, Final
 
-import matplotlib as mpl
 import numpy as np
 from crossfield.export.pictures.draw import fixed_settings
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.domain import Bools, Floats
 from crossfield.models.instance.grid import Grid
-from crossfield.models.proof.lattice import block_starts, checkerboard_offsets
+from crossfield.models.proof.lattice import block_starts
 from crossfield.models.proof.record import LevelRecord, Proof
-from diagrams import STYLE, U, V
+from diagrams import STYLE, V
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
@@ -21,9 +20,7 @@ STRIP: Final = HALF**2
 """Area of all crosses, in radians squared."""
 COLOURS: Final = "viridis"
 CELL: Final = "#2a788e"
-BACKGROUND: Final = "#f0f0f0"
 COLUMNS: Final = 4
-SHOWN: Final = 6  # levels whose cells are drawn for single pixels
 
 
 def allowed_cells(level: LevelRecord, pixel: int) -> Bools:
@@ -105,54 +102,3 @@ def _strokes(place: Any, proof: Proof) -> None:
     instance = proof.field.instance
     at = instance.stroke_index
     place.plot(instance.grid.columns[at], instance.grid.rows[at], "o", color=V, markersize=1.8)
-
-
-def draw_strips(proof: Proof, path: Path) -> list[int]:
-    """Draw the cells that are left, level by level, for a pixel with a stroke and the last one to be decided;
-    return these pixels.
-    """
-    levels, instance = last_levels(proof)[:SHOWN], proof.field.instance
-    late = remaining_shares(levels[2])
-    drawn = instance.stroke_index
-    pixels = (int(drawn[np.argsort(late[drawn])[len(drawn) // 2]]), int(np.argmax(late)))
-    names = ("on a stroke", "decided last")
-    with fixed_settings(STYLE):
-        figure = Figure(figsize=(2.0 * len(levels) + 0.7, 4.5), layout="constrained")
-        axes = figure.subplots(2, len(levels), squeeze=False)
-        for row, (pixel, name) in enumerate(zip(pixels, names, strict=True)):
-            for place, level in zip(axes[row], levels, strict=True):
-                _strip(place, level, pixel, proof)
-            where = f"pixel {instance.grid.rows[pixel]}, {instance.grid.columns[pixel]}"
-            axes[row, 0].set_ylabel(f"{where}, {name}\n\nbeta, degrees", fontsize=10)
-        for place, (number, level) in zip(axes[0], enumerate(levels, start=1), strict=True):
-            place.set_title(f"level {number}: {np.degrees(level.h):.2g}° apart", fontsize=10)
-        for place in axes[1]:
-            place.set_xlabel("alpha, degrees", fontsize=9)
-        figure.savefig(path, dpi=110, metadata={"Software": None})
-    return list(pixels)
-
-
-def _strip(place: Any, level: LevelRecord, pixel: int, proof: Proof) -> None:
-    """Draw one pixel's strip, the cells that are left of it, and the cross of the field."""
-    offset = checkerboard_offsets(proof.field.instance.grid)[pixel]
-    alpha, beta = (
-        np.degrees(centre[pixel] + level.h * (first[pixel] + np.arange(count[pixel]) + offset))
-        for centre, first, count in (
-            (level.alpha, level.alpha_first, level.alpha_count),
-            (level.beta, level.beta_first, level.beta_count),
-        )
-    )
-    centre = np.degrees(level.alpha[pixel])
-    place.set_facecolor(BACKGROUND)
-    picture = np.where(allowed_cells(level, pixel), 1.0, np.nan).T
-    place.pcolormesh(alpha, beta, picture, cmap=mpl.colors.ListedColormap([CELL]))
-    place.axvline(centre, color=U, linewidth=0.6)
-    place.axhline(np.degrees(level.beta[pixel]), color=U, linewidth=0.6)
-    left = centre - 45 + np.degrees(proof.levels[0].h) * offset
-    place.set(xlim=(left, left + 90), ylim=(-45, 45), aspect="equal")
-    place.set_yticks([-45, 0, 45])
-    place.tick_params(labelsize=8)
-    share = min(1.0, allowed_cells(level, pixel).sum() * level.h**2 / STRIP)
-    words = f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"
-    box = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
-    place.text(0.05, 0.05, words, transform=place.transAxes, fontsize=9, bbox=box)

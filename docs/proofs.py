@@ -1,4 +1,4 @@
-"""Make docs/proofs.md, the fields that are proven optimal, from docs/proofs.json: `python docs/proofs.py`.
+"""Make docs/proofs.md and the tables in docs/proofs/ from docs/proofs.json: `python docs/proofs.py`.
 
     python docs/proofs.py [--measure PART ...] [--names NAME ...] [--seconds S] [--sketches FOLDER]
                           [--work FOLDER]
@@ -14,13 +14,15 @@ its time limit. With --work, fields and certificates stay in that folder, but no
 from __future__ import annotations
 
 import argparse
+import csv
+import io
 import json
 import re
 import subprocess
 import sys
 import tempfile
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -39,7 +41,6 @@ from crossfield.models.sketch.samples import SAMPLES, sample
 from drawings import PROVERS, SUFFIXES, Sketch, drawings_of, optimum, run_command, sketches, tiny_instances
 from machine import machine_facts
 from make import generated_line, markdown
-from public_drawings import COLLECTIONS
 from studying.wording import percent
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -56,6 +57,10 @@ WITHIN: Final = 1e-5
 PICTURED: Final = "mouse"
 HARDEST: Final = ("mouse", "singular")
 """Samples of other sizes and weights."""
+SKETCHES: Final = ("samples", "paper", "middle", "fine", "large", "sketches", "collections")
+"""Parts with a proof of each sketch."""
+KINDS: Final = ("cold", "tightened", "here")
+"""Files of a solver as they are and tightened, and `crossfield prove`."""
 MIP_SAMPLES: Final = ("bottle", "cylinder_bend", "mouse", "saddle", "singular")
 SECONDS: Final = {
     "samples": 60.0, "paper": 60.0, "sketches": 60.0, "collections": 60.0, "middle": 180.0, "fine": 300.0,
@@ -168,12 +173,11 @@ def solvers(request: Request) -> Iterator[tuple[str, Facts]]:
 
 
 def pictures(request: Request) -> Iterator[tuple[str, Facts]]:
-    """The pictures of the crosses left at every level."""
+    """The picture of the crosses left at every level."""
     proof = prove(sample(PICTURED, SIZE), limits=Limits(request.seconds, gap=0))
     certificate = write_certificate(proof, request.work / f"{PICTURED}.certificate.npz")
     proof_pictures.draw_maps(proof, certificate.proven.boxes, DOCS / "pictures" / "proof_levels.png")
-    pixels = proof_pictures.draw_strips(proof, DOCS / "pictures" / "proof_strips.png")
-    yield PICTURED, {"levels": len(proof.levels), "status": proof.status, "pixels": pixels}
+    yield PICTURED, {"levels": len(proof.levels), "status": proof.status}
 
 
 PARTS: Final[dict[str, Measurement]] = {
@@ -205,107 +209,31 @@ def read() -> Results:
     return dict(json.loads(KEPT.read_text())) if KEPT.exists() else {}
 
 
-PROOF_COLUMNS: Final = (
-    "sketch", "pixels", "energy", "bound", "gap", "", "forced jumps", "levels", "labels", "s",
-    "certificate, MB", "check, s", "GB",
-)  # fmt: skip
-
-
-ENDS: Final = {
-    "time": "open: out of time",
-    "labels": "open: too many labels",
-    "interrupted": "open: interrupted",
-    "gap": "open: requested gap reached",
-    "optimal": "optimal but for rounding",
-}
-"""Reasons for the end of a proof without an optimum."""
-
-
-def proof_table(rows: dict[str, Facts]) -> str:
-    """Energy, bound and effort of proofs, in the order of the samples."""
-    order = sorted(rows, key=lambda name: (list(SAMPLES).index(name) if name in SAMPLES else 99, name))
+def reach_table(results: Results) -> str:
+    """How many fields of each part are proven optimal, the gaps, and the medians of the effort."""
+    columns = ("drawings", "pixels", "limit, s", "optimal", "largest gap", "s", "check, s")
+    collections = len({name.partition("/")[0] for name in results["collections"]})
+    titles = {
+        "samples": ("samples", SIZE),
+        "fine": ("samples", FINE),
+        "large": ("samples", LARGE),
+        "sketches": ("drawings by others", SIZE),
+        "collections": (f"{collections} public collections", SIZE),
+    }
     cells = []
-    for name in order:
-        row = rows[name]
+    for part, (title, size) in titles.items():
+        rows = list(results[part].values())
         cells.append(
             [
-                name,
-                str(row["pixels"]),
-                f"{row['energy']:.6f}",
-                f"{row['bound']:.6f}",
-                percent(row["gap"]) if row["status"] == "gap" else "0",
-                "**optimal**" if row["status"] == "optimal" else ENDS[row["ended"]],
-                f"{row['forced_jumps']} of {row['pairs']}",
-                str(row["levels"]),
-                f"{row['labels']:,}",
-                f"{row['seconds']:.1f}",
-                f"{row['bytes'] / 1e6:.1f}",
-                f"{row['check']:.1f}",
-                f"{row['memory'] / 1e9:.2f}",
+                title,
+                str(size),
+                f"{max(row['limit'] for row in rows):g}",
+                f"{sum(row['status'] == 'optimal' for row in rows)} of {len(rows)}",
+                percent(max(row["gap"] for row in rows)),
+                *(f"{median(row[name] for row in rows):.1f}" for name in ("seconds", "check")),
             ]
         )
-    return markdown(PROOF_COLUMNS, cells)
-
-
-def collections_table(rows: dict[str, Facts]) -> str:
-    """How many drawings of each collection are proven optimal, the gaps, and the times."""
-    columns = (
-        "collection", "repository", "drawings", "optimal", "gap at most 3 %", "greatest gap",
-        "s, median", "check, s, median", "check, s, at most",
-    )  # fmt: skip
-    cells = []
-    for name, collection in COLLECTIONS.items():
-        mine = [row for key, row in rows.items() if key.startswith(f"{name}/")]
-        cells.append([name, collection.repository, *_counts(mine)])
-    return markdown(columns, [*cells, ["all", "", *_counts(list(rows.values()))]])
-
-
-def _counts(rows: list[Facts]) -> list[str]:
-    return [
-        str(len(rows)),
-        str(sum(row["status"] == "optimal" for row in rows)),
-        str(sum(row["gap"] <= 0.03 for row in rows)),
-        percent(max(row["gap"] for row in rows)),
-        f"{median(row['seconds'] for row in rows):.0f}",
-        f"{median(row['check'] for row in rows):.1f}",
-        f"{max(row['check'] for row in rows):.1f}",
-    ]
-
-
-def open_drawings(rows: dict[str, Facts]) -> str:
-    """The drawings that are left open, and their gaps."""
-    left = sorted((row["gap"], name) for name, row in rows.items() if row["status"] == "gap")
-    return ", ".join(f"{name.partition('/')[2]} {percent(gap)}" for gap, name in left)
-
-
-def optima_table(rows: dict[str, Facts]) -> str:
-    """Proven optima here and elsewhere."""
-    cells = [
-        [
-            name,
-            row["grid"],
-            f"{row['energy']:.9f}",
-            f"{row['bound']:.9f}",
-            row["status"],
-            f"{row['seconds']:.1f}",
-            f"{row['other']:.9f}" if row["other"] is not None else "none in the time",
-            f"{solver_title(row['by'])}, {row['other_seconds']:.1f} s" if row["by"] else "",
-            f"{difference(row):.0e}" if row["other"] is not None else "",
-        ]
-        for name, row in rows.items()
-    ]
-    columns = (
-        "instance",
-        "grid",
-        "energy",
-        "bound",
-        "",
-        "s",
-        "optimum of another solver",
-        "by",
-        "difference",
-    )
-    return markdown(columns, sorted(cells, key=lambda row: (row[0].startswith("random"), row[0])))
+    return markdown(columns, cells)
 
 
 def solver_title(solver: str) -> str:
@@ -319,76 +247,42 @@ def difference(row: Facts) -> float:
 
 
 def solvers_table(rows: dict[str, Facts]) -> str:
-    """The table of proofs of MIP solvers."""
+    """How many files each solver closes, and how many `crossfield prove` does."""
+    groups = defaultdict[tuple[str, str], list[Facts]](list)
+    for row in rows.values():
+        groups[row["formulation"], row["solver"]].append(row)
     cells = [
         [
-            solver_title(row["solver"]),
-            f"`{row['formulation']}`",
-            row["name"],
-            f"{row['width']} x {row['height']}",
-            f"{row['free_jumps']} of {row['pairs']}",
-            *solver_cells(row, "cold"),
-            *solver_cells(row, "tightened"),
-            *solver_cells(row, "here"),
+            f"`{formulation}`",
+            solver_title(solver),
+            *(f"{sum(row[kind]['proven'] for row in group)} of {len(group)}" for kind in KINDS),
         ]
-        for row in sorted(rows.values(), key=lambda row: (row["formulation"], row["solver"], row["name"]))
+        for (formulation, solver), group in sorted(groups.items())
     ]
-    columns = (
-        "solver", "formulation", "sample", "grid", "free jumps", "cold: best", "bound", "s",
-        "tightened: best", "bound", "s", "`prove`: best", "bound", "s",
-    )  # fmt: skip
-    return markdown(columns, cells)
+    return markdown(("formulation", "solver", "cold", "tightened", "`prove`"), cells)
 
 
-def solver_cells(row: Facts, kind: str) -> list[str]:
-    """Cells of a solver: the best point, the bound and the seconds."""
-    answer = row[kind]
-    best, bound = (
-        "none" if answer[name] is None else f"{round(answer[name], 5) + 0.0:.5f}"
-        for name in ("objective", "bound")
-    )
-    return [best, f"**{bound}**" if answer["proven"] else bound, f"{answer['seconds']:.1f}"]
-
-
-def short_summary(results: Results) -> str:
-    """Summary: the reach of proofs, agreement with other solvers, and the reach of those."""
-    rows, small, mip = results["samples"], results["optima"], results["solvers"]
-    closed = [row for row in rows.values() if row["status"] == "optimal"]
-    open_gaps = ", ".join(
-        f"{name}, gap {percent(row['gap'])}" for name, row in rows.items() if row["status"] != "optimal"
-    )
-    rest = f" (not closed: {open_gaps})" if open_gaps else ""
-    known = [row for row in small.values() if row["other"] is not None]
+def agreement(rows: dict[str, Facts]) -> str:
+    """How often another solver proves the same optimum of a small instance."""
+    known = [row for row in rows.values() if row["other"] is not None]
     same = sum(difference(row) <= AGREE and row["status"] == "optimal" for row in known)
-    exact = [row for row in mip.values() if row["formulation"] == "miqp-exact"]
-    large = [row for row in mip.values() if row["solver"] in {"highs", "scip"}]
-    cold = sum(row["cold"]["proven"] for row in large)
-    narrow = sum(row["tightened"]["proven"] for row in large)
-    here = sum(row["here"]["proven"] for row in large)
-    seconds = max(row["seconds"] for row in exact)
+    programs = ", ".join(sorted({solver_title(row["by"]) for row in known}))
     return (
-        f"At {SIZE} pixels and under the default weights, `crossfield prove` closes {len(closed)} of "
-        f"{len(rows)} samples, each within {max(row['seconds'] for row in closed):.0f} s on two threads"
-        f"{rest}. Another solver proves the optimum of {len(known)} small instances; in {same} of them both "
-        f"optima agree to {AGREE:g}. HiGHS and SCIP close {cold} of {len(large)} files of this size in "
-        f"{seconds:g} s, and {narrow} of {len(large)} in the windows that proofs leave. `crossfield prove` "
-        f"closes {here} of them, the MILPs in the 1-norm."
+        f"Other solvers ({programs}) prove the optimum of {len(known)} instances with sides of at most "
+        f"{max(int(side) for row in known for side in row['grid'].split(' x '))} pixels. In {same} of them, "
+        f"both optima agree to {AGREE:g} ([list](proofs/optima.csv))."
     )
 
 
-def describe_machines(rows: dict[str, Facts]) -> str:
-    """The machine of most measurements, and the other ones with their rows."""
-    by_machine = defaultdict[str, list[str]](list)
-    for name, row in rows.items():
-        facts = row["machine"]
-        machine = f"{facts['processor']}, {count_cores(facts['cores'])}, Python {facts['python']}, 2 threads"
-        by_machine[machine].append(name)
-    first, *others = sorted(by_machine, key=lambda machine: -len(by_machine[machine]))
-    named = "".join(f" {', '.join(by_machine[other])}: {other}." for other in others)
-    loads = [row["machine"]["load"] for row in rows.values()]
+def machines(results: Results) -> str:
+    """The machines of all proofs, and the load."""
+    facts = [row["machine"] for part in SKETCHES for row in results[part].values()]
+    counts = Counter(f"{machine['processor']}, {count_cores(machine['cores'])}" for machine in facts)
+    named = "; ".join(f"{machine}: {count} proofs" for machine, count in counts.most_common())
+    loads = [machine["load"] for machine in facts]
     return (
-        f"{first}.{named} The load average of the machine was {min(loads):.1f} to {max(loads):.1f}; above "
-        "the number of its cores, seconds are too long."
+        f"{named}. The load average was {min(loads):.1f} to {max(loads):.1f}; above the number of cores, "
+        "seconds are too long."
     )
 
 
@@ -397,34 +291,56 @@ def count_cores(cores: int) -> str:
     return "one core" if cores == 1 else f"{cores} cores"
 
 
-def page(results: Results) -> str:
-    """The text of docs/proofs.md."""
-    tables = ("samples", "paper", "middle", "sketches", "fine", "large")
-    parts = {part: results[part] for part in (*tables, "collections", "solvers")}
+def flatten(facts: Facts) -> Facts:
+    """The facts of a row without nested ones, whose names are joined by an underscore."""
+    flat: Facts = {}
+    for name, value in facts.items():
+        flat |= (
+            {f"{name}_{key}": entry for key, entry in value.items()}
+            if isinstance(value, dict)
+            else {name: value}
+        )
+    return flat
+
+
+def csv_text(results: Results, parts: Sequence[str]) -> str:
+    """The rows of some parts as a CSV file with a column per fact."""
+    rows = [
+        {"part": part, "row": name} | flatten(facts)
+        for part in parts
+        for name, facts in sorted(results[part].items())
+    ]
+    buffer = io.StringIO(newline="")
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    writer = csv.DictWriter(buffer, columns, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return buffer.getvalue()
+
+
+def files(results: Results) -> dict[str, str]:
+    """The texts of docs/proofs.md and of its tables, by their paths in docs/."""
     texts = {
         "generated": generated_line("python docs/proofs.py"),
-        "short": short_summary(results),
         "most": f"{MOST_LABELS:,}",
-        "optima": optima_table(results["optima"]),
+        "reach": reach_table(results),
+        "machines": machines(results),
+        "agreement": agreement(results["optima"]),
         "solvers": solvers_table(results["solvers"]),
-        **{
-            f"{part}_limit": f"{max(row['limit'] for row in results[part].values()):g}"
-            for part in (*tables, "collections")
-        },
         "solvers_limit": f"{SECONDS['solvers']:g}",
     }
-    texts |= {
-        "collections": collections_table(results["collections"]),
-        "collections_open": open_drawings(results["collections"]),
+    page = re.sub(r"@(\w+)@", lambda match: texts[match[1]], TEMPLATE.read_text(encoding="utf-8"))
+    return {
+        "proofs.md": page,
+        "proofs/sketches.csv": csv_text(results, SKETCHES),
+        "proofs/optima.csv": csv_text(results, ["optima"]),
+        "proofs/solvers.csv": csv_text(results, ["solvers"]),
     }
-    texts |= {part: proof_table(results[part]) for part in tables}
-    texts |= {f"{part}_machine": describe_machines(rows) for part, rows in parts.items()}
-    return re.sub(r"@(\w+)@", lambda match: texts[match[1]], TEMPLATE.read_text(encoding="utf-8"))
 
 
 def main() -> None:
     """Measure the requested parts, and write the page."""
-    parser = argparse.ArgumentParser(description="Measure proofs and write docs/proofs.md.")
+    parser = argparse.ArgumentParser(description="Measure proofs; write docs/proofs.md and its tables.")
     parser.add_argument("--measure", nargs="*", choices=PARTS, default=[], help="Parts to measure first.")
     parser.add_argument("--names", nargs="*", default=[], help="Only these of a part.")
     parser.add_argument("--seconds", type=float, help="Time limit of each proof or solve.")
@@ -437,7 +353,9 @@ def main() -> None:
             measure(
                 part, Request(tuple(options.names), seconds, options.sketches, options.work or Path(name))
             )
-    (DOCS / "proofs.md").write_text(page(read()))
+    (DOCS / "proofs").mkdir(exist_ok=True)
+    for path, text in files(read()).items():
+        (DOCS / path).write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -12,8 +12,9 @@ def proofs(docs_module):
     return docs_module("proofs")
 
 
-def test_the_page_is_made_from_the_rows_beside_it(proofs):
-    assert (places.ROOT / "docs" / "proofs.md").read_text() == proofs.page(proofs.read())
+def test_the_page_and_its_tables_are_made_from_the_rows_beside_it(proofs):
+    for path, text in proofs.files(proofs.read()).items():
+        assert (places.ROOT / "docs" / path).read_text(encoding="utf-8") == text, path
 
 
 def test_no_bound_is_above_an_energy_and_every_optimum_is_that_of_other_solvers(proofs):
