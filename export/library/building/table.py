@@ -114,7 +114,7 @@ COLUMNS: Final[Mapping[str, TableColumn]] = {
     "jumps_file": TableColumn(str, _fact("jumps_file")),
     "licence": TableColumn(str, _fact("licence")),
 }
-"""The columns in order; docs/library.md states their meanings."""
+"""The columns in order; docs/library/columns.csv states their meanings."""
 
 
 def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:

@@ -12,6 +12,7 @@ from contextlib import closing
 import crossfield as cf
 import places
 import pytest
+from crossfield.export.library.building.table import COLUMNS
 from libraries import OPEN, library_of
 
 PAGE = places.ROOT / "docs" / "library.md"
@@ -31,6 +32,11 @@ def test_the_query_of_the_page_finds_entries():
         for entry in cf.entries()
         if entry.facts["formulation"] == "miqp-exact" and entry.facts["pairs"] < 30
     ]
+
+
+def test_the_page_describes_every_column_of_the_table():
+    with (places.ROOT / "docs" / "library" / "columns.csv").open(newline="") as stream:
+        assert [row["column"] for row in csv.DictReader(stream)] == list(COLUMNS)
 
 
 def blocks(*words):
