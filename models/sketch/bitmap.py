@@ -23,7 +23,7 @@ from ..instance.domain import Bools, Floats
 from .colour import REDDISH, ink_of, redness
 from .cover import Box, Cover, Covers, Frame, block_means
 from .paper import Ink, reduce_pixels, relative_to_paper
-from .sheet import SIDE, Sheet, find_sheet
+from .sheet import SIDE, PhotographedSheet, find_sheet
 
 FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
 """Formats that Pillow decodes by itself, without starting other programs."""
@@ -64,7 +64,7 @@ class Bitmap:
     reduction: int
     width: int
     height: int
-    sheet: Sheet | None = None
+    sheet: PhotographedSheet | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:

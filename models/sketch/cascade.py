@@ -168,8 +168,8 @@ def _add_rules(cascade: Cascade, rules: Iterable[Any]) -> None:
 
 def _combinators(selector: str) -> tuple[int, int]:
     """Bounds on how often a selector tries all ancestors, and all siblings, of an element."""
-    found = [sign for sign in re.findall(r"\s*([>+~])\s*|\s+", selector.strip()) if sign not in ("+", ">")]
-    return found.count(""), found.count("~")
+    signs = re.findall(r"\s*([>+~])\s*|\s+", selector.strip())
+    return signs.count(""), signs.count("~")
 
 
 @lru_cache(maxsize=1024)

@@ -36,7 +36,7 @@ Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class ParallelFamily:
     """Parallels of one kind. curve: numbers of their curves. count: of the lines, those drawn twice once."""
 
     curve: Indices
@@ -101,7 +101,7 @@ def leave_out_parallels(curves: Curves) -> Curves:
     )
 
 
-def find_parallels(curves: Curves) -> list[Family]:
+def find_parallels(curves: Curves) -> list[ParallelFamily]:
     """The families of hatching and of ruled paper."""
     lines = _straight_lines(curves)
     rows = list(_even_rows(lines))
@@ -116,9 +116,9 @@ def find_parallels(curves: Curves) -> list[Family]:
         members = lines.at(row.members)
         middle = (members.start + members.end).mean(axis=0) / 2
         if len(others) and _goes_beyond(members, row.direction, others, _BEYOND * side):
-            families.append(Family(lines.curve[numbers], row.count, "ruled paper", middle))
+            families.append(ParallelFamily(lines.curve[numbers], row.count, "ruled paper", middle))
         elif row.count >= HATCHED and row.spacing <= CLOSE * side:
-            families.append(Family(members.curve, row.count, "hatching", middle))
+            families.append(ParallelFamily(members.curve, row.count, "hatching", middle))
     return families
 
 

@@ -123,7 +123,7 @@ def find_silhouettes(areas: Sequence[Floats]) -> list[int]:
     return sorted(outer)
 
 
-def _find_stroke(samples: _Samples, width: float, widest: float) -> PenStroke | None:
+def _find_stroke(samples: _OutlineSamples, width: float, widest: float) -> PenStroke | None:
     """The stroke whose outline has these samples and this mean width; None for an area."""
     partner = _pair_samples(samples, width)
     if partner is None:
@@ -144,7 +144,7 @@ def _find_stroke(samples: _Samples, width: float, widest: float) -> PenStroke | 
 
 
 @dataclass(frozen=True, eq=False)
-class _Samples:
+class _OutlineSamples:
     """Samples of an outline in its order, each loop from its start.
 
     at: (n, 2). inward: (n, 2), unit normals into the fill. first: (n,), the first sample of the same loop.
@@ -227,7 +227,7 @@ def _measure_shape(cubics: Floats, area: float) -> tuple[float, Floats]:
     return width, np.maximum(length / (_COARSE * width), np.minimum(length / (_FINE * width), _FEW))
 
 
-def _sample_outline(cubics: Floats, loop: Indices, side: Floats, share: Floats) -> _Samples:
+def _sample_outline(cubics: Floats, loop: Indices, side: Floats, share: Floats) -> _OutlineSamples:
     """Samples at even steps of each loop; their number is the sum of `share` (k,) over its curves."""
     total = np.cumsum(share)
     first = np.flatnonzero(np.diff(loop, prepend=-1))
@@ -244,7 +244,7 @@ def _sample_outline(cubics: Floats, loop: Indices, side: Floats, share: Floats) 
     step = after - before
     normal = side[curve[: len(at)], None] * np.stack([-step[:, 1], step[:, 0]], axis=1)
     normal /= np.maximum(vector_length(*step.T), _TINY)[:, None]
-    return _Samples(at, normal, first, np.repeat(count, count))
+    return _OutlineSamples(at, normal, first, np.repeat(count, count))
 
 
 # --- pairs of samples and pieces of centre lines ------------------------------------------------------------
@@ -263,7 +263,7 @@ class _Piece:
     is_tip: tuple[bool, bool] = (False, False)
 
 
-def _pair_samples(samples: _Samples, width: float) -> Indices | None:
+def _pair_samples(samples: _OutlineSamples, width: float) -> Indices | None:
     """The sample (n,) that faces each one across the stroke, -1 without one; None for an area."""
     from scipy.spatial import cKDTree
 
@@ -296,7 +296,7 @@ def _pair_samples(samples: _Samples, width: float) -> Indices | None:
     return partner
 
 
-def _find_runs(samples: _Samples, partner: Indices, width: float) -> list[tuple[Indices, bool]]:
+def _find_runs(samples: _OutlineSamples, partner: Indices, width: float) -> list[tuple[Indices, bool]]:
     """Runs of samples along one side of a stroke, longest first, and whether each is a whole loop."""
     at, inward = samples.at, samples.inward
     after = samples.move_on(np.arange(len(at)), 1)
@@ -325,7 +325,7 @@ def _find_runs(samples: _Samples, partner: Indices, width: float) -> list[tuple[
     return sorted(runs, key=lambda run: -len(run[0]))
 
 
-def _cut_pieces(samples: _Samples, partner: Indices, mean_width: float) -> list[_Piece]:
+def _cut_pieces(samples: _OutlineSamples, partner: Indices, mean_width: float) -> list[_Piece]:
     """The pieces of the centre lines between ends and junctions, each found from one of its sides."""
     at = samples.at
     step = vector_length(*(at[samples.move_on(np.arange(len(at)), 1)] - at).T)
@@ -344,7 +344,7 @@ def _cut_pieces(samples: _Samples, partner: Indices, mean_width: float) -> list[
 
 
 def _make_piece(
-    samples: _Samples, step: Floats, side: Indices, other_side: Indices, *, closed: bool
+    samples: _OutlineSamples, step: Floats, side: Indices, other_side: Indices, *, closed: bool
 ) -> _Piece:
     """The piece between two sides of a stroke, with its free ends at the tips of their caps."""
     at = samples.at
@@ -367,7 +367,9 @@ def _make_piece(
     return _Piece(points, width, closed, (is_tip[0], is_tip[1]))
 
 
-def _cap_samples(samples: _Samples, step: Floats, last: int, first: int, width: float) -> Indices | None:
+def _cap_samples(
+    samples: _OutlineSamples, step: Floats, last: int, first: int, width: float
+) -> Indices | None:
     """The samples of the outline between the two sides at the end of a stroke, None at a junction."""
     if samples.first[last] != samples.first[first]:
         return None

@@ -38,7 +38,7 @@ _FOCAL: Final = (0.6, 0.9, 4.0)  # least, usual and greatest focal length in lon
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class PhotographedSheet:
     """A sheet of paper in a picture.
 
     corners: (4, 2), x and y in pixels of the picture, clockwise from the top left. picture: width and height
@@ -110,7 +110,7 @@ class Sheet:
         return on
 
 
-def find_sheet(coarse: NDArray[np.uint8], factor: int, picture: tuple[int, int]) -> Sheet | None:
+def find_sheet(coarse: NDArray[np.uint8], factor: int, picture: tuple[int, int]) -> PhotographedSheet | None:
     """The sheet in a picture, of this width and height, that is reduced by a factor to [h, w, channels].
 
     None if nothing surrounds the paper, as in a scan.
@@ -140,7 +140,9 @@ def find_sheet(coarse: NDArray[np.uint8], factor: int, picture: tuple[int, int])
     if best is None:
         return None
     corners = factor * best.shrink()
-    return Sheet(corners, picture, None if best.is_cut.any() else _estimate_size(corners, picture))
+    return PhotographedSheet(
+        corners, picture, None if best.is_cut.any() else _estimate_size(corners, picture)
+    )
 
 
 def _list_regions(colours: Floats) -> Iterator[Bools]:

@@ -49,8 +49,17 @@ from .svg_elements import (
     number_of,
     tag_of,
 )
-from .svg_page import GREATEST, UNPAGED, Page, fit_view, frame_drawing, page_of, view_box, window_around
-from .visible import Seen, Shape, opaque_colour, see_strokes
+from .svg_page import (
+    GREATEST,
+    UNPAGED,
+    DrawingPage,
+    fit_view,
+    frame_drawing,
+    page_of,
+    view_box,
+    window_around,
+)
+from .visible import PaintedShape, Seen, opaque_colour, see_strokes
 
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
 _INHERITED: Final = (
@@ -115,7 +124,7 @@ def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     return _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
 
 
-def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page: Page | None) -> None:
+def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page: DrawingPage | None) -> None:
     """Put the background that the style of a drawing declares behind its elements, as browsers do."""
     colour = background_of(styles[root])
     if page is not None and colour is not None:
@@ -127,7 +136,9 @@ def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page
         root.insert(0, sheet)
 
 
-def _trace_fills(shapes: list[Shape], page: Page | None, matcher: LabelMatcher | None) -> list[Shape]:
+def _trace_fills(
+    shapes: list[PaintedShape], page: DrawingPage | None, matcher: LabelMatcher | None
+) -> list[PaintedShape]:
     """The shapes with the centre lines of those that are only filled, and without lines for areas.
 
     Areas show where the body ends if no stroke does: where all strokes are curvature lines, the outlines of
@@ -152,7 +163,7 @@ def _trace_fills(shapes: list[Shape], page: Page | None, matcher: LabelMatcher |
     return traced
 
 
-def _is_ground(shape: Shape, page: Page | None) -> bool:
+def _is_ground(shape: PaintedShape, page: DrawingPage | None) -> bool:
     """Whether a filled shape is the ground of a drawing: as white as paper, or as large as the page."""
     rgb = opaque_colour(shape.paint[:7])
     opacity = int(shape.paint[7:], 16) / 255 if shape.paint[7:] and not np.isnan(rgb).any() else 1.0
@@ -165,7 +176,7 @@ def _is_ground(shape: Shape, page: Page | None) -> bool:
     return bool((corners.min(axis=0) <= start + room).all() and (corners.max(axis=0) >= end - room).all())
 
 
-def _is_curvature_line(shape: Shape, matcher: LabelMatcher | None) -> bool:
+def _is_curvature_line(shape: PaintedShape, matcher: LabelMatcher | None) -> bool:
     """Whether the label or the paint of a shape makes it a curvature line."""
     if matcher is not None:
         return shape.chosen or f"colour={shape.paint}" in matcher.wanted
@@ -173,9 +184,9 @@ def _is_curvature_line(shape: Shape, matcher: LabelMatcher | None) -> bool:
 
 
 def _join_strokes(
-    shapes: Sequence[Shape],
+    shapes: Sequence[PaintedShape],
     seen: Sequence[Seen],
-    page: Page | None,
+    page: DrawingPage | None,
     matcher: LabelMatcher | None,
     notes: tuple[str, ...],
 ) -> Curves:
@@ -248,7 +259,7 @@ def _parse_xml(data: bytes) -> Element:
 
 
 def _put_styles(root: Element, styles: dict[Element, dict[str, str]]) -> dict[Element, dict[str, str]]:
-    """The same styles, put into the attribute `style` of each element in place of style sheets."""
+    """Put the styles into the attribute `style` of each element in place of style sheets; returns them."""
     characters = 0
     for element in root.iter():
         characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
@@ -286,7 +297,7 @@ class _ElementWalk:
     used: int = 0
     curves: int = 0
 
-    def shapes(self, root: Element, page: Page | None) -> Iterator[Shape]:
+    def shapes(self, root: Element, page: DrawingPage | None) -> Iterator[PaintedShape]:
         """Every painted shape in drawing order. Replaces each `use` by a group of what it shows."""
         from svgelements import Matrix
 
@@ -362,7 +373,7 @@ class _ElementWalk:
         self.styles[element] = style
         return replace(place, links=(*place.links, link))
 
-    def _painted_shape(self, place: _Place, named: Mapping[str, Element]) -> Iterator[Shape]:
+    def _painted_shape(self, place: _Place, named: Mapping[str, Element]) -> Iterator[PaintedShape]:
         """The shape of an element, if it is painted."""
         style = place.style
         stroke, fill = (_paint(style, kind, named) for kind in ("stroke", "fill"))
@@ -371,7 +382,7 @@ class _ElementWalk:
         scale = float(np.sqrt(abs(place.matrix.determinant)))
         width = length_of(style.get("stroke-width", "1"), 1.0, float(np.hypot(*place.size) / np.sqrt(2)))
         fixed = style.get("vector-effect") == "non-scaling-stroke"
-        yield Shape(
+        yield PaintedShape(
             place.element,
             name_of(place.element),
             self._place_shape(place),

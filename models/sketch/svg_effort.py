@@ -1,4 +1,4 @@
-"""What a renderer has to do for an SVG drawing: limits, and the resolution that keeps the work in them."""
+"""The work of a renderer on an SVG drawing: its limits, and the resolution that keeps it within them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..input_limits import MAX_DEPTH, MAX_ELEMENTS, MAX_LAYERS
 from ..instance.domain import Floats
 from .cover import Box
 from .svg_elements import HREFS, tag_of
-from .visible import SIDE, Shape
+from .visible import SIDE, PaintedShape
 
 _EASY: Final = 100  # layers of the size of the page that are drawn at full resolution
 _LEAST_SIDE: Final = 256  # pixels on the longer side of a picture
@@ -23,7 +23,7 @@ _LAYERED: Final = ("clip-path", "mask", "opacity")
 _EMPTY: Final = np.array([[np.inf, np.inf], [-np.inf, -np.inf]])
 
 
-def choose_side(root: Element, window: Box, shapes: Sequence[Shape]) -> int:
+def choose_side(root: Element, window: Box, shapes: Sequence[PaintedShape]) -> int:
     """Pixels on the longer side of the pictures of a drawing: fewer for many clips, masks and opacities.
 
     A renderer draws the content of each of them on a layer of its own. Raises InputError if they draw too
@@ -62,7 +62,7 @@ def choose_side(root: Element, window: Box, shapes: Sequence[Shape]) -> int:
     return max(_LEAST_SIDE, round(SIDE * min(1.0, math.sqrt(_EASY / max(layers, 1.0)))))
 
 
-def _box_of(shape: Shape, window: Box) -> Floats:
+def _box_of(shape: PaintedShape, window: Box) -> Floats:
     """Least and greatest corner of a shape as shares of the window, within it."""
     if not len(shape.points):
         return _EMPTY

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..input_limits import LEAST_LENGTH
 from .cover import Box
 from .svg_elements import GROUP, SVG, chosen_attributes, length_of_attribute, name_of
-from .visible import Shape
+from .visible import PaintedShape
 
 GREATEST: Final = 1e9
 """Greatest coordinate."""
@@ -24,7 +24,7 @@ _OWN_MARGIN: Final = 0.05  # of the drawing, around the picture of a drawing wit
 
 
 @dataclass(frozen=True)
-class Page:
+class DrawingPage:
     """The page of a drawing.
 
     view: its viewBox, or width and height from (0, 0). box: the same in the units of the result, which differ
@@ -36,24 +36,24 @@ class Page:
     window: Box
 
 
-def page_of(root: Element) -> Page | None:
+def page_of(root: Element) -> DrawingPage | None:
     """The page of a drawing; None if it states neither a viewBox nor a width and height."""
     view = view_box(root)
     wide, high = (length_of_attribute(root, key, 0.0) for key in ("width", "height"))
     has_size = min(wide, high) >= LEAST_LENGTH
     if view is None:
         box = (0.0, 0.0, wide, high)
-        return Page(box, box, box) if has_size else None
+        return DrawingPage(box, box, box) if has_size else None
     if not has_size:
-        return Page(view, view, view)
+        return DrawingPage(view, view, view)
     across, down, right, below = fit_view(view, wide, high, root.get("preserveAspectRatio", ""))
     stretch = down / across
     box = (view[0], view[1] * stretch, view[2], view[3] * stretch)
     window = (box[0] - right / across, box[1] - below / across, wide / across, high / across)
-    return Page(view, box, window)
+    return DrawingPage(view, box, window)
 
 
-def window_around(shapes: Sequence[Shape]) -> Box:
+def window_around(shapes: Sequence[PaintedShape]) -> Box:
     """The box of all shapes with a margin, for a drawing without a page."""
     corners = np.concatenate([shape.points.reshape(-1, 2) for shape in shapes])
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -62,7 +62,7 @@ def window_around(shapes: Sequence[Shape]) -> Box:
     return left, top, wide, tall
 
 
-def frame_drawing(root: Element, page: Page | None, window: Box) -> Element:
+def frame_drawing(root: Element, page: DrawingPage | None, window: Box) -> Element:
     """The drawing inside a root whose viewBox is the window."""
     view, box = (page.view, page.box) if page else (UNPAGED, UNPAGED)
     frame = Element(SVG + "svg", {"viewBox": _join(window), "preserveAspectRatio": "none"})

@@ -1,4 +1,4 @@
-"""What a picture of a drawing shows of its strokes.
+"""The strokes that a picture of a drawing shows.
 
 resvg draws the picture, without fonts, files and links. A stroke counts where the colour at its centre line
 differs from the ground, which is the picture without strokes. So what is clipped, masked, covered, erased or
@@ -38,7 +38,7 @@ _HIDDEN, _VISIBLE, _CROSSED = 0, 1, 2
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class PaintedShape:
     """A painted shape of a drawing.
 
     points: (k, 4, 2), control points of its centre line in the units of the page, none for an area. paint: of
@@ -66,14 +66,14 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What is seen of a shape: control points (m, 4, 2), and red, green, blue in [0, 1]."""
+    """The visible part of a shape: control points (m, 4, 2), and red, green, blue in [0, 1]."""
 
     points: Floats
     colour: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class _Samples:
+class _LineSamples:
     """Points on the centre lines of shapes, in the order of the lines.
 
     shape, cubic, run: (s,), numbers of the shape, of its cubic among all, and of the unbroken run. start,
@@ -92,9 +92,9 @@ class _Samples:
 
 
 def see_strokes(
-    root: Element, window: Box, shapes: Sequence[Shape], side: int = SIDE
+    root: Element, window: Box, shapes: Sequence[PaintedShape], side: int = SIDE
 ) -> tuple[list[Seen], tuple[str, ...]]:
-    """What is seen of each shape, and notes on what is left out. Raises InputError.
+    """The visible part of each shape, and notes on the strokes that are left out. Raises InputError.
 
     root: the drawing, whose viewBox is the window; its shapes get other styles. window: x, y, width, height.
     side: pixels on the longer side of the pictures.
@@ -128,7 +128,7 @@ def see_strokes(
     return _collect(samples, shapes, visible, colour, expected), notes
 
 
-def _widened(shape: Shape, pixel: float) -> str:
+def _widened(shape: PaintedShape, pixel: float) -> str:
     """The style that gives a shape a stroke of its paint, wide enough for its centre line to have pixels."""
     if not len(shape.points):
         return ""
@@ -172,7 +172,7 @@ def _at(picture: NDArray[np.uint8] | None, pixel: Indices) -> Floats:
     return np.asarray(picture.reshape(-1, 3)[pixel] / 255.0)
 
 
-def _sample_lines(shapes: Sequence[Shape], window: Box, pixel: float) -> _Samples:
+def _sample_lines(shapes: Sequence[PaintedShape], window: Box, pixel: float) -> _LineSamples:
     """Samples of the centre lines of all shapes, at least two on each cubic."""
     points = np.concatenate([shape.points for shape in shapes])
     number = np.repeat(np.arange(len(shapes)), [len(shape.points) for shape in shapes])
@@ -193,7 +193,7 @@ def _sample_lines(shapes: Sequence[Shape], window: Box, pixel: float) -> _Sample
     )
     column, row = np.floor(place).astype(np.intp).T
     inside = (column >= 0) & (column < wide) & (row >= 0) & (row < high)
-    return _Samples(
+    return _LineSamples(
         number[cubic],
         cubic,
         run_numbers(points, number.astype(np.int32))[cubic],
@@ -206,7 +206,7 @@ def _sample_lines(shapes: Sequence[Shape], window: Box, pixel: float) -> _Sample
 
 
 def _find_fronts(
-    root: Element, shapes: Sequence[Shape], styles: Sequence[str], samples: _Samples, pixel: float
+    root: Element, shapes: Sequence[PaintedShape], styles: Sequence[str], samples: _LineSamples, pixel: float
 ) -> tuple[Indices, Bools]:
     """The number of the paint in front (s,) at each sample, and which shapes are painted elsewhere only.
 
@@ -258,8 +258,8 @@ def _make_opaque(root: Element) -> None:
 
 
 def _decide(
-    samples: _Samples,
-    shapes: Sequence[Shape],
+    samples: _LineSamples,
+    shapes: Sequence[PaintedShape],
     front: Indices,
     elsewhere: Bools,
     *,
@@ -289,7 +289,7 @@ def _decide(
 
 
 def _describe_hidden(
-    samples: _Samples, shapes: Sequence[Shape], visible: Bools, reason: Indices
+    samples: _LineSamples, shapes: Sequence[PaintedShape], visible: Bools, reason: Indices
 ) -> tuple[str, ...]:
     """A note for each reason for which more than a small part of a shape is left out."""
     whole = np.bincount(samples.shape, samples.length, len(shapes))
@@ -310,7 +310,7 @@ def _describe_hidden(
 
 
 def _collect(
-    samples: _Samples, shapes: Sequence[Shape], visible: Bools, colour: Floats, expected: Floats
+    samples: _LineSamples, shapes: Sequence[PaintedShape], visible: Bools, colour: Floats, expected: Floats
 ) -> list[Seen]:
     """The visible parts of each shape, whole cubics unchanged. colour: (s, 3), nan where another's."""
     points = np.concatenate([shape.points for shape in shapes])
