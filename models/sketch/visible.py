@@ -123,9 +123,15 @@ def see_strokes(
         front, elsewhere = _find_fronts(root, shapes, styles, samples, pixel)
         visible, reason = _decide(samples, shapes, front, elsewhere, contrast=contrast, own=own, pixel=pixel)
         notes = _describe_hidden(samples, shapes, visible, reason)
-    pure = visible & (own | (front == 2 * samples.shape))
-    colour[~pure] = np.nan
+    colour[~_shows_colour(samples, visible & contrast, front, own)] = np.nan
     return _collect(samples, shapes, visible, colour, expected), notes
+
+
+def _shows_colour(samples: _LineSamples, visible: Bools, front: Indices, own: Bools) -> Bools:
+    """Which samples (s,) show the colour of their shape: in front, or else below clear areas and masks."""
+    in_front = visible & (own | (front == 2 * samples.shape))
+    has_some = np.bincount(samples.shape, in_front) > 0
+    return np.asarray(in_front | (visible & ~has_some[samples.shape] & ((front < 0) | (front % 2 == 1))))
 
 
 def _widened(shape: PaintedShape, pixel: float) -> str:
@@ -252,8 +258,8 @@ def _make_opaque(root: Element) -> None:
         element = stack.pop()
         if element.tag.rpartition("}")[2] not in ("mask", "clipPath", "pattern"):
             style = element.get("style", "")
-            if "opacity" in style or "mix-blend-mode" in style:
-                element.set("style", style + ";opacity:1;mix-blend-mode:normal")
+            if "opacity" in style:
+                element.set("style", style + ";opacity:1")
             stack += element
 
 
@@ -324,7 +330,7 @@ def _collect(
     for number in range(len(shapes)):
         within = slice(edges[number], edges[number + 1])
         shown = colour[within][np.isfinite(colour[within, 0])]
-        rgb = expected[edges[number]] if len(shown) else np.zeros(3)
+        rgb = np.nan_to_num(expected[edges[number]]) if edges[number] < edges[number + 1] else np.zeros(3)
         if len(shown) and not (np.abs(np.median(shown, axis=0) - rgb) <= _SAME).all():
             rgb = np.median(shown, axis=0)
         red, green, blue = rgb.tolist()

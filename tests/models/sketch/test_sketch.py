@@ -449,6 +449,14 @@ def test_places_and_clips_that_are_not_understood_are_reported(style):
     assert re.search(rf"1 property is not understood, first '{style[:10]}.*' of <path>", *curves.notes)
 
 
+@for_each("line", ["stroke-opacity='0.7'", "opacity='0.7'", ""])
+def test_red_lines_below_a_clear_marker_stay_red(line):
+    lines = f'<path d="M20 50H80M50 20V80" fill="none" stroke="red" {line}/>'
+    marker = '<rect x="5" y="5" width="90" height="90" fill="yellow" fill-opacity="0.3"/>'
+    curves = read_svg(svg(TWO_COLOURS.partition("<path")[0] + lines + marker))
+    assert 0 < curves.red.sum() < len(curves.red)
+
+
 def test_a_part_without_a_curvature_line_is_left_out():
     ring = (
         f'<circle cx="50" cy="50" r="40" {BLACK}/><circle cx="50" cy="50" r="15" {BLACK}/>'
