@@ -30,13 +30,13 @@ _DOT: Final = 0.016  # radius of a dot, in sides of the picture
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class Viewpoint:
     """A direction of view: axes, unit vectors (3, 3): to the right, upwards, to the viewer."""
 
     axes: Floats
 
     @classmethod
-    def from_side(cls, side: Floats) -> View:
+    def from_side(cls, side: Floats) -> Viewpoint:
         """The view from a side, with z upwards, or y where that is the side."""
         forward = side / np.linalg.norm(side)
         up = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
@@ -45,7 +45,7 @@ class View:
         return cls(np.stack([right, np.cross(forward, right), forward]))
 
     @classmethod
-    def of(cls, mesh: Mesh, marked: Floats) -> View:
+    def of(cls, mesh: Mesh, marked: Floats) -> Viewpoint:
         """The view from one of 26 sides in which most marked normals (k, 3) and most of the area show."""
         if np.ptp(mesh.vertices[:, 2]) == 0:
             return cls.from_side(np.array([0.0, 0.0, 1.0]))
@@ -77,7 +77,7 @@ def draw_mesh(axes: Any, subject: CrossField | Instance) -> None:
     vertex, turns = _NONE, np.zeros(0)
     if field is not None:
         vertex, turns = field.singularities.vertex, field.singularities.index
-    view = View.of(mesh, _vertex_normals(mesh)[vertex])
+    view = Viewpoint.of(mesh, _vertex_normals(mesh)[vertex])
     points = view.project(mesh.vertices)
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     side, corners, towards = float((high - low).max()), points[mesh.faces], view.project(mesh.normals)
@@ -208,7 +208,7 @@ def model_data(field: CrossField) -> dict[str, Any] | None:
         "dots": singular.vertex.astype(number),
         "turns": np.round(4 * singular.index).astype("i1"),
     }
-    view = View.of(mesh, _vertex_normals(mesh)[singular.vertex])
+    view = Viewpoint.of(mesh, _vertex_normals(mesh)[singular.vertex])
     return {name: b64encode(array.tobytes()).decode() for name, array in arrays.items()} | {
         "wide": wide,
         "closed": not len(mesh.boundary),

@@ -21,7 +21,7 @@ _APART: Final = np.radians(30)  # least angle between lines of two families; str
 
 
 def find_next_step(document: Document) -> NextStep:
-    """What the strokes lack: a closed outline, a curvature line, a line across the others, or nothing.
+    """The next step of a drawing: a closed outline, a curvature line, a line across the others, or none.
 
     Lines of one family leave the other family free: turning it by any angle costs nothing, so many fields
     have the least energy. Where two lines cross, both lines of the cross are given, and smoothness carries

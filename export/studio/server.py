@@ -163,7 +163,7 @@ class Page:
         return _stream_response(self._compute_views(data, size, stop, lines=lines))
 
     async def next(self, request: Request) -> Response:
-        """What a document without curvature lines needs next. Ends the work on earlier edits."""
+        """The next step of a document without curvature lines. Ends the work on earlier edits."""
         data, stop = await self._edit(request)
         return await _answered(lambda: self.desk.submit("fields", next_step, data, stop=stop).result())
 

@@ -43,7 +43,7 @@ def field_step(data: bytes, size: int | None = None) -> tuple[dict[str, Any], Dr
 
 
 def next_step(data: bytes) -> dict[str, Any]:
-    """What a drawing needs next, for documents without a field. Raises InputError."""
+    """The next step of a drawing, for documents without a field. Raises InputError."""
     return {"next": find_next_step(Document.from_bytes(data))}
 
 

@@ -68,7 +68,7 @@ class Bitmap:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was changed while reading, one line each."""
+        """Changes made while reading, one line each."""
         return () if self.sheet is None else (self.sheet.describe(),)
 
     @property

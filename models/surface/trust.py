@@ -52,7 +52,7 @@ def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
 
 
 def describe_support(field: CrossField, off: Floats) -> dict[str, str]:
-    """What supports a surface, and where it is a guess. off: as from `right_angle_deviation`."""
+    """The support of a surface, and the places where it is a guess. off: as from `right_angle_deviation`."""
     instance = field.instance
     free = np.ones(instance.mask.shape, dtype=bool)
     free[tuple(instance.stroke_pixels.T)] = False
