@@ -304,6 +304,7 @@ _ONLY_IF_ANY: Final = (
     "dual_bound",
     "gap",
     "start_returned",
+    "reason",
     "worst_family",
     "message",
 )
