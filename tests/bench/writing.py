@@ -1,7 +1,7 @@
-"""The benchmark of the writers: measures and writes performance.md.
+"""The benchmark of the writers: `python tests/bench writing`.
 
-Every measurement is a process of its own, one at a time: `python performance.py --one JSON` prints seconds,
-CPU seconds, bytes and peak memory. A small model goes through it first, so that imports and compiled
+Every measurement is a process of its own, one at a time: the option `--one JSON` prints seconds, CPU seconds,
+bytes and peak memory. A small model goes through it first, so that imports and compiled
 expressions, which a process pays once, count for nobody. A peer goes on to the next size as long as that
 would take it about a minute and bearable memory.
 """
@@ -28,9 +28,7 @@ from crossfield.models.formulations.catalogue import FORMULATIONS, list_formulat
 from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.instance import Instance
 from machine import processor_name
-from make import markdown
 
-PAGE: Final = Path(__file__).with_suffix(".md")
 MILP: Final = "milp-mccormick"
 SUFFIXES: Final = ("nl", "lp", "mps", "gms")
 SIZES: Final = (64, 128, 256, 512)
@@ -52,7 +50,7 @@ Writer = Callable[[Instance, str, Path], None]
 # The writers: from an instance and the name of a formulation to a closed file.
 
 
-def square(size: int) -> Instance:
+def make_square(size: int) -> Instance:
     """A full square of pixels, a fifth of them with a stroke, each in its own direction."""
     row, column = np.mgrid[:size, :size]
     pixels = np.argwhere((7 * row + 3 * column) % 5 == 0)
@@ -61,29 +59,29 @@ def square(size: int) -> Instance:
     return Instance.on_pixels("square", np.ones((size, size), dtype=bool), pixels, theta, w)
 
 
-def problem_of(instance: Instance, name: str) -> Problem:
+def make_problem(instance: Instance, name: str) -> Problem:
     """The problem; where jumps are data, they are 0."""
     pairs = len(instance.grid.first)
     return formulate(instance, name, p=np.zeros(pairs, np.int32) if FORMULATIONS[name].fixed else None)
 
 
-def by_crossfield(instance: Instance, name: str, path: Path) -> None:
+def write_with_crossfield(instance: Instance, name: str, path: Path) -> None:
     """With names, hash and, for .nl, the files of names."""
-    write(problem_of(instance, name), path)
+    write(make_problem(instance, name), path)
 
 
-def by_pyomo(instance: Instance, name: str, path: Path) -> None:
+def write_with_pyomo(instance: Instance, name: str, path: Path) -> None:
     """Pyomo: building the model, and its own writer with numbered names."""
     from crossfield.export.formats.pyomo_model import to_pyomo
 
-    problem, suffix = problem_of(instance, name), path.suffix[1:]
+    problem, suffix = make_problem(instance, name), path.suffix[1:]
     held = problem_in_format(problem, FORMATS[suffix]) if suffix in {"lp", "mps"} else problem
     kind = {"nl": "nl_v2", "lp": "lp_v2", "mps": "mps", "gms": "gams"}[suffix]
     to_pyomo(held).write(str(path.with_suffix(f".{kind}")), format=kind)
     path.with_suffix(f".{kind}").replace(path)
 
 
-def by_linopy(instance: Instance, name: str, path: Path) -> None:
+def write_with_linopy(instance: Instance, name: str, path: Path) -> None:
     """linopy: building the model from whole arrays, and its LP writer or, for MPS, that of HiGHS behind."""
     import linopy as lib
     import xarray as xr
@@ -94,7 +92,7 @@ def by_linopy(instance: Instance, name: str, path: Path) -> None:
         data = {"coeffs": ((dim, "_term"), values), "vars": ((dim, "_term"), columns)}
         return lib.LinearExpression(xr.Dataset(data, coords={dim: np.arange(count)}), model)
 
-    problem, model = problem_of(instance, name), lib.Model()
+    problem, model = make_problem(instance, name), lib.Model()
     for block in problem.blocks.values():
         lower, upper = (xr.DataArray(end, dims=block.over) for end in (block.lower, block.upper))
         model.add_variables(lower, upper, name=block.name, integer=block.integer)
@@ -109,18 +107,18 @@ def by_linopy(instance: Instance, name: str, path: Path) -> None:
     model.to_file(path, progress=False)
 
 
-def by_highs(instance: Instance, name: str, path: Path) -> None:
+def write_with_highs(instance: Instance, name: str, path: Path) -> None:
     """HiGHS: a model passed as whole arrays, with our names left out, and its writeModel."""
     from crossfield.models.formulations.arrays import build_highs
 
-    build_highs(problem_of(instance, name).to_arrays(names=False), "square").writeModel(str(path))
+    build_highs(make_problem(instance, name).to_arrays(names=False), "square").writeModel(str(path))
 
 
 WRITERS: Final[dict[str, Writer]] = {
-    "crossfield": by_crossfield,
-    "linopy": by_linopy,
-    "highs": by_highs,
-    "pyomo": by_pyomo,
+    "crossfield": write_with_crossfield,
+    "linopy": write_with_linopy,
+    "highs": write_with_highs,
+    "pyomo": write_with_pyomo,
 }
 
 
@@ -132,7 +130,7 @@ def peak_memory() -> int:
     return 1024 * int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0])
 
 
-def timed(writer: Writer, instance: Instance, name: str, path: Path) -> Row:
+def time_writer(writer: Writer, instance: Instance, name: str, path: Path) -> Row:
     """Wall and CPU seconds of one run, into an empty folder.
 
     To replace a file, a file system may send the new blocks to the disk at once, as ext4 does.
@@ -145,7 +143,7 @@ def timed(writer: Writer, instance: Instance, name: str, path: Path) -> Row:
     return {"seconds": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
 
 
-def measured(writer: str, name: str, suffix: str, size: int, *, once: bool = False) -> Row:
+def measure_writer(writer: str, name: str, suffix: str, size: int, *, once: bool = False) -> Row:
     """A row of measurements: the median of three runs, or one run where it is long.
 
     once: one run, and no small model before it.
@@ -153,18 +151,18 @@ def measured(writer: str, name: str, suffix: str, size: int, *, once: bool = Fal
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"model.{suffix}"
         if not once:
-            WRITERS[writer](square(WARM), name, path)
-        runs = [timed(WRITERS[writer], square(size), name, path)]
+            WRITERS[writer](make_square(WARM), name, path)
+        runs = [time_writer(WRITERS[writer], make_square(size), name, path)]
         memory = peak_memory()
         if not once and runs[0]["seconds"] <= ONCE:
-            runs += [timed(WRITERS[writer], square(size), name, path) for _ in range(2)]
+            runs += [time_writer(WRITERS[writer], make_square(size), name, path) for _ in range(2)]
         middle = sorted(runs, key=lambda run: float(run["seconds"]))[len(runs) // 2]
         return middle | {"memory": memory, "bytes": path.stat().st_size, "load": os.getloadavg()[0]}
 
 
-def in_child(*task: Any) -> Row | None:
+def measure_in_child(*task: Any) -> Row | None:
     """Measure in a separate process; return None, with the reason on standard error, when it fails."""
-    command = [sys.executable, __file__, "--one", json.dumps(task)]
+    command = [sys.executable, str(Path(__file__).parent), "writing", "--one", json.dumps(task)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         print(f"{task}: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
@@ -174,10 +172,10 @@ def in_child(*task: Any) -> Row | None:
     return row
 
 
-def here(*task: Any) -> Row | None:
+def measure_here(*task: Any) -> Row | None:
     """A single run in this process; None for a peer that is not installed."""
     try:
-        return measured(*task, once=True)
+        return measure_writer(*task, once=True)
     except ImportError as error:
         print(f"{task}: {error}", file=sys.stderr)
         return None
@@ -186,21 +184,23 @@ def here(*task: Any) -> Row | None:
 # The page
 
 
-def seconds(row: Row | None, column: str = "seconds") -> str:
+def format_seconds(row: Row | None, column: str = "seconds") -> str:
     """Seconds with three significant digits."""
     return "" if row is None else f"{row[column]:.3g}" if row[column] < 100 else f"{row[column]:.0f}"
 
 
-def ratio(row: Row, ours: Row, column: str) -> str:
+def format_ratio(row: Row, ours: Row, column: str) -> str:
     """A ratio with significant digits."""
     value = row[column] / ours[column] if ours[column] else 0.0
     return f"{value:.1f}" if value < 10 else f"{value:.0f}"
 
 
-def peers_table(
+def compare_peers(
     measure: Callable[..., Row | None], suffix: str, sizes: Sequence[int], loads: list[float]
 ) -> str:
     """Ours and the peers, by size."""
+    from make import markdown
+
     rows, going = [], list(PEERS)
     for size in sizes:
         ours: Row = {}
@@ -215,20 +215,28 @@ def peers_table(
             rate = f"{row['bytes'] / 1e6 / row['seconds']:.0f}"
             cells = [
                 f"{row['bytes'] / 1e6:.3g}",
-                seconds(row),
-                seconds(row, "cpu"),
+                format_seconds(row),
+                format_seconds(row, "cpu"),
                 rate,
                 f"{row['memory'] / 1e6:.0f}",
             ]
             rows.append(
-                [str(size), PEERS[writer], *cells, ratio(row, ours, "seconds"), ratio(row, ours, "cpu")]
+                [
+                    str(size),
+                    PEERS[writer],
+                    *cells,
+                    format_ratio(row, ours, "seconds"),
+                    format_ratio(row, ours, "cpu"),
+                ]
             )
     head = ["size", "writer", "MB", "seconds", "CPU s", "MB/s", "peak MB", "seconds / ours", "CPU / ours"]
-    return "\n".join([f"### {suffix.upper()}", "", markdown(head, rows), "", ""])
+    return markdown(head, rows)
 
 
-def formulations_table(measure: Callable[..., Row | None], names: Sequence[str], size: int) -> str:
+def compare_formulations(measure: Callable[..., Row | None], names: Sequence[str], size: int) -> str:
     """Ours and Pyomo for every formulation and format."""
+    from make import markdown
+
     rows = []
     for name in names:
         cells = []
@@ -237,17 +245,15 @@ def formulations_table(measure: Callable[..., Row | None], names: Sequence[str],
                 cells.append("")
                 continue
             ours, theirs = (measure(writer, name, suffix, size) for writer in ("crossfield", "pyomo"))
-            compared = (
-                f"{seconds(ours)} / {seconds(theirs)} = {ratio(theirs, ours, 'seconds')}x"
-                if ours and theirs
-                else ""
-            )
-            cells.append(compared or seconds(ours))
+            cell = format_seconds(ours)
+            if ours and theirs:
+                cell += f" / {format_seconds(theirs)} = {format_ratio(theirs, ours, 'seconds')}x"
+            cells.append(cell)
         rows.append([f"`{name}`", *cells])
     return markdown(["", *SUFFIXES], rows)
 
 
-def machine() -> str:
+def describe_machine() -> str:
     """Facts about the machine that the numbers depend on, without the name of the host."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     packages = []
@@ -262,57 +268,37 @@ def machine() -> str:
     )
 
 
-def page(measure: Callable[..., Row | None], sizes: Sequence[int], names: Sequence[str], middle: int) -> str:
-    """The page as Markdown, made from new measurements."""
+def measure_tables(
+    measure: Callable[..., Row | None], sizes: Sequence[int], names: Sequence[str], middle: int
+) -> dict[str, str]:
+    """The generated parts of the page, by the names of their markers."""
     loads: list[float] = []
-    tables = [peers_table(measure, suffix, sizes, loads) for suffix in ("lp", "mps")]
-    return f"""# How fast files are written
-
-[All pages](index.md). Speed and memory of the writers, compared with other programs.
-
-`python docs/performance.py` measures every number in a separate process, one at a time.
-The instance is a full square of pixels, a fifth of them with a stroke.
-
-- Seconds: from the instance to the closed file, with names, SHA-256 and, for .nl, the files of names.
-  Median of three runs, or one run if it takes more than 5 s.
-- CPU: time of all threads. Compare it if other programs shared the cores.
-- Peak memory: of the whole process, with its libraries.
-
-{machine()}
-Load average while measuring: {min(loads):.1f} to {max(loads):.1f}.
-
-## LP and MPS of `{MILP}` next to other programs
-
-linopy and HiGHS build their models from whole arrays. The other programs do not write our names.
-Each stops before the size that would take more than about a minute.
-gurobipy is missing, because its free licence ends at 2000 columns.
-
-{"".join(tables)}## Every formulation against Pyomo
-
-{middle} x {middle}: seconds of crossfield, of Pyomo (model and writer), and their ratio.
-
-{formulations_table(measure, names, middle)}
-"""
+    tables = {suffix: compare_peers(measure, suffix, sizes, loads) for suffix in ("lp", "mps")}
+    formulations = compare_formulations(measure, names, middle)
+    facts = f"{describe_machine()}\nLoad average while measuring: {min(loads):.1f} to {max(loads):.1f}."
+    sentence = f"{middle} x {middle}: seconds of crossfield, of Pyomo (model and writer), and their ratio."
+    return {"writing": facts, **tables, "formulations": f"{sentence}\n\n{formulations}"}
 
 
-def main() -> None:
-    """Measure and write the page."""
+def main(page: Path, arguments: Sequence[str]) -> None:
+    """Measure, and replace the tables of a page."""
     parser = argparse.ArgumentParser(
-        description="Measure the writers against their peers and write performance.md."
+        prog="python tests/bench writing", description="Measure the writers next to those of other programs."
     )
-    parser.add_argument("--output", type=Path, default=PAGE)
+    parser.add_argument("--page", type=Path, default=page)
     parser.add_argument(
         "--smoke", action="store_true", help="sizes 4 and 8, one run each, in one process: shows that it runs"
     )
     parser.add_argument("--one", help=argparse.SUPPRESS)
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     if options.one:
-        print(json.dumps(measured(*json.loads(options.one))))
-    elif options.smoke:
-        options.output.write_text(page(here, (4, 8), ["minlp-quartic"], 8), encoding="utf-8")
+        print(json.dumps(measure_writer(*json.loads(options.one))))
+        return
+    if options.smoke:
+        tables = measure_tables(measure_here, (4, 8), ["minlp-quartic"], 8)
     else:
-        options.output.write_text(page(in_child, SIZES, list_formulations(), 128), encoding="utf-8")
+        tables = measure_tables(measure_in_child, SIZES, list_formulations(), 128)
+    from make import replace_between
 
-
-if __name__ == "__main__":
-    main()
+    for name, table in tables.items():
+        replace_between(options.page, name, table)

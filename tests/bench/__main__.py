@@ -1,0 +1,24 @@
+"""Measure on a quiet machine and replace the tables of docs/performance.md: `python tests/bench NAME`."""
+
+import importlib
+import sys
+from pathlib import Path
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "performance.md"
+BENCHMARKS = {
+    "writing": "the writers next to those of other programs",
+}
+
+
+def main() -> None:
+    """Run the benchmark named first; each is a module with a function main(page, arguments)."""
+    if sys.argv[1:2] and sys.argv[1] in BENCHMARKS:
+        sys.path.append(str(PAGE.parent))  # for what the programs of docs/ share
+        importlib.import_module(sys.argv[1]).main(PAGE, sys.argv[2:])
+    else:
+        lines = [f"  {name}: {measured}" for name, measured in BENCHMARKS.items()]
+        sys.exit("\n".join(["usage: python tests/bench NAME [OPTIONS]", *lines]))
+
+
+if __name__ == "__main__":
+    main()
