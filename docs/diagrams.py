@@ -14,6 +14,7 @@ from typing import Any, Final
 import crossfield as cf
 import matplotlib as mpl
 import numpy as np
+from crossfield.export.library.documents.statistics import problem_counts
 from crossfield.export.pictures.canvas import draw_smooth_image, paint, set_coordinates
 from crossfield.export.pictures.draw import fixed_settings
 from crossfield.export.pictures.marks import BORDER, FAINT, FAMILIES, POSITIVE, STROKE
@@ -24,6 +25,7 @@ from crossfield.export.shading.raster import view_of_grid
 from crossfield.export.surfaces.files import draw_strokes
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
+from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
 from crossfield.models.smooth.polyvector import HOLDS
@@ -36,6 +38,12 @@ PAGE: Final = 340.0
 """Points of the width of a picture of docs/cross-field.md, whose words stay legible on a phone."""
 CLOSE: Final = 68.0
 """Points of a pixel in the picture of the singularity."""
+SIZED: Final = ("mouse", 24)
+"""The sketch whose formulations are counted."""
+CONVEX, NON_CONVEX = "#4477aa", "#cc79a7"
+ROW, BAR = 24.0, 46.0
+"""Points of a row and of the longest bar in the picture of sizes."""
+COLUMNS: Final = (122.0, 179.0, 236.0, 289.0)
 
 
 def line(axes: Any, angle: float, colour: str, name: str = "", at: tuple[float, float] = (0.0, 0.0)) -> None:
@@ -283,6 +291,41 @@ def singular(figure: Figure) -> None:
         axes.set(xlim=(-0.55, 1.55), ylim=(-0.55, 1.55))
 
 
+def sizes(figure: Figure) -> None:
+    """Columns, rows, integers and nonlinear terms of every formulation of one sketch, as numbers and bars."""
+    rows = {name: count_parts(name) for name in FORMULATIONS}
+    most = np.max(list(rows.values()), axis=0)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    set_coordinates(axes, 0.0, 0.0, PAGE, ROW * (len(rows) + 2))
+    for place, title in zip(COLUMNS, ("columns", "rows", "integers", "nonlinear\nterms"), strict=True):
+        axes.text(place, 1.2 * ROW, title, ha="left", va="bottom", fontsize=10)
+    for number, (name, counts) in enumerate(rows.items()):
+        y = (number + 1.8) * ROW
+        colour = CONVEX if declare(name).is_convex else NON_CONVEX
+        axes.text(2, y + 4, name, va="center", fontsize=10.5)
+        for place, count, whole in zip(COLUMNS, counts, most, strict=True):
+            axes.text(place, y, f"{count:,}", va="center", fontsize=9.5)
+            bar = ((place, y + 6.5), BAR * count / whole, 4.5)
+            axes.add_patch(mpl.patches.Rectangle(*bar, color=colour, linewidth=0))
+    for x, colour, words in ((2, CONVEX, "convex"), (58, NON_CONVEX, "not convex")):
+        axes.add_patch(mpl.patches.Rectangle((x, 6), 9, 9, color=colour, linewidth=0))
+        axes.text(x + 13, 10.5, words, va="center", fontsize=10)
+
+
+def count_parts(name: str) -> tuple[int, int, int, int]:
+    """Columns, rows, integers, and terms of degree 2 or more of a formulation of `SIZED`.
+
+    A row of degree 2 has one such term.
+    """
+    instance = replace(cf.sample(*SIZED), orthogonal=FORMULATIONS[name].orthogonal)
+    jumps = {"p": cf.greedy_field(instance).p} if FORMULATIONS[name].fixed else {}
+    problem = cf.formulate(instance, name, **jumps)
+    counts = problem_counts(problem)
+    kinds = ("quadratic", "higher", "general")
+    terms = sum(counts[f"objective_{kind}_terms"] for kind in kinds) + counts["quadratic_constraints"]
+    return problem.n_columns, problem.n_rows, int(problem.integer.sum()), terms
+
+
 FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float, float]]] = {
     "front": (front, 2 * PAGE / 72, 2.65, 13),
     "first_strokes": (strokes, PAGE / 72, 4.03, 13),
@@ -290,6 +333,7 @@ FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float, float]]] 
     "first_jump": (jump, PAGE / 72, 2.35, 13),
     "first_singularity": (singularity, PAGE / 72, 3.8, 13),
     "first_surface": (surface, PAGE / 72, 3.95, 13),
+    "formulation_sizes": (sizes, PAGE / 72, 15 * ROW / 72, 10),
     "math_strip": (strip, 8.6, 3.4, 11),
     "math_facets": (facets, 7.6, 2.9, 11),
     "math_singularities": (singular, 6.0, 3.1, 11),

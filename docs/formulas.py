@@ -34,15 +34,15 @@ def model_table(name: str, source: str) -> str:
 def lines_of(source: str) -> tuple[dict[str, str], ...]:
     """Return the lines of a model as role, formula, set and equation of the paper.
 
-    role: `minimise`, `subject to`, `where`, or empty as on the line before. Formula and set are MathML made
-    from our declarations alone.
+    role: `minimise`, `subject to`, or empty as on the line before. Formula and set are MathML made from our
+    declarations alone.
     """
     last, lines = "", []
-    for row in source.strip().split("\n")[1:-1]:  # lead & formula && set, label; domains have no label
-        lead, formula, *rest = (part.strip() for part in row.removesuffix(r" \\").split("&", maxsplit=2))
+    for row in source.strip().split("\n")[1:-1]:  # lead & formula && set, label; a term has no set
+        _, formula, *rest = (part.strip() for part in row.removesuffix(r" \\").split("&", maxsplit=2))
         over = rest[0].removeprefix("&").strip() if rest else ""
         label = _LABEL.search(over)
-        role = "minimise" if lead or not rest else "subject to" if label else "where"
+        role = "subject to" if rest else "minimise"
         line = {"role": "" if role == last else role, "formula": mathml(formula)}
         lines.append(line | {"over": mathml(_LABEL.sub("", over)), "label": label[1] if label else ""})
         last = role

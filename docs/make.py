@@ -17,11 +17,10 @@ import crossfield as cf
 import numpy as np
 from crossfield.export.cli.domains import BOTH, DOMAINS
 from crossfield.export.cli.tables import tables
-from crossfield.export.formats.registry import DEFAULTS
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.models.errors import InputError
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
-from crossfield.models.formulations.latex import latex
+from crossfield.models.formulations.latex import aligned, domain, objective_and_rows
 from crossfield.models.formulations.symbols import VARIABLES
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from crossfield.models.instance.symmetries import turned
@@ -43,82 +42,80 @@ def generated_line(command: str) -> str:
 
 
 def write_formulations() -> None:
-    """Write docs/formulations.md: every formulation as mathematics, and the tables of formats and solvers."""
+    """Write docs/formulations.md: every formulation as mathematics, its size, formats and solvers."""
     parts = [
         "# Formulations",
         generated_line("python docs/make.py formulations"),
-        kinds_in_short(),
         INTRODUCTION,
+        "![Columns, rows, integers and nonlinear terms of each formulation](pictures/formulation_sizes.svg)",
+        "## Variables and data",
+        SYMBOLS,
+        markdown(("variable", "over", "meaning", "domain"), list(map(variable_row, VARIABLES))),
     ]
-    parts.append(
-        markdown(
-            ("variable", "over", "meaning"), [[f"`{v.name}`", v.over, v.meaning] for v in VARIABLES.values()]
-        )
-    )
     for name, recipe in FORMULATIONS.items():
-        formulation = declare(name)
-        settable = ", ".join(sorted(recipe.option_names)) or "none"
-        about = (
-            recipe.source,
-            recipe.kind,
-            recipe.summary,
-            f"in short `{recipe.short}`, options: {settable}",
-        )
-        facts = " ".join(f"{words[0].upper()}{words[1:]}." for words in about)
-        parts += [f"## `{name}`", facts, f"$$\n{latex(formulation)}\n$$"]
+        summary = f"{recipe.summary[0].upper()}{recipe.summary[1:]}."
+        settable = ", ".join(f"`{option}`" for option in sorted(recipe.option_names - {"relax"}))
+        summary += f" Options: {settable}." if settable else ""
+        parts += [f"## `{name}`", summary, f"$$\n{aligned(objective_and_rows(declare(name)))}\n$$"]
     _, formats = tables()["formulations"]
-    shown = ("name", "short", "paper", "class", *DEFAULTS)
-    columns, rows = tables()["solvers"]
-    parts += [
-        "## Formulations and formats",
-        LIFTED,
-        markdown(shown, [[str(row[column]) for column in shown] for row in formats]),
-        "## Formulations and bundled solvers",
-        markdown(columns, [[str(row[column]) for column in columns] for row in rows]),
-    ]
+    (_, *solvers), answers = tables()["solvers"]
+    columns = ("name", "short", "paper", "class", "minimises", "LP, MPS", *solvers)
+    parts += ["## Formats and solvers", SUPPORT, markdown(columns, support_rows(formats, answers, solvers))]
     (DOCS / "formulations.md").write_text("\n\n".join(parts) + "\n")
 
 
-def kinds_in_short() -> str:
-    """Numbers of formulations by kind, and the solvers that close them."""
-    convex = [f"`{name}`" for name in FORMULATIONS if declare(name).is_convex]
-    _, rows = tables()["solvers"]
-    solvers = [column for column in rows[0] if column != "formulation"]
-    closed = {row["formulation"] for row in rows if any(row[solver] == "yes" for solver in solvers)}
-    whole = [name for name in FORMULATIONS if name in closed]
-    return (
-        f"This page prints all {len(FORMULATIONS)} formulations from their declarations. {len(convex)} have "
-        f"convex relaxations: {', '.join(convex)}. The solvers that crossfield installs (HiGHS, Ipopt, "
-        f"Bonmin) solve {len(whole)} of them; the table at the end shows which."
-    )
+def variable_row(name: str) -> list[str]:
+    """Name, index set, meaning and domain of a variable."""
+    variable, users = VARIABLES[name], [user for user in map(declare, FORMULATIONS) if name in user.variables]
+    domains = dict.fromkeys(domain(user.variable(name), user) for user in users)
+    return [f"`{name}`", variable.over, variable.meaning, " or ".join(f"${text}$" for text in domains)]
 
 
-LIFTED = """*Lifted, exact*: each product of an integer and a continuous variable becomes one column and
-four rows, without loss. `crossfield list` prints the other formats, too."""
+def support_rows(
+    formats: list[dict[str, Any]], answers: list[dict[str, Any]], solvers: list[str]
+) -> list[list[str]]:
+    """Names and class of each formulation, and whether LP, MPS and the bundled solvers take it."""
+    taken = {row["formulation"]: [row[solver] == "yes" for solver in solvers] for row in answers}
+    rows = []
+    for row in formats:
+        whole, relaxed = (taken.get(row["name"] + suffix, [False] * 3) for suffix in ("", ", relaxed"))
+        both = zip(whole, relaxed, strict=True)
+        words = ["yes" if all_of_it else "relaxed" if loose else "no" for all_of_it, loose in both]
+        held = {"yes": "yes", "lifted": "lifted", "refused": "no"}[re.split("[,:]", row["lp"])[0]]
+        names = f"`{row['name']}`", f"`{row['short']}`", row["paper"], row["class"]
+        rows.append([*names, FORMULATIONS[row["name"]].minimises, held, *words])
+    return rows
 
-INTRODUCTION = r"""[A cross field in 60 seconds](cross-field.md) explains crosses and jumps, and [the
-mathematics](mathematics.md) derives the model. $I$ is the set of pixels of the mask. $S_c$ is the set of
-stroke pixels, with direction $\theta_i$ and weight $w_i$. $E$ is the set of ordered pairs $(i, j)$ in
-which $j$ is the upper or the right neighbour of $i$. Angles are in radians, counter-clockwise, with $y$
-up.
 
-The window $[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is data. Under the gauge `strokes` it is
-$[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0, \pi/2]$ elsewhere. Under `box` it is $[0, \pi/2]$
-everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$ follow from the windows. With the facet
-`printed`, the row (26) is replaced by the bound $z \ge -\pi/4$, as in the paper. Sections and numbers in
-brackets refer to the paper.
+INTRODUCTION = r"""This page states the problem of [a cross field](cross-field.md) in 13 formulations, printed
+from their declarations in the code. [The mathematics](mathematics.md) derives them. Four are for orthogonal
+crosses only ($\beta = 0$), on pixels or meshes.
 
-Four formulations are for orthogonal crosses only ($\beta = 0$). `crossfield export` leaves them out of an
-instance whose crosses may be skewed. `miqp-cycle` and `milp-cycle` have no windows and no $\alpha$: $C$ is a
-basis of the cycles of pairs and strokes, in which a stroke joins its pixel to one further point. Their
-integers are the quarter turns along a cycle, and $H_c$ is the sum of $\pm\kappa_{ij}$ along it, plus
-$\theta_i - \theta_j$ for a walk from the stroke $i$ to the stroke $j$.
+Their sizes for the sketch `mouse` at 24 pixels:"""
 
-Residuals have the bounds $d^{\max} = q^{\max} = \pi/4$, which every optimum keeps. The option `limits` of the
-2-norm replaces them by $\pi/4 \, (1 - r)$, where $r$ is the effective resistance between the ends of the pair
-or stroke times its conductance $2 \omega_{ij}$ or $w_{\mathrm{strokes}} w_i$. Exactly those fields are cut
-off in which one jump can change by one, all angles follow, and the energy falls. No optimum is among them,
-so the optimum stays; a field of low energy may be cut off."""
+SYMBOLS = r"""$I$ are the pixels. $S_c$ are the stroke pixels, with direction $\theta_i$ and weight $w_i$. $E$
+are the pairs $(i, j)$, in which $j$ is the upper or right neighbour of $i$. $C$ is a basis of the
+[cycles](cycles.md#residuals-and-cycles) of pairs and strokes. $H_c$ is the sum of the turns $\pm\kappa_{ij}$
+along a cycle, plus $\theta_i - \theta_j$ for a walk from stroke to stroke. Numbers in brackets are the
+paper's equations.
+
+The windows of $\alpha$ follow from the [gauge](mathematics.md#4-gauges-and-windows), and $p^{\min}$ and
+$p^{\max}$ from the windows. $d^{\max}$ and $q^{\max}$ are $\pi/4$.
+
+- `limits` replaces them by [smaller ones](cycles.md#limits-of-residuals), which cut off no optimum.
+- `facet=printed` replaces row (26) by the bound $z \ge -\pi/4$, as in the paper.
+- `stroke_norm` and `beta_norm` are 1 or 2.
+- `relax` makes integers continuous; every formulation except `qp-fixed` has this option."""
+
+SUPPORT = """Formulations that minimise the same are the same problem; their points carry over by name.
+
+- `.nl` and GAMS files hold every formulation.
+- *Lifted*: each product of an integer and a continuous variable becomes one column and four rows, without
+  loss. Instead of `minlp-parity`, which needs a cosine, write `minlp-quartic`.
+- *Relaxed*: the solver accepts the formulation only without integers. HiGHS solves linear problems and convex
+  QPs, Ipopt has no integers, and Bonmin is exact for convex problems only.
+
+`crossfield list` prints more formats and solvers."""
 
 
 def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes") -> Instance:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 import sympy as sp
@@ -32,29 +33,44 @@ def expression(value: sp.Expr) -> str:
 
 def latex(formulation: Formulation) -> str:
     """The whole model as one `aligned` environment: objective, rows with their equation numbers, domains."""
+    variables = map(formulation.variable, formulation.variables)
+    domains = [f"& {domain(variable, formulation)} && {_FOR[variable.over]}" for variable in variables]
+    return aligned([*objective_and_rows(formulation), *domains])
+
+
+def aligned(lines: Iterable[str]) -> str:
+    """Lines as one environment."""
+    return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+
+
+def objective_and_rows(formulation: Formulation) -> list[str]:
+    """A line per term of the objective, and per row or two rows that bound the same expression."""
     terms = [
         f"& {'+' if place else ''} {_SUM[family.over]} {_summand(family)}"
         for place, family in enumerate(formulation.objective)
     ]
     lines = [r"\min\ " + terms[0], *(rf"\quad {term}" for term in terms[1:])]
-    lines += [_row(family) for family in formulation.rows]
-    lines += [_domain(formulation.variable(name), formulation) for name in formulation.variables]
-    return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+    rows = list(formulation.rows)
+    while rows:
+        first = rows.pop(0)
+        both = _two_rows(first, rows[0]) if rows else ""
+        papers = list(dict.fromkeys([first.paper, *([rows.pop(0).paper] if both else [])]))
+        label = rf"\quad \text{{{', '.join(papers)}}}"
+        lines.append(f"& {both or _row(first)} && {_FOR[first.over]} {label}")
+    return lines
 
 
-def _domain(variable: Variable, formulation: Formulation) -> str:
-    """A line with the domain of a variable."""
+def domain(variable: Variable, formulation: Formulation) -> str:
+    """The domain of a variable."""
     name, lower, upper = (expression(e) for e in (_symbol_of(variable), variable.lower, variable.upper))
     if variable.integer and not formulation.options.relax:
         between = [] if variable.upper - variable.lower == 1 else [r"\ldots"]
-        domain = rf"{name} \in \{{{', '.join([lower, *between, upper])}\}}"
-    elif variable.lower == -sp.oo:
-        domain = rf"{name} \in \mathbb{{R}}"
-    elif variable.upper == sp.oo:
-        domain = rf"{name} \ge {lower}"
-    else:
-        domain = rf"{lower} \le {name} \le {upper}"
-    return rf"& {domain} && {_FOR[variable.over]}"
+        return rf"{name} \in \{{{', '.join([lower, *between, upper])}\}}"
+    if variable.lower == -sp.oo:
+        return rf"{name} \in \mathbb{{R}}"
+    if variable.upper == sp.oo:
+        return rf"{name} \ge {lower}"
+    return rf"{lower} \le {name} \le {upper}"
 
 
 def _symbol_of(variable: Variable) -> sp.Symbol:
@@ -75,8 +91,18 @@ def _summand(family: Family) -> str:
 
 def _row(family: Family) -> str:
     relation = family.expression
-    text = (
-        rf"& {expression(relation.lhs)} {_SENSE[family.sense]} {expression(relation.rhs)} && "
-        rf"{_FOR[family.over]}"
-    )
-    return rf"{text} \quad \text{{{family.paper}}}"
+    return f"{expression(relation.lhs)} {_SENSE[family.sense]} {expression(relation.rhs)}"
+
+
+def _two_rows(first: Family, second: Family) -> str:
+    """Both bounds of an expression, or an expression above a value and its negative; else empty."""
+    one, two = first.expression, second.expression
+    if (one.lhs, first.over) != (two.lhs, second.over):
+        return ""
+    if {first.sense, second.sense} == {">=", "<="}:
+        least, most = (one.rhs, two.rhs) if first.sense == ">=" else (two.rhs, one.rhs)
+        return rf"{expression(least)} \le {expression(one.lhs)} \le {expression(most)}"
+    if first.sense == second.sense == ">=" and sp.expand(one.rhs + two.rhs) == 0:
+        value = rf"\left({expression(one.rhs)}\right)" if one.rhs.is_Add else expression(one.rhs)
+        return rf"{expression(one.lhs)} \ge \pm {value}"
+    return ""

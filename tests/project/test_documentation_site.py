@@ -81,16 +81,18 @@ def test_formulas_are_whole_and_inside_the_page(browser, address, site, width):
     assert count
 
 
-def test_a_model_has_every_line_of_its_declaration(browser, address):
+def test_a_model_has_every_term_and_equation_of_its_declaration(browser, address):
     browser.get(f"{address}/formulations.html")
-    models = (
-        "[...document.querySelectorAll('.model')].map(model => model.querySelectorAll('tbody tr').length)"
-    )
-    declared = [declare(name) for name in FORMULATIONS]
-    assert browser.execute_script(f"return {models}") == [
-        len(declaration.objective) + len(declaration.rows) + len(declaration.variables)
-        for declaration in declared
-    ]
+    models = """
+        [...document.querySelectorAll('.model')].map(model => [...model.querySelectorAll('tbody tr')]
+          .map(line => line.querySelector('.equation').textContent))
+    """
+    shown = browser.execute_script(f"return {models}")
+    assert len(shown) == len(FORMULATIONS)
+    for name, equations in zip(FORMULATIONS, shown, strict=True):
+        declared = declare(name)
+        assert equations.count("") == len(declared.objective), name
+        assert {row.paper for row in declared.rows if row.paper not in ", ".join(equations)} == set(), name
 
 
 @pytest.mark.parametrize(
