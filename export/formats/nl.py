@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.names import name_length
 from ...models.instance.domain import Floats, Ints
-from ..writing.canonical import BOUND_KINDS, CanonicalForm, coefficient
+from ..writing.canonical import BOUND_KINDS, CanonicalForm, bound_kinds, coefficient
 from ..writing.expressions import Operator, PrefixLanguage
 from ..writing.names import OBJECTIVE
 from ..writing.nl_order import NlOrder, equal_runs, nonlinear_terms
@@ -114,7 +114,8 @@ def generate(
 ) -> Iterator[bytes]:
     """The bytes of the .nl file, which holds no comments. start: a point (columns,) for the segment x."""
     problem, nl, code = form.problem, form.nl_order, BinaryForm() if binary else TextForm()
-    yield _head(nl, code)
+    gradient = _gradient(nl)
+    yield _head(nl, code, len(gradient[0]))
     first = 0
     for family in nl.rows:
         head = code.token(b"C", np.arange(first, first + family.count, dtype=np.int32))
@@ -126,11 +127,12 @@ def generate(
         parts = code.token(b"", np.arange(problem.n_columns, dtype=np.int32), start[nl.order])
         yield from code.records(parts, problem.n_columns)
     yield from _limits(nl, code)
-    yield from _bounds(form, code)
-    yield from _jacobian(nl, code)
+    yield from _bounds(nl, code)
+    yield from _jacobian(nl, code, *gradient)
 
 
-def _head(nl: NlOrder, code: TextForm) -> bytes:
+def _head(nl: NlOrder, code: TextForm, costs: int) -> bytes:
+    """The first ten lines. costs: entries of G."""
     problem, count = nl.problem, np.bincount(nl.group, minlength=9)
     nlvb, nlvc, only = int(count[:2].sum()), int(count[:4].sum()), int(count[4:6].sum())
     equations = sum(family.count for family in nl.rows if family.family.sense == "==")
@@ -145,7 +147,7 @@ def _head(nl: NlOrder, code: TextForm) -> bytes:
         b" %d %d %d" % (nlvc, nlvc + only if only else nlvb, nlvb),
         b" 0 0 %d 1" % code.arithmetic,
         b" %d %d %d %d %d" % tuple(int(count[group]) for group in (7, 8, 1, 3, 5)),
-        b" %d %d" % (entries, len(_gradient(nl)[0])),
+        b" %d %d" % (entries, costs),
         b" %d %d" % (max([len(OBJECTIVE), *rows]), max(columns)),
         b" 0 0 0 0 0",
     ]
@@ -216,15 +218,14 @@ _BOUND: Final = np.array([{"lower": 2, "upper": 1, "free": 3}.get(kind, 0) for k
 """The digit before the bounds of a column, by their kind."""
 
 
-def _bounds(form: CanonicalForm, code: TextForm) -> Iterator[bytes]:
+def _bounds(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
     """Bounds in file order, one stretch of one block and of equal digits after the other."""
-    problem, nl = form.problem, form.nl_order
     yield from code.records(code.token(b"b"))
-    for _, run in nl.stretches:
-        columns = nl.order[run]
-        digits = _BOUND[form.bound_kinds[columns]]
+    for block, run in nl.stretches:
+        inside = nl.order[run] - block.offset
+        digits = _BOUND[bound_kinds(block)[inside]]
         for part in equal_runs(digits):
-            lower, upper = problem.lower[columns[part]], problem.upper[columns[part]]
+            lower, upper = block.lower[inside[part]], block.upper[inside[part]]
             digit = int(digits[part.start])
             ends = {0: (lower, upper), 1: (upper,), 2: (lower,), 3: ()}[digit]
             yield from code.records(code.token(b"%d" % digit, *ends), len(lower))
@@ -249,7 +250,7 @@ def _gradient(nl: NlOrder) -> tuple[Ints, Floats]:
     return place, costs[nl.order[place]]
 
 
-def _jacobian(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
+def _jacobian(nl: NlOrder, code: TextForm, place: Ints, costs: Floats) -> Iterator[bytes]:
     problem = nl.problem
     rows = [(family, _entries(family)) for family in nl.rows]
     if rows:
@@ -269,7 +270,6 @@ def _jacobian(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
             parts += code.token(b"", nl.places(family, symbol), np.asarray(value, dtype=np.float64))
         yield from code.records(parts, family.count)
         first += family.count
-    place, costs = _gradient(nl)
     if len(place):
         yield from code.records(code.token(b"G", 0, len(place)))
         yield from code.records(code.token(b"", place, costs), len(place))

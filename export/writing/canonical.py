@@ -113,21 +113,15 @@ class CanonicalForm:
         """The nonempty blocks of a kind, in order."""
         return [block for block in self.problem.blocks.values() if block.count and self.kind(block) == kind]
 
-    @cached_property
-    def bound_kinds(self) -> NDArray[np.int8]:
-        """The kind of the bounds of every column, a place in BOUND_KINDS, shape (columns,)."""
-        lower, upper = self.problem.lower, self.problem.upper
-        low, high = np.isfinite(lower), np.isfinite(upper)
-        return np.select([lower == upper, low & high, low, high], [0, 1, 2, 3], 4).astype(np.int8)
-
     def bounds(self, block: Block) -> Iterator[BlockBounds]:
         """The bounds of a block, kind by kind."""
-        names, kinds = self.names.of(block), self.bound_kinds[block.slice]
+        names, kinds = self.names.of(block), bound_kinds(block)
         for number, kind in enumerate(BOUND_KINDS):
             at = np.flatnonzero(kinds == number)
-            if len(at):
-                chosen = names if len(at) == block.count else names.at(at)
-                yield BlockBounds(kind, chosen, block.lower[at], block.upper[at])
+            if len(at) == block.count > 0:
+                yield BlockBounds(kind, names, block.lower, block.upper)
+            elif len(at):
+                yield BlockBounds(kind, names.at(at), block.lower[at], block.upper[at])
 
     @cached_property
     def row_lower(self) -> Floats:
@@ -188,6 +182,12 @@ def _first_occurrences(indices: Ints) -> Ints:
     """Every number once, in the order of first occurrence."""
     numbers, places = np.unique(indices, return_index=True)
     return numbers[np.argsort(places)]
+
+
+def bound_kinds(block: Block) -> NDArray[np.int8]:
+    """The kind of the bounds of every column of a block, a place in BOUND_KINDS, shape (count,)."""
+    low, high = np.isfinite(block.lower), np.isfinite(block.upper)
+    return np.select([block.lower == block.upper, low & high, low, high], [0, 1, 2, 3], 4).astype(np.int8)
 
 
 def _is_zero_to_one(block: Block) -> Bools:

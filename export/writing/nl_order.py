@@ -69,8 +69,8 @@ class NlOrder:
     @cached_property
     def binary(self) -> Bools:
         """True for integer columns within [0, 1], fixed ones too: the header counts them as binary (N1)."""
-        problem = self.problem
-        return problem.integer & (problem.lower >= 0) & (problem.upper <= 1)
+        blocks = self.problem.blocks.values()
+        return np.concatenate([block.integer & (block.lower >= 0) & (block.upper <= 1) for block in blocks])
 
     @cached_property
     def group(self) -> NDArray[np.int8]:

@@ -235,6 +235,11 @@ def sort_factors(factors: tuple[Ints, ...]) -> Ints:
 
 def merge_monomials(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
     """Sums over equal rows of `index`, sorted, without noise. columns: a number above every index."""
+    if index.shape[1] == 1:  # a column is its own rank
+        rank = index[:, 0] - (first := index.min())
+        total, largest = (_sums_by_rank(values, rank, 0) for values in (coefficient, scale))
+        kept = np.flatnonzero(exceeds_noise(total, largest))
+        return (kept + first).astype(index.dtype)[:, None], total[kept]
     key = index[:, 0].astype(np.int64)
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]
@@ -244,7 +249,7 @@ def merge_monomials(index: Ints, coefficient: Floats, scale: Floats, columns: in
     return index[place[nonzero]], total[nonzero]
 
 
-def _sums_by_rank(values: Floats, rank: NDArray[np.intp], count: int) -> Floats:
+def _sums_by_rank(values: Floats, rank: NDArray[Any], count: int) -> Floats:
     return np.bincount(rank, weights=values, minlength=count).astype(np.float64, copy=False)
 
 

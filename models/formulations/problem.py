@@ -32,6 +32,7 @@ from .symbols import (
     NARROWED,
     SLOTS,
     VARIABLES,
+    IndexSet,
     Variable,
     constants_of,
     count_elements,
@@ -270,9 +271,15 @@ class Problem:
 
     def _elements(self, family: Family) -> Ints:
         if family.only is None:
-            return np.arange(count_elements(self.instance, family.over), dtype=np.int32)
+            return self._index_sets[family.over]
         name, parity = family.only
         return np.flatnonzero(self.data[name] & 1 == parity).astype(np.int32)
+
+    @cached_property
+    def _index_sets(self) -> dict[IndexSet, Ints]:
+        """The numbers of all elements by index set, shared by the families over it."""
+        sets = {family.over for family in (*self.formulation.objective, *self.formulation.rows)}
+        return {over: np.arange(count_elements(self.instance, over), dtype=np.int32) for over in sets}
 
     @property
     def n_rows(self) -> int:
