@@ -5,6 +5,8 @@ The tables state sizes, seeds and time limits. Other pages have programs of thei
 
 from __future__ import annotations
 
+import csv
+import io
 import re
 import shlex
 import sys
@@ -34,6 +36,16 @@ def markdown(columns: tuple[str, ...], rows: list[list[str]]) -> str:
     """A Markdown table."""
     lines = [columns, ("---",) * len(columns), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def csv_text(rows: list[dict[str, Any]]) -> str:
+    """Rows as CSV, with a column per name in the order in which names first appear."""
+    buffer = io.StringIO(newline="")
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    writer = csv.DictWriter(buffer, columns, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return buffer.getvalue()
 
 
 def generated_line(command: str) -> str:

@@ -14,8 +14,6 @@ its time limit. With --work, fields and certificates stay in that folder, but no
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import json
 import re
 import subprocess
@@ -40,7 +38,7 @@ from crossfield.models.proof.prove import prove
 from crossfield.models.sketch.samples import SAMPLES, sample
 from drawings import PROVERS, SUFFIXES, Sketch, drawings_of, optimum, run_command, sketches, tiny_instances
 from machine import machine_facts
-from make import generated_line, markdown
+from make import csv_text, generated_line, markdown
 from studying.wording import percent
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -303,19 +301,14 @@ def flatten(facts: Facts) -> Facts:
     return flat
 
 
-def csv_text(results: Results, parts: Sequence[str]) -> str:
+def csv_of_parts(results: Results, parts: Sequence[str]) -> str:
     """The rows of some parts as a CSV file with a column per fact."""
     rows = [
         {"part": part, "row": name} | flatten(facts)
         for part in parts
         for name, facts in sorted(results[part].items())
     ]
-    buffer = io.StringIO(newline="")
-    columns = list(dict.fromkeys(name for row in rows for name in row))
-    writer = csv.DictWriter(buffer, columns, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return buffer.getvalue()
+    return csv_text(rows)
 
 
 def files(results: Results) -> dict[str, str]:
@@ -332,9 +325,9 @@ def files(results: Results) -> dict[str, str]:
     page = re.sub(r"@(\w+)@", lambda match: texts[match[1]], TEMPLATE.read_text(encoding="utf-8"))
     return {
         "proofs.md": page,
-        "proofs/sketches.csv": csv_text(results, SKETCHES),
-        "proofs/optima.csv": csv_text(results, ["optima"]),
-        "proofs/solvers.csv": csv_text(results, ["solvers"]),
+        "proofs/sketches.csv": csv_of_parts(results, SKETCHES),
+        "proofs/optima.csv": csv_of_parts(results, ["optima"]),
+        "proofs/solvers.csv": csv_of_parts(results, ["solvers"]),
     }
 
 

@@ -1,11 +1,11 @@
-"""Replace the tables of docs/surface.md, the errors of surfaces against known ones, from docs/surface.json.
+"""Write summary, plot and tables of docs/surface.md, errors of surfaces against known ones.
 
     python docs/surface.py [--measure PART ...] [--sketches FOLDER] [--jobs N]
 
-With --measure, parts are measured first, and their rows in docs/surface.json replaced: `known` (surfaces with
-a known answer, from exact crosses and from the field of each method), `noise` (bend fields of noisy strokes),
-`sides` (surfaces that bend both ways), `trust` (doubts about samples and drawings) and `times`. FOLDER has
-line drawings by others.
+They come from docs/surface.json. With --measure, parts are measured first, and their rows there replaced:
+`known` (surfaces with a known answer, from exact crosses and from the field of each method), `noise` (bend
+fields of noisy strokes), `sides` (surfaces that bend both ways), `trust` (doubts about samples and drawings)
+and `times`. FOLDER has line drawings by others.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.sketch.surfaces import CurvaturePatch, analytic_instance, rotation_by
 from crossfield.models.surface.trust import OFF, right_angle_deviation
 from drawings import SUFFIXES
-from make import markdown, replace_between
+from make import csv_text, markdown, replace_between
+from studying.plots import open_panels, styles
 
 DOCS: Final = Path(__file__).resolve().parent
 KEPT: Final = DOCS / "surface.json"
@@ -217,63 +218,6 @@ def measure_part(part: str, folder: Path | None, jobs: int) -> Rows:
 # The page
 
 
-def by_surface(rows: Rows) -> str:
-    """Errors of the normals: a row for each surface and size, a column for each source of crosses."""
-    table = []
-    for name, size in dict.fromkeys((row["surface"], row["size"]) for row in rows):
-        own = [row for row in rows if (row["surface"], row["size"]) == (name, size)]
-        cells = [f"{row['mean']:.1f} / {row['most']:.1f}" for row in own]
-        table.append([f"`{name}`", str(size), f"{own[0]['flat']:.1f}", *cells])
-    return markdown(
-        ("surface", "size", "facing the viewer", "exact crosses", *(f"`{way}`" for way in WAYS)), table
-    )
-
-
-def with_hints(rows: Rows) -> str:
-    """As `by_surface` with one hint, and the cross errors of bend."""
-    table = []
-    for name, size in dict.fromkeys((row["surface"], row["size"]) for row in rows):
-        exact, bend, *_ = [row for row in rows if (row["surface"], row["size"]) == (name, size)]
-        cells = [f"{row['mean']:.1f} to {row['hinted']:.1f}" for row in (exact, bend)]
-        table.append([f"`{name}`", str(size), f"{bend['cross']:.2f}", *cells])
-    heads = (
-        "surface", "size", "cross error of `bend`", "exact: without, with hint", "`bend`: without, with hint",
-    )  # fmt: skip
-    return markdown(heads, table)
-
-
-def by_noise(rows: Rows, clean: Rows) -> str:
-    """Mean errors from bend fields, a column for each noise."""
-    table = []
-    for name, size in dict.fromkeys((row["surface"], row["size"]) for row in rows):
-        without = [row for row in clean if (row["surface"], row["size"], row["way"]) == (name, size, "bend")]
-        own = [row for row in rows if (row["surface"], row["size"]) == (name, size)]
-        table.append([f"`{name}`", str(size), *(f"{row['mean']:.1f}" for row in [*without, *own])])
-    return markdown(
-        ("surface", "size", "exact strokes", *(f"{degrees:g} degrees" for degrees in NOISE)), table
-    )
-
-
-def by_drawing(rows: Rows) -> str:
-    """The table of doubts about drawings."""
-    table = [
-        [
-            row["drawing"], f"{row['unfit']:.0%}", str(row["spots"]), f"{row['slant']:.0f}",
-            f"{row['confidence']:.2f}", str(len(row["doubts"])),
-        ]
-        for row in rows
-    ]  # fmt: skip
-    heads = (
-        "drawing",
-        "unfit crosses",
-        "singular spots",
-        "mean slant",
-        "mean confidence",
-        "doubts",
-    )
-    return markdown(heads, table)
-
-
 def by_time(rows: Rows) -> str:
     """Seconds by pixels."""
     table = [[row["drawing"], str(row["pixels"]), f"{row['seconds']:.1f}"] for row in rows]
@@ -288,34 +232,84 @@ def short_summary(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
     undoubted = [row["mean"] for row in bend if not row["doubts"]]
     even = [row["side"] for row in both_ways]
     ranks = [row["alike"] for row in bend]
+    own = [bool(row["doubts"]) for row in drawings if row["drawing"] in SAMPLES]
     others = [bool(row["doubts"]) for row in drawings if row["drawing"] not in SAMPLES]
     return f"""\
-- Surfaces are good on smooth nets of curvature lines. On {len(errors)} known surfaces at {max(SIZES)} pixels,
-  the normals from bend fields have mean errors of {min(errors):.1f} to {max(errors):.1f} degrees.
-- Over drawings by others they can rarely be trusted. crossfield [doubts](#confidence-and-doubts)
-  {sum(others)} of the {len(others)} below, which are not part of this project.
-- A surface without doubts may be wrong: on a known one, the mean error from a bend field is
-  {max(undoubted):.1f} degrees, and crossfield has no doubt.
-- Catenoids and saddle sheets come out on the wrong side half of the time, because inside out they are
-  surfaces of the same kind: the default side is right in {sum(even):.0f} of {len(even)} views.
-  On the surfaces below, it is right in {sum(sides):.0f} of {len(sides)} cases, from exact crosses and
-  three methods.
-- `confidence` hardly shows errors: its rank correlation with the true error over the pixels of a surface
+- **Good on clean nets of curvature lines.** On {len(errors)} known surfaces at {max(SIZES)} pixels, the
+  normals from bend fields have mean errors of {min(errors):.1f} to {max(errors):.1f} degrees.
+- **Poor on most drawings by others.** crossfield [flags](#confidence-and-doubts) {sum(others)} of
+  {len(others)} surfaces over them, and {sum(own)} of {len(own)} over our samples.
+- **No doubt is no guarantee.** On a known surface without doubts, the mean error is {max(undoubted):.1f}
+  degrees.
+- **The side is a guess.** The default side is right in {sum(sides):.0f} of {len(sides)} cases on known
+  surfaces. Catenoids and saddle sheets look alike inside out: there it is right in {sum(even):.0f} of
+  {len(even)} views.
+- **`confidence` hardly shows errors**: its rank correlation with the true error over the pixels of a surface
   is {min(ranks):.1f} to {max(ranks):.1f}."""
 
 
-def write_page(rows: dict[str, Rows]) -> None:
-    """Replace the summary and the tables of the page."""
-    parts = {
-        "summary": short_summary(rows["known"], rows["trust"], rows["sides"]),
-        "known": by_surface(rows["known"]),
-        "hints": with_hints(rows["known"]),
-        "noise": by_noise(rows["noise"], rows["known"]),
-        "trust": by_drawing(rows["trust"]),
-        "times": by_time(rows["times"]),
+def draw_errors(rows: dict[str, Rows], path: Path) -> None:
+    """Plot mean errors of the normals of every surface by source of the crosses, and by noise of strokes."""
+    size = max(SIZES)
+    known = {(row["surface"], row["way"]): row for row in rows["known"] if row["size"] == size}
+    noise = {(row["surface"], row["noise"]): row for row in rows["noise"] if row["size"] == size}
+    with_hint = {name: known[name, "bend"]["hinted"] for name in SURFACES}
+    panels = {
+        "crosses of": {
+            way.replace("exact", "the surface"): {name: known[name, way]["mean"] for name in SURFACES}
+            for way in ("exact", "bend", "greedy", "polyvector")
+        },
+        "`bend`, strokes with noise of": {"0°": {name: known[name, "bend"]["mean"] for name in SURFACES}}
+        | {f"{degrees:g}°": {name: noise[name, degrees]["mean"] for name in SURFACES} for degrees in NOISE}
+        | {"0°, with a hint": with_hint},
     }
-    for name, text in parts.items():
-        replace_between(DOCS / "surface.md", name, text)
+    with open_panels(path, len(panels), high=6.2, wide=WIDE, stacked=True) as axes:
+        for axis, (title, lines) in zip(axes, panels.items(), strict=True):
+            looks = styles(list(lines))
+            for name, errors in lines.items():
+                look = looks[name] | {"linestyle": "none", "markersize": 7}
+                axis.plot(list(errors.values()), list(errors), label=name, **look)
+            axis.invert_yaxis()
+            axis.set(xlim=(0, None), xlabel="mean error of the normals, degrees")
+            axis.legend(title=title.replace("`", ""), loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=4)
+
+
+WIDE: Final = 4.9
+"""Inches, for words that are legible on a phone."""
+
+
+COLUMNS: Final = {
+    "known": {
+        "surface": "surface", "size": "size", "way": "crosses", "flat": "facing the viewer",
+        "mean": "mean error", "most": "95th percentile", "hinted": "mean error with a hint",
+        "cross": "cross error",
+        "side": "right side", "doubts": "doubts", "alike": "rank correlation of confidence",
+    },
+    "noise": {"surface": "surface", "size": "size", "noise": "noise", "mean": "mean error"},
+    "trust": {
+        "drawing": "drawing", "size": "size", "unfit": "unfit crosses", "spots": "singular spots",
+        "slant": "mean slant", "confidence": "mean confidence", "doubts": "doubts",
+    },
+}  # fmt: skip
+"""Columns of the CSV files, and their titles. Angles are in degrees."""
+
+
+def cell_of(doubts: Any) -> Any:
+    """Doubts as one text; their number as it is."""
+    return "; ".join(doubts) if isinstance(doubts, list) else doubts
+
+
+def write_page(rows: dict[str, Rows]) -> None:
+    """Replace the summary and the table of the page, and write its plot and its rows as CSV."""
+    summary = short_summary(rows["known"], rows["trust"], rows["sides"])
+    replace_between(DOCS / "surface.md", "summary", summary)
+    replace_between(DOCS / "surface.md", "times", by_time(rows["times"]))
+    (DOCS / "surface").mkdir(exist_ok=True)
+    for part, titles in COLUMNS.items():
+        own = [row | {"doubts": cell_of(row.get("doubts"))} for row in rows[part]]
+        table = [{title: row[name] for name, title in titles.items()} for row in own]
+        (DOCS / "surface" / f"{part}.csv").write_text(csv_text(table), encoding="utf-8")
+    draw_errors(rows, DOCS / "pictures" / "surface_errors.svg")
 
 
 def main() -> None:

@@ -39,12 +39,14 @@ Bars = tuple[list[float], list[float], list[float]]
 
 
 @contextmanager
-def open_panels(path: Path, panels: int, high: float = 3.4, wide: float = 10.0) -> Iterator[Any]:
-    """The axes of adjacent panels; the file is written at the end of the context."""
+def open_panels(
+    path: Path, panels: int, high: float = 3.4, wide: float = 10.0, *, stacked: bool = False
+) -> Iterator[Any]:
+    """The axes of panels side by side, or stacked; the file is written at the end of the context."""
     with fixed_settings(_STYLE):
         figure = Figure(figsize=(wide, high), layout="constrained")
         figure.get_layout_engine().set(w_pad=0.1)
-        yield np.atleast_1d(figure.subplots(1, panels))
+        yield np.atleast_1d(figure.subplots(*((panels, 1) if stacked else (1, panels))))
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, metadata={"Date": None, "Creator": None})
 
