@@ -9,8 +9,8 @@ It does the runs that have no row yet, one after the other on one thread, and co
 Each solver reads a file without a start. Other work on the machine delays runs: the rows have the processor
 time too. --skewed adds rows of cycles and limits to the
 file of miqp-exact, for crosses that may be skewed. --narrowed proves
-each sketch for that time, and counts the limits that say more than its narrowed windows, as a table of the
-page. --page replaces the other tables in docs/cycles.md.
+each sketch for that time, and counts the limits that say more than its narrowed windows, as a table of
+docs/cycles.md. --page draws the plots of that page.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from crossfield.models.instance.mesh import Mesh
 from crossfield.models.mesh.shapes import blocks
 from crossfield.models.proof.tightening import remaining_windows
 from make import markdown, replace_between
+from studying.plots import open_panels, styles
 from studying.rows import DATA as FOLDER
 from studying.rows import Keyed, Row, Rows
 from studying.solvers.plan import make_instance
@@ -286,7 +287,9 @@ def main() -> None:
         replace_between(PAGE, "narrowed", narrowed_table(options.limit))
         return
     if options.page:
-        write_page(table(DATA).rows, table(SKEWED_DATA, Skewed).rows)
+        rows = table(DATA).rows
+        draw_runs(rows, TWO_NORM, ("scip", "gurobi"), PAGE.parent / "pictures" / "cycles_squares.svg")
+        draw_runs(rows, ONE_NORM, ("highs", "scip", "cbc"), PAGE.parent / "pictures" / "cycles_values.svg")
         return
     kind, planned = (Skewed, SKEWED) if options.skewed else (Run, runs())
     results = table(options.data or (SKEWED_DATA if options.skewed else DATA), kind)
@@ -299,53 +302,62 @@ def main() -> None:
         print(f"{run}: {row['status']}, {row.get('wall') or 0:.1f} s", file=sys.stderr, flush=True)
 
 
-def write_page(rows: list[Row], skewed: list[Row]) -> None:
-    """Replace the tables of the page, one for each solver and norm, and one for skewed crosses."""
-    for title, formulations in (("two", TWO_NORM), ("one", ONE_NORM)):
-        names = {formulation for formulation, _ in formulations}
-        mine = [row for row in rows if row["formulation"] in names]
-        parts = [
-            _solver_table(solver, formulations, mine) for solver in dict.fromkeys(r["solver"] for r in mine)
-        ]
-        replace_between(PAGE, title, "\n\n".join(parts))
-    heads = ("plain", "limits", "cycles", "both")
-    lines = []
-    for name, solver in dict.fromkeys((row["instance"], row["solver"]) for row in skewed):
-        mine = [row for row in skewed if row["instance"] == name]
-        best = min((row["objective"] for row in mine if row["objective"] is not None), default=None)
-        own = [row for row in mine if row["solver"] == solver]
-        title = f"{SOLVERS[solver].title} {own[0]['version']}"
-        lines.append([name, title, *(_cell(row, best) for row in own)])
-    replace_between(PAGE, "skewed", markdown(("instance", "solver", *heads), lines))
+def draw_runs(
+    rows: list[Row], formulations: tuple[tuple[str, bool], ...], solvers: tuple[str, ...], path: Path
+) -> None:
+    """Plot the runs of solvers, a panel each: a line per instance, a mark per formulation."""
+    runs = {
+        (row["solver"], row["instance"], (row["formulation"], row["limits"] == "True")): row
+        for row in rows
+        if row["status"] not in {TOO_LARGE, FAILED}
+    }
+    best: dict[str, float] = {}
+    for (_, name, form), row in runs.items():
+        if row["objective"] is not None and form in formulations:
+            best[name] = min(row["objective"], best.get(name, np.inf))
+    titles = {form: f"{form[0]}{', limits' * form[1]}" for form in formulations}
+    looks = styles(list(titles.values()))
+    ticks = [*map(_place_of_seconds, _SECONDS), *map(_place_of_gap, (0.0, 0.5, 1.0))]
+    words = [*(f"{seconds:g} s" for seconds in _SECONDS), "0 %", "50 %", "100 %"]
+    with open_panels(path, len(solvers), high=0.7 + 2.3 * len(solvers), wide=WIDE, stacked=True) as axes:
+        for axis, solver in zip(axes, solvers, strict=True):
+            names = [
+                name
+                for name in (*MESHES, *GRIDS)
+                if any((solver, name, form) in runs for form in formulations)
+            ]
+            for form, title in titles.items():
+                mine = [(number, runs.get((solver, name, form))) for number, name in enumerate(names)]
+                points = [(_place(row, best[names[number]]), number) for number, row in mine if row]
+                look = looks[title] | {"linestyle": "none", "markersize": 7, "alpha": 0.85}
+                axis.plot(*zip(*points, strict=True), label=title, **look)
+            version = next(row["version"] for row in rows if row["solver"] == solver).split(" ")[0]
+            axis.set_title(f"{SOLVERS[solver].title} {version}: proven in, or gap after 30 s", fontsize=9)
+            axis.set_xticks(ticks, words)
+            axis.set_yticks(range(len(names)), names)
+            axis.axvline((_place_of_seconds(30) + _place_of_gap(0)) / 2, color="#888888", linewidth=0.8)
+            axis.set(xlim=(-0.04, ticks[-1] + 0.04), ylim=(len(names) - 0.5, -0.5))
+        axes[0].figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
 
 
-def _solver_table(solver: str, formulations: tuple[tuple[str, bool], ...], rows: list[Row]) -> str:
-    """The runs of a solver: a line per instance, a column per formulation."""
-    heads = [f"`{name}`{', limits' * limits}" for name, limits in formulations]
-    lines = []
-    for name in (*MESHES, *GRIDS):
-        of_instance = [row for row in rows if row["instance"] == name]
-        mine = {(r["formulation"], r["limits"]): r for r in of_instance if r["solver"] == solver}
-        if mine:
-            best = min((r["objective"] for r in of_instance if r["objective"] is not None), default=None)
-            cells = [_cell(mine.get((form, str(limits))), best) for form, limits in formulations]
-            lines.append([name, f"{of_instance[0]['pairs']:.0f}", *cells])
-    version = next((row["version"] for row in rows if row["solver"] == solver and row["version"]), "")
-    return f"**{SOLVERS[solver].title} {version}**\n\n" + markdown(("instance", "pairs", *heads), lines)
+WIDE: Final = 4.9
+"""Inches, for words that are legible on a phone."""
+_SECONDS: Final = (0.1, 1.0, 10.0, 30.0)
 
 
-def _cell(row: Row | None, best: float | None) -> str:
-    """Seconds to a proven optimum; else the bound, in per cent of the best objective of all runs."""
-    if row is None:
-        return ""
-    solved = {str(Status.OPTIMAL_GLOBAL), str(Status.OPTIMAL_LOCAL), "optimal", "gaplimit"}  # all are convex
-    if row["status"] in solved:
-        return f"{row['wall']:.1f} s"
-    if row["status"] in {TOO_LARGE, FAILED}:
-        return row["status"]
-    if row["bound"] is None or not best:
-        return "no bound"
-    return f"{max(0.0, 100 * row['bound'] / best):.0f} %"
+def _place(row: Row, best: float) -> float:
+    """Place on the axis: seconds to a proven optimum, or the gap to the best objective of all runs."""
+    if row["status"] in {str(Status.OPTIMAL_GLOBAL), str(Status.OPTIMAL_LOCAL)}:  # all are convex
+        return _place_of_seconds(row["wall"])
+    return _place_of_gap(1 - max(row["bound"] or 0.0, 0.0) / best)
+
+
+def _place_of_seconds(seconds: float) -> float:
+    return float(np.log(max(seconds, 0.05) / 0.05) / np.log(30 / 0.05))
+
+
+def _place_of_gap(gap: float) -> float:
+    return 1.25 + 0.8 * gap
 
 
 if __name__ == "__main__":
