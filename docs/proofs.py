@@ -24,9 +24,9 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from statistics import median
 from typing import Any, Final
 
+import numpy as np
 import proof_pictures
 import proof_solvers
 from crossfield.export.solvers_table import SOLVERS
@@ -39,7 +39,7 @@ from crossfield.models.sketch.samples import SAMPLES, sample
 from drawings import PROVERS, SUFFIXES, Sketch, drawings_of, optimum, run_command, sketches, tiny_instances
 from machine import machine_facts
 from make import csv_text, generated_line, markdown
-from studying.wording import percent
+from studying.plots import open_panels, styles
 
 DOCS: Final = Path(__file__).resolve().parent
 KEPT: Final = DOCS / "proofs.json"
@@ -207,31 +207,29 @@ def read() -> Results:
     return dict(json.loads(KEPT.read_text())) if KEPT.exists() else {}
 
 
-def reach_table(results: Results) -> str:
-    """How many fields of each part are proven optimal, the gaps, and the medians of the effort."""
-    columns = ("drawings", "pixels", "limit, s", "optimal", "largest gap", "s", "check, s")
+def draw_reach(results: Results, path: Path) -> None:
+    """Plot the share of drawings that are proven optimal within some seconds, a step line per part."""
     collections = len({name.partition("/")[0] for name in results["collections"]})
     titles = {
-        "samples": ("samples", SIZE),
-        "fine": ("samples", FINE),
-        "large": ("samples", LARGE),
-        "sketches": ("drawings by others", SIZE),
-        "collections": (f"{collections} public collections", SIZE),
+        "samples": f"samples, {SIZE} pixels",
+        "fine": f"samples, {FINE} pixels",
+        "large": f"samples, {LARGE} pixels",
+        "sketches": f"drawings by others, {SIZE} pixels",
+        "collections": f"{collections} public collections, {SIZE} pixels",
     }
-    cells = []
-    for part, (title, size) in titles.items():
-        rows = list(results[part].values())
-        cells.append(
-            [
-                title,
-                str(size),
-                f"{max(row['limit'] for row in rows):g}",
-                f"{sum(row['status'] == 'optimal' for row in rows)} of {len(rows)}",
-                percent(max(row["gap"] for row in rows)),
-                *(f"{median(row[name] for row in rows):.1f}" for name in ("seconds", "check")),
-            ]
-        )
-    return markdown(columns, cells)
+    looks = styles(list(titles))
+    with open_panels(path, 1, high=4.0, wide=4.9) as (axis,):
+        for part, title in titles.items():
+            rows = list(results[part].values())
+            seconds = sorted(row["seconds"] for row in rows if row["status"] == "optimal")
+            shares = 100 * np.arange(1, len(seconds) + 1) / len(rows)
+            limit = max(row["limit"] for row in rows)
+            look = looks[part] | {"marker": "", "drawstyle": "steps-post", "linewidth": 1.8}
+            reach = f"{title}: {len(seconds)} of {len(rows)} in {limit:g} s"
+            axis.plot([seconds[0], *seconds, limit], [0, *shares, shares[-1]], label=reach, **look)
+        axis.set(xscale="log", xlabel="seconds", ylabel="proven optimal, %", ylim=(0, 102))
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.legend(loc="lower center", bbox_to_anchor=(0.45, 1.0))
 
 
 def solver_title(solver: str) -> str:
@@ -316,7 +314,6 @@ def files(results: Results) -> dict[str, str]:
     texts = {
         "generated": generated_line("python docs/proofs.py"),
         "most": f"{MOST_LABELS:,}",
-        "reach": reach_table(results),
         "machines": machines(results),
         "agreement": agreement(results["optima"]),
         "solvers": solvers_table(results["solvers"]),
@@ -347,6 +344,7 @@ def main() -> None:
                 part, Request(tuple(options.names), seconds, options.sketches, options.work or Path(name))
             )
     (DOCS / "proofs").mkdir(exist_ok=True)
+    draw_reach(read(), DOCS / "pictures" / "proof_reach.svg")
     for path, text in files(read()).items():
         (DOCS / path).write_text(text, encoding="utf-8")
 
