@@ -19,7 +19,7 @@ from formulas import mathml, model_table
 project = "crossfield"
 author = "The crossfield authors"
 version = release = installed("crossfield")
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "command_pages"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "command_pages", "csv_pages"]
 exclude_patterns = ["static", "studying"]
 source_suffix = {".md": "markdown"}
 

@@ -11,6 +11,7 @@ from places import ROOT
 NEEDS = {
     "command_pages": "sphinx",
     "conf": "sphinx",
+    "csv_pages": "sphinx",
     "formulas": "latex2mathml",
     "studio_pictures": "selenium",
     "studio_times": "selenium",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import subprocess
 import sys
@@ -93,6 +94,15 @@ def test_a_model_has_every_term_and_equation_of_its_declaration(browser, address
         declared = declare(name)
         assert equations.count("") == len(declared.objective), name
         assert {row.paper for row in declared.rows if row.paper not in ", ".join(equations)} == set(), name
+
+
+def test_a_link_to_a_csv_file_opens_a_page_with_its_rows(browser, address):
+    browser.get(f"{address}/files.html")
+    browser.execute_script("""document.querySelector("a[href$='files/keys.html']").click()""")
+    with (places.ROOT / "docs" / "files" / "keys.csv").open(newline="", encoding="utf-8") as file:
+        _, *rows = csv.reader(file)
+    cells = "[...document.querySelectorAll('tbody tr')].map(tr => [...tr.cells].map(td => td.textContent))"
+    assert browser.execute_script(f"return {cells}") == rows
 
 
 @pytest.mark.parametrize(
