@@ -31,8 +31,9 @@ os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
 
 from crossfield.export.library.documents.lock import library_lock
 from crossfield.export.solvers_table import SOLVERS
+from studying.rows import Row
 from studying.solvers.measure import SLACK, busy_seconds, measure_run
-from studying.solvers.plan import DATA, FULL, PROVE, QUICK, Plan, Row, Run, table
+from studying.solvers.plan import DATA, FULL, PROVE, QUICK, Plan, Run, table
 from studying.solvers.statistics import DISCARDED, FAILED, best_pairs
 
 _LONGEST: Final = 200  # characters of a note

@@ -5,7 +5,7 @@
     python docs/study.py --plan | --page
 
 Without options it does all runs that have no row yet in docs/studying/data, then makes the page. After an
-interruption, the same command continues. --quick does the same in a minute, small, in another folder.
+interruption, the same command continues. --quick does small runs in a minute, in another folder.
 --plan counts the runs and their seconds. With --scheduler, dask workers do the runs: scheduler and workers
 have the folder docs on their PYTHONPATH, and OPENBLAS_NUM_THREADS=1.
 
@@ -70,9 +70,10 @@ def main() -> None:
             plan, options.data, jobs=options.jobs, scheduler=options.scheduler, folder=options.sketches,
             parts=options.parts, progress=lambda line: print(line, file=sys.stderr, flush=True),
         )  # fmt: skip
-    from studying.page import write_page
+    if options.data == DATA:
+        from studying.page import write_page
 
-    write_page(options.data, DOCS if options.data == DATA else options.data, plan)
+        write_page(DOCS)
 
 
 if __name__ == "__main__":

@@ -88,7 +88,7 @@ def change(rows: Iterable[Row], before: Kind, after: Kind) -> Change | None:
     for case in old.keys() & new.keys():
         of[case[0]].append(float(np.mean(new[case]) - np.mean(old[case])))
     effect = summary(np.array([np.mean(of[name]) for name in sorted(of)]))
-    if effect is None or effect.error is None or effect.count < 3:
+    if effect is None or effect.count < 3:
         return None
     return Change(effect.mean, effect.error, effect.count, sum(map(len, of.values())))
 

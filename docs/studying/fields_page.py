@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from crossfield.models.instance.instance import STROKE_WEIGHT
 from crossfield.models.sketch.samples import SAMPLES
 
+from . import plots
 from .errors import Change, change
 from .hidden import summary
 from .rows import DATA, Row, Table
@@ -54,11 +56,7 @@ def over_drawings(rows: list[Row]) -> str:
     for row in rows:
         of.setdefault(row["name"], []).append(row["value"])
     mean_of_drawings = summary(np.array([np.mean(values) for values in of.values()]))
-    if mean_of_drawings is None:
-        return "-"
-    return f"{mean_of_drawings.mean:.1f}" + (
-        "" if mean_of_drawings.error is None else f" ± {mean_of_drawings.error:.1f}"
-    )
+    return str(mean_of_drawings or "-")
 
 
 def by_origin(cell: Callable[..., str]) -> tuple[tuple[str, ...], list[str]]:
@@ -94,10 +92,8 @@ def compared_table() -> Table:
     heads: tuple[str, ...] = ()
     cells = []
     for before, after in COMPARED:
-        heads, line = by_origin(
-            lambda b=before, a=after, **case: "-" if (c := compared(b, a, **case)) is None else c.cell
-        )
-        cells.append([f"`{after}` minus `{before}`", *line])
+        heads, line = by_origin(lambda b=before, a=after, **case: str(compared(b, a, **case) or "-"))
+        cells.append([f"{after} minus {before}", *line])
     return ("difference", *heads), cells
 
 
@@ -179,14 +175,34 @@ def missed_sentence() -> str:
     worst = max(rows_with(**facts), key=lambda row: row["value"])
     return (
         f"Under the default weights, every method misses at most {most:.1%} of the stroke pixels by more "
-        f"than 10 degrees, on average over drawings (`{method}` at {size} pixels). The worst drawing has "
-        f"{worst['value']:.1%} (`{worst['method']}` at {worst['size']} pixels)."
+        f"than 10 degrees, on average over drawings (`{method}` at {size} pixels), and {worst['value']:.1%} "
+        f"on the worst drawing (`{worst['method']}` at {worst['size']} pixels)."
     )
 
 
 def mean(rows: list[Row]) -> float:
     """The mean value of the rows."""
     return float(np.mean([row["value"] for row in rows]))
+
+
+def draw(pictures: Path) -> None:
+    """The plot of the table of weights, without its standard errors."""
+    (_, *heads), cells = weight_table()
+    weights = [float(line[0]) for line in cells]
+    panels: dict[tuple[str, str], dict[str, plots.Line]] = {}
+    for column, head in enumerate(heads, 1):
+        measure, _, case = head.partition(", ")
+        values_of_case = [float(line[column].split()[0].rstrip("%")) for line in cells]
+        panels.setdefault(("weight of the strokes", PLOTTED[measure]), {})[case] = weights, values_of_case
+    plots.lines_by_value(pictures / "evidence_weights.svg", panels)
+
+
+PLOTTED: Final = {
+    "hidden curves": "error at hidden curves, degrees",
+    "missed": "missed stroke pixels, %",
+    "surfaces": "error on surfaces, degrees",
+}
+"""Titles of the axes of the plot."""
 
 
 def tables() -> dict[str, Table]:

@@ -66,18 +66,19 @@ def hidden_curves(instance: Instance, curve: Ints, most: int) -> list[HiddenCurv
 
 @dataclass(frozen=True)
 class Summary:
-    """Count, mean and median of the angles of several curves; standard error, None for a single angle."""
+    """Count, mean and standard error of the values of several drawings."""
 
     count: int
     mean: float
-    median: float
-    error: float | None
+    error: float
+
+    def __str__(self) -> str:
+        return f"{self.mean:.1f} ± {self.error:.1f}"
 
 
-def summary(angles: Floats) -> Summary | None:
-    """Count, mean, median and standard error of angles (k,); None without angles."""
-    count = len(angles)
-    if not count:
+def summary(values: Floats) -> Summary | None:
+    """Count, mean and standard error of values (k,); None for fewer than two."""
+    count = len(values)
+    if count < 2:
         return None
-    error = float(angles.std(ddof=1) / np.sqrt(count)) if count > 1 else None
-    return Summary(count, float(angles.mean()), float(np.median(angles)), error)
+    return Summary(count, float(values.mean()), float(values.std(ddof=1) / np.sqrt(count)))

@@ -34,13 +34,11 @@ _STYLE: Final = {
     "axes.axisbelow": True,
 }
 Line = tuple[list[float], list[float]]
-Bars = tuple[list[float], list[float], list[float]]
-"""Values, means and standard errors."""
 
 
 @contextmanager
 def open_panels(
-    path: Path, panels: int, high: float = 3.4, wide: float = 10.0, *, stacked: bool = False
+    path: Path, panels: int, high: float, wide: float = 8.0, *, stacked: bool = False
 ) -> Iterator[Any]:
     """The axes of panels side by side, or stacked; the file is written at the end of the context."""
     with fixed_settings(_STYLE):
@@ -62,7 +60,7 @@ def styles(names: list[str]) -> dict[str, dict[str, Any]]:
 
 def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
     """Error against the gap to the optimum: points by kind of field, and medians of bins."""
-    with open_panels(path, len(panels), high=3.8) as axes:
+    with open_panels(path, len(panels), high=6.4, wide=6.0, stacked=True) as axes:
         names = list(dict.fromkeys(name for kinds in panels.values() for name in kinds))
         looks = styles(names)
         for axis, (title, kinds) in zip(axes, panels.items(), strict=True):
@@ -94,46 +92,19 @@ _ZERO: Final = 0.01
 """Percent: smaller gaps are drawn here."""
 
 
-def error_by_weight(path: Path, panels: dict[str, dict[str, Bars]]) -> None:
-    """Mean error by weight, with standard errors over drawings; panels have the names of the weights."""
-    with open_panels(path, len(panels), high=3.2) as axes:
-        for axis, (title, lines) in zip(axes, panels.items(), strict=True):
+def lines_by_value(path: Path, panels: dict[tuple[str, str], dict[str, Line]]) -> None:
+    """Lines over a weight or a size, on a logarithmic axis; panels have the titles of their axes."""
+    with open_panels(path, len(panels), high=0.8 + 2.2 * len(panels), wide=5.0, stacked=True) as axes:
+        for axis, ((across, up), lines) in zip(axes, panels.items(), strict=True):
             looks = styles(list(lines))
-            ticks = sorted({value for x, _, _ in lines.values() for value in x})
-            wide = ticks[-1] / ticks[0] if ticks else 1.0
-            for place, (name, (x, y, bar)) in enumerate(lines.items()):
-                beside = np.array(x) * wide ** (
-                    _BESIDE * (place - (len(lines) - 1) / 2)
-                )  # or bars hide others
-                axis.errorbar(beside, y, yerr=bar, capsize=2, elinewidth=0.9, label=name, **looks[name])
-            axis.set(xscale="log", xlabel=title, ylim=(0, None))
+            for name, (x, y) in lines.items():
+                axis.plot(x, y, label=name, **looks[name])
+            top = max(max(y) for _, y in lines.values())
+            axis.set(xscale="log", xlabel=across, ylabel=up, ylim=(0, 1.08 * top))
+            ticks = sorted({value for x, _ in lines.values() for value in x})
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-        axes[0].set_ylabel("error, degrees")
-        axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
-
-
-_BESIDE: Final = 0.0155
-"""Share of the axis between the places of two lines at the same weight."""
-
-
-def error_by_seconds(path: Path, panels: dict[str, dict[str, tuple[float, float, float]]]) -> None:
-    """Error on hidden curves against seconds, a panel for each size, a mark for each way."""
-    names = list(dict.fromkeys(name for ways in panels.values() for name in ways))
-    looks = styles(names)
-    with open_panels(path, len(panels), high=3.6, wide=11.0) as axes:
-        for axis, (title, ways) in zip(axes, panels.items(), strict=True):
-            for name, (x, y, bar) in ways.items():
-                look = looks[name] | {"linestyle": "none", "markersize": 8}
-                axis.errorbar([x], [y], yerr=[bar], capsize=2, label=name, elinewidth=0.8, **look)
-            axis.set(title=title, xscale="log", xlabel="seconds, median", xlim=(3e-3, 60))
-            axis.xaxis.set_major_formatter("{x:g}")
-        low = min((y - bar for ways in panels.values() for _, y, bar in ways.values()), default=0)
-        high = max((y + bar for ways in panels.values() for _, y, bar in ways.values()), default=1)
-        for axis in axes:
-            axis.set_ylim(low - 1, high + 1)
-        axes[0].set_ylabel("error to hidden curves, degrees")
-        axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
+            axis.legend(ncols=1 + len(lines) // 5)
 
 
 def _all_of(axes: Any) -> tuple[list[Any], list[str]]:

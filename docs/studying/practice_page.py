@@ -97,8 +97,8 @@ def smallest_error(rows: list[Row]) -> str:
         errors.rows_with_error(rows), lambda row: name_of(row) == second, lambda row: name_of(row) == best
     )
     return (
-        f"On crossfield's own drawings, at {min(by_size)} to {max(by_size)} pixels, `{best}` has the smallest "
-        f"error, {mean[best]:.1f} degrees, and `{second}` is next: the difference is {effect} degrees."
+        f"On our own drawings, at {min(by_size)} to {max(by_size)} pixels, `{best}` has the smallest error, "
+        f"{mean[best]:.1f} degrees, and `{second}` is next: the difference is {effect}."
     )
 
 
@@ -113,7 +113,7 @@ def lowest_energy(rows: list[Row]) -> str:
     proven = [
         f"{of.optimal} of {of.fields} fields at {size} pixels"
         for size, methods in by_size.items()
-        for method, of in methods.items()
+        for of in methods.values()
         if of.optimal
     ]
     lower, tried = below_all_others(rows, MILP_WAY)
@@ -136,21 +136,23 @@ def below_all_others(rows: list[Row], way: str) -> tuple[int, int]:
 def draw(rows_of: RowsByPart, pictures: Path) -> None:
     """The plot of this part."""
     by_size = results(rows_of["practice"])
-    lines: dict[str, plots.Bars] = {
-        method: (
-            list(map(float, by_size)),
-            [of[method].error.mean for of in by_size.values()],
-            [of[method].error.error or 0.0 for of in by_size.values()],
-        )
+    lines = {
+        method: (list(map(float, by_size)), [of[method].error.mean for of in by_size.values()])
         for method in next(iter(by_size.values()))
     }
-    plots.error_by_value(pictures / "evidence_practice.svg", {"pixels of the longer side": lines})
+    axes = ("pixels of the longer side", "error at hidden curves, degrees")
+    plots.lines_by_value(pictures / "evidence_practice.svg", {axes: lines})
 
 
 def sentences(rows_of: RowsByPart) -> dict[str, str]:
     """The sentences of this part by name."""
     rows = rows_of["practice"]
-    return {"smallest_error": smallest_error(rows), "lowest_energy": lowest_energy(rows)}
+    spreads = [of.error.error for methods in results(rows).values() for of in methods.values()]
+    return {
+        "smallest_error": smallest_error(rows),
+        "lowest_energy": lowest_energy(rows),
+        "spreads": f"{min(spreads):.1f} to {max(spreads):.1f}",
+    }
 
 
 def tables(rows_of: RowsByPart) -> dict[str, Table]:

@@ -14,7 +14,7 @@ DATA = DOCS / "studying" / "data"
 @pytest.fixture(scope="module")
 def study(docs_module):
     """The modules of the study."""
-    return SimpleNamespace(**{name: docs_module(f"studying.{name}") for name in ("page", "plan", "rows")})
+    return SimpleNamespace(**{name: docs_module(f"studying.{name}") for name in ("page", "rows")})
 
 
 def test_a_second_row_of_a_run_and_a_file_of_another_study_are_refused(study, tmp_path):
@@ -32,7 +32,7 @@ def test_a_second_row_of_a_run_and_a_file_of_another_study_are_refused(study, tm
 
 @pytest.mark.slow
 def test_the_page_and_its_tables_are_made_from_the_rows(study, tmp_path):
-    study.page.write_page(DATA, tmp_path, study.plan.FULL)
+    study.page.write_page(tmp_path)
     names = ["evidence.md", *(f"evidence/{path.name}" for path in (DOCS / "evidence").iterdir())]
     assert len(list((tmp_path / "evidence").iterdir())) == len(names) - 1
     for name in names:
@@ -40,7 +40,7 @@ def test_the_page_and_its_tables_are_made_from_the_rows(study, tmp_path):
 
 
 def test_no_run_has_two_rows(study):
-    kept = study.page.read(DATA)
+    kept = study.page.read()
     for part in study.rows.PARTS:
         keys = [study.rows.key_of(row) for row in kept[part]]
         assert len(keys) == len(set(keys)) > 0

@@ -13,7 +13,7 @@ from crossfield.export.solvers_table import SOLVERS
 from ..rows import Row, Table
 from ..wording import series
 from . import statistics
-from .plan import COMMERCIAL, LONG, PAIRS, PROBLEMS, PROVE, STARTS, Plan, Run, make_instance, run_of
+from .plan import COMMERCIAL, PAIRS, PROBLEMS, PROVE, STARTS, Plan, make_instance
 from .statistics import (
     FAILED,
     TOO_LARGE,
@@ -36,7 +36,7 @@ MISSING: Final = "-"
 
 def solver_title(solver: str) -> str:
     """The name of a solver in a table."""
-    return f"`{PROVE}`" if solver == PROVE else SOLVERS[solver].title
+    return PROVE if solver == PROVE else SOLVERS[solver].title
 
 
 def groups(rows: Iterable[Row], plan: Plan) -> dict[int, dict[Kind, list[Row]]]:
@@ -56,39 +56,32 @@ def with_interval(values: np.ndarray, statistic: statistics.Statistic, form: str
     return f"{statistic(values):{form}} [{low:{form}}, {high:{form}}]"
 
 
-def count_solved(rows: list[Row]) -> str:
-    """Number of solved runs."""
-    return f"{sum(map(is_solved, rows))} of {len(rows)}"
-
-
 def solved_table(rows: list[Row], plan: Plan) -> Table:
-    """Solved instances and mean seconds of every kind; means of complete groups alone."""
-    by_count = groups(rows, plan)
+    """Numbers of instances that at least one solver solves, and `prove`."""
     cells = []
-    for formulation, solver, start in KINDS:
-        line = [f"`{formulation}`", solver_title(solver), "" if solver == PROVE else start]
-        for count, names in plan.instances.items():
-            mine = by_count[count][formulation, solver, start]
-            text = count_solved(mine) if mine else MISSING
-            if len(mine) == len(names):
-                text += f", {with_interval(seconds(mine), shifted_geometric_mean, '.1f')} s"
-            elif mine:
-                text += f" so far, {len(names)} planned"
-            line.append(text)
-        cells.append(line)
-    heads = (f"about {count} pairs, {2 * count} integers" for count in plan.instances)
-    return ("formulation", "solver", "start", *heads), cells
+    for formulation in PROBLEMS:
+        solvers = [solver for name, solver in PAIRS if name == formulation]
+        titles = ", ".join(map(solver_title, solvers))
+        for names, start, words in (
+            *((solvers, start, [titles, start]) for start in STARTS),
+            ([PROVE], "cold", [f"`{PROVE}`", ""]),
+        ):
+            solved = [
+                {row["instance"] for name in names for row in of[formulation, name, start] if is_solved(row)}
+                for of in groups(rows, plan).values()
+            ]
+            cells.append([f"`{formulation}`", *words, *(str(len(instances)) for instances in solved)])
+    heads = (f"{count} pairs" for count in plan.instances)
+    return ("formulation", "at least one of", "start", *heads), cells
 
 
 def details_table(rows: list[Row], plan: Plan) -> Table:
-    """PAR-10, primal-dual integrals and root bounds of complete groups."""
+    """Solved instances, mean seconds, PAR-10, primal-dual integrals and root bounds."""
     best = known_values(rows)
     cells = []
     for count, of in groups(rows, plan).items():
         for kind in KINDS:
             mine = of[kind]
-            if len(mine) < len(plan.instances[count]):
-                continue
             areas = np.array([row["integral"] for row in mine if row["integral"] is not None])
             roots = np.array(
                 [
@@ -99,14 +92,16 @@ def details_table(rows: list[Row], plan: Plan) -> Table:
             )
             cells.append(
                 [
-                    str(count), f"`{kind[0]}`", solver_title(kind[1]), "" if kind[1] == PROVE else kind[2],
+                    str(count), kind[0], solver_title(kind[1]), "" if kind[1] == PROVE else kind[2],
+                    f"{sum(map(is_solved, mine))} of {len(mine)}",
+                    with_interval(seconds(mine), shifted_geometric_mean, ".1f"),
                     with_interval(seconds(mine, statistics.PENALTY), statistics.mean, ".0f"),
                     _some(areas, len(mine), ".1f"), _some(100 * roots, len(mine), ".0f"),
                 ]
             )  # fmt: skip
     return (
-        "pairs", "formulation", "solver", "start", "PAR-10, s", "primal-dual integral, s",
-        "gap at the root, %",
+        "pairs", "formulation", "solver", "start", "solved", "CPU, s", "PAR-10, s",
+        "primal-dual integral, s", "gap at the root, %",
     ), cells  # fmt: skip
 
 
@@ -149,7 +144,7 @@ def instances_table(rows: list[Row], plan: Plan) -> Table:
             cells.append(line + [_energy(proofs.get((name, formulation))) for formulation in PROBLEMS])
     return (
         "instance", "pairs", "stroke pixels", "integers",
-        *(f"columns of `{formulation}`" for formulation in PROBLEMS), "energy, 1-norm", "energy, 2-norm",
+        *(f"columns of {formulation}" for formulation in PROBLEMS), "energy, 1-norm", "energy, 2-norm",
     ), cells  # fmt: skip
 
 
@@ -180,7 +175,7 @@ def turned_table(rows: list[Row], plan: Plan) -> Table:
         ratio = statistics.SHIFT + times
         cells.append(
             [
-                f"`{pair[0]}`", solver_title(pair[1]), f"{len(whole)} of {len(plan.turned)}",
+                pair[0], solver_title(pair[1]), f"{len(whole)} of {len(plan.turned)}",
                 *(
                     f"{sum(map(is_solved, column))}, {shifted_geometric_mean(times[turns]):.1f} s"
                     for turns, column in enumerate(zip(*whole, strict=True))
@@ -196,7 +191,7 @@ def long_table(rows: list[Row], plan: Plan) -> Table:
     """The runs of an hour."""
     cells = [
         [
-            row["instance"], f"`{row['formulation']}`", solver_title(row["solver"]),
+            row["instance"], row["formulation"], solver_title(row["solver"]),
             "yes" if is_solved(row) else "no",
             *(MISSING if row[name] is None else f"{row[name]:.6g}" for name in ("objective", "bound")),
             f"{row['cpu']:.0f}",
@@ -226,7 +221,7 @@ def editions_table(rows: list[Row], plan: Plan) -> Table:
         common = sorted(set.intersection(*taken))
         if common:
             pairs = [of[COMMERCIAL[0]][name]["pairs"] for name in common]
-            line = [f"`{formulation}`", str(len(common)), f"{min(pairs):.0f} to {max(pairs):.0f}"]
+            line = [formulation, str(len(common)), f"{min(pairs):.0f} to {max(pairs):.0f}"]
             line += [
                 f"{sum(map(is_solved, mine))}, {shifted_geometric_mean(seconds(mine)):.1f} s"
                 for runs in of.values()
@@ -241,37 +236,14 @@ def editions_table(rows: list[Row], plan: Plan) -> Table:
     ), cells
 
 
-def part_of(run: Run) -> str:
-    """The part of the plan that a run belongs to."""
-    if run.limit == LONG:
-        return "of an hour"
-    if run.solver in COMMERCIAL:
-        return "of free commercial editions"
-    if run.solver == PROVE:
-        return "proofs"
-    return "turned" if run.turns else run.start
-
-
-def completeness(rows: list[Row], plan: Plan) -> str:
-    """Sentences on the completed share of the plan."""
-    planned = Counter(map(part_of, [*plan.first(), *plan.last([*PAIRS[: statistics.BEST]])]))
-    done = Counter(part_of(run_of(row)) for row in rows)
-    parts = ", ".join(f"{done[part]} of {count} {part}" for part, count in planned.items())
-    text = f"{len(rows)} of {plan.size} planned runs are done: {parts}."
-    missing = plan.size - len(rows)
-    return (
-        text if not missing else f"{text} **{missing} runs are missing**, and nothing is claimed about them."
-    )
-
-
 def claims(rows: list[Row]) -> str:
     """Sentence on answers that contradict a proven bound or a known field, and on failures."""
     best = known_values(rows)
     wrong = [row for row in rows if problem(row) in best and contradicted(row, *best[problem(row)])]
     lost = [row for row in rows if row["status"] in {FAILED, "unknown"}]
     return (
-        f"{sum(map(is_solved, rows))} runs end with a proven optimum. Answers that contradict another run: "
-        f"{_listed(wrong)}. Runs without a usable answer: {_listed(lost)}."
+        f"Of {len(rows)} runs, {sum(map(is_solved, rows))} end with a proven optimum. Answers that "
+        f"contradict another run: {_listed(wrong)}. Runs without a usable answer: {_listed(lost)}."
     )
 
 
@@ -281,66 +253,12 @@ def _listed(rows: list[Row]) -> str:
     return "; ".join(f"{name} {count}" for name, count in sorted(counts.items())) or "none"
 
 
-def answer(rows: list[Row], plan: Plan) -> list[str]:
-    """Answer on the reach of solvers, for the numbers of pairs with all cold runs done; then tightened."""
-    by_count = groups(rows, plan)
-    said = [_reach(by_count, plan, start) for start in STARTS]
-    if said[0] is None:
-        unfinished = f"{len(rows)} of {plan.size} planned runs are done, and no number of pairs is complete."
-        return [f"The measurement is under way: {unfinished}"]
-    counts, reach = said[0]
-    count = len(next(iter(plan.instances.values())))
-    cold = (
-        f"Of {count} instances each with about {series(counts)} pairs of pixels, the following are proven "
-        f"optimal in {plan.limit:g} s on one thread, from a cold start: {reach}."
-    )
-    sentences = [cold, "The [tables](#how-far-solvers-get) have each solver."]
-    if said[1] is not None and said[1][0] == counts:
-        tightened = (
-            "In the windows that a certificate of `prove` leaves, these are proven optimal, the seconds of "
-            f"that proof not counted: {said[1][1]}."
-        )
-        sentences.insert(1, tightened)
-    return sentences
-
-
-def _reach(
-    by_count: dict[int, dict[Kind, list[Row]]], plan: Plan, start: str
-) -> tuple[list[int], str] | None:
-    """The complete numbers of pairs, and how many instances any solver and `prove` solve of each."""
-    kinds = [kind for kind in KINDS if kind[2] == start]
-    complete = [
-        count
-        for count, names in plan.instances.items()
-        if all(len(by_count[count][kind]) == len(names) for kind in kinds)
-    ]
-    if not complete:
-        return None
-    parts = []
-    for formulation in PROBLEMS:
-        mine = [kind for kind in kinds if kind[0] == formulation]
-        by = [[kind for kind in mine if kind[1] != PROVE], [kind for kind in mine if kind[1] == PROVE]]
-        solved = [
-            f"{series(len(_solved(by_count[count], some)) for count in complete)} by "
-            f"{'at least one of ' if len(some) > 1 else ''}{series(solver_title(kind[1]) for kind in some)}"
-            for some in by
-            if some
-        ]
-        parts.append(f"as `{formulation}`, {', and '.join(solved)}")
-    return complete, "; ".join(parts)
-
-
-def _solved(by_kind: dict[Kind, list[Row]], kinds: list[Kind]) -> set[str]:
-    """The instances that at least one of the kinds solves."""
-    return {row["instance"] for kind in kinds for row in by_kind[kind] if is_solved(row)}
-
-
 def tables(rows: list[Row], plan: Plan) -> dict[str, Table]:
     """The tables of this part by name."""
     return {
         "solver-instances": instances_table(rows, plan),
-        "solvers": solved_table(rows, plan),
-        "solvers-in-detail": details_table(rows, plan),
+        "solved": solved_table(rows, plan),
+        "solvers": details_table(rows, plan),
         "solvers-turned": turned_table(rows, plan),
         "solvers-in-an-hour": long_table(rows, plan),
         "solvers-free-editions": editions_table(rows, plan),
@@ -351,9 +269,18 @@ def sentences(rows: list[Row], plan: Plan) -> dict[str, Any]:
     """The sentences of this part by name."""
     machines = sorted({row["machine"] for row in rows if row["machine"]})
     versions = sorted({f"{solver_title(row['solver'])} {row['version']}" for row in rows if row["version"]})
+    _, solved = solved_table(rows, plan)
+    ratios = sorted(line[-1] for line in turned_table(rows, plan)[1])
+    long_runs = [row for row in rows if row["limit"] == plan.long and row["cpu"] is not None]
+    closed = [row for row in long_runs if is_solved(row)]
     return {
-        "solvers_done": completeness(rows, plan),
         "claims": claims(rows),
+        "solved_cold": series(solved[0][3:]),
+        "solved_by_prove": series(solved[2][3:]),
+        "turned": f"{ratios[0]} to {ratios[-1]}",
+        "long_by_solvers": sum(row["solver"] != PROVE for row in closed),
+        "long_runs": sum(row["solver"] != PROVE for row in long_runs),
+        "long_by_prove": sum(row["solver"] == PROVE for row in closed),
         "solver_machine": "; ".join(machines),
         "solver_versions": ", ".join(versions),
     }

@@ -15,7 +15,7 @@ from crossfield.models.sketch.samples import SAMPLES
 
 from ..random_curves import instance_of_curves
 from ..rows import DATA as FOLDER
-from ..rows import Keyed, Row, Rows
+from ..rows import Keyed, Rows
 
 INSTANCES: Final[dict[int, tuple[str, ...]]] = {
     25: (
@@ -137,8 +137,3 @@ WORDS: Final = frozenset(
 def table(path: Path = DATA) -> Rows:
     """The rows of a file."""
     return Rows(path, ASKED, FOUND, frozenset(ASKED + FOUND) - WORDS)
-
-
-def run_of(row: Row) -> Run:
-    """The run of a row."""
-    return Run(**{name: row[name] for name in ASKED})
