@@ -359,10 +359,13 @@ def draw_figures() -> None:
 
 
 def write_traps() -> None:
-    """Replace the table of traps inside docs/format-rules.md: the results of the installed programs."""
+    """Write docs/format-rules/traps.csv, the results of the installed programs, and their numbers."""
     import traps as files
 
-    replace_between(DOCS / "format-rules.md", "traps", markdown(*files.table()))
+    rows = files.table()
+    with files.RESULTS.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)
+    replace_between(DOCS / "format-rules.md", "traps", markdown(*files.summary(*rows)))
 
 
 def write_architecture() -> None:

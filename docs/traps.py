@@ -17,7 +17,9 @@ from typing import Any, Final
 
 Answer = float | str
 REFUSED: Final = "refused"
+WRONG: Final = " (wrong)"
 SECONDS: Final = 60
+RESULTS: Final = Path(__file__).parent / "format-rules" / "traps.csv"
 
 
 @dataclass(frozen=True)
@@ -70,32 +72,32 @@ ONE_TRIANGLE: Final = " x x 2\n x y 1\n y y 2\n"
 TRAPS: Final = (
     lp("W2", "constant as the cost of a fixed column", "x + 7 ONE", "x >= 1", 8.0,
        rest="Bounds\n 1 <= ONE <= 1\n", good=True),
-    lp("L1", "`x + 7`", "x + 7", "x >= 1", 8.0),
-    lp("L2", "`7 + x`", "7 + x", "x >= 1", 8.0),
-    lp("L3", "`x + 5 <= 10`, maximise x", "- x", "x + 5 <= 10", -5.0),
-    lp("L4", "`x <= 10 + z`, z <= 1, maximise x", "- x", "x <= 10 + z", -11.0,
+    lp("L1", "x + 7", "x + 7", "x >= 1", 8.0),
+    lp("L2", "7 + x", "7 + x", "x >= 1", 8.0),
+    lp("L3", "x + 5 <= 10, maximise x", "- x", "x + 5 <= 10", -5.0),
+    lp("L4", "x <= 10 + z, z <= 1, maximise x", "- x", "x <= 10 + z", -11.0,
        rest="Bounds\n 0 <= z <= 1\n"),
-    lp("L5", "`Integers`, maximise x, x <= 3.5", "- x", "x <= 3.5", -3.0, rest="Integers\n x\n"),
-    lp("L6", "bounds after `Generals`, maximise x, x <= 2.5", "- x", "x <= 9", -2.0,
+    lp("L5", "Integers, maximise x, x <= 3.5", "- x", "x <= 3.5", -3.0, rest="Integers\n x\n"),
+    lp("L6", "bounds after Generals, maximise x, x <= 2.5", "- x", "x <= 9", -2.0,
        rest="Generals\n x\nBounds\n 0 <= x <= 2.5\n"),
-    lp("L9", "`[ x^2 ]` at x = 2", "[ x^2 ]", "x >= 2", 4.0),
-    lp("L13", "`-1 <= x <= 5`", "x", "-1 <= x <= 5", 0.0),
-    lp("L14", "`x + x` at x = 1", "x + x", "x >= 1", 2.0),
-    lp("L17", "`x <= -3` alone", "x", "x + y >= -9", "infeasible", rest="Bounds\n x <= -3\n"),
-    lp("L18", "`=>`", "x", "x => 1", 1.0),
-    lp("L20", "`x + -3 y`", "x + -3 y", "x >= 1", -2.0, rest="Bounds\n 0 <= y <= 1\n"),
-    lp("L22", "`-inf <= x`", "x", "x >= -4", -4.0, rest="Bounds\n -inf <= x <= 5\n", good=True),
-    lp("L22", "`-infinity <= x`", "x", "x >= -4", -4.0, rest="Bounds\n -infinity <= x <= 5\n"),
-    lp("L34", "`[ x ^2 ] / 2` at x = 2", "[ x ^2 ] / 2", "x >= 2", 2.0, good=True),
-    lp("L34", "`[ x ^ 2 ] / 2` at x = 2", "[ x ^ 2 ] / 2", "x >= 2", 2.0),
+    lp("L9", "[ x^2 ] at x = 2", "[ x^2 ]", "x >= 2", 4.0),
+    lp("L13", "-1 <= x <= 5", "x", "-1 <= x <= 5", 0.0),
+    lp("L14", "x + x at x = 1", "x + x", "x >= 1", 2.0),
+    lp("L17", "x <= -3 alone", "x", "x + y >= -9", "infeasible", rest="Bounds\n x <= -3\n"),
+    lp("L18", "=>", "x", "x => 1", 1.0),
+    lp("L20", "x + -3 y", "x + -3 y", "x >= 1", -2.0, rest="Bounds\n 0 <= y <= 1\n"),
+    lp("L22", "-inf <= x", "x", "x >= -4", -4.0, rest="Bounds\n -inf <= x <= 5\n", good=True),
+    lp("L22", "-infinity <= x", "x", "x >= -4", -4.0, rest="Bounds\n -infinity <= x <= 5\n"),
+    lp("L34", "[ x ^2 ] / 2 at x = 2", "[ x ^2 ] / 2", "x >= 2", 2.0, good=True),
+    lp("L34", "[ x ^ 2 ] / 2 at x = 2", "[ x ^ 2 ] / 2", "x >= 2", 2.0),
     mps("M1", "an integer without bounds, maximise x", -1.0, COLUMNS=WHOLE, **UP_TO_5),
-    mps("M2", "an integer with `LO 0` alone, maximise x, x <= 5", -5.0, COLUMNS=WHOLE,
+    mps("M2", "an integer with LO 0 alone, maximise x, x <= 5", -5.0, COLUMNS=WHOLE,
         BOUNDS=" LO BND1 x 0\n", **UP_TO_5),
-    mps("M3", "`UP -3` alone, x >= -9", -9.0, RHS=" RHS1 c -9\n", BOUNDS=" UP BND1 x -3\n"),
+    mps("M3", "UP -3 alone, x >= -9", -9.0, RHS=" RHS1 c -9\n", BOUNDS=" UP BND1 x -3\n"),
     mps("M4", "right side 7 of the objective, at x = 1", -6.0, RHS=" RHS1 c 1\n RHS1 obj 7\n"),
-    mps("M5", "`OBJSENSE MAX`, x <= 5", 5.0, HEAD="OBJSENSE MAX\n", **UP_TO_5),
-    mps("M5", "`OBJSENSE MAXIMIZE`, x <= 5", 5.0, HEAD="OBJSENSE MAXIMIZE\n", **UP_TO_5),
-    mps("M6", "`OBJSENSE` and `MAX` in two lines", 5.0, HEAD="OBJSENSE\n    MAX\n", **UP_TO_5),
+    mps("M5", "OBJSENSE MAX, x <= 5", 5.0, HEAD="OBJSENSE MAX\n", **UP_TO_5),
+    mps("M5", "OBJSENSE MAXIMIZE, x <= 5", 5.0, HEAD="OBJSENSE MAXIMIZE\n", **UP_TO_5),
+    mps("M6", "OBJSENSE and MAX in two lines", 5.0, HEAD="OBJSENSE\n    MAX\n", **UP_TO_5),
     mps("M7", "cost 1 and cost 3, at x = 1", REFUSED, COLUMNS=f"{COST} x obj 3\n"),
     mps("M8", "the set of right sides is named like the row", 1.0, RHS=" c c 1\n"),
     mps("M9", "no set name", REFUSED, RHS=" c 1\n"),
@@ -103,7 +105,7 @@ TRAPS: Final = (
     mps("M13", "QUADOBJ, both triangles", REFUSED, TAIL=f"QUADOBJ\n{ONE_TRIANGLE} y x 1\n", **FIXED),
     mps("M14", "QMATRIX, one triangle", REFUSED, TAIL=f"QMATRIX\n{ONE_TRIANGLE}", **FIXED),
     mps("M15", "QSECTION", 3.0, TAIL=f"QSECTION obj\n{ONE_TRIANGLE}", **FIXED),
-    mps("M25", "`BV`, then `UP 5`, maximise x", REFUSED, COLUMNS=" x obj -1\n x c 1\n",
+    mps("M25", "BV, then UP 5, maximise x", REFUSED, COLUMNS=" x obj -1\n x c 1\n",
         BOUNDS=" BV BND1 x\n UP BND1 x 5\n", **UP_TO_5),
 )  # fmt: skip
 """`meant` is a human reader's interpretation of the file; `refused` for files without a clear meaning."""
@@ -235,10 +237,9 @@ def answer(title: str, trap: Trap) -> Answer:
 
 
 def result_cell(value: Answer, trap: Trap) -> str:
-    """A cell: bold where the program neither refuses nor finds the intended optimum."""
+    """A cell: wrong where the program neither refuses nor finds the intended optimum."""
     text = f"{value:g}" if isinstance(value, float) else value
-    wrong = value not in {REFUSED, trap.meant}
-    return f"**{text}**" if wrong else text
+    return text if value in {REFUSED, trap.meant} else f"{text}{WRONG}"
 
 
 def meant_cell(trap: Trap) -> str:
@@ -246,12 +247,23 @@ def meant_cell(trap: Trap) -> str:
     return f"{trap.meant:g}" if isinstance(trap.meant, float) else trap.meant.replace(REFUSED, "unclear")
 
 
-def table() -> tuple[tuple[str, ...], list[list[str]]]:
-    """Columns and rows: rule, file, intended optimum, and the result of each program."""
+def table() -> list[list[str]]:
+    """Heads and rows: rule, file, intended optimum, and the result of each program."""
     titles = installed_programs()
     rows = [
         [trap.rule, trap.what, meant_cell(trap)]
         + [result_cell(answer(title, trap), trap) for title in titles]
         for trap in TRAPS
     ]
-    return ("rule", "file", "meant", *titles), rows
+    return [["rule", "file", "meant", *titles], *rows]
+
+
+def summary(heads: list[str], *rows: list[str]) -> tuple[tuple[str, ...], list[list[str]]]:
+    """Heads and rows: numbers of files that each program reads as intended, refuses, and reads wrongly."""
+    counts = []
+    for column, title in enumerate(heads[3:], 3):
+        cells = [row[column] for row in rows]
+        wrong = sum(cell.endswith(WRONG) for cell in cells)
+        refused = cells.count(REFUSED)
+        counts.append([title, str(len(cells) - wrong - refused), str(refused), str(wrong)])
+    return ("program", "as meant", "refused", "wrong"), counts
