@@ -305,41 +305,53 @@ def samples_in_short() -> str:
     )
 
 
-GALLERY = """crossfield reads what a person sees. These small drawings are written as the named programs
-write them, each with something that is easily misread. Most show the same body, a black outline and two red
-lines. The second picture is the right answer on the grid, computed from the shapes alone: white is outside,
-grey is the mask, and the colour of a curvature line is its direction. In a test, no pixel may be more than
-one pixel off [`test_a_drawing_is_read_as_it_looks`]. The last column has the warnings of
-`crossfield instance`."""
+GALLERY = """crossfield reads what a person sees. Each of these small drawings is written as the named
+program writes it, and has something that is easily misread. Most show the same body, a black outline and two
+red lines, and have the same right answer on the grid:
+
+![The mask in grey, and two coloured lines]({answer})
+
+White is outside, grey is the mask, and the colour of a curvature line is its direction. Other answers stand
+below their drawings. They are computed from the shapes alone, and no pixel may be more than one pixel off
+(`test_a_drawing_is_read_as_it_looks`). [drawings.csv](gallery/drawings.csv) has the options and the messages
+of `crossfield instance`."""
+USUAL = "leaf"
+"""The right answer of most drawings."""
 
 
 def write_gallery() -> None:
-    """Write docs/gallery.md: drawings of many programs, what is read of them, and what is reported."""
+    """Write docs/gallery.md, drawings of many programs, and docs/gallery/drawings.csv, what is reported."""
     folder = DOCS.parent / "tests" / "data" / "drawings"
+    where = f"../{folder.relative_to(DOCS.parent).as_posix()}"
     table = tomllib.loads((folder / "drawings.toml").read_text())
-    parts = ["# Drawings of many programs", generated_line("python docs/make.py gallery"), GALLERY]
+    text = GALLERY.format(answer=f"{where}/expected/{USUAL}.png")
+    parts = ["# Drawings of many programs", generated_line("python docs/make.py gallery"), text]
     for kind, title in table["kinds"].items():
-        rows = [gallery_row(folder, row) for row in table["drawing"] if row["kind"] == kind]
-        columns = ("drawing", "right answer", "content", "reported")
-        parts += [f"## {title}", markdown(columns, rows)] if rows else []
+        lines = []
+        for row in (row for row in table["drawing"] if row["kind"] == kind):
+            line = f"{row['shows']} ({row['program']})"
+            if "picture" in row:
+                other = f"![right answer]({where}/expected/{row['picture']}.png) " * (row["picture"] != USUAL)
+                line = f"![{row['file']}]({where}/{row['file']}) {other}{line}"
+            lines.append(f"- {line}")
+        parts += [f"## {title}", "\n".join(lines)]
     (DOCS / "gallery.md").write_text("\n\n".join(parts) + "\n")
+    rows = [drawing_row(folder, row) for row in table["drawing"]]
+    (DOCS / "gallery" / "drawings.csv").write_text(csv_text(rows))
 
 
-def gallery_row(folder: Path, row: dict[str, Any]) -> list[str]:
-    """The drawing, its right answer, its content and the reader's warnings or refusal, as Markdown."""
+def drawing_row(folder: Path, row: dict[str, Any]) -> dict[str, str]:
+    """The drawing, its options, and the reader's warnings or refusal."""
     path = folder / row["file"]
     options = {key: row[key] for key in ("size", "curvature") if key in row}
     try:
         reported = " ".join(f"{line}." for line in cf.read_sketch(path, **options).reading.warnings)
     except InputError as error:
         reported = f"error: {error}".replace(f"{path}: ", "")
-    reported = re.sub(r"(<[^>]+>|--[a-z]+)", r"`\1`", reported)
-    where = f"../{folder.relative_to(DOCS.parent).as_posix()}"
-    answer = f"![{row['picture']}]({where}/expected/{row['picture']}.png)" if "picture" in row else "none"
-    drawing = f"![{row['file']}]({where}/{row['file']})" if "picture" in row else f"`{row['file']}`"
     texts = {key: value if key == "size" else shlex.join(value) for key, value in options.items()}
-    set_by = "".join(f", `--{key} {text}`" for key, text in texts.items())
-    return [drawing, answer, f"{row['shows']} ({row['program']}{set_by})", reported]
+    set_by = " ".join(f"--{key} {text}" for key, text in texts.items())
+    facts = {"drawing": row["file"], "program": row["program"], "content": row["shows"]}
+    return {**facts, "options": set_by, "reported": reported}
 
 
 def write_editions() -> None:
