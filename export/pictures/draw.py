@@ -29,6 +29,7 @@ from .mesh_view import draw_mesh
 from .svg import sheet_svg
 from .underlay import Underlay, read_underlay
 
+_WORDS: Final = 7.5  # points of text
 DrawPanel = Callable[[Any, panels.PanelContent], None]
 
 
@@ -36,14 +37,17 @@ DrawPanel = Callable[[Any, panels.PanelContent], None]
 class PictureKind:
     """A kind of picture: description, panels with headings; no panels: the layers on the page of a drawing.
 
-    size: points of the longer side of a panel. bar: points to the right for a colour bar. legend: keys below.
+    size: points of the longer side of a panel. columns: panels in a row. bar: points to the right for a
+    colour bar. legend: keys below. words: points of text.
     """
 
     description: str
     panels: tuple[tuple[str, DrawPanel], ...]
     size: float = 340.0
+    columns: int = 1
     bar: float = 0.0
     legend: bool = False
+    words: float = _WORDS
     needs_field: bool = True
 
 
@@ -63,16 +67,18 @@ KINDS: Final = {
     ),
     "angle": PictureKind("map of the angle between the two lines", (("", panels.draw_angle),), bar=52.0),
     "overview": PictureKind(
-        "instance, crosses, streamlines and angle map in a row, with counts and energies",
+        "instance, crosses, streamlines and angle map, with counts and energies",
         (
             ("instance", panels.draw_instance),
             ("crosses", panels.draw_crosses),
             ("streamlines", panels.draw_streamlines),
             ("angle map", panels.draw_angle),
         ),
-        size=170.0,
-        bar=50.0,
+        size=165.0,
+        columns=2,
+        bar=62.0,
         legend=True,
+        words=10.0,
     ),
     LAYERS: PictureKind("the field in the coordinates of its drawing, on top of it with --underlay", ()),
 }
@@ -95,9 +101,11 @@ _PREVIEW_DOTS: Final = 96
 _POINTS: Final = 72.0
 _EDGE: Final = 9.0
 _GAP: Final = 14.0
-_LINE: Final = 13.0  # height of a line of text
-_CHARACTER: Final = 4.0  # width of a character of the caption, at most
+_LINE: Final = 1.6  # height of a line of text, in its size
+_CHARACTER: Final = 0.55  # width of a character, at most, in its size
 _NARROWEST: Final = 52.0  # room for a heading
+_SEPARATOR: Final = "  ·  "
+_LONGEST: Final = 46  # characters of the longest part of a caption
 _MESH_SIDE: Final = 400.0  # points of the side of a picture of a mesh
 ON_MESHES: Final = ("instance", "crosses")  # kinds of pictures of instances and fields on meshes
 
@@ -160,7 +168,7 @@ def draw(
             return path
         if underlay is not None:
             raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}")
-    with fixed_settings():
+    with fixed_settings({"font.size": chosen.words}):
         return write_bytes(path, _save_figure(_draw_panels(subject, chosen), suffix))
 
 
@@ -214,7 +222,7 @@ def fixed_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
     """Constant settings of matplotlib, whatever the user's are, and some more."""
     import matplotlib as mpl
 
-    settings = {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": 7.5, "path.simplify": False}
+    settings = {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": _WORDS, "path.simplify": False}
     defaults = {key: value for key, value in mpl.rcParamsDefault.items() if not key.startswith("backend")}
     with mpl.rc_context(defaults | settings | (more or {})):
         yield
@@ -253,18 +261,17 @@ def _draw_on_mesh(subject: CrossField | Instance, underlay: object) -> Any:
 
     if underlay is not None:
         raise DomainError("a mesh lies on no drawing; leave the underlay out")
-    side, below = _MESH_SIDE / _POINTS, (2 * _EDGE + _LINE) / _POINTS
+    side, below = _MESH_SIDE / _POINTS, (2 * _EDGE + _LINE * _WORDS) / _POINTS
     figure = Figure(figsize=(side, side + below), facecolor="white")
     axes = figure.add_axes((0.0, below / (side + below), 1.0, side / (side + below)))
     draw_mesh(axes, subject)
-    figure.text(
-        0.5, _EDGE / _POINTS / (side + below), _caption(subject, full=False), ha="center", color="#444444"
-    )
+    caption = _SEPARATOR.join(_caption_parts(subject, full=False))
+    figure.text(0.5, _EDGE / _POINTS / (side + below), caption, ha="center", color="#444444")
     return figure
 
 
 def _draw_panels(subject: Subject, kind: PictureKind) -> Any:
-    """The figure: panels in a row, headings above, legend and caption below; every length in points."""
+    """The figure: panels with headings, legend and caption below; every length in points."""
     from matplotlib.figure import Figure
 
     instance = _instance_of(subject)
@@ -272,32 +279,48 @@ def _draw_panels(subject: Subject, kind: PictureKind) -> Any:
     picture = panels.PanelContent(
         instance, field, kind.size, subject if isinstance(subject, Surface) else None
     )
-    height, width = (side * picture.unit for side in picture.instance.mask.shape)
-    above = _EDGE + _LINE * any(heading for heading, _ in kind.panels)
-    below = _EDGE + _LINE * (1 + kind.legend)
-    pitch, count = max(width, _NARROWEST) + _GAP, len(kind.panels)
-    row = count * pitch - _GAP + kind.bar
-    caption = _caption(subject, full=count > 1)
+    size = np.array([picture.unit * side for side in picture.instance.mask.shape[::-1]])
+    line, character = _LINE * kind.words, _CHARACTER * kind.words
+    above = line * any(heading for heading, _ in kind.panels)
+    pitch = np.array([max(size[0], _NARROWEST), size[1] + above]) + _GAP
+    grid = np.array([kind.columns, -(-len(kind.panels) // kind.columns)])
+    inside = grid * pitch - _GAP + np.array([kind.bar, 0.0])
     keys = panels.legend_keys(picture) if kind.legend else []
-    words = _CHARACTER * max(len(caption), sum(len(key.get_label()) + 8 for key in keys))
-    page = np.array([max(row, words) + 2 * _EDGE, above + height + below])
+    legend = character * sum(len(key.get_label()) + 6 for key in keys)
+    wide = max(inside[0], legend, character * _LONGEST)
+    caption = _wrap(_caption_parts(subject, full=len(kind.panels) > 1), int(wide / character))
+    below = _EDGE + line * (len(caption) + bool(keys))
+    page = np.array([wide + 2 * _EDGE, _EDGE + inside[1] + below])
     figure = Figure(figsize=tuple(page / _POINTS), facecolor="white")
     for number, (heading, panel) in enumerate(kind.panels):
-        corner = np.array([(page[0] - row) / 2 + number * pitch + (pitch - _GAP - width) / 2, below])
-        axes = figure.add_axes((*(corner / page), *(np.array([width, height]) / page)))
-        set_coordinates(axes, 0.0, 0.0, width, height)
-        axes.set_title(heading, fontsize=8, pad=4)
+        row, column = divmod(number, kind.columns)
+        left = (page[0] - inside[0]) / 2 + column * pitch[0] + (pitch[0] - _GAP - size[0]) / 2
+        corner = np.array([left, page[1] - _EDGE - row * pitch[1] - above - size[1]])
+        axes = figure.add_axes((*(corner / page), *(size / page)))
+        set_coordinates(axes, 0.0, 0.0, *size)
+        axes.set_title(heading, fontsize=kind.words, pad=4)
         panel(axes, picture)
-    figure.text(0.5, _EDGE / page[1], caption, ha="center", va="bottom", color="#444444")
+    for number, words in enumerate(reversed(caption)):
+        figure.text(0.5, (_EDGE + number * line) / page[1], words, ha="center", va="bottom", color="#444444")
     if keys:
-        place = (0.5, (_EDGE + _LINE - 3) / page[1])
-        spaces = {"borderaxespad": 0, "borderpad": 0.2, "handlelength": 1.4, "columnspacing": 1.6}
+        place = (0.5, (_EDGE + line * len(caption) - 3) / page[1])
+        spaces = {"borderaxespad": 0, "borderpad": 0.2, "handlelength": 1.4, "columnspacing": 1.4}
         style = {"bbox_to_anchor": place, "ncols": len(keys), "frameon": False}
         figure.legend(handles=keys, loc="lower center", **style, **spaces)
     return figure
 
 
-def _caption(subject: Subject, *, full: bool) -> str:
+def _wrap(parts: list[str], most: int) -> list[str]:
+    """Parts of a caption in lines of so many characters, or of one part."""
+    lines = parts[:1]
+    for part in parts[1:]:
+        longer = lines[-1] + _SEPARATOR + part
+        lines = [*lines[:-1], longer] if len(longer) <= most else [*lines, part]
+    return lines
+
+
+def _caption_parts(subject: Subject, *, full: bool) -> list[str]:
+    """Size and contents; if full, energies and gauge too."""
     instance = _instance_of(subject)
     domain, plural = instance.domain, "" if len(instance.theta) == 1 else "s"
     size = f"{domain.size} faces" if isinstance(domain, Mesh) else f"{domain.width} × {domain.height} pixels"
@@ -307,9 +330,7 @@ def _caption(subject: Subject, *, full: bool) -> str:
     if isinstance(subject, CrossField) and full:
         squared, absolute = (subject.energy(norm).total for norm in (2, 1))
         parts.append(f"energy {squared:.4g} (2-norm), {absolute:.4g} (1-norm)")
-    if full:
-        parts.append(f"gauge {instance.gauge}")
-    return "  ·  ".join(parts)
+    return [*parts, f"gauge {instance.gauge}"] if full else parts
 
 
 def count_singularities(field: CrossField) -> str:

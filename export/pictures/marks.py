@@ -12,14 +12,12 @@ from ...models.field.field import CrossField
 from ...models.instance.domain import Bools, Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.cover import Box
+from .palette import LIGHT
 from .streamlines import Streamline, align_labels, streamlines
 from .underlay import Underlay
 
-FAMILIES: Final = ("#00798c", "#e1812c")
-"""Teal and orange, which differ for all common kinds of colour blindness."""
-POSITIVE: Final = "#d1242f"
-NEGATIVE: Final = "#3056d3"
-STROKE: Final = "#b3261e"
+FAMILIES: Final = (LIGHT["u"], LIGHT["v"])
+POSITIVE, NEGATIVE, STROKE = LIGHT["plus"], LIGHT["minus"], LIGHT["stroke"]
 FAINT: Final = "#c9c9c9"
 BORDER: Final = "#9a9a9a"
 PAPER: Final = "#ffffff"

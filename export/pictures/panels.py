@@ -15,6 +15,7 @@ from ..shading.colours import shade_by_light
 from ..shading.raster import raster, view_of_grid
 from .canvas import draw_smooth_image, paint
 from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, GridFrame
+from .palette import ANGLE_MAP
 
 COLLAPSED: Final = "#b9a3d6"
 OUTSIDE: Final = "#ececec"
@@ -88,7 +89,7 @@ def draw_angle(axes: Any, picture: PanelContent) -> None:
     """The angle between the two lines in degrees."""
     field = picture.crosses
     degrees = field.image(np.degrees(field.angle_between))
-    image = _draw_image(axes, picture, degrees, vmin=0.0, vmax=90.0, cmap="magma")
+    image = _draw_image(axes, picture, degrees, vmin=0.0, vmax=90.0, cmap=ANGLE_MAP)
     _draw_border(axes, picture)
     _draw_singularities(axes, picture)
     _draw_colour_bar(axes, image, picture, "angle between the lines", ticks=[0, 30, 60, 90], format="%d°")
@@ -141,10 +142,10 @@ def _draw_colour_bar(axes: Any, image: Any, picture: PanelContent, label: str, *
     bar = axes.figure.colorbar(image, cax=inset, **style)
     bar.outline.set_visible(False)
     if picture.unit * picture.instance.grid.height > 100:
-        bar.set_label(label, fontsize=7)
+        bar.set_label(label)
     else:
         bar.set_ticks([bar.vmin, bar.vmax])
-    inset.tick_params(labelsize=6.5, length=2, width=0.5)
+    inset.tick_params(length=2, width=0.5)
 
 
 def draw_surface(axes: Any, picture: PanelContent) -> None:

@@ -26,8 +26,9 @@ from ...models.sketch.curves import Curves, are_straight, run_numbers
 from ...models.sketch.drawing_file import parse_drawing, read_file
 from ...models.sketch.read import DEFAULT_SIZE
 from ...models.sketch.samples import SAMPLES, sample_svg
+from .palette import LIGHT
 
-INK: Final = {"black": "#4a4a4a", "red": "#c23b33"}
+INK: Final = {"black": "#4a4a4a", "red": LIGHT["stroke"]}
 """Colours of the strokes below a field; red are those that are drawn in red."""
 _LEVELS: Final = 16  # of ink
 _LENGTH: Final = re.compile(r"(\d{1,9}(?:\.\d{1,12})?)(px|pt|pc|mm|cm|in|Q)?")

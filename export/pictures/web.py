@@ -15,8 +15,9 @@ from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
 from .draw import fixed_settings
-from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE, Area, GridFrame, Layer, Lines, Mark, Sheet
+from .marks import PAPER, STROKE, Area, GridFrame, Layer, Lines, Mark, Sheet
 from .mesh_view import draw_mesh
+from .palette import DARK, LIGHT
 from .svg import web_sheet_svg
 
 _SIDE: Final = 320.0
@@ -25,17 +26,12 @@ _GRID: Final = "#e4e6ea"
 _EDGE: Final = "#8b929c"
 _SHADE: Final = "#e1e4e9"
 _FAINT: Final = "#d3d6db"
-_NIGHT: Final = {  # colours in dark mode by those in light mode
+_NIGHT: Final = {LIGHT[mark]: DARK[mark] for mark in LIGHT} | {  # colours in dark mode by those in light mode
     PAPER: "#1d2126",
     _SHADE: "#3a424c",
     _GRID: "#30363d",
     _EDGE: "#7d8590",
-    STROKE: "#ff7b72",
     _FAINT: "#3d444d",
-    FAMILIES[0]: "#41b3c5",
-    FAMILIES[1]: "#f0a35e",
-    POSITIVE: "#ff6b70",
-    NEGATIVE: "#7c9cff",
 }
 _MARGIN: Final = 7.0
 _SPACING: Final = 10.0  # between streamlines of one family

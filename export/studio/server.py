@@ -31,6 +31,7 @@ from ...models.processes.deadline import Over
 from ...models.sketch.samples import SAMPLES, sample_svg
 from ...templates import ENVIRONMENT
 from ..formats.registry import FORMATS
+from ..pictures.palette import ANGLES, DARK, LIGHT
 from .desk import ClosedError, Desk
 from .document import SIZES
 from .files import DOWNLOADS, download
@@ -125,6 +126,7 @@ class Page:
             formulations=list_formulations(),
             formats=list(FORMATS),
             sizes=SIZES,
+            palette=json.dumps({"light": LIGHT, "dark": DARK, "angles": ANGLES}),
         )
         return Response(text, media_type="text/html")
 

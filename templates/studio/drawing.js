@@ -3,13 +3,13 @@
 import { boxOf } from "./strokes.js";
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
+const PALETTE = JSON.parse(document.body.dataset.palette); // of all pictures: u, v, stroke, plus and minus
 const COLOURS = {
-  light: { line: "#c2281d", cut: "#1c2430", ignored: "#9aa3ae", page: "#c9d0d9", beyond: "#eef0f3", chosen: "#0b6b8066", u: "#0b7285", v: "#b3560a",
-    plus: "#d6202b", minus: "#2f4bd0", cursor: "#0b6b80", suspect: "#f08c0066", tints: ["#0000", "#4a90e226", "#f5a5236b", "#0000"] },
-  dark: { line: "#ff7b72", cut: "#e6eaf0", ignored: "#6b7685", page: "#3a434f", beyond: "#0e1115", chosen: "#5cc3d677", u: "#41b3c5", v: "#f0a35e",
-    plus: "#ff6b70", minus: "#8ba4ff", cursor: "#5cc3d6", suspect: "#f0a35e77", tints: ["#0000", "#6aa9f033", "#f5a5237a", "#0000"] },
+  light: { ...PALETTE.light, line: PALETTE.light.stroke, cut: "#1c2430", ignored: "#9aa3ae", page: "#c9d0d9", beyond: "#eef0f3", chosen: "#0b6b8066",
+    cursor: "#0b6b80", suspect: "#f08c0066", tints: ["#0000", "#4a90e226", "#f5a5236b", "#0000"] },
+  dark: { ...PALETTE.dark, line: PALETTE.dark.stroke, cut: "#e6eaf0", ignored: "#6b7685", page: "#3a434f", beyond: "#0e1115", chosen: "#5cc3d677",
+    cursor: "#5cc3d6", suspect: "#f0a35e77", tints: ["#0000", "#6aa9f033", "#f5a5237a", "#0000"] },
 };
-const ANGLES = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 const APART = 13; // pixels of the screen between crosses
 export const colours = () => COLOURS[dark.matches ? "dark" : "light"];
 
@@ -114,13 +114,15 @@ function tint(field) {
   return field.tint.picture;
 }
 
+const ANGLES = PALETTE.angles.map(rgba);
+
 function angleMap(field) {
   field.angles ??= gridPicture(field.frame.rows, field.frame.columns, k => {
     const n = field.number[k];
     if (n < 0) return [0, 0, 0, 0];
     const between = Math.abs(Math.asin(Math.sin(field.u[n] - field.v[n]))) / (Math.PI / 2) * (ANGLES.length - 1);
     const low = Math.min(ANGLES.length - 2, Math.floor(between)), part = between - low;
-    return [...ANGLES[low].map((value, c) => value + part * (ANGLES[low + 1][c] - value)), 215];
+    return ANGLES[low].map((value, c) => value + part * (ANGLES[low + 1][c] - value));
   });
   return field.angles;
 }
