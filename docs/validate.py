@@ -1,11 +1,13 @@
 """Make docs/validation.md, one instance through every route: `python docs/validate.py` (four minutes).
 
-Every row is a written file and the answer of a program, checked by `crossfield verify --solve`. Free licences
-end, so licensed.json keeps the last results of each program that needs one.
+The rows go to docs/validation, and `--page` only writes the page from them. A row of a route is a written
+file and the answer of a program, checked by `crossfield verify --solve`. Free licences end, so licensed.json
+keeps the last results of each program that needs one.
 """
 
 from __future__ import annotations
 
+import csv
 import json
 import sys
 import tempfile
@@ -24,17 +26,19 @@ from crossfield.export.cli.tables import smallest_problems
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, suitability
 from crossfield.export.verify.checks import Check, Verdict, Verification
 from crossfield.export.verify.verify import verify
-from crossfield.models.formulations.catalogue import list_formulations
+from crossfield.models.formulations.catalogue import FORMULATIONS, list_formulations
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
-from make import generated_line, markdown
+from make import csv_text, generated_line, markdown
 
 DOCS: Final = Path(__file__).resolve().parent
 RECORD: Final = DOCS / "licensed.json"
+TABLES: Final = DOCS / "validation"
 SECONDS: Final = 15.0
 SHAPE: Final = (2, 4)
 STROKES: Final = 4
 SEED: Final = 1
+OPTIMAL: Final = "optimal"
 ROUTES: Final = ("formulation", "solver", "file", "objective", "bound", "s", "result")
 VARIANTS: Final = ("milp-mccormick", "miqp-mccormick")
 """The formulations that have both options, gauge and facet."""
@@ -76,11 +80,6 @@ class Run:
         solves = self.solves(formulation)
         return sorted((f.objective, f.energy or 0.0) for f in solves if f.proven and f.objective is not None)
 
-    def apart(self, formulation: str) -> float:
-        """Largest difference between its proven optima."""
-        values = [value for value, _ in self.proven(formulation)]
-        return values[-1] - values[0]
-
 
 def verify_instance(gauge: Gauge, facet: str, formulations: tuple[str, ...]) -> Run:
     """The verification of the instance's files, solves included."""
@@ -92,15 +91,27 @@ def verify_instance(gauge: Gauge, facet: str, formulations: tuple[str, ...]) -> 
     return Run(gauge, facet, result)
 
 
-def route_row(check: Check) -> list[str]:
+def route_row(check: Check) -> dict[str, str]:
     """A row about a solve."""
     numbers = ((check.objective, ".9f"), (check.bound, ".9f"), (check.seconds, ".1f"))
-    words = {Verdict.AGREES: "optimal", Verdict.LIMIT: f"stopped after {SECONDS:g} s"}
-    return [
+    words = {Verdict.AGREES: OPTIMAL, Verdict.LIMIT: f"stopped after {SECONDS:g} s"}
+    cells = [
+        check.problem.rpartition(" ")[2],
         SOLVERS[check.program].title,
         check.file.rpartition(".")[2],
         *("" if value is None else format(value, digits) for value, digits in numbers),
         words.get(check.verdict, f"{check.verdict}: {check.reason}"),
+    ]
+    return dict(zip(ROUTES, cells, strict=True))
+
+
+def route_rows(main: Run) -> list[dict[str, str]]:
+    """The solves of each formulation by the solvers that take it."""
+    return [
+        route_row(check)
+        for problem in verified_problems()
+        for check in main.solves(problem.name)
+        if suitability(problem, check.program).answer == "yes"
     ]
 
 
@@ -109,196 +120,83 @@ def verified_problems() -> list[Problem]:
     return [problem for problem in smallest_problems() if problem.name in list_formulations()]
 
 
-def route_tables(main: Run) -> list[str]:
-    """A table for each formulation, of the solvers that take it."""
-    parts = []
-    for problem in verified_problems():
-        checks = [f for f in main.solves(problem.name) if suitability(problem, f.program).answer == "yes"]
-        proven = "No route proves the optimum in time."
-        if proofs := len(main.proven(problem.name)):
-            proven = (
-                f"{proofs} routes prove the optimum. Their values differ by {main.apart(problem.name):.1e}."
-            )
-        parts += [
-            f"## `{problem.name}`",
-            proven,
-            markdown(ROUTES[1:], [route_row(f) for f in checks]),
-        ]
-    return parts
-
-
-def same_problem(main: Run) -> str:
-    """Optima of the formulations of the same problem."""
-    groups = {
-        "2-norm energy": ("minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact"),
-        "1-norm smoothness, 2-norm rest": ("miqcp-bilinear", "miqp-mccormick"),
-        "1-norm energy": ("miqcp-bilinear-l1", "milp-mccormick"),
-    }
-    rows = []
-    for words, names in groups.items():
-        for name in names:
-            best = min((f.objective for f in main.solves(name) if f.objective is not None), default=np.nan)
-            rows.append([words, f"`{name}`", f"{best:.9f}", "yes" if main.proven(name) else "no"])
-    return markdown(("problem", "formulation", "best objective", "proven"), rows)
-
-
-def short_summary(main: Run, runs: list[Run]) -> str:
-    """Numbers of files that were read as intended or not, and of formulations with a proven optimum."""
-    verdicts = [f.verdict for run in runs for f in run.result.checks if f.step == "read"]
-    proven = [name for name in list_formulations() if main.proven(name)]
-    counts = [len(main.proven(name)) for name in proven]
-    return (
-        f"{len(main.result.versions)} programs read {verdicts.count(Verdict.AGREES)} files correctly and "
-        f"{verdicts.count(Verdict.DIFFERS) + verdicts.count(Verdict.FAILED)} wrongly. "
-        f"{len(proven)} of the {len(list_formulations())} formulations are proven optimal, "
-        f"each by {min(counts)} to {max(counts)} routes. "
-        f"The proven optima of a formulation differ by at most {max(map(main.apart, proven)):.1e}."
-    )
-
-
-def errata(runs: list[Run]) -> str:
+def variant_rows(runs: list[Run]) -> list[dict[str, Any]]:
     """The misprints as numbers: optimum, and the energy of its field."""
     rows = []
     for run in runs:
         for name in VARIANTS:
             (objective, energy), *more = run.proven(name)
-            numbers = (f"{objective:.6f}", f"{energy:.6f}", str(1 + len(more)))
-            rows.append([f"`{name}`", run.gauge, run.facet, *numbers])
-    return markdown(
-        ("formulation", "gauge", "facet", "optimum", "energy of its field", "proofs"), sorted(rows)
-    )
+            values = {"optimum": f"{objective:.6f}", "energy of its field": f"{energy:.6f}"}
+            facts = {"formulation": name, "gauge": run.gauge, "facet": run.facet}
+            rows.append({**facts, **values, "proofs": 1 + len(more)})
+    return sorted(rows, key=lambda row: tuple(row.values()))
 
 
-def readings(runs: list[Run]) -> str:
+def reading_rows(runs: list[Run]) -> list[dict[str, Any]]:
     """Number of files that each program read, by result."""
     rows = []
     for name, entry in PROGRAMS.items():
         checks = [f for run in runs for f in run.result.checks if f.program == name and f.step == "read"]
         verdicts = [f.verdict for f in checks]
-        counts = [verdicts.count(verdict) for verdict in (Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED)]
-        counts.append(verdicts.count(Verdict.DIFFERS) + verdicts.count(Verdict.FAILED))
-        version = runs[0].result.versions.get(name, "absent")
         by = ["coefficients"] * bool(entry.algebra) + ["values"] * bool(entry.behaviour)
-        rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(by), *map(str, counts)])
-    return markdown(
-        ("program", "version", "reads", "compared by", "agree", "refused, as stated", "not tried", "differ"),
-        rows,
-    )
+        facts = {
+            "program": entry.title,
+            "version": runs[0].result.versions.get(name, "absent"),
+            "reads": ", ".join(entry.formats),
+            "compared by": " and ".join(by),
+            "agree": verdicts.count(Verdict.AGREES),
+            "refused, as stated": verdicts.count(Verdict.REFUSED),
+            "differ": verdicts.count(Verdict.DIFFERS) + verdicts.count(Verdict.FAILED),
+        }
+        rows.append(facts)
+    return rows
 
 
-def update_record(runs: list[Run]) -> dict[str, dict[str, Any]]:
-    """Store the results of programs that need a licence, and return the last ones of each."""
+def update_record(runs: list[Run]) -> None:
+    """Store the results of programs that need a licence."""
     record: dict[str, dict[str, Any]] = json.loads(RECORD.read_text())
     main = runs[0]
     for name, entry in PROGRAMS.items():
         if entry.free and name in main.result.versions:
             checks = [check for run in runs for check in run.result.checks if check.program == name]
             read = [check.verdict for check in checks if check.step == "read"]
+            titles = {SOLVERS[solver].title for solver in entry.solvers}
             record[name] = {
                 "version": main.result.versions[name],
                 "date": datetime.now(UTC).date().isoformat(),
                 "files": [read.count(Verdict.AGREES), *map(read.count, (Verdict.DIFFERS, Verdict.FAILED))],
-                "routes": [
-                    [f"`{problem.name}`", *route_row(check)]
-                    for problem in verified_problems()
-                    for check in main.solves(problem.name)
-                    if check.program in entry.solvers and check.verdict != Verdict.NOT_TRIED
-                    if suitability(problem, check.program).answer == "yes"
-                ],
+                "routes": [row for row in route_rows(main) if row["solver"] in titles],
             }
     RECORD.write_text(json.dumps(record, indent=1) + "\n")
-    return record
 
 
-def licences(record: dict[str, dict[str, Any]], present: dict[str, str]) -> list[str]:
-    """The table of the last runs with a licence, and the results of programs that are absent now."""
-    rows = []
-    for name, last in record.items():
-        titles = [PROGRAMS[name].title, *(SOLVERS[solver].title for solver in PROGRAMS[name].solvers)]
-        rows.append(
-            [", ".join(dict.fromkeys(titles)), last["version"], last["date"], *map(str, last["files"])]
-        )
-    absent = [line for name, last in record.items() if name not in present for line in last["routes"]]
-    title = "Results of that run, for programs that are left out above:"
+def capability_rows() -> list[dict[str, str]]:
+    """The solvers that take each formulation."""
     return [
-        (
-            "The free licences of these programs end, except that of CPLEX. "
-            "A program that does not accept its licence is left out above. "
-            "The tests also solve `.bar` files of up to 10 columns with BARON, "
-            "which needs no licence for them."
-        ),
-        markdown(
-            ("program", "version", "last run with a licence", "files that agree", "differ", "failed"), rows
-        ),
-        *([title, markdown(ROUTES, absent)] if absent else []),
-    ]
-
-
-def capabilities() -> list[str]:
-    """The solvers that take each formulation, and the reasons of the others."""
-    marks = {"yes": "yes", "local": "local", "no": "-"}
-    rows = [
-        [f"`{p.name}`", *(marks[suitability(p, name).answer] for name in SOLVERS)]
+        {"formulation": p.name, **{of.title: suitability(p, name).answer for name, of in SOLVERS.items()}}
         for p in smallest_problems()
     ]
-    reasons = [
-        [entry.title, trait, refusal.reason]
+
+
+def refusal_rows() -> list[dict[str, str]]:
+    """The reasons for which solvers do not take a formulation, or answer without proof."""
+    return [
+        {"solver": entry.title, "trait": trait, "reason": refusal.reason}
         for entry in SOLVERS.values()
         for trait, refusal in entry.refusals.items()
     ]
-    return [
-        markdown(("formulation", *(entry.title for entry in SOLVERS.values())), rows),
-        markdown(("solver", "trait", "reason"), reasons),
-    ]
 
 
-def main() -> None:
-    """Run everything and write the page."""
-    ArgumentParser(description=__doc__).parse_args()
+def measure() -> None:
+    """Do everything, and store the rows."""
     begin = time.perf_counter()
     main_run = verify_instance("strokes", "hull", tuple(list_formulations()))
     others = [(gauge, facet) for gauge in GAUGES for facet in ("hull", "printed")][1:]
     runs = [main_run, *(verify_instance(gauge, facet, VARIANTS) for gauge, facet in others)]
-    parts = [
-        "# One instance, all routes",
-        generated_line("python docs/validate.py"),
-        (
-            "Results of free programs on one small instance, in every formulation and format. "
-            "A route is a written file and a solver that reads it."
-        ),
-        short_summary(main_run, runs),
-        f"""\
-- The instance has {SHAPE[0]} x {SHAPE[1]} pixels and w_beta = 0.001. {STROKES} pixels have a stroke in a
-  random direction (seed {SEED}).
-- Each solve may take {SECONDS:g} s, on one thread where that can be set.
-  Seconds depend on the load of the machine.
-- Objectives are recomputed from the declaration at the solver's point. Optima must agree to 1e-6.
-- Solvers are listed for the formulations that they [take](#solvers-and-formulations).
-
-`crossfield verify DIR --solve SECONDS` makes the same checks for any folder. It writes `verify.json`.""",
-        "## Reading",
-        readings(runs),
-        "## Licences",
-        *licences(update_record(runs), main_run.result.versions),
-        "## The same problem in several formulations",
-        same_problem(main_run),
-        *route_tables(main_run),
-        "## Gauge and facet",
-        (
-            "The effect of the two [misprints of the paper](errata.md). The printed facet (26) lowers the "
-            "optimum below the energy of its field. The printed box (1) raises the optimum."
-        ),
-        errata(runs),
-        "## Solvers and formulations",
-        "`local`: the solver answers without proof. `-`: it does not take the formulation. Reasons follow.",
-        *capabilities(),
-        "## Starting points",
-        markdown(
-            ("solver", "suffix", "how"),
-            [[SOLVERS[name].title, entry.suffix, entry.use] for name, entry in STARTS.items()],
-        ),
-    ]
-    (DOCS / "validation.md").write_text("\n\n".join(parts) + "\n")
+    update_record(runs)
+    write_rows("reading", reading_rows(runs))
+    write_rows("routes", route_rows(main_run))
+    write_rows("variants", variant_rows(runs))
     bad = [check for run in runs for check in run.result.failed_checks]
     print(
         f"{time.perf_counter() - begin:.0f} s, {len(bad)} checks with something wrong",
@@ -306,6 +204,142 @@ def main() -> None:
         sep="\n",
         file=sys.stderr,
     )
+
+
+def write_rows(name: str, rows: list[dict[str, Any]]) -> None:
+    """Write rows to a CSV file beside the page."""
+    (TABLES / f"{name}.csv").write_text(csv_text(rows))
+
+
+def read_rows(name: str) -> list[dict[str, str]]:
+    """The rows of a CSV file beside the page."""
+    with (TABLES / f"{name}.csv").open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def table(rows: list[dict[str, str]]) -> str:
+    """Rows as a Markdown table."""
+    return markdown(tuple(rows[0]), [list(row.values()) for row in rows])
+
+
+def optima(routes: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Best objective of each formulation, its proofs and their largest difference."""
+    rows = []
+    for name in dict.fromkeys(row["formulation"] for row in routes):
+        mine = [row for row in routes if row["formulation"] == name]
+        proven = [float(row["objective"]) for row in mine if row["result"] == OPTIMAL]
+        facts = {
+            "formulation": f"`{name}`",
+            "minimises": FORMULATIONS[name].minimises,
+            "best objective": min((row["objective"] for row in mine if row["objective"]), key=float),
+            "proofs": f"{len(proven)} of {len(mine)}",
+            "proofs differ by": f"{max(proven) - min(proven):.1g}" if proven else "",
+        }
+        rows.append(facts)
+    return rows
+
+
+def licences() -> str:
+    """The table of the last runs with a licence."""
+    rows = []
+    for name, last in json.loads(RECORD.read_text()).items():
+        titles = [PROGRAMS[name].title, *(SOLVERS[solver].title for solver in PROGRAMS[name].solvers)]
+        agree, *bad = last["files"]
+        facts = {
+            "program": ", ".join(dict.fromkeys(titles)),
+            "version": last["version"],
+            "last run with a licence": last["date"],
+            "files that agree": str(agree),
+            "differ or fail": str(sum(bad)),
+        }
+        rows.append(facts)
+    return table(rows)
+
+
+PAGE: Final = """# One instance, all routes
+
+{generated}
+
+A route is a written file and a solver that reads it. This page has the results of free programs on one
+small instance, in every formulation and format. {programs} programs read {right} files correctly and
+{wrong} wrongly. The routes that prove an optimum agree to {apart}.
+
+- The instance has {shape} pixels and the skew weight 0.001. {strokes} pixels have a stroke in a random
+  direction (seed {seed}).
+- Each solve may take {seconds:g} s, on one thread where that can be set.
+- Objectives are recomputed from the declaration at the solver's point. Optima must agree to 1e-6.
+
+`crossfield verify DIR --solve SECONDS` makes the same checks for any folder, and writes `verify.json`.
+
+## Reading
+
+A program refuses a file *as stated* if crossfield says beforehand that it cannot read that model.
+
+{reading}
+
+## Licences
+
+The free licences of these programs end, except that of CPLEX. [licensed.json](licensed.json) keeps the
+last results of each. The tests also solve `.bar` files of up to 10 columns with BARON, which needs no
+licence for them.
+
+{licences}
+
+## Optima
+
+{optima}
+
+Formulations that minimise the same energy have the same optimum. [routes.csv](validation/routes.csv) has
+objective, bound and seconds of each route. Seconds depend on the load of the machine.
+
+[variants.csv](validation/variants.csv) has the effect of the two [misprints of the paper](errata.md): the
+printed facet (26) lowers the optimum below the energy of its field, and the printed box (1) raises the
+optimum.
+
+## Solvers and formulations
+
+[solvers.csv](validation/solvers.csv) states which solver takes which formulation (`local`: it answers
+without proof), and [refusals.csv](validation/refusals.csv) why a solver does not take one.
+
+## Starting points
+
+{starts}
+"""
+
+
+def page() -> str:
+    """The page, from the stored rows."""
+    reading, best = read_rows("reading"), optima(read_rows("routes"))
+    starts = [
+        {"solver": SOLVERS[name].title, "suffix": entry.suffix, "how": f"`{entry.use}`"}
+        for name, entry in STARTS.items()
+    ]
+    return PAGE.format(
+        generated=generated_line("python docs/validate.py"),
+        programs=sum(row["version"] != "absent" for row in reading),
+        right=sum(int(row["agree"]) for row in reading),
+        wrong=sum(int(row["differ"]) for row in reading),
+        apart=max((row["proofs differ by"] for row in best if row["proofs differ by"]), key=float),
+        shape=" x ".join(map(str, SHAPE)),
+        strokes=STROKES,
+        seed=SEED,
+        seconds=SECONDS,
+        reading=table(reading),
+        licences=licences(),
+        optima=table(best),
+        starts=table(starts),
+    )
+
+
+def main() -> None:
+    """Measure, and write the page."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("--page", action="store_true", help="only write the page from the stored rows")
+    if not parser.parse_args().page:
+        measure()
+    write_rows("solvers", capability_rows())
+    write_rows("refusals", refusal_rows())
+    (DOCS / "validation.md").write_text(page())
 
 
 if __name__ == "__main__":
