@@ -381,18 +381,14 @@ def write_traps() -> None:
 
 
 def write_architecture() -> None:
-    """Write docs/architecture.svg, and the table inside docs/architecture.md: the present folders."""
+    """Write docs/architecture.svg, docs/architecture/folders.csv, and the commands by domain: as they are."""
     import rooms
 
     (DOCS / "architecture.svg").write_text(rooms.picture(DOCS.parent))
-    columns = ("folder", "content", "uses, besides the top of `models/`")
-    domains = [
-        [f"`{command}`", *("yes" if kind in kinds else "no" for kind in BOTH)]
-        for command, kinds in DOMAINS.items()
-    ]
-    columns_of_domains = ("command", "sketches, on pixels", "meshes, on faces")
-    replace_between(DOCS / "architecture.md", "domains", markdown(columns_of_domains, domains))
-    replace_between(DOCS / "architecture.md", "folders", markdown(columns, rooms.table(DOCS.parent)))
+    (DOCS / "architecture" / "folders.csv").write_text(csv_text(rooms.table(DOCS.parent)))
+    some = ", ".join(f"`{command}`" for command, kinds in DOMAINS.items() if kinds != BOTH)
+    text = f"Every command takes sketches and meshes, except these, which take sketches only: {some}."
+    replace_between(DOCS / "architecture.md", "domains", text)
 
 
 def replace_between(page: Path, name: str, text: str) -> None:

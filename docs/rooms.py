@@ -62,14 +62,14 @@ def target_folders(root: Path, folder: str, node: ast.ImportFrom) -> set[str]:
     }
 
 
-def table(root: Path) -> list[list[str]]:
-    """Rows in the order from the ground up: folder, description, imports."""
+def table(root: Path) -> list[dict[str, str]]:
+    """Rows in the order from the ground up: folder, content, imports besides the top of models/."""
     return [
-        [
-            f"`{folder}/`",
-            first_line(root, folder),
-            ", ".join(f"`{used}`" for used in used_folders(root, folder)) or "-",
-        ]
+        {
+            "folder": folder,
+            "content": first_line(root, folder),
+            "imports": " ".join(used_folders(root, folder)),
+        }
         for folder in ORDER
     ]
 

@@ -1,7 +1,7 @@
 """The table of the domains that each command takes: pixels of sketches, faces of meshes.
 
 A command whose table lacks a domain ends with one DomainError, which `Instance.grid` raises.
-docs/architecture.md shows the table.
+docs/architecture.md states the exceptions.
 """
 
 from __future__ import annotations
