@@ -24,10 +24,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from ...models.errors import UnsupportedByFormatError
+from ...models.formulations.expressions import Expression, Factor, Operand, Symbol, expression_of
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.names import element_numbers, is_numbered, number_width
 from ...models.formulations.problem import Problem
@@ -258,7 +258,7 @@ def _variable_text(variable: Variable, block: Block, indices: _Indices) -> dict[
     attributes += [
         f"{sign} {language.bound(end)}"
         for sign, end in ((">=", variable.lower), ("<=", variable.upper))
-        if not end.is_infinite
+        if end is not None
     ]
     return {
         "name": block.name,
@@ -281,10 +281,10 @@ def _family_text(family: PlacedFamily) -> dict[str, str]:
     declared, indices = family.family.rolled or family.family, _indices(family.instance)
     words = _AmplExpressions(declared.over, indices)
     if declared.is_row:
-        left, right = (words.expression(side) for side in (declared.expression.lhs, declared.expression.rhs))
+        left, right = words.expression(declared.relation.left), words.expression(declared.relation.right)
         pieces = [*left, SENSES[declared.sense], *right]
     else:
-        pieces = wrap_lines(words.summands(declared.expression), WIDTH, b"  ")
+        pieces = wrap_lines(words.summands(declared.body), WIDTH, b"  ")
     paper = f"section {declared.paper}" if declared.paper[0].isdigit() else declared.paper
     return {
         "tag": family.family.tag,
@@ -312,7 +312,7 @@ class _AmplExpressions(InfixLanguage):
         self._over = over
         self._indices = indices
 
-    def symbol(self, symbol: sp.Symbol) -> Piece:
+    def symbol(self, symbol: Symbol) -> Piece:
         """A symbol's name and index; scalars have none."""
         if symbol in SCALARS:
             return str(symbol.name).encode()
@@ -325,23 +325,24 @@ class _AmplExpressions(InfixLanguage):
         index = ends.get(kind, self._indices.index[self._over])
         return f"{name}[{index}]".encode()
 
-    def is_data(self, expression: sp.Expr) -> bool:
+    def is_data(self, expression: Factor) -> bool:
         """Whether it is a constant: data have names in this language."""
-        return not expression.free_symbols
+        return not expression.symbols
 
-    def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
+    def constant(self, expression: Expression, *, signed: bool) -> Piece:
         """A constant in mathematical notation."""
-        negative = bool(expression < 0)
-        text = str(-expression if negative else expression).replace("**", "^")
+        number, factors = expression.as_term
+        assert not factors  # no declaration has a sum of constants
+        negative, text = number.ratio < 0, str(number).removeprefix("-")
         if signed:
             return f"{'-' if negative else '+'} {text}".encode()
         return f"(-{text})".encode() if negative else text.encode()
 
     coefficient = constant
 
-    def bound(self, expression: sp.Expr) -> str:
+    def bound(self, expression: Operand) -> str:
         """A bound of a variable for all elements of its set."""
-        return _literal_text(self.outermost(expression))
+        return _literal_text(self.outermost(expression_of(expression)))
 
 
 def _literal_text(pieces: list[Piece]) -> str:

@@ -28,8 +28,8 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-import sympy as sp
 
+from ...models.formulations.expressions import Expression, Factor, Symbol
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Floats
@@ -106,19 +106,19 @@ class GamsExpressions(InfixLanguage):
         self._family = family
         self._names = names
 
-    def symbol(self, symbol: sp.Symbol) -> Piece:
+    def symbol(self, symbol: Symbol) -> Piece:
         """A column's name at each element."""
         return self._names.at(self._family, symbol)
 
-    def is_data(self, expression: sp.Expr) -> bool:
+    def is_data(self, expression: Factor) -> bool:
         """Whether it holds no column."""
         return is_free_of_columns(self._family, expression)
 
-    def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
+    def constant(self, expression: Expression, *, signed: bool) -> Piece:
         """One number per element."""
         return _data_words(self._family.data(expression), signed=signed)
 
-    def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
+    def coefficient(self, expression: Expression, *, signed: bool) -> Piece:
         """One number per element; raises UnsupportedByFormatError for an extreme one."""
         values = self._family.data(expression)
         check_coefficients(values, f"family {self._family.family.tag}")
@@ -165,14 +165,14 @@ def _equations(problem: Problem, names: Names) -> Iterator[bytes]:
 def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
     """The terms of the objective, one line per element (more if it is long)."""
     for family in problem.objective:
-        terms = GamsExpressions(family, names).summands(family.family.expression)
+        terms = GamsExpressions(family, names).summands(family.family.body)
         yield from render([*wrap_lines(terms, WIDTH, b"  "), b"\n"], family.count)
 
 
 def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
     for family in problem.rows:
-        language, relation = GamsExpressions(family, names), family.family.expression
-        left, right = language.expression(relation.lhs), language.expression(relation.rhs)
+        language, relation = GamsExpressions(family, names), family.family.relation
+        left, right = language.expression(relation.left), language.expression(relation.right)
         parts: list[Piece] = [names.row(family), b".. ", *left, SENSES[family.family.sense], *right, b";\n"]
         yield from render(parts, family.count)
 

@@ -25,9 +25,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
+from ...models.formulations.expressions import Symbol
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.names import name_length
 from ...models.instance.domain import Floats, Ints
@@ -178,7 +178,7 @@ class _NlExpressions(PrefixLanguage):
         """A number."""
         return self._code.constant(values)
 
-    def column(self, symbol: sp.Symbol) -> Pieces:
+    def column(self, symbol: Symbol) -> Pieces:
         """A column, by its place in the file."""
         return self._code.token(b"v", self._nl.places(self.family, symbol))
 
@@ -231,7 +231,7 @@ def _bounds(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
             yield from code.records(code.token(b"%d" % digit, *ends), len(lower))
 
 
-def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:
+def _entries(family: PlacedFamily) -> list[tuple[Symbol, Floats | float]]:
     """Symbols and coefficients of a row in J: linear terms, and 0 for columns only in nonlinear ones."""
     linear = {term.symbols[0]: coefficient(term) for term in family.of_degree(1)}
     return list((linear | {s: 0.0 for s in family.variables if s not in linear}).items())

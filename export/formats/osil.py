@@ -26,8 +26,8 @@ from html import escape
 from typing import Final
 
 import numpy as np
-import sympy as sp
 
+from ...models.formulations.expressions import Symbol
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Floats, Ints
@@ -199,7 +199,7 @@ class _OsilExpressions(PrefixLanguage):
         """A number."""
         return [b'<number value="', words(values), b'"/>']
 
-    def column(self, symbol: sp.Symbol) -> Pieces:
+    def column(self, symbol: Symbol) -> Pieces:
         """A column, by its place."""
         return [b'<variable idx="', Decimals(self.family.column_of(symbol)), b'"/>']
 

@@ -15,10 +15,10 @@ from typing import Any, Final
 
 import numpy as np
 import pyomo.environ as pyo
-import sympy as sp
 
 from ...models.arguments import check_arguments
 from ...models.field.field import CrossField
+from ...models.formulations.expressions import IN_NUMPY, Expression, Symbol
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.names import element_numbers, is_numbered
 from ...models.formulations.problem import Problem
@@ -35,7 +35,7 @@ _COMPARE: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "<=": operator.le,
     "==": operator.eq,
 }
-_FUNCTIONS: Final = {"cos": pyo.cos, "pi": math.pi}
+_FUNCTIONS: Final = {**IN_NUMPY, "cos": pyo.cos}
 
 
 @check_arguments
@@ -121,27 +121,22 @@ def _constraints(family: PlacedFamily, columns: list[Any]) -> pyo.Constraint:
     """The rows of a family, left and right side as declared."""
     declared = element_indices(family.instance, family.family.over)
     index = [declared[element] for element in family.elements.tolist()]
-    sides = (
-        _values(family, side, columns)
-        for side in (family.family.expression.lhs, family.family.expression.rhs)
-    )
+    relation = family.family.relation
+    sides = (_values(family, side, columns) for side in (relation.left, relation.right))
     compare = _COMPARE[family.family.sense]
     rows = dict(zip(index, (compare(left, right) for left, right in zip(*sides, strict=True)), strict=True))
     return pyo.Constraint(index, rule=lambda _, *place: rows[place])
 
 
-def _values(family: PlacedFamily, expression: sp.Expr, columns: list[Any]) -> Iterator[Any]:
+def _values(family: PlacedFamily, expression: Expression, columns: list[Any]) -> Iterator[Any]:
     """The expression at each element, over Pyomo variables where a symbol denotes a column."""
-    symbols = sorted(expression.free_symbols, key=str)
-    evaluate = sp.lambdify(symbols, expression, modules=[_FUNCTIONS, "math"])
-    values = [_arguments(family, symbol, columns) for symbol in symbols]
-    return (
-        evaluate(*arguments) for arguments in (zip(*values, strict=True) if values else [()] * family.count)
-    )
+    values = {symbol: _arguments(family, symbol, columns) for symbol in expression.symbols}
+    elements = zip(*values.values(), strict=True) if values else [()] * family.count
+    return (expression.evaluate(dict(zip(values, each, strict=True)), _FUNCTIONS) for each in elements)
 
 
-def _arguments(family: PlacedFamily, symbol: sp.Symbol, columns: list[Any]) -> list[Any]:
+def _arguments(family: PlacedFamily, symbol: Symbol, columns: list[Any]) -> list[Any]:
     """Arguments for a symbol at each element: a Pyomo variable or a number."""
     if symbol in family.variables:
         return [columns[column] for column in family.column_of(symbol).tolist()]
-    return np.broadcast_to(family.data(symbol), (family.count,)).tolist()  # type: ignore[no-any-return]
+    return np.broadcast_to(family.datum(symbol), (family.count,)).tolist()  # type: ignore[no-any-return]

@@ -12,8 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Literal
 
-import sympy as sp
-
+from ...models.formulations.expressions import ONE, Expression, Factor, Function, Symbol, Term
 from ...models.formulations.families import PlacedFamily
 from ...models.formulations.symbols import SCALARS, VARIABLES
 from ...models.instance.domain import Floats
@@ -24,19 +23,19 @@ class InfixLanguage(ABC):
     """The form of the leaves of an expression in an algebraic language."""
 
     @abstractmethod
-    def symbol(self, symbol: sp.Symbol) -> Piece:
+    def symbol(self, symbol: Symbol) -> Piece:
         """A symbol."""
 
     @abstractmethod
-    def is_data(self, expression: sp.Expr) -> bool:
+    def is_data(self, expression: Factor) -> bool:
         """Whether an expression is passed to `constant` and `coefficient` as a whole."""
 
     @abstractmethod
-    def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
+    def constant(self, expression: Expression, *, signed: bool) -> Piece:
         """A summand that is data: with its sign and a blank (`- 3`), or with negative numbers in brackets."""
 
     @abstractmethod
-    def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
+    def coefficient(self, expression: Expression, *, signed: bool) -> Piece:
         """A factor that is data, signed or bracketed like `constant`."""
 
     def power(self, base: list[Piece], exponent: int) -> list[Piece]:
@@ -44,70 +43,72 @@ class InfixLanguage(ABC):
         bracketed = base if len(base) == 1 else [b"(", *base, b")"]
         return [*bracketed, f"^{exponent}".encode()]
 
-    def expression(self, expression: sp.Expr) -> list[Piece]:
+    def expression(self, expression: Expression) -> list[Piece]:
         """An expression; its first term has a sign only when it is negative."""
         terms = self._terms(expression)
         return [piece for place, term in enumerate(terms) for piece in self._term(term, signed=place > 0)]
 
-    def outermost(self, expression: sp.Expr) -> list[Piece]:
+    def outermost(self, expression: Expression) -> list[Piece]:
         """An expression that is not part of another: a negative number needs no brackets."""
-        negative = not expression.free_symbols and expression.is_negative
+        negative = not expression.symbols and expression.as_term.constant.ratio < 0
         return [b"-", *self.expression(-expression)] if negative else self.expression(expression)
 
-    def summands(self, expression: sp.Expr) -> list[list[Piece]]:
+    def summands(self, expression: Expression) -> list[list[Piece]]:
         """The terms of an expression, each with its sign."""
         return [self._term(term, signed=True) for term in self._terms(expression)]
 
-    def _terms(self, expression: sp.Expr) -> list[sp.Expr]:
-        """Its terms in a fixed order, with all data as one term, in the place of their first."""
-        terms = expression.as_ordered_terms()
+    def _terms(self, expression: Expression) -> list[Expression]:
+        """Its terms in their order, with all data as one term, in the place of their first."""
+        terms = [Expression((term,)) for term in expression.terms] or [expression]
         data = [term for term in terms if self.is_data(term)]
-        merged = sp.Add(*data)
+        merged = Expression(tuple(part for term in data for part in term.terms))
         return (
             [merged if term is data[0] else term for term in terms if term not in data[1:]] if data else terms
         )
 
-    def _term(self, term: sp.Expr, *, signed: bool) -> list[Piece]:
-        if self.is_data(term):
-            constant = self.constant(term, signed=signed)
+    def _term(self, expression: Expression, *, signed: bool) -> list[Piece]:
+        if self.is_data(expression):
+            constant = self.constant(expression, signed=signed)
             return [b" ", constant] if signed else [constant]
-        number, symbol = term.as_coeff_Mul()
-        if symbol.is_Symbol and number.is_Rational and number.p == 1 < number.q:
-            return [*self._term(symbol, signed=signed), f"/{number.q}".encode()]
-        factors = sorted(term.as_ordered_factors(), key=_rank)
-        coefficient = sp.Mul(*(factor for factor in factors if self.is_data(factor)))
-        rest = [self._factor(factor) for factor in factors if not self.is_data(factor)]
-        product = [piece for place, factor in enumerate(rest) for piece in ([b"*"] if place else []) + factor]
+        (term,) = expression.terms
+        coefficient, rest = term.split(self.is_data)
+        divisor = coefficient.ratio and coefficient.ratio.denominator
+        if divisor and coefficient * divisor == ONE != coefficient and rest[0][1] == 1 == len(rest):
+            return [*self._term(coefficient * divisor * rest[0][0], signed=signed), f"/{divisor}".encode()]
+        factors = [self._factor(factor, power) for factor, power in sorted(rest, key=_rank)]
+        product = [
+            piece for place, factor in enumerate(factors) for piece in ([b"*"] if place else []) + factor
+        ]
         return self._lead(coefficient, signed=signed) + product
 
-    def _lead(self, coefficient: sp.Expr, *, signed: bool) -> list[Piece]:
+    def _lead(self, coefficient: Expression, *, signed: bool) -> list[Piece]:
         """The start of a term before its variables: its sign and its coefficient, unless it is 1."""
-        if abs(coefficient) == 1:
-            minus = coefficient == -1
+        if coefficient in (ONE, -ONE):
+            minus = coefficient != ONE
             return [b" - " if minus else b" + "] if signed else [b"-"] * minus
         number = self.coefficient(coefficient, signed=signed)
         return [b" ", number, b"*"] if signed else [number, b"*"]
 
-    def _factor(self, factor: sp.Expr) -> list[Piece]:
-        if factor.is_Symbol:
-            return [self.symbol(factor)]
-        if factor.is_Add:
-            return [b"(", *self.expression(factor), b")"]
-        if factor.is_Pow and factor.exp.is_Integer and factor.exp >= 2:
-            return self.power(self.expression(factor.base), int(factor.exp))
-        if isinstance(factor, sp.cos | sp.floor):
-            return [f"{factor.func.__name__}(".encode(), *self.expression(factor.args[0]), b")"]
-        raise AssertionError(f"no declaration holds {factor.func}")
+    def _factor(self, factor: Factor, power: int) -> list[Piece]:
+        if isinstance(factor, Symbol):
+            pieces = [self.symbol(factor)]
+        elif isinstance(factor, Function):
+            pieces = [f"{factor.name}(".encode(), *self.expression(factor.argument), b")"]
+        else:
+            inside = self.expression(factor)
+            pieces = inside if power > 1 else [b"(", *inside, b")"]
+        return self.power(pieces, power) if power > 1 else pieces
 
 
-def _rank(factor: sp.Expr) -> tuple[bool, bool, bool]:
+def _rank(factor: tuple[Factor, int]) -> tuple[bool, bool, bool]:
     """Order of the factors of a product: weights, data, variables, and then other expressions."""
-    return not factor.is_Symbol, factor not in SCALARS, str(factor) in VARIABLES
+    base, power = factor
+    return not isinstance(base, Symbol) or power > 1, base not in SCALARS, str(base) in VARIABLES
 
 
-def is_free_of_columns(family: PlacedFamily, expression: sp.Expr) -> bool:
+def is_free_of_columns(family: PlacedFamily, expression: Factor) -> bool:
     """Whether an expression of a family holds no column."""
-    return not expression.free_symbols & set(family.variables)
+    return not expression.symbols & set(family.variables)
 
 
 Operator = Literal["sum", "product", "negative", "square", "cos"]
@@ -127,31 +128,41 @@ class PrefixLanguage(ABC):
         """A number, one per element or one for all."""
 
     @abstractmethod
-    def column(self, symbol: sp.Symbol) -> Pieces:
+    def column(self, symbol: Symbol) -> Pieces:
         """The column of a symbol."""
 
     @abstractmethod
     def node(self, operator: Operator, parts: list[Pieces]) -> Pieces:
         """An operator with its operands: two or more of a sum or a product, one of the others."""
 
-    def expression(self, expression: sp.Expr) -> Pieces:
+    def expression(self, expression: Expression) -> Pieces:
         """An expression."""
-        if is_free_of_columns(self.family, expression):
-            return self.number(self.family.data(expression))
-        if expression.is_Symbol:
-            return self.column(expression)
-        if expression.is_Add or expression.is_Mul:
-            return self._chain(expression)
-        assert isinstance(expression, sp.cos) or expression.exp == 2  # no declaration holds anything else
-        return self.node("square" if expression.is_Pow else "cos", [self.expression(expression.args[0])])
+        parts = [(term, self._is_data(Expression((term,)))) for term in expression.terms]
+        data = Expression(tuple(term for term, is_data in parts if is_data))
+        constant = [self.number(self.family.data(data))] if data.terms else []
+        return self.join("sum", constant + [self._term(term) for term, is_data in parts if not is_data])
 
-    def _chain(self, expression: sp.Expr) -> Pieces:
-        data = [part for part in expression.args if is_free_of_columns(self.family, part)]
-        parts = [self.expression(part) for part in expression.args if part not in data]
-        if expression.is_Mul and data == [-1]:
+    def _is_data(self, expression: Factor) -> bool:
+        return is_free_of_columns(self.family, expression)
+
+    def _term(self, term: Term) -> Pieces:
+        coefficient, rest = term.split(self._is_data)
+        parts = [self._factor(factor, power) for factor, power in rest]
+        if coefficient == -ONE:
             return self.node("negative", [self.join("product", parts)])
-        constant = [self.expression(expression.func(*data))] if data else []
-        return self.join("sum" if expression.is_Add else "product", constant + parts)
+        constant = [] if coefficient == ONE else [self.number(self.family.data(coefficient))]
+        return self.join("product", constant + parts)
+
+    def _factor(self, factor: Factor, power: int) -> Pieces:
+        assert power <= 2  # no declaration holds anything else
+        if isinstance(factor, Symbol):
+            pieces = self.column(factor)
+        elif isinstance(factor, Function):
+            assert factor.name == "cos"  # likewise
+            pieces = self.node("cos", [self.expression(factor.argument)])
+        else:
+            pieces = self.expression(factor)
+        return self.node("square", [pieces]) if power == 2 else pieces
 
     def join(self, operator: Operator, parts: list[Pieces]) -> Pieces:
         """The sum or the product of one part or more."""

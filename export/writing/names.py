@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any, Final
 
-import sympy as sp
-
+from ...models.formulations.expressions import Symbol
 from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.names import column_names, element_names
 from ...models.formulations.problem import Problem
@@ -45,7 +44,7 @@ class Names:
             family.family.tag.encode(), words if family.covers_index_set else words.at(family.elements)
         )
 
-    def at(self, family: PlacedFamily, symbol: sp.Symbol) -> TaggedWords:
+    def at(self, family: PlacedFamily, symbol: Symbol) -> TaggedWords:
         """Name of the symbol's column at each element of a family."""
         block, (_, way), declared = family.block(symbol), family.family.slots[symbol], family.family
         key = (declared.over, way, declared.only, declared.steps)

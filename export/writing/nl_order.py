@@ -13,9 +13,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
+from ...models.formulations.expressions import Symbol
 from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Bools, Ints
@@ -99,7 +99,7 @@ class NlOrder:
         number = np.repeat(np.arange(len(blocks), dtype=np.int8), [block.count for block in blocks])
         return [(blocks[number[self.order[run.start]]], run) for run in equal_runs(number[self.order])]
 
-    def places(self, family: PlacedFamily, symbol: sp.Symbol) -> Ints:
+    def places(self, family: PlacedFamily, symbol: Symbol) -> Ints:
         """Place in the file of the symbol's column at each element of a family."""
         places, inside = self.place[family.block(symbol).slice], family.inside(symbol)
         return places if inside is None else places[inside]

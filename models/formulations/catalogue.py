@@ -1,9 +1,9 @@
 """The formulations, each one function that reads from top to bottom like the paper.
 
-Each yields the terms of its objective and its rows as SymPy expressions over the pixels I, the stroke pixels
-S_c or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the docs are all
-derived from these expressions. Equation numbers are the paper's. Parts of a formulation: declaration.py;
-symbols: symbols.py.
+Each yields the terms of its objective and its rows as expressions over the pixels I, the stroke pixels S_c or
+the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the docs are all derived from
+these expressions. Equation numbers are the paper's. Parts of a formulation: declaration.py; symbols:
+symbols.py; operators and functions: expressions.py.
 """
 
 from __future__ import annotations
@@ -12,8 +12,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from typing import Any, Final
-
-import sympy as sp
 
 from ..field.field import Norm
 from ..instance.instance import Instance
@@ -32,6 +30,7 @@ from .declaration import (
     short_names,
     term,
 )
+from .expressions import Expression, Operand, Symbol, Term, cos, equal
 from .symbols import (
     B_LIFTED,
     OF_SKEW,
@@ -41,6 +40,7 @@ from .symbols import (
     beta,
     beta_i,
     beta_j,
+    change_of_direction,
     constants_of,
     d,
     d_round,
@@ -77,13 +77,13 @@ RIGHT_ONE_NORM: Final = "the 1-norm energy of orthogonal crosses"
 BY_HULL: Final = "z = p1 beta_i at every point with binary p1, by the four facets of its hull"
 BY_ROWS: Final = "the products p1 beta_i stand in the rows"
 
-A_WHOLE: Final = A.subs(p1 + 2 * p2, p)
+A_WHOLE: Final = change_of_direction(p)
 """Change of direction across a pair, with one integer jump."""
-PARITY: Final = omega * (2 * (A_WHOLE**2 + (sp.cos(pi * p) * beta_i - beta_j) ** 2))
+PARITY: Final = omega * (2 * (A_WHOLE**2 + (cos(pi * p) * beta_i - beta_j) ** 2))
 """The smoothness of a pair with one integer jump, (1)-(4)."""
 QUARTIC: Final = omega * (2 * (A**2 + B**2))
 """The smoothness of a pair, (8)."""
-CUBIC: Final = sp.expand(sp.expand(QUARTIC).subs(p1**2, p1))
+CUBIC: Final = QUARTIC.expanded(p1)
 """(8) expanded, with p1^2 = p1: (9)."""
 
 _EXACT: Final = "z = p1 beta_i with the hull facets (26)-(29), exact"
@@ -200,8 +200,8 @@ def qp_fixed() -> Families:
 def miqp_exact() -> Families:
     """2-norm with z = p1 beta by its hull: exactly (8), and convex."""
     yield term("smooth", E, omega * (2 * (d**2 + u**2)))
-    yield row("cd", E, sp.Eq(d, A), "residual of (8)")
-    yield row("cu", E, sp.Eq(u, B_LIFTED), "residual of (8), lifted")
+    yield row("cd", E, equal(d, A), "residual of (8)")
+    yield row("cu", E, equal(u, B_LIFTED), "residual of (8), lifted")
     yield from facets_of_z("hull")
     yield from jump_bounds()
     yield from strokes(norm=2)
@@ -219,7 +219,7 @@ BY_CYCLES: Final = "jumps matter only through their sums along a basis of the cy
 def miqp_orthogonal(limits: bool = False) -> Families:  # noqa: ARG001 - the bounds of d depend on it
     """Orthogonal crosses as in mixed-integer quadrangulation: one integer per pair."""
     yield term("smooth", E, omega * (2 * d**2))
-    yield row("cd", E, sp.Eq(d, A_WHOLE), "residual of (1)")
+    yield row("cd", E, equal(d, A_WHOLE), "residual of (1)")
     yield from strokes(norm=2)
 
 
@@ -268,13 +268,13 @@ def cycles() -> Families:
     They are residuals of a field exactly then.
     """
     turns = holonomy + pi / 2 * k
-    yield row("cyc", C, sp.Eq(d_round, turns), "closed", only=("is_open", 0))
+    yield row("cyc", C, equal(d_round, turns), "closed", only=("is_open", 0))
     yield row(
-        "path", C, sp.Eq(d_round + q_end - q_start, turns), "from stroke to stroke", only=("is_open", 1)
+        "path", C, equal(d_round + q_end - q_start, turns), "from stroke to stroke", only=("is_open", 1)
     )
 
 
-def strokes(norm: int, residual: sp.Expr = R) -> Families:
+def strokes(norm: int, residual: Operand = R) -> Families:
     """The stroke term, (5) or (20), and for the 1-norm its rows (22), (23)."""
     if norm == 2:
         yield term("strokes", S_C, w_strokes * w * residual**2, "(5)")
@@ -344,18 +344,18 @@ def list_formulations(instance: Instance | None = None, *, narrowed: bool = Fals
 
 
 @cache
-def _with_constants(formulation: Formulation, constants: tuple[tuple[sp.Symbol, int], ...]) -> Formulation:
+def _with_constants(formulation: Formulation, constants: tuple[tuple[Symbol, int], ...]) -> Formulation:
     """The formulation with numbers for symbols, without the terms and rows that vanish."""
     numbers = dict(constants)
     vanishing = set(OF_SKEW) & numbers.keys()
     families = [
-        replace(family, expression=family.expression.subs(numbers))
+        replace(family, expression=family.expression.substitute(numbers))
         for family in (*formulation.objective, *formulation.rows)
-        if not (family.is_row and vanishing & family.expression.free_symbols)
+        if not (family.is_row and vanishing & family.expression.symbols)
     ]
     return replace(
         formulation,
-        objective=tuple(family for family in families if not family.is_row and family.expression != 0),
+        objective=tuple(family for family in families if not family.is_row and family.body.terms),
         rows=tuple(family for family in families if family.is_row),
     )
 
@@ -378,7 +378,7 @@ def lift_products(formulation: Formulation) -> Formulation:
     (`Formulation.weakened`). A square stays a square of a linear expression, so that (8) becomes convex; (9)
     stays the expanded polynomial with 4 z beta_j.
     """
-    lifted = tuple(replace(family, expression=_lift(family.expression)) for family in formulation.objective)
+    lifted = tuple(replace(family, expression=_lift(family.body)) for family in formulation.objective)
     return replace(
         formulation,
         objective=lifted,
@@ -387,11 +387,23 @@ def lift_products(formulation: Formulation) -> Formulation:
     )
 
 
-def _lift(expression: sp.Expr) -> sp.Expr:
-    squares_kept = expression.replace(
-        lambda e: e.is_Pow and e.base.is_Add, lambda e: sp.expand(e.base).subs(p1 * beta_i, z) ** e.exp
+def _lift(expression: Expression) -> Expression:
+    """The expression with z for p1 beta_i; squares of sums are kept, and the sums expanded."""
+    inside = expression.map_factors(
+        lambda factor, power: (
+            (_lift(factor.expanded() if power > 1 else factor) if isinstance(factor, Expression) else factor)
+            ** power
+        )
     )
-    return squares_kept.subs(p1 * beta_i, z)
+    return Expression(tuple(map(_lift_term, inside.terms)))
+
+
+def _lift_term(term: Term) -> Term:
+    powers = dict(term.factors)
+    if p1 not in powers or beta_i not in powers:
+        return term
+    powers |= {p1: powers[p1] - 1, beta_i: powers[beta_i] - 1, z: 1}
+    return Term(term.constant, tuple((factor, power) for factor, power in powers.items() if power))
 
 
 __all__ = ["FORMULATIONS", "declaration_of", "short_names"]  # the table and its names come from there

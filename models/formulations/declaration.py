@@ -11,14 +11,14 @@ import difflib
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, reduce
+from operator import add
 from types import MappingProxyType
 from typing import Any, Final, Literal, get_args
 
-import sympy as sp
-
 from ..arguments import check_fields
 from ..errors import FormulationError, shortened
+from .expressions import Expression, Operand, Relation, Symbol, Term, expression_of
 from .symbols import (
     BOUNDED,
     SLOTS,
@@ -51,7 +51,7 @@ class Family:
 
     tag: str
     over: IndexSet
-    expression: sp.Expr
+    expression: Expression | Relation
     paper: str
     only: tuple[str, int] | None = None
     steps: int = 0
@@ -60,39 +60,44 @@ class Family:
     def unrolled(self, steps: int) -> Family:
         """The family for cycles of so many steps alone, with a term for each step."""
         symbols = list(step_slots(steps))
-        total = sp.Add(*(d * sign for d, sign in zip(symbols[:steps], symbols[steps:], strict=True)))
-        expression = self.expression.subs(d_round, total)
+        steps_along = (d * sign for d, sign in zip(symbols[:steps], symbols[steps:], strict=True))
+        expression = self.expression.substitute({d_round: reduce(add, steps_along)})
         return replace(self, tag=f"{self.tag}{steps}", expression=expression, steps=steps, rolled=self)
 
     @property
-    def slots(self) -> dict[sp.Symbol, tuple[str, IndexMap]]:
+    def slots(self) -> dict[Symbol, tuple[str, IndexMap]]:
         """What its symbols mean: quantity and way to it."""
         return step_slots(self.steps) | SLOTS[self.over] if self.steps else SLOTS[self.over]
 
     @property
     def is_row(self) -> bool:
         """Whether the family is a row; otherwise it is a term of the objective."""
-        return bool(self.expression.is_Relational)
+        return isinstance(self.expression, Relation)
 
     @property
-    def body(self) -> sp.Expr:
+    def relation(self) -> Relation:
+        """The expression of a row."""
+        assert isinstance(self.expression, Relation)
+        return self.expression
+
+    @property
+    def body(self) -> Expression:
         """The term itself, or left minus right side of a row."""
         e = self.expression
-        return e.lhs - e.rhs if self.is_row else e
+        return e.left - e.right if isinstance(e, Relation) else e
 
     @property
     def sense(self) -> str:
         """Relation `>=`, `<=` or `==` of a row, empty for a term of the objective."""
-        e = self.expression
-        return {"Eq": "=="}.get(e.func.__name__, e.rel_op) if self.is_row else ""
+        return self.expression.sense if isinstance(self.expression, Relation) else ""
 
     @property
-    def symbols(self) -> list[sp.Symbol]:
+    def symbols(self) -> list[Symbol]:
         """Its symbols that are quantities on the grid, in the order of the notation."""
-        present = self.expression.free_symbols
+        present = self.expression.symbols
         return [symbol for symbol in self.slots if symbol in present]
 
-    def unknowns(self, fixed: tuple[str, ...] = ()) -> list[sp.Symbol]:
+    def unknowns(self, fixed: tuple[str, ...] = ()) -> list[Symbol]:
         """Its symbols that denote variables, without the fixed ones."""
         return [
             symbol
@@ -101,15 +106,15 @@ class Family:
         ]
 
 
-def term(tag: str, over: IndexSet, expression: sp.Expr, paper: str = "") -> Family:
+def term(tag: str, over: IndexSet, expression: Operand, paper: str = "") -> Family:
     """A term of the objective: the sum over an index set. paper: by default the formulation's section."""
-    return Family(tag, over, expression, paper)
+    return Family(tag, over, expression_of(expression), paper)
 
 
 def row(
     number: int | str,
     over: IndexSet,
-    relation: sp.Expr,
+    relation: Relation,
     paper: str = "",
     *,
     only: tuple[str, int] | None = None,
@@ -302,34 +307,31 @@ class Formulation:
 def _is_convex(objective: tuple[Family, ...], rows: tuple[Family, ...], fixed: tuple[str, ...]) -> bool:
     """Whether families are convex as written; cached, because the sets of families are few."""
     return all(_degree(family.body, family.unknowns(fixed)) <= 1 for family in rows) and all(
-        _is_sum_of_squares(family.expression, family.unknowns(fixed)) for family in objective
+        _is_sum_of_squares(family.body, family.unknowns(fixed)) for family in objective
     )
 
 
-def _is_sum_of_squares(expression: sp.Expr, unknowns: list[sp.Symbol]) -> bool:
+def _is_sum_of_squares(expression: Expression, unknowns: list[Symbol]) -> bool:
     """Whether every term is linear, or a square of a linear expression that is added."""
-    return all(_is_square(summand, unknowns) for summand in sp.Add.make_args(expression))
+    return all(_is_square(summand, unknowns) for summand in expression.terms)
 
 
-def _is_square(summand: sp.Expr, unknowns: list[sp.Symbol]) -> bool:
-    if _degree(summand, unknowns) <= 1:
+def _is_square(summand: Term, unknowns: list[Symbol]) -> bool:
+    if _degree(Expression((summand,)), unknowns) <= 1:
         return True
-    number, rest = summand.as_coeff_Mul()
-    factors = [factor for factor in sp.Mul.make_args(rest) if factor.free_symbols & set(unknowns)]
-    if len(factors) != 1 or number < 0:
+    factors = [factor for factor in summand.factors if factor[0].symbols & set(unknowns)]
+    if len(factors) != 1 or summand.constant.ratio < 0:
         return False
-    if factors[0].is_Add:  # times a weight
-        return _is_sum_of_squares(factors[0], unknowns)
-    return bool(factors[0].is_Pow and factors[0].exp == 2 and _degree(factors[0].base, unknowns) == 1)
+    base, power = factors[0]
+    if power == 1 and isinstance(base, Expression):  # times a weight
+        return _is_sum_of_squares(base, unknowns)
+    return power == 2 and _degree(expression_of(base), unknowns) == 1
 
 
-def _degree(expression: sp.Expr, unknowns: list[sp.Symbol]) -> float:
+def _degree(expression: Expression, unknowns: list[Symbol]) -> float:
     """Degree in the unknowns; infinite for an expression that is not a polynomial."""
-    if not unknowns:
-        return 0
-    if not expression.is_polynomial(*unknowns):
-        return float("inf")
-    return int(sp.Poly(expression, *unknowns).total_degree())
+    terms = expression.polynomial(unknowns)
+    return float("inf") if terms is None else max(map(len, terms), default=0)
 
 
 _TABLE: Final[dict[str, Declaration]] = {}

@@ -9,16 +9,16 @@ from functools import cache, cached_property, reduce
 from typing import Any, Final
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from .declaration import Family
-from .symbols import SCALARS, IndexSet, index_map, numpy_function, values_at
+from .expressions import Expression, Symbol
+from .symbols import SCALARS, IndexSet, index_map, values_at
 
 Coefficient = float | Floats
-Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]
+Monomials = tuple[tuple[tuple[Symbol, ...], Expression], ...]
 """Symbols, each repeated as often as its power, and a coefficient without these symbols."""
 
 _NOISE: Final = 1e-12
@@ -54,7 +54,7 @@ class Monomial:
     """A monomial of a family: symbols, each as often as its power, and coefficient (one or (count,))."""
 
     family: PlacedFamily
-    symbols: tuple[sp.Symbol, ...]
+    symbols: tuple[Symbol, ...]
     coefficient: Coefficient
 
     @property
@@ -88,22 +88,22 @@ class PlacedFamily:
         return len(self.elements)
 
     @cached_property
-    def variables(self) -> tuple[sp.Symbol, ...]:
+    def variables(self) -> tuple[Symbol, ...]:
         """Symbols that mean columns."""
         slots = self.family.slots
         return tuple(symbol for symbol in self.family.symbols if slots[symbol][0] in self.blocks)
 
-    def column_of(self, symbol: sp.Symbol) -> Ints:
+    def column_of(self, symbol: Symbol) -> Ints:
         """Column of the symbol at each element, shape (count,)."""
         block, inside = self.block(symbol), self.inside(symbol)
         places = np.arange(block.count, dtype=np.int32) if inside is None else inside
         return places + np.int32(block.offset)
 
-    def block(self, symbol: sp.Symbol) -> Block:
+    def block(self, symbol: Symbol) -> Block:
         """The block of columns that a symbol means."""
         return self.blocks[self.family.slots[symbol][0]]
 
-    def inside(self, symbol: sp.Symbol) -> Ints | None:
+    def inside(self, symbol: Symbol) -> Ints | None:
         """The symbol's place in its block at each element, (count,); None: the element's own."""
         index = index_map(self.instance, self.family.slots[symbol][1])
         if isinstance(index, slice):
@@ -115,15 +115,13 @@ class PlacedFamily:
         """Whether its elements are the whole index set."""
         return self.family.only is None
 
-    def data(self, expression: sp.Expr) -> Coefficient:
+    def data(self, expression: Expression) -> Coefficient:
         """Value of an expression free of columns: a number, or an array (count,)."""
-        symbols = sorted(expression.free_symbols, key=str)
-        if not symbols:
-            return float(expression)
-        value = numpy_function(symbols, expression)(*(self._datum(symbol) for symbol in symbols))
+        value = expression.evaluate({symbol: self.datum(symbol) for symbol in expression.symbols})
         return value if np.ndim(value) else float(value)
 
-    def _datum(self, symbol: sp.Symbol) -> Any:
+    def datum(self, symbol: Symbol) -> Any:
+        """Value of a symbol that means no column: a number, or an array (count,)."""
         if symbol in SCALARS:
             return getattr(self.instance, SCALARS[symbol])
         name, kind = self.family.slots[symbol]
@@ -161,10 +159,11 @@ class PlacedFamily:
 
     def values(self, point: Floats) -> Floats:
         """The expression (of a row: left minus right side) at a point, shape (count,)."""
-        symbols = sorted(self.family.body.free_symbols, key=str)
-        evaluate = numpy_function(symbols, self.family.body)
-        arguments = (point[self.column_of(s)] if s in self.variables else self._datum(s) for s in symbols)
-        return np.broadcast_to(np.asarray(evaluate(*arguments), dtype=float), (self.count,))
+        values = {
+            symbol: point[self.column_of(symbol)] if symbol in self.variables else self.datum(symbol)
+            for symbol in self.family.body.symbols
+        }
+        return np.broadcast_to(np.asarray(self.family.body.evaluate(values), dtype=float), (self.count,))
 
     def excess(self, point: Floats) -> Floats:
         """By how much a point breaks each row, shape (count,): 0 or less where it holds."""
@@ -184,26 +183,13 @@ def row_sides(families: Iterable[PlacedFamily]) -> tuple[Floats, Floats]:
 
 
 @cache
-def monomials(family: Family, variables: tuple[sp.Symbol, ...]) -> Monomials | None:
+def monomials(family: Family, variables: tuple[Symbol, ...]) -> Monomials | None:
     """The monomials of a declaration by degree, constant included; None if it is not a polynomial.
 
-    Declarations are few and fixed: SymPy expands each once, for any number of instances.
+    Declarations are few and fixed: each is expanded once, for any number of instances.
     """
-    if not variables:
-        return (((), family.body),)
-    if family.steps:  # linear, in more variables than a dense polynomial should have
-        split = sp.expand(family.body).as_coefficients_dict(*variables)
-        return (((), split[sp.S.One]), *(((symbol,), split[symbol]) for symbol in variables))
-    try:
-        terms = sp.Poly(family.body, *variables).terms()
-    except sp.PolynomialError:
-        return None
-    terms = sorted(terms, key=lambda term: (sum(term[0]), tuple(-power for power in term[0])))
-    return tuple(
-        (tuple(s for s, power in zip(variables, powers, strict=True) for _ in range(power)), value)
-        for powers, value in terms
-        if value != 0
-    )
+    terms = family.body.polynomial(variables)
+    return None if terms is None else tuple(terms.items())
 
 
 def merge_terms(

@@ -3,7 +3,7 @@
 Columns, rows and terms as arrays; values and violations at points.
 
 Writers, solvers and readers see a Problem and never a formulation's name. All arrays come from the
-declaration: SymPy splits an expression into monomials once per family, index arrays do the rest.
+declaration: an expression is split into monomials once per family, index arrays do the rest.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import sympy as sp
 
 from ..arguments import check_arguments, check_kind, float_array, whole_numbers
 from ..errors import FormulationError, InputError
@@ -26,6 +25,7 @@ from ..instance.instance import Instance
 from ..previews import table_of
 from .catalogue import declare, lift_products, norm_of, reason_against
 from .declaration import Family, Formulation
+from .expressions import Operand, expression_of
 from .families import ANY_DEGREE, Block, PlacedFamily, merge_terms
 from .residuals import angles_and_jumps, residual_data
 from .symbols import (
@@ -36,7 +36,6 @@ from .symbols import (
     Variable,
     constants_of,
     count_elements,
-    numpy_function,
     values_at,
 )
 from .windows import Windows
@@ -204,7 +203,8 @@ class Problem:
             variable = self.variable(name)
             shape = (count_elements(self.instance, variable.over),)
             lower, upper = (
-                np.broadcast_to(self._value(bound), shape) for bound in (variable.lower, variable.upper)
+                np.broadcast_to(unbounded if bound is None else self._value(bound), shape)
+                for bound, unbounded in ((variable.lower, -np.inf), (variable.upper, np.inf))
             )
             integer = variable.integer and not self.formulation.options.relax
             if self.pinned is not None and variable.integer:
@@ -214,12 +214,11 @@ class Problem:
             offset += shape[0]
         return blocks
 
-    def _value(self, bound: sp.Expr) -> Floats:
+    def _value(self, bound: Operand) -> Floats:
         """Values of a bound: one for each element, or one for all."""
-        symbols = sorted(bound.free_symbols, key=str)
-        return np.asarray(
-            numpy_function(symbols, bound)(*(self.data[str(symbol)] for symbol in symbols)), np.float64
-        )
+        expression = expression_of(bound)
+        values = {symbol: self.data[symbol.name] for symbol in expression.symbols}
+        return np.asarray(expression.evaluate(values), np.float64)
 
     @property
     def n_columns(self) -> int:
@@ -464,11 +463,14 @@ def _at_field(problem: Problem, name: str, quantities: dict[str, Any]) -> Floats
     if name in quantities:
         return np.asarray(quantities[name], dtype=np.float64)
     variable = VARIABLES[name]
-    sources, value = problem.data | quantities, variable.value.subs(constants_of(problem.instance))
-    symbols = sorted(value.free_symbols, key=str)
-    slots = (SLOTS[variable.over][symbol] for symbol in symbols)
-    arguments = (values_at(problem.instance, kind, sources[quantity]) for quantity, kind in slots)
-    return np.asarray(numpy_function(symbols, value)(*arguments), dtype=np.float64)
+    value = expression_of(variable.value).substitute(constants_of(problem.instance))
+    sources, slots = problem.data | quantities, SLOTS[variable.over]
+    values = {
+        symbol: values_at(problem.instance, kind, sources[quantity])
+        for symbol in value.symbols
+        for quantity, kind in [slots[symbol]]
+    }
+    return np.asarray(value.evaluate(values), dtype=np.float64)
 
 
 def stamp_of(sha256: str) -> str:

@@ -9,16 +9,15 @@ the cycles, d_round is the sum of d along a cycle: `Family.unrolled` writes it a
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, Final, Literal
 
 import numpy as np
-import sympy as sp
 
 from ..instance.domain import Ints
 from ..instance.instance import Instance
+from .expressions import ONE, PI, ZERO, Expression, Operand, Symbol, absolute, floor, parity
 
 IndexSet = Literal["pixels", "strokes", "pairs", "cycles"]
 IndexMap = Literal["itself", "first", "second", "stroke", "round", "start", "end"] | tuple[str, int]
@@ -27,28 +26,30 @@ the sum along it, the stroke at its start or end, and (`pair` or `place`, step).
 """
 
 
-def _symbol(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
-
-
-alpha, beta, gamma, psi = (_symbol(name) for name in ("alpha", "beta", "gamma", "psi"))
-alpha_i, alpha_j, beta_i, beta_j = (_symbol(name) for name in ("alpha_i", "alpha_j", "beta_i", "beta_j"))
-p, p1, p2, s, t, z, d, u = (_symbol(name) for name in ("p", "p1", "p2", "s", "t", "z", "d", "u"))
+alpha, beta, gamma, psi = (Symbol(name) for name in ("alpha", "beta", "gamma", "psi"))
+alpha_i, alpha_j, beta_i, beta_j = (Symbol(name) for name in ("alpha_i", "alpha_j", "beta_i", "beta_j"))
+p, p1, p2, s, t, z, d, u = (Symbol(name) for name in ("p", "p1", "p2", "s", "t", "z", "d", "u"))
 q, k, d_round, p_round, q_start, q_end = (
-    _symbol(name) for name in ("q", "k", "d_round", "p_round", "q_start", "q_end")
+    Symbol(name) for name in ("q", "k", "d_round", "p_round", "q_start", "q_end")
 )
 d_max, q_max, k_min, k_max, holonomy = (
-    _symbol(name) for name in ("d_max", "q_max", "k_min", "k_max", "holonomy")
+    Symbol(name) for name in ("d_max", "q_max", "k_min", "k_max", "holonomy")
 )
-p_min, p_max, theta, w = (_symbol(name) for name in ("p_min", "p_max", "theta", "w"))
+p_min, p_max, theta, w = (Symbol(name) for name in ("p_min", "p_max", "theta", "w"))
 alpha_lo, alpha_up, beta_lo, beta_up = (
-    _symbol(name) for name in ("alpha_lo", "alpha_up", "beta_lo", "beta_up")
+    Symbol(name) for name in ("alpha_lo", "alpha_up", "beta_lo", "beta_up")
 )
-w_strokes, w_beta, kappa, omega = (_symbol(name) for name in ("w_strokes", "w_beta", "kappa", "omega"))
-pi: Final = sp.pi
+w_strokes, w_beta, kappa, omega = (Symbol(name) for name in ("w_strokes", "w_beta", "kappa", "omega"))
+pi: Final = PI
 
-A: Final = alpha_i - alpha_j + kappa + pi / 2 * (p1 + 2 * p2)
-"""Change of direction across a pair, (8); kappa turns the frame of the first point into the second's."""
+
+def change_of_direction(jump: Operand) -> Expression:
+    """Change of direction across a pair; kappa turns the frame of the first point into the second's."""
+    return alpha_i - alpha_j + kappa + pi / 2 * jump
+
+
+A: Final = change_of_direction(p1 + 2 * p2)
+"""Change of direction across a pair, (8)."""
 B: Final = (1 - 2 * p1) * beta_i - beta_j
 """Change of skew across a pair, bilinear, (8)."""
 B_LIFTED: Final = beta_i - 2 * z - beta_j
@@ -61,23 +62,21 @@ R: Final = alpha + beta - theta
 class Variable:
     """A block of columns: one variable per element of an index set.
 
-    lower, upper: its bounds, numbers or expressions in data over its index set. Every format, NumPy and the
+    lower, upper: its bounds, expressions in data over its index set, or None. Every format, NumPy and the
     formulas of the docs are derived from them. value: the variable at a given field, as an expression over
     its index set. meaning: one line for the docs.
     """
 
     name: str
     over: IndexSet
-    lower: sp.Expr
-    upper: sp.Expr
-    value: sp.Expr
+    lower: Operand | None
+    upper: Operand | None
+    value: Operand
     meaning: str
     integer: bool = field(default=False, kw_only=True)
 
 
-_FREE: Final = sp.oo
 _QUARTER: Final = pi / 4
-_ZERO: Final = sp.Integer(0)
 
 VARIABLES: Final = {
     variable.name: variable
@@ -85,19 +84,19 @@ VARIABLES: Final = {
         Variable("alpha", "pixels", alpha_lo, alpha_up, alpha, "direction of the cross"),
         Variable("beta", "pixels", -_QUARTER, _QUARTER, beta, "skew of the cross"),
         Variable("p", "pairs", p_min, p_max, p, "jump between the labels of two neighbours", integer=True),
-        Variable("p1", "pairs", _ZERO, sp.Integer(1), sp.Mod(p, 2), "1 when the jump is odd", integer=True),
-        Variable("p2", "pairs", sp.floor(p_min / 2), sp.floor(p_max / 2), sp.floor(p / 2),
+        Variable("p1", "pairs", ZERO, ONE, parity(p), "1 when the jump is odd", integer=True),
+        Variable("p2", "pairs", floor(p_min / 2), floor(p_max / 2), floor(p / 2),
                  "half of the even part of the jump", integer=True),
-        Variable("s", "pairs", _ZERO, _FREE, sp.Abs(A), "absolute change of direction"),
-        Variable("t", "pairs", _ZERO, _FREE, sp.Abs(B), "absolute change of skew"),
+        Variable("s", "pairs", ZERO, None, absolute(A), "absolute change of direction"),
+        Variable("t", "pairs", ZERO, None, absolute(B), "absolute change of skew"),
         Variable("z", "pairs", -_QUARTER, _QUARTER, p1 * beta_i,
                  "the product of p1 and beta of the first pixel"),
-        Variable("d", "pairs", -_FREE, _FREE, A, "change of direction"),
-        Variable("u", "pairs", -_FREE, _FREE, B, "change of skew"),
+        Variable("d", "pairs", None, None, A, "change of direction"),
+        Variable("u", "pairs", None, None, B, "change of skew"),
         Variable("q", "strokes", -q_max, q_max, R, "deviation from a stroke"),
         Variable("k", "cycles", k_min, k_max, p_round, "quarter turns along a cycle", integer=True),
-        Variable("gamma", "strokes", _ZERO, _FREE, sp.Abs(R), "absolute deviation from a stroke"),
-        Variable("psi", "pixels", _ZERO, _FREE, sp.Abs(beta), "absolute skew"),
+        Variable("gamma", "strokes", ZERO, None, absolute(R), "absolute deviation from a stroke"),
+        Variable("psi", "pixels", ZERO, None, absolute(beta), "absolute skew"),
     )
 }  # fmt: skip
 """Every variable of every formulation, in the order of columns."""
@@ -108,7 +107,7 @@ NARROWED: Final = VARIABLES | {"beta": replace(VARIABLES["beta"], lower=beta_lo,
 BOUNDED: Final = VARIABLES | {"d": replace(VARIABLES["d"], lower=-d_max, upper=d_max)}
 """`VARIABLES` for orthogonal crosses, whose residuals have bounds in every optimum."""
 
-SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, IndexMap]]]] = {
+SLOTS: Final[dict[IndexSet, dict[Symbol, tuple[str, IndexMap]]]] = {
     "pixels": {
         symbol: (symbol.name, "itself") for symbol in (alpha, beta, psi, alpha_lo, alpha_up, beta_lo, beta_up)
     },
@@ -143,11 +142,11 @@ SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, IndexMap]]]] = {
 
 
 @cache
-def step_slots(count: int) -> dict[sp.Symbol, tuple[str, IndexMap]]:
+def step_slots(count: int) -> dict[Symbol, tuple[str, IndexMap]]:
     """The slots of d at each of some steps of a cycle, and then of the signs of these steps."""
     numbers = range(count)
     return {
-        _symbol(f"{name}_{step:04d}"): (name, (way, step))
+        Symbol(f"{name}_{step:04d}"): (name, (way, step))
         for name, way in (("d", "pair"), ("sign", "place"))
         for step in numbers
     }
@@ -206,14 +205,14 @@ def count_elements(instance: Instance, over: IndexSet) -> int:
     return sizes[over]
 
 
-def constants_of(instance: Instance | None, *, orthogonal: bool = False) -> dict[sp.Symbol, int]:
+def constants_of(instance: Instance | None, *, orthogonal: bool = False) -> dict[Symbol, int]:
     """Symbols that are numbers on this instance's domain, and these numbers.
 
     On a grid, and without an instance, kappa is 0; without weights of pairs omega is 1. Where crosses are
     orthogonal, beta is 0, and so are the variables that only measure it. orthogonal: whether they are without
     an instance.
     """
-    constants: dict[sp.Symbol, int] = {}
+    constants: dict[Symbol, int] = {}
     if instance is None or instance.domain.kappa is None:
         constants[kappa] = 0
     if instance is None or instance.pair_weights is None:
@@ -250,17 +249,3 @@ def point_of(instance: Instance, over: IndexSet) -> Ints:
     if over == "pairs":
         return instance.domain.first
     return instance.stroke_index
-
-
-def numpy_function(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., Any]:
-    """A NumPy function of the symbols that evaluates the expression over whole arrays."""
-    return _compile_expression(tuple(arguments), expression)
-
-
-@cache
-def _compile_expression(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
-    """The compiled expression; declarations are few and fixed, so each is compiled once.
-
-    The module itself, not its name: for the name SymPy imports all of NumPy, f2py and testing too.
-    """
-    return sp.lambdify(arguments, expression, modules=np, cse=True)  # type: ignore[no-any-return]

@@ -12,17 +12,17 @@ from dataclasses import replace
 from types import ModuleType
 from unittest.mock import patch
 
-import sympy as sp
 from crossfield.export import solvers_table
 from crossfield.export.formats import lp, registry
 from crossfield.models.formulations import declaration, symbols
 from crossfield.models.formulations.catalogue import jump_bounds, skew, strokes
 from crossfield.models.formulations.declaration import E, formulation, row, term
+from crossfield.models.formulations.expressions import ZERO, Symbol, absolute
 
-v = sp.Symbol("v", real=True)
+v = Symbol("v")
 """The new symbol: the absolute change of direction across a pair."""
 
-VARIABLE = symbols.Variable("v", "pairs", sp.Integer(0), sp.oo, sp.Abs(symbols.A), "change of direction")
+VARIABLE = symbols.Variable("v", "pairs", ZERO, None, absolute(symbols.A), "change of direction")
 FORMAT = registry.Format("toy", "LP with another suffix", 2, "toy", command="toy {model} {answer}")
 SOLVER = replace(solvers_table.SOLVERS["highs"], name="twin", title="Twin", formats=("mps", "toy"))
 

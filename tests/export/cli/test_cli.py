@@ -239,8 +239,8 @@ def test_wrong_usage_has_exit_code_2(arguments, tmp_path, monkeypatch, capsys):
 
 
 HEAVY = {
-    "scipy", "numba", "matplotlib", "PIL", "casadi", "highspy", "pyomo", "jinja2", "distributed", "rich",
-    "crossfield.models.proof", "crossfield.models.search", "crossfield.export.library",
+    "scipy", "sympy", "numba", "matplotlib", "PIL", "casadi", "highspy", "pyomo", "jinja2", "distributed",
+    "rich", "crossfield.models.proof", "crossfield.models.search", "crossfield.export.library",
     "crossfield.export.solving",
 }  # fmt: skip
 
@@ -257,7 +257,7 @@ def modules_of(*arguments):
 
 
 def test_help_loads_nothing_heavy():
-    assert not modules_of("--help") & (HEAVY - {"rich"} | {"numpy", "sympy", "jsonschema"})
+    assert not modules_of("--help") & (HEAVY - {"rich"} | {"numpy", "jsonschema"})
 
 
 def test_files_are_written_and_read_without_solvers_proofs_and_libraries(crossfield, instance, instance_file):

@@ -42,15 +42,21 @@ def objective_at(name, field, **options):
 # formulas
 
 
-def test_9_is_8_expanded_for_a_binary_p1():
-    a, b, x, y, p1, p2 = n.alpha_i, n.alpha_j, n.beta_i, n.beta_j, n.p1, n.p2
+@pytest.fixture(scope="module")
+def to_sympy(docs_module):
+    """The function that passes an expression to SymPy."""
+    return docs_module("latex").to_sympy
+
+
+def test_9_is_8_expanded_for_a_binary_p1(to_sympy):
+    a, b, x, y, p1, p2 = map(to_sympy, (n.alpha_i, n.alpha_j, n.beta_i, n.beta_j, n.p1, n.p2))
     pi = sp.pi
     printed = 2 * (
         a**2 + b**2 - 2 * a * b + pi * a * p1 - pi * b * p1 + 2 * pi * a * p2 - 2 * pi * b * p2
         + (pi / 2) ** 2 * p1 + pi**2 * p1 * p2 + pi**2 * p2**2 + x**2 + y**2 - 2 * x * y + 4 * x * y * p1
     )  # fmt: skip
     on_grid = {n.kappa: 0, n.omega: 1}
-    quartic, cubic = QUARTIC.subs(on_grid), CUBIC.subs(on_grid)
+    quartic, cubic = (to_sympy(declared.substitute(on_grid)) for declared in (QUARTIC, CUBIC))
     assert sp.expand(cubic - printed) == 0
     for parity in (0, 1):
         assert sp.expand((quartic - printed).subs(p1, parity)) == 0
@@ -59,15 +65,16 @@ def test_9_is_8_expanded_for_a_binary_p1():
     assert sp.Poly(cubic, a, b, x, y, p1, p2).total_degree() == 3
 
 
-def test_parity_is_8_for_whole_jumps():
+def test_parity_is_8_for_whole_jumps(to_sympy):
     half = sp.Symbol("half", integer=True)
+    p, p2 = to_sympy(n.p), to_sympy(n.p2)
     for parity in (0, 1):
-        jump = {n.p: 2 * half + parity}
-        split = {n.p1: parity, n.p2: half}
-        assert sp.expand(sp.simplify(PARITY.subs(jump)) - QUARTIC.subs(split)) == 0
+        whole = to_sympy(PARITY).subs(p, 2 * half + parity)
+        split = to_sympy(QUARTIC.substitute({n.p1: parity})).subs(p2, half)
+        assert sp.expand(sp.simplify(whole) - split) == 0
 
 
-def test_hull_facets_force_the_product_and_the_printed_one_does_not():
+def test_hull_facets_force_the_product_and_the_printed_one_does_not(to_sympy):
     """By (26)-(29) at a binary p1 the interval left to z is the product; as printed,
     p1 = 0 leaves one open.
     """
@@ -75,12 +82,13 @@ def test_hull_facets_force_the_product_and_the_printed_one_does_not():
         rows = [
             f
             for f in declare("milp-mccormick", facet=facet).rows
-            if n.z in f.expression.free_symbols and n.t not in f.expression.free_symbols
+            if n.z in f.symbols and n.t not in f.symbols
         ]
         for p1, beta in product((0, 1), np.linspace(-QUARTER, QUARTER, 7)):
             low, high = -QUARTER, QUARTER  # the bounds of z
             for family in rows:
-                end = float(sp.solve(family.body.subs({n.p1: p1, n.beta_i: beta}), n.z)[0])
+                given = to_sympy(family.body.substitute({n.p1: p1})).subs(to_sympy(n.beta_i), beta)
+                end = float(sp.solve(given, to_sympy(n.z))[0])
                 low, high = (max(low, end), high) if family.sense == ">=" else (low, min(high, end))
             if facet == "hull" or p1 == 1:
                 assert (low, high) == pytest.approx((p1 * beta, p1 * beta), abs=1e-15)
