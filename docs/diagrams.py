@@ -5,6 +5,7 @@ Every figure is computed. Lines, strokes and singularities have the colours of a
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -20,16 +21,20 @@ from crossfield.export.pictures.draw import fixed_settings
 from crossfield.export.pictures.marks import BORDER, FAINT, FAMILIES, POSITIVE, STROKE
 from crossfield.export.pictures.panels import PanelContent, draw_surface
 from crossfield.export.pictures.streamlines import align_labels
-from crossfield.export.pictures.underlay import read_underlay
-from crossfield.export.shading.raster import view_of_grid
+from crossfield.export.pictures.underlay import Underlay, read_underlay
+from crossfield.export.shading.colours import shade_by_light
+from crossfield.export.shading.raster import grid_box, raster, view_of_grid
 from crossfield.export.surfaces.files import draw_strokes
+from crossfield.export.surfaces.outline import find_outline
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
+from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.smooth.polyvector import HOLDS
 from matplotlib.figure import Figure
+from PIL import Image
 
 U, V = FAMILIES
 GREY, FILL = "#7a7a7a", "#dfe9f5"
@@ -89,33 +94,62 @@ def panel(
     return axes, content
 
 
-def draw_mouse(axes: Any, content: PanelContent) -> None:
+def drawing_of(instance: Instance) -> Underlay:
+    """The drawing of a sample; of a computed one, the curvature lines whose pixels are strokes."""
+    if SAMPLES[instance.name].kind == "sketch":
+        return read_underlay(instance.name, on=instance)
+    segments = cf.analytic(instance.name, max(instance.mask.shape)).segments
+    breaks = np.flatnonzero((segments[1:, 0] != segments[:-1, 1]).any(axis=1)) + 1
+    return Underlay(grid_box(instance), {"red": np.split(segments, breaks)}, ("", ""), None)
+
+
+def draw_drawing(axes: Any, content: PanelContent) -> None:
     """The drawing from which the instance of a panel was read."""
     instance = content.instance
-    ink = draw_strokes(
-        instance, read_underlay("mouse", on=instance), view_of_grid(instance, round(2 * content.unit))
-    )
-    draw_smooth_image(axes, ink, content.extent)
+    view = view_of_grid(instance, round(2 * content.unit))
+    draw_smooth_image(axes, draw_strokes(instance, drawing_of(instance), view), content.extent)
 
 
 def strokes(figure: Figure) -> None:
     """The drawing, and its stroke pixels, each with its direction."""
     axes, content = panel(figure, mouse(20), PAGE)
     frame = content.frame
-    draw_mouse(axes, content)
+    draw_drawing(axes, content)
     paint(axes, [frame.sides("#e4e4e4", 0.6, between=True), frame.sides(BORDER, 0.9)])
     paint(axes, frame.strokes(STROKE, 3.0))
 
 
 def front(figure: Figure) -> None:
-    """The drawing, the lines of the field, and the surface, for README and home page: without words."""
-    field = mouse(48)
+    """The row of the mouse, for README and home page."""
+    draw_row(figure, mouse(48))
+
+
+def draw_row(figure: Figure, field: CrossField) -> None:
+    """The drawing of a sample, the lines of its field, and the surface, without words."""
     width, pitch = 0.64 * PAGE, 0.68 * PAGE
     panels = [panel(figure, field, width, 4, number * pitch) for number in range(3)]
-    (drawing, content), (lines, _), (shape, _) = panels
-    draw_mouse(drawing, content)
+    (strokes_of, content), (lines, _), (shape, _) = panels
+    draw_drawing(strokes_of, content)
     paint(lines, content.frame.streamlines(field, 1.1, 7.0))
-    draw_surface(shape, replace(content, surface=cf.surface(field)))
+    paint(lines, content.frame.singularities(field, 3.0))
+    instance, drawing = field.instance, drawing_of(field.instance)
+    outline = find_outline(instance, drawing) if SAMPLES[instance.name].kind == "sketch" else None
+    view = view_of_grid(instance, round(2 * content.unit))
+    shaded = raster(instance, cf.surface(field).normals, view, outline=outline)
+    draw_smooth_image(shape, shade_by_light(shaded), content.extent)
+
+
+def draw_sample(name: str, path: Path) -> None:
+    """Draw the row of a sample as a PNG; the longer side of each grid has the same length."""
+    field = cf.bend_field(cf.polyvector_field(cf.sample(name, 48), hold=max(HOLDS)))
+    height = 0.64 * PAGE * field.instance.grid.height / max(field.instance.mask.shape) + 8
+    with fixed_settings(STYLE):
+        figure = Figure(figsize=(2 * PAGE / 72, height / 72))
+        draw_row(figure, field)
+        stream = io.BytesIO()
+        figure.savefig(stream, dpi=110, metadata={"Software": None})
+    with Image.open(stream) as picture:
+        picture.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def crosses(figure: Figure) -> None:
@@ -186,7 +220,7 @@ def surface(figure: Figure) -> None:
 
 def strip(figure: Figure) -> None:
     """The strip of all crosses with its edges glued, and the windows of both gauges for a stroke."""
-    left, right = figure.subplots(1, 2, width_ratios=(1.25, 1))
+    left, right = figure.subplots(2, 1, height_ratios=(1.35, 1))
     bare(left, "all crosses: a strip, glued with a twist", equal=False)
     left.add_patch(mpl.patches.Rectangle((0, -45), 90, 90, facecolor=FILL, edgecolor="none"))
     for x, (low, high) in ((0, (-45, 45)), (90, (45, -45))):
@@ -241,7 +275,7 @@ def facets(figure: Figure) -> None:
         )
         axes.fill_between(degrees(beta), degrees(hull), degrees(upper), color="#9db9dd", label="hull")
         if p1 in {0.0, 1.0}:
-            axes.plot(degrees(beta), degrees(p1 * beta), color=V, linewidth=2.4, label="z = p1 β")
+            axes.plot(degrees(beta), degrees(p1 * beta), color="#333", linewidth=2.4, label="z = p1 β")
         axes.set(
             title=f"p1 = {p1:g}",
             xlabel="β",
@@ -252,7 +286,7 @@ def facets(figure: Figure) -> None:
         )
         axes.spines[["top", "right"]].set_visible(False)
     shown[0].set_ylabel("z")
-    shown[0].legend(loc="upper left", frameon=False, fontsize=9)
+    figure.legend(*shown[0].get_legend_handles_labels(), loc="outside upper center", frameon=False, ncols=3)
 
 
 def singular(figure: Figure) -> None:
@@ -334,9 +368,9 @@ FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float, float]]] 
     "first_singularity": (singularity, PAGE / 72, 3.8, 13),
     "first_surface": (surface, PAGE / 72, 3.95, 13),
     "formulation_sizes": (sizes, PAGE / 72, 15 * ROW / 72, 10),
-    "math_strip": (strip, 8.6, 3.4, 11),
-    "math_facets": (facets, 7.6, 2.9, 11),
-    "math_singularities": (singular, 6.0, 3.1, 11),
+    "math_strip": (strip, PAGE / 72, 5.4, 11),
+    "math_facets": (facets, PAGE / 72, 2.5, 10),
+    "math_singularities": (singular, PAGE / 72, 2.6, 10),
 }
 """File -> drawing function, width and height in inches, points of its words."""
 

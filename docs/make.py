@@ -9,7 +9,9 @@ import csv
 import io
 import re
 import shlex
+import shutil
 import sys
+import tempfile
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -27,7 +29,6 @@ from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from crossfield.models.instance.symmetries import turned
 from crossfield.models.sketch.samples import SAMPLES
 from latex import aligned, domain, objective_and_rows
-from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
 
@@ -262,36 +263,36 @@ def misprints_in_short(facets: list[list[str]], gauges: list[list[str]], angles:
 
 
 def write_samples() -> None:
-    """Write docs/samples.md: a picture of each sample with a field from a search."""
+    """Write docs/samples.md: drawing, field and surface of each sample."""
+    import diagrams
+
     folder = DOCS / "pictures"
-    folder.mkdir(exist_ok=True)
     parts = [
         "# Samples",
         generated_line("python docs/make.py samples"),
         samples_in_short(),
     ]
     for name, entry in SAMPLES.items():
-        draw_overview(cf.search(cf.sample(name, 48), rounds=10).field, folder / f"{name}.png")
-        parts += [
-            f"## `{name}`",
-            f"{entry.description[0].upper()}{entry.description[1:]}.",
-            f"![{name}](pictures/{name}.png)",
-        ]
+        diagrams.draw_sample(name, folder / f"{name}.png")
+        description = f"{entry.description[0].upper()}{entry.description[1:]}."
+        parts += [f"## `{name}`", description, f"![Strokes, field and surface](pictures/{name}.png)"]
     (DOCS / "samples.md").write_text("\n\n".join(parts) + "\n")
 
 
-def draw_overview(field: cf.CrossField, path: Path) -> None:
-    """Draw the overview of a field with few colours."""
-    cf.draw(field, path, kind="overview")
-    with Image.open(path) as picture:
-        small = picture.convert("RGB").quantize(128, dither=Image.Dither.NONE)
-    small.save(path, optimize=True)
+def draw_tutorials() -> None:
+    """Draw the fields and the surface of docs/tutorials/solver.md and drawing.md."""
+    from surface import field_by
 
-
-def draw_solved_field() -> None:
-    """Draw docs/pictures/ellipsoid_milp.png, the field of docs/tutorials/solver.md."""
-    problem = cf.formulate(cf.sample("ellipsoid", 7), "milp-mccormick")
-    draw_overview(cf.solve(problem, solver="highs").field, DOCS / "pictures" / "ellipsoid_milp.png")
+    problem, pictures = cf.formulate(cf.sample("ellipsoid", 7), "milp-mccormick"), DOCS / "pictures"
+    cf.draw(cf.solve(problem, solver="highs").field, pictures / "ellipsoid_milp.png", kind="overview")
+    page = (DOCS / "tutorials" / "drawing.md").read_text()
+    with tempfile.TemporaryDirectory() as name:
+        drawing = Path(name) / "pebble.svg"
+        drawing.write_text(re.findall(r"```xml\n(.*?)```", page, re.DOTALL)[0])
+        field = field_by("bend", cf.read_sketch(drawing, size=48))
+        cf.draw(field, pictures / "pebble_field.png", kind="overview")
+        cf.write_surface(cf.surface(field), name, drawing=drawing, side=1000)
+        shutil.copy(Path(name) / "overlay.png", pictures / "pebble_surface.png")
 
 
 def samples_in_short() -> str:
@@ -300,8 +301,8 @@ def samples_in_short() -> str:
     return (
         f"There are {len(SAMPLES)} samples: "
         f"{len(SAMPLES) - known} sketches and {known} computed surfaces with known crosses. Use a name in "
-        "place of a sketch, as in `crossfield run mouse -o out`. The pictures show fields of a search of 10 "
-        "rounds at 48 pixels."
+        "place of a sketch, as in `crossfield run mouse -o out`. The pictures show the strokes, the field of "
+        "`bend` at 48 pixels, and its surface, on the default side."
     )
 
 
@@ -402,7 +403,7 @@ PAGES: dict[str, Callable[[], None]] = {
     "errata": write_errata,
     "samples": write_samples,
     "gallery": write_gallery,
-    "solved": draw_solved_field,
+    "tutorials": draw_tutorials,
     "figures": draw_figures,
     "traps": write_traps,
     "architecture": write_architecture,

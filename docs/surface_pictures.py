@@ -14,7 +14,6 @@ from typing import Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.pictures.underlay import read_underlay
 from crossfield.export.shading.colours import colour_normals, shade_by_light, to_eight_bit
 from crossfield.export.shading.raster import View, raster, view_of_grid
 from crossfield.export.surfaces.files import draw_strokes, lay_over
@@ -22,6 +21,7 @@ from crossfield.export.surfaces.outline import find_outline
 from crossfield.models.instance.domain import Floats
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.surface import Surface
+from diagrams import drawing_of
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -40,12 +40,11 @@ SIZE: Final = 48
 class Row:
     """A surface of a picture. title: text above it.
 
-    drawing: file or sample that it was read from; None: its stroke pixels. truth: the true normals (n, 3).
+    truth: the true normals (n, 3), where they are known.
     """
 
     title: str
     surface: Surface
-    drawing: str | Path | None = None
     truth: Floats | None = None
 
 
@@ -86,8 +85,8 @@ def _view(row: Row) -> View:
 def _cells(row: Row, view: View) -> list[NDArray[np.uint8]]:
     """The pictures of a row, uint8 (h, w, 4) each, in a view of the grid."""
     instance = row.surface.instance
-    drawing = None if row.drawing is None else read_underlay(row.drawing, on=instance)
-    outline = None if drawing is None else find_outline(instance, drawing)
+    drawing = drawing_of(instance)
+    outline = find_outline(instance, drawing) if row.truth is None else None
     shaded = raster(instance, row.surface.normals, view, outline=outline)
     faint = to_eight_bit(np.ones((*shaded.opacity.shape, 4)) * (0.94, 0.94, 0.94, 1.0))
     faint[..., 3] = to_eight_bit(shaded.opacity)
@@ -110,14 +109,14 @@ def known_rows() -> list[Row]:
         off = normal_error(estimate, true.normals)
         if off.mean() < angles(estimate.normals, true.normals).mean():
             estimate = estimate.flipped()
-        rows.append(Row(f"{name}, {off.mean():.1f} degrees off", estimate, None, true.normals))
+        rows.append(Row(f"{name}, {off.mean():.1f} degrees off", estimate, true.normals))
     return rows
 
 
 def sample_rows() -> list[Row]:
     """The drawn samples with the surfaces over their bend fields."""
     drawn = [name for name, entry in SAMPLES.items() if entry.kind == "sketch"]
-    return [Row(name, cf.surface(field_by("bend", cf.sample(name, SIZE))), name) for name in drawn]
+    return [Row(name, cf.surface(field_by("bend", cf.sample(name, SIZE)))) for name in drawn]
 
 
 if __name__ == "__main__":

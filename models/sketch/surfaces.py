@@ -63,6 +63,7 @@ class AnalyticInstance:
 
     At the centre of each pixel of the grid: u_angle, v_angle: float (n,) in [0, pi) radians,
     counter-clockwise with y up; normals: unit vectors towards the viewer, (n, 3); heights: z in pixels, (n,).
+    segments: the lines whose pixels are strokes, (m, 2, 2), in the units of `origin`, y down.
     """
 
     instance: Instance
@@ -70,6 +71,7 @@ class AnalyticInstance:
     v_angle: Floats
     normals: Floats
     heights: Floats
+    segments: Floats
 
 
 def rotation_by(tilt: float, spin: float) -> Floats:
@@ -258,7 +260,7 @@ def analytic_instance(
     s, t, mask = _find_parameters(surface, frame)
     tangents = surface.tangents(s, t)
     u_angle, v_angle = (wrap(arctangent(d[:, 1], d[:, 0]), 0.0, np.pi) for d in tangents)
-    weight, on_u = _choose_strokes(surface, frame, mask)
+    weight, on_u, segments = _choose_strokes(surface, frame, mask)
     stroke = weight >= LEAST_WEIGHT
     instance = Instance.on_pixels(
         name=name,
@@ -277,6 +279,7 @@ def analytic_instance(
         v_angle,
         normals=_normals_towards_viewer(*tangents),
         heights=surface.point(s, t)[:, 2] / frame.pixel,
+        segments=segments,
     )
 
 
@@ -334,8 +337,8 @@ def _invert_projection(surface: CurvaturePatch, wanted: Floats) -> tuple[Floats,
     return s, t
 
 
-def _choose_strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
-    """Weight [height, width] of drawn lines; and which pixels (n,) have a line of family u."""
+def _choose_strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple[Floats, Bools, Floats]:
+    """Weight [height, width] of drawn lines; which pixels (n,) have one of family u; and the segments."""
     near, far = 1.0, float(max(frame.shape))
     candidates = []
     for _ in range(_BISECTIONS):  # of the spacing, by ratio
@@ -348,7 +351,7 @@ def _choose_strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple
         candidates.append((abs(share - surface.share), weight, u_lines, v_lines))
     _, weight, u_lines, v_lines = min(candidates, key=lambda candidate: candidate[0])
     of_u, of_v = (cover_by_segments(lines, frame).amount for lines in (u_lines, v_lines))
-    return weight, (of_u >= of_v)[mask]
+    return weight, (of_u >= of_v)[mask], np.concatenate([u_lines, v_lines])
 
 
 def _lines_at_spacing(surface: CurvaturePatch, frame: Frame, spacing: float) -> tuple[Floats, Floats]:
