@@ -21,7 +21,7 @@ import numpy as np
 from crossfield.export.pictures.draw import fixed_settings
 from crossfield.models.mesh.shapes import MESHES
 from machine import machine_facts
-from make import markdown, replace_between
+from make import csv_text, replace_between
 from matplotlib.figure import Figure
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -77,26 +77,23 @@ def is_optimal(row: Row) -> bool:
     return row["bound"] is not None and best - row["bound"] <= SAME * max(1.0, best)
 
 
-def table(rows: dict[str, Row]) -> str:
-    """One row per mesh."""
-    heads = (
-        "mesh", "faces", "strokes", "greedy energy", "best energy", "greedy above best", "bound", "gap",
-        "singularities, greedy and best", "seconds: greedy, search, proof",
-    )  # fmt: skip
-    return markdown(heads, [table_row(name, row) for name, row in rows.items()])
-
-
-def table_row(name: str, row: Row) -> list[str]:
+def table_row(name: str, row: Row) -> dict[str, str]:
     """The cells of a mesh."""
     greedy, best, bound = row["greedy"]["energy"], row["best"]["energy"], row["bound"]
     gap = "0, proven" if is_optimal(row) else "-" if bound is None else f"{100 * (1 - bound / best):.2g} %"
     greedy, best, bound = ("-" if value is None else f"{value:.3f}" for value in (greedy, best, bound))
-    above = f"{excess(row):.1f} %"
-    return [
-        f"`{name}`", f"{row['faces']:,}", str(row["strokes"]), greedy, best, above, bound, gap,
-        f"{row['greedy']['singularities']}, {row['best']['singularities']}",
-        ", ".join("-" if value is None else f"{value:.2g}" for value in row["seconds"].values()),
-    ]  # fmt: skip
+    return {
+        "mesh": name,
+        "faces": f"{row['faces']:,}",
+        "strokes": str(row["strokes"]),
+        "greedy energy": greedy,
+        "best energy": best,
+        "greedy above best": f"{excess(row):.1f} %",
+        "bound": bound,
+        "gap": gap,
+        **{f"singularities, {kind}": str(row[kind]["singularities"]) for kind in ("greedy", "best")},
+        **{f"s, {part}": "-" if s is None else f"{s:.2g}" for part, s in row["seconds"].items()},
+    }
 
 
 def sentence(rows: dict[str, Row]) -> str:
@@ -152,7 +149,7 @@ def main() -> None:
         kept = {"machine": machine_facts(), "proof_limit": asked.seconds, "meshes": rows}
         MEASURED.write_text(json.dumps(kept, indent=1) + "\n")
     rows = kept["meshes"]
-    replace_between(PAGE, "table", table(rows))
+    (DOCS / "meshes" / "energies.csv").write_text(csv_text([table_row(*entry) for entry in rows.items()]))
     replace_between(PAGE, "findings", sentence(rows))
     machine = kept["machine"]
     conditions = (
