@@ -128,20 +128,21 @@ def differences(gaps: list[tuple[Row, float]]) -> list[tuple[Row, float, float]]
     return [(row, gap, row["error"] - least[case_of(row)]["error"]) for row, gap in gaps]
 
 
-def medians(x: Any, y: Any, bins: int = 12) -> tuple[list[float], list[float]]:
-    """The medians of x and y in bins of x of FEW points or more: a first one of zeros, others logarithmic.
+def quartiles(x: Any, y: Any, bins: int = 12) -> tuple[list[float], ...]:
+    """Medians of x, and quartiles of y, in bins of x of FEW points or more.
 
-    x: gaps, not negative.
+    The first bin has no gap, others are logarithmic. x: gaps, not negative.
     """
     x, y = np.asarray(x, float), np.asarray(y, float)
     if not len(x):
-        return [], []
+        return [], [], [], []
     ends = np.concatenate(
         [[0.0, _NO_GAP], np.geomspace(5 * _NO_GAP, max(1.01 * x.max(), 10 * _NO_GAP), bins)]
     )
     parts = [(x >= a) & (x < b) for a, b in pairwise(ends)]
-    bins_of_points = [(x[inside], y[inside]) for inside in parts if inside.sum() >= FEW]
-    return [float(np.median(a)) for a, _ in bins_of_points], [float(np.median(b)) for _, b in bins_of_points]
+    inside = [part for part in parts if part.sum() >= FEW]
+    low, middle, high = ([float(np.percentile(y[part], share)) for part in inside] for share in (25, 50, 75))
+    return [float(np.median(x[part])) for part in inside], low, middle, high
 
 
 FEW: Final = 5

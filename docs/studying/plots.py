@@ -13,7 +13,7 @@ import numpy as np
 from crossfield.export.pictures.draw import fixed_settings
 from matplotlib.figure import Figure
 
-from .errors import medians
+from .errors import quartiles
 
 mpl.use("svg")
 
@@ -58,34 +58,31 @@ def styles(names: list[str]) -> dict[str, dict[str, Any]]:
     }
 
 
-def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
-    """Error against the gap to the optimum: points by kind of field, and medians of bins."""
-    with open_panels(path, len(panels), high=6.4, wide=6.0, stacked=True) as axes:
-        names = list(dict.fromkeys(name for kinds in panels.values() for name in kinds))
-        looks = styles(names)
+def error_by_gap(path: Path, panels: dict[str, dict[str, Line]], shown: tuple[str, ...]) -> None:
+    """Error against the gap to the optimum: medians, middle halves and points, some kinds in colour."""
+    looks = styles(["all fields", *shown])
+    with open_panels(path, len(panels), high=6.2, wide=5.0, stacked=True) as axes:
         for axis, (title, kinds) in zip(axes, panels.items(), strict=True):
-            for name, (x, y) in kinds.items():
+            x, y = (np.concatenate([np.array(line[k]) for line in kinds.values()] or [[]]) for k in (0, 1))
+            axis.scatter(np.maximum(x, _ZERO), y, s=5, color="#888888", alpha=0.5, linewidths=0)
+            for name in shown:
                 look = {"color": looks[name]["color"], "marker": looks[name]["marker"]}
-                axis.scatter(np.maximum(x, _ZERO), y, s=16, alpha=0.6, linewidths=0, label=name, **look)
-            x, y = (
-                np.concatenate([np.array(points[i]) for points in kinds.values()] or [[]]) for i in (0, 1)
-            )
-            centre, middle = medians(x / 100, y)
-            axis.plot(
-                np.maximum(100 * np.array(centre), _ZERO),
-                middle,
-                color="#000000",
-                linewidth=2.2,
-                label="median of bins",
-            )
+                gaps, more = kinds.get(name, ([], []))
+                axis.scatter(np.maximum(gaps, _ZERO), more, s=14, alpha=0.8, linewidths=0, label=name, **look)
+            centre, low, middle, high = quartiles(x / 100, y)
+            at = np.maximum(100 * np.array(centre), _ZERO)
+            axis.fill_between(at, low, high, color="#000000", alpha=0.15, label="middle half", linewidth=0)
+            axis.plot(at, middle, color="#000000", linewidth=2.2, label="median")
             axis.set(title=title, xscale="log", xlabel="energy above the proven optimum, %")
+            axis.set_ylabel("error above optimum's, degrees")
             axis.axhline(0, color="#888888", linewidth=0.8)
             axis.set_xlim(_ZERO / 1.5, max(1.5 * x.max(initial=0.0), 100))
+            least, most = np.percentile(y, [1, 99]) if len(y) else (-1, 1)
+            axis.set_ylim(least - 1, most + 1)
             ticks = [tick for tick in (0.1, 1, 10, 100, 1000, 10000) if tick <= axis.get_xlim()[1]]
             axis.set_xticks([_ZERO, *ticks], ["0", *(f"{tick:g}" for tick in ticks)])
             axis.minorticks_off()
-        axes[0].set_ylabel("error less that of the optimum, degrees")
-        axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes[0].figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
 
 
 _ZERO: Final = 0.01
@@ -105,12 +102,3 @@ def lines_by_value(path: Path, panels: dict[tuple[str, str], dict[str, Line]]) -
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
             axis.legend(ncols=1 + len(lines) // 5)
-
-
-def _all_of(axes: Any) -> tuple[list[Any], list[str]]:
-    """The legend of all panels, each name once."""
-    handles: dict[str, Any] = {}
-    for axis in axes:
-        for handle, name in zip(*axis.get_legend_handles_labels(), strict=True):
-            handles.setdefault(name, handle)
-    return list(handles.values()), list(handles)

@@ -99,7 +99,7 @@ def correlation_text(rows: list[Row]) -> str:
 def harmless_gaps(rows: list[Row]) -> str:
     """Sentence on the gaps between which fields of drawings become worse than the optimum."""
     fields = [field for field in errors.differences(errors.gaps(rows)) if not is_surface(field[0])]
-    gap, more = errors.medians([field[1] for field in fields], [field[2] for field in fields])
+    gap, _, more, _ = errors.quartiles([field[1] for field in fields], [field[2] for field in fields])
     after = max(place + 1 for place, field in enumerate(more) if field <= HARM)
     return (
         f"The median error at hidden curves rises by more than {HARM:g} degrees only above "
@@ -122,7 +122,7 @@ def draw(rows_of: RowsByPart, pictures: Path) -> None:
                 entry for entry in fields if kind_of(entry[0]) == kind and is_surface(entry[0]) == surfaces
             ]
             panels[title][kind] = ([100 * gap for _, gap, _ in mine], [more for _, _, more in mine])
-    plots.error_by_gap(pictures / "evidence_quality.svg", panels)
+    plots.error_by_gap(pictures / "evidence_quality.svg", panels, ("bend", "best, 1-norm"))
 
 
 def tables(rows_of: RowsByPart) -> dict[str, Table]:
