@@ -267,8 +267,6 @@ def tables(rows: list[Row], plan: Plan) -> dict[str, Table]:
 
 def sentences(rows: list[Row], plan: Plan) -> dict[str, Any]:
     """The sentences of this part by name."""
-    machines = sorted({row["machine"] for row in rows if row["machine"]})
-    versions = sorted({f"{solver_title(row['solver'])} {row['version']}" for row in rows if row["version"]})
     _, solved = solved_table(rows, plan)
     ratios = sorted(line[-1] for line in turned_table(rows, plan)[1])
     long_runs = [row for row in rows if row["limit"] == plan.long and row["cpu"] is not None]
@@ -281,6 +279,4 @@ def sentences(rows: list[Row], plan: Plan) -> dict[str, Any]:
         "long_by_solvers": sum(row["solver"] != PROVE for row in closed),
         "long_runs": sum(row["solver"] != PROVE for row in long_runs),
         "long_by_prove": sum(row["solver"] == PROVE for row in closed),
-        "solver_machine": "; ".join(machines),
-        "solver_versions": ", ".join(versions),
     }
