@@ -7,20 +7,22 @@ from typing import Any, Final
 
 import numpy as np
 from crossfield.export.pictures.draw import fixed_settings
+from crossfield.export.pictures.marks import STROKE
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.domain import Bools, Floats
 from crossfield.models.instance.grid import Grid
 from crossfield.models.proof.lattice import block_starts
 from crossfield.models.proof.record import LevelRecord, Proof
-from diagrams import STYLE, V
+from diagrams import STYLE
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 STRIP: Final = HALF**2
 """Area of all crosses, in radians squared."""
 COLOURS: Final = "viridis"
-CELL: Final = "#2a788e"
 COLUMNS: Final = 4
+WIDE: Final = 4.9
+"""Inches, for words that are legible on a phone."""
 
 
 def allowed_cells(level: LevelRecord, pixel: int) -> Bools:
@@ -51,43 +53,26 @@ def draw_maps(proof: Proof, boxes: Floats, path: Path) -> None:
     """Draw the part left at every pixel for every level, and after the last; one colour scale."""
     levels = last_levels(proof)
     values = [*map(remaining_shares, levels), box_shares(boxes)]
+    gaps = [1 - level.bound / proof.energy for level in levels]
     titles = [
-        f"level {number}, {np.degrees(level.h):.2g}° apart\n"
-        f"{np.count_nonzero(level.allowed):,} labels, bound {level.bound:.4f}"
-        for number, level in enumerate(levels, start=1)
+        f"{np.degrees(level.h):.2g}° apart\ngap {100 * gap:.2g} %"
+        for level, gap in zip(levels, gaps, strict=True)
     ]
-    titles.append(f"after the last level\nbound {proof.bound:.4f} = energy")
+    titles.append("last step\nno gap")
     rows = -(-len(values) // COLUMNS)
     norm = LogNorm(10.0 ** np.floor(np.log10(values[-1].min())), 1.0)
-    with fixed_settings(STYLE):
-        figure = Figure(figsize=(11.5, 2.75 * rows + 0.2), layout="constrained")
+    with fixed_settings(STYLE | {"font.size": 10}):
+        figure = Figure(figsize=(WIDE, 1.5 * rows + 0.7), layout="constrained")
         axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for place, (array, title) in zip(axes, zip(values, titles, strict=True), strict=False):
             shown = _map(place, proof.field.instance.grid, array, norm)
-            place.set_title(title, fontsize=10)
+            place.set_title(title, fontsize=9)
         for place in axes[len(values) :]:
             place.set_axis_off()
-        if len(values) < len(axes):
-            _gaps(axes[len(values)], proof)
         _strokes(axes[0], proof)
-        bar = figure.colorbar(shown, ax=axes, aspect=35, pad=0.02)
-        bar.set_label("remaining share of the strip of crosses")
-        figure.savefig(path, dpi=110, metadata={"Software": None})
-
-
-def _gaps(place: Any, proof: Proof) -> None:
-    """Draw the distance of every level's bound from the energy."""
-    gaps = [100 * (proof.energy - level.bound) / proof.energy for level in last_levels(proof)]
-    numbers = range(1, len(gaps) + 1)
-    place.set_axis_on()
-    place.semilogy(numbers, gaps, "o-", color=CELL, markersize=4)
-    for number, gap in zip(numbers, gaps, strict=True):
-        place.annotate(f"{gap:.2g} %", (number, gap), (4, 4), textcoords="offset points", fontsize=8)
-    place.set_title("gap of each level", fontsize=10)
-    place.set_xlabel("level", fontsize=9)
-    place.set(xticks=list(numbers), xlim=(0.6, len(gaps) + 1.1), yticks=[])
-    place.minorticks_off()
-    place.spines[["top", "right", "left"]].set_visible(False)
+        bar = figure.colorbar(shown, ax=axes, orientation="horizontal", aspect=35, pad=0.03)
+        bar.set_label("remaining share of all crosses")
+        figure.savefig(path, dpi=160, metadata={"Software": None})
 
 
 def _map(place: Any, grid: Grid, values: Floats, norm: LogNorm) -> Any:
@@ -101,4 +86,4 @@ def _strokes(place: Any, proof: Proof) -> None:
     """Mark the pixels with strokes."""
     instance = proof.field.instance
     at = instance.stroke_index
-    place.plot(instance.grid.columns[at], instance.grid.rows[at], "o", color=V, markersize=1.8)
+    place.plot(instance.grid.columns[at], instance.grid.rows[at], "o", color=STROKE, markersize=1.0)
