@@ -7,7 +7,6 @@ result to keep, the exit code is 1. Heavy libraries are imported inside the comm
 
 from __future__ import annotations
 
-import gc
 import logging
 import os
 import signal
@@ -65,7 +64,6 @@ app = typer.Typer(
 )
 
 _STOPPED: Final = 130  # exit code of typer after a Ctrl-C that no command handled
-_OBJECTS: Final = 100_000  # new objects before a search for cycles, which slows down the imports of SymPy
 
 
 command = partial(command_of, app)
@@ -304,7 +302,6 @@ def main() -> NoReturn:
     escape_unencodable()
     for reader in ("PIL", "trimesh"):  # every error is one line, printed by `invoke`
         logging.getLogger(reader).addHandler(logging.NullHandler())
-    gc.set_threshold(_OBJECTS)
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     if sys.argv[1:2] in (["export"], ["read"]):
         # They multiply no matrices, and to start the threads for that takes a tenth of their time.

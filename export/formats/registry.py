@@ -157,7 +157,7 @@ def problem_in_format(problem: Problem, entry: Format) -> Problem:
 
     Raises UnsupportedByFormatError, naming an equivalent formulation, when neither fits.
     """
-    if _highest_degree(problem) <= entry.degree:
+    if entry.degree == ANY_DEGREE or _highest_degree(problem) <= entry.degree:
         return problem
     if _highest_degree(problem) < ANY_DEGREE:
         lifted = with_products_lifted(problem)

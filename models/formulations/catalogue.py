@@ -19,11 +19,13 @@ from .declaration import (
     FORMULATIONS,
     S_C,
     C,
+    Declaration,
     E,
     Facet,
     Family,
     Formulation,
     I,
+    Options,
     declaration_of,
     formulation,
     row,
@@ -315,10 +317,10 @@ def declare(name: str, on: Instance | None = None, **chosen: Any) -> Formulation
     on: the instance whose domain it is written for, None for the pixels of a sketch. An option that is None
     keeps its default. Raises FormulationError for an unknown name, option or value.
     """
-    options = {key: value for key, value in chosen.items() if value is not None}
     declaration = declaration_of(name)
+    options = declaration.options({key: value for key, value in chosen.items() if value is not None})
     constants = constants_of(on, orthogonal=declaration.orthogonal)
-    return _with_constants(declaration.with_options(options), tuple(constants.items()))
+    return _declare(declaration, options, tuple(constants.items()))
 
 
 def reason_against(formulation: Formulation, instance: Instance | None, *, narrowed: bool = False) -> str:
@@ -344,9 +346,11 @@ def list_formulations(instance: Instance | None = None, *, narrowed: bool = Fals
 
 
 @cache
-def _with_constants(formulation: Formulation, constants: tuple[tuple[Symbol, int], ...]) -> Formulation:
+def _declare(
+    declaration: Declaration, options: Options, constants: tuple[tuple[Symbol, int], ...]
+) -> Formulation:
     """The formulation with numbers for symbols, without the terms and rows that vanish."""
-    numbers = dict(constants)
+    formulation, numbers = declaration.with_options(options), dict(constants)
     vanishing = set(OF_SKEW) & numbers.keys()
     families = [
         replace(family, expression=family.expression.substitute(numbers))

@@ -202,9 +202,8 @@ class Declaration:
         )
         return next((name for name in same if name != self.name), "")
 
-    def with_options(self, chosen: Mapping[str, Any]) -> Formulation:
-        """The formulation with the chosen options. Raises FormulationError for a wrong option."""
-        options = self._options(chosen)
+    def with_options(self, options: Options) -> Formulation:
+        """The formulation with options that `options` returned."""
         arguments = {name: getattr(options, name) for name in inspect.signature(self.families).parameters}
         families = [
             family if family.paper else replace(family, paper=self.paper)
@@ -213,7 +212,8 @@ class Declaration:
         objective = tuple(family for family in families if not family.is_row)
         return Formulation(self, options, objective, tuple(family for family in families if family.is_row))
 
-    def _options(self, chosen: Mapping[str, Any]) -> Options:
+    def options(self, chosen: Mapping[str, Any]) -> Options:
+        """The default options and the chosen ones. Raises FormulationError for a wrong option."""
         known = Options.__dataclass_fields__
         for key, value in chosen.items():
             if key not in known:

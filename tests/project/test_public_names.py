@@ -100,6 +100,11 @@ def test_a_sketch_becomes_a_field_without_solvers_or_pictures():
     assert not loaded & SOLVERS_AND_LAYOUT
 
 
+def test_the_table_of_entries_needs_numpy_alone():
+    loaded = loaded_after("import crossfield as cf\ncf.entries()")
+    assert not loaded & (SOLVERS_AND_LAYOUT | {"scipy", "sympy", "numba", "PIL", "jsonschema"})
+
+
 def test_importing_the_package_loads_nothing_heavy():
     loaded = loaded_after("import crossfield")
     assert not loaded & (SOLVERS_AND_LAYOUT | {"numpy", "scipy", "sympy", "numba", "PIL"})

@@ -7,30 +7,26 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ....models.arguments import check_arguments
 from ....models.errors import InputError, InstanceError, shortened
-from ....models.field.field import CrossField
-from ....models.formulations.catalogue import FORMULATIONS
-from ....models.formulations.problem import Problem
-from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
-from ....models.proof.certificate import Certificate, read_certificate
-from ....models.storage import make_folder
-from ...bundle.manifest import write_manifest
-from ...formats.registry import Written, write
-from ..documents.documents import about_file, tightened_by
-from ..ledger.known_points import ROLES, InstancePoints, read_instance_points
-from ..ledger.ledger import Ledger, read_ledger
-from ..ledger.points import KnownField, best_point, provenance_by
-from ..plan.instances import formulate_entry, make_instance
-from ..plan.recipe import EntryRecipe, InstancePlan, plan_library
-from ..plan.spec import DEFAULT, RUNGS, Spec, default_spec
-from .entry_files import write_models
 from .table import TABLE, read_table
 
-SHIPPED: Final = DEFAULT.with_name(TABLE)
+if TYPE_CHECKING:
+    from ....models.field.field import CrossField
+    from ....models.formulations.problem import Problem
+    from ....models.instance.instance import Instance
+    from ....models.proof.certificate import Certificate
+    from ...formats.registry import Written
+    from ..ledger.known_points import InstancePoints
+    from ..ledger.ledger import Ledger
+    from ..ledger.points import KnownField
+    from ..plan.recipe import EntryRecipe, InstancePlan
+    from ..plan.spec import Spec
+
+SHIPPED: Final = Path(__file__).parents[1] / "plan" / TABLE
 _REMEDY: Final = "make the points again with `crossfield library build --search`"
 
 
@@ -76,21 +72,31 @@ class LibraryEntry:
     @cached_property
     def instance(self) -> Instance:
         """The instance."""
+        from ..plan.instances import make_instance
+
         return make_instance(_plan_of(self.name)[0].recipe)
 
     @cached_property
     def problem(self) -> Problem:
         """The problem. Raises InputError, InstanceError for damaged points of a `qp` entry."""
+        from ....models.formulations.catalogue import FORMULATIONS
+        from ..plan.instances import formulate_entry
+
         recipe = self._recipe
         jumps = self._points.field("baseline").field.p if FORMULATIONS[recipe.formulation].fixed else None
         problem = formulate_entry(self.instance, recipe.formulation, recipe.facet, jumps)
         if not recipe.tightened or self.certificate is None:
             return problem
+        from ..documents.documents import tightened_by
+
         return tightened_by(self.certificate, problem)
 
     @cached_property
     def field(self) -> CrossField:
         """The field of the best known point. Raises InputError, InstanceError for damaged points."""
+        from ..ledger.known_points import ROLES
+        from ..ledger.points import best_point
+
         known = [*(self._points.field(role) for role in ROLES), *self._submitted()]
         certified = self.certificate.field if self._recipe.tightened and self.certificate else None
         return best_point(self.problem, known, certified).known.field
@@ -101,6 +107,8 @@ class LibraryEntry:
 
         Raises InputError for a certificate that is refused.
         """
+        from ....models.proof.certificate import read_certificate
+
         stated = self._points.about.get("certificates", {}).get(str(self._recipe.norm))
         if stated is None:
             return None
@@ -129,6 +137,8 @@ class LibraryEntry:
             If a file cannot be written.
 
         """
+        from ...formats.registry import write
+
         return write(self.problem, path)
 
     def write_set(self, folder: Path) -> list[str]:
@@ -137,6 +147,9 @@ class LibraryEntry:
         The manifest has the name of the entry, because several entries have one formulation. Raises
         OutputError.
         """
+        from ...bundle.manifest import write_manifest
+        from .entry_files import write_models
+
         written, refused = write_models(self.problem, self._recipe, folder)
         manifest = write_manifest(self.problem, written, refused, folder, self.name)
         models = [name for model in written for name in model.files]
@@ -149,6 +162,9 @@ class LibraryEntry:
     @cached_property
     def _points(self) -> InstancePoints:
         """The points that ship for the instance. Raises InstanceError for points of another one."""
+        from ..documents.documents import about_file
+        from ..ledger.known_points import read_instance_points
+
         points = read_instance_points(_points_folder() / about_file(self.facts["instance"]))
         if points.instance != self.instance.sha256:
             raise InstanceError(f"holds points of another instance; {_REMEDY}", file=_points_folder())
@@ -156,6 +172,8 @@ class LibraryEntry:
 
     def _submitted(self) -> Iterable[KnownField]:
         """The fields of the ledger for the entries of the instance."""
+        from ..ledger.points import KnownField, provenance_by
+
         ledger = _ledger()
         for recipe in _plan_of(self.name)[0].entries:
             record = ledger.record_with_field(recipe.name)
@@ -185,9 +203,12 @@ def entries(*, rung: str | None = None) -> list[LibraryEntry]:
         For an unknown rung.
 
     """
-    if rung is not None and rung not in RUNGS:
+    chosen = [LibraryEntry(row) for row in _rows().values() if rung in (None, row["rung"])]
+    if not chosen:
+        from ..plan.spec import RUNGS
+
         raise InputError(f"there is no rung {shortened(rung)!r}; choose one of {', '.join(RUNGS)}")
-    return [LibraryEntry(row) for row in _rows().values() if rung in (None, row["rung"])]
+    return chosen
 
 
 @check_arguments
@@ -197,7 +218,7 @@ def entry(name: str) -> LibraryEntry:
     Parameters
     ----------
     name
-        Name of the entry, such as `cf_mouse_n012_exact`.
+        Name of the entry, such as `cf_mouse_n032_exact`.
 
     Returns
     -------
@@ -224,6 +245,8 @@ def write_entries(
 
     Returns the names of the files by entry. Raises OutputError.
     """
+    from ....models.storage import make_folder
+
     target, written = make_folder(folder), {}
     for number, one in enumerate(chosen, 1):
         progress(f"{number} of {len(chosen)} entries: {one.name}")
@@ -238,11 +261,15 @@ def _rows() -> dict[str, dict[str, Any]]:
 
 @cache
 def _spec() -> Spec:
+    from ..plan.spec import default_spec
+
     return default_spec()
 
 
 @cache
 def _plans() -> dict[str, tuple[InstancePlan, EntryRecipe]]:
+    from ..plan.recipe import plan_library
+
     return {recipe.name: (planned, recipe) for planned in plan_library(_spec()) for recipe in planned.entries}
 
 
@@ -261,6 +288,8 @@ def _points_folder() -> Path:
 
 @cache
 def _ledger() -> Ledger:
+    from ..ledger.ledger import read_ledger
+
     path = _spec().ledger
     assert path is not None  # the specification that ships has a ledger
     return read_ledger(path.parent, path.name)

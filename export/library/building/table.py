@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from ....models.field.file import read_field
 from ....models.storage import read_bytes
-from ..documents.documents import about_file, read_about
-from ..plan.recipe import norm_minimised
 
 TABLE: Final = "entries.csv"
 OPEN: Final = "open"  # the status `best known` of a sidecar, in one word
@@ -57,6 +54,8 @@ def role_of(sidecar: dict[str, Any]) -> str:
     """
     if sidecar["jumps"] is not None:
         return "baseline"
+    from ..plan.recipe import norm_minimised
+
     return f"least_{norm_minimised(sidecar['formulation']) or 2}"
 
 
@@ -122,6 +121,9 @@ def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:
 
     Raises InputError, InstanceError for a missing or damaged file.
     """
+    from ....models.field.file import read_field
+    from ..documents.documents import about_file, read_about
+
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -143,8 +145,10 @@ def read_table(path: Path) -> list[dict[str, Any]]:
 
 def parse_table(data: bytes) -> list[dict[str, Any]]:
     """Return the rows of the content of a table, as `read_table` does."""
-    rows: Iterable[dict[str, str]] = csv.DictReader(io.StringIO(data.decode()))
-    return [{key: _parse_value(row[key], column.kind) for key, column in COLUMNS.items()} for row in rows]
+    names, *rows = csv.reader(io.StringIO(data.decode()))
+    texts = dict(zip(names, zip(*rows, strict=True), strict=True))
+    values = [[_parse_value(text, column.kind) for text in texts[key]] for key, column in COLUMNS.items()]
+    return [dict(zip(COLUMNS, row, strict=True)) for row in zip(*values, strict=True)]
 
 
 def _format_value(value: Any) -> str:
