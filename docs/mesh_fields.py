@@ -122,12 +122,12 @@ def draw(rows: dict[str, Row], path: Path) -> None:
     order = sorted(rows, key=lambda name: excess(rows[name]))
     values = np.array([excess(rows[name]) for name in order])
     with fixed_settings({"font.family": "DejaVu Sans", "font.size": 10}):
-        figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+        figure = Figure(figsize=(4.9, 3.8), layout="constrained")
         axes = figure.add_subplot()
         colours = ["#1a6f83" if is_optimal(rows[name]) else "#9fc4cd" for name in order]
         bars = axes.barh([f"{name} ({rows[name]['faces']:,})" for name in order], values, color=colours)
         axes.bar_label(bars, [f"{value:.1f}" for value in values], padding=3)
-        axes.set_xlabel("energy of the greedy field above the best known one, %")
+        axes.set_xlabel("greedy energy above the best known, %")
         axes.spines[["top", "right"]].set_visible(False)
         axes.margins(x=0.08)
         figure.savefig(path, metadata={"Date": None, "Creator": None})
