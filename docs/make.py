@@ -229,15 +229,14 @@ def misprints_in_short(
     higher = sum(values[seed, "box"][0] > values[seed, "strokes"][0] + 1e-4 for seed in sketches)
     changed = sum(abs(values[seed, "box"][0] - values[seed, "box"][1]) > 1e-4 for seed in sketches)
     return f"""**(26) as printed.** HiGHS proves the optima of `milp-mccormick` on {len(seeds)} grids of 4 x 4
-pixels with random strokes ([facets.csv](errata/facets.csv)). With the printed facet, the optimum is below the
-1-norm energy of its field in {len(lower)} of them, and its field has up to {worst:.1f} times the minimum
-energy: for p1 = 0, z is free in an interval, and the model underestimates the change of skew.
+pixels with random strokes ([facets.csv](errata/facets.csv)). With the printed facet, the optimum is too
+low in {len(lower)} of them, and its field has up to {worst:.1f} times the minimum 1-norm energy. For p1 = 0,
+z is free in an interval, so the model underestimates the change of skew.
 
 **The box (1).** Bonmin solves `miqp-exact` on {len(sketches)} grids of 2 x 3 pixels
 ([gauges.csv](errata/gauges.csv)). With the paper's box, the optimum is higher in {higher} of them, and a
 rotation by 90 degrees changes it in {changed}. At a single stroke of 120 degrees, the lines of the cross are
-{angles["box"]} degrees apart with the box, and {angles["strokes"]} degrees
-with a window around the stroke."""
+{angles["box"]} degrees apart with the box, and {angles["strokes"]} with a window around the stroke."""
 
 
 def write_samples() -> None:

@@ -174,9 +174,9 @@ def missed_sentence() -> str:
     (method, size), most = max(shares.items(), key=lambda entry: entry[1])
     worst = max(rows_with(**facts), key=lambda row: row["value"])
     return (
-        f"Under the default weights, every method misses at most {most:.1%} of the stroke pixels by more "
-        f"than 10 degrees, on average over drawings (`{method}` at {size} pixels), and {worst['value']:.1%} "
-        f"on the worst drawing (`{worst['method']}` at {worst['size']} pixels)."
+        f"A stroke pixel is missed if the field is more than 10 degrees away. Under the default weights, no "
+        f"method misses more than {most:.1%} of them on average (`{method}` at {size} pixels), or "
+        f"{worst['value']:.1%} on any drawing (`{worst['method']}` at {worst['size']} pixels)."
     )
 
 

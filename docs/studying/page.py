@@ -19,7 +19,7 @@ from .solvers import page as solvers_page
 from .solvers.plan import DATA as SOLVER_ROWS
 from .solvers.plan import FULL
 from .solvers.plan import table as solvers_table
-from .wording import percent
+from .wording import percent, series
 
 RowsByPart = dict[str, list[Row]]
 TEMPLATE: Final = Path(__file__).with_name("evidence.template")
@@ -45,7 +45,7 @@ def difference_by_others() -> str:
         size: fields_page.compared("polyvector", "bend", origin=fields_page.OTHERS, size=size)
         for size in sizes
     }
-    return ", ".join(f"{change and change.cell} at {size} pixels" for size, change in changes.items())
+    return series(f"{change and change.cell} at {size} pixels" for size, change in changes.items())
 
 
 def effect_of_energy(rows_of: RowsByPart) -> dict[str, Any]:

@@ -73,11 +73,11 @@ def kind_of(row: Row) -> str:
 def sure_changes(rows: list[Row]) -> str:
     """Sentence on the changes beyond two standard errors."""
     parts = []
-    for surfaces, where in ((False, "at hidden curves"), (True, "on surfaces")):
+    for surfaces, where in ((False, "At hidden curves"), (True, "On surfaces")):
         effects = changes(rows, surfaces=surfaces).items()
         sure = [f"{name} ({effect})" for name, effect in effects if effect and effect.sure]
-        parts.append(f"{where}, {', '.join(sure)}")
-    return f"Beyond two standard errors are, {'; '.join(parts)}."
+        parts.append(f"{where}: {'; '.join(sure)}.")
+    return f"Beyond two standard errors are these. {' '.join(parts)}"
 
 
 def correlation_text(rows: list[Row]) -> str:
