@@ -84,11 +84,10 @@ def test_formulas_are_whole_and_inside_the_page(browser, address, site, width):
 
 def test_a_model_has_every_term_and_equation_of_its_declaration(browser, address):
     browser.get(f"{address}/formulations.html")
-    models = """
-        [...document.querySelectorAll('.model')].map(model => [...model.querySelectorAll('tbody tr')]
-          .map(line => line.querySelector('.equation').textContent))
-    """
-    shown = browser.execute_script(f"return {models}")
+    shown = browser.execute_script(
+        "return [...document.querySelectorAll('.model')].map(model =>"
+        " [...model.querySelectorAll('tbody .equation')].map(cell => cell.textContent))"
+    )
     assert len(shown) == len(FORMULATIONS)
     for name, equations in zip(FORMULATIONS, shown, strict=True):
         declared = declare(name)
