@@ -26,20 +26,25 @@ def link_pages(app: Sphinx, doctree: document, name: str) -> None:
 
 def csv_pages(app: Sphinx) -> Iterator[tuple[str, dict[str, Any], str]]:
     """Name, content and layout of the page of every linked CSV file."""
-    for path, (_, copy) in app.env.dlfiles.items():
+    for path, (pages, copy) in app.env.dlfiles.items():
         if path.suffix == ".csv":
             name = path.with_suffix("").as_posix()
             with (app.srcdir / path).open(newline="", encoding="utf-8") as file:
                 head, *rows = csv.reader(file)
             download = f"{'../' * name.count('/')}_downloads/{copy}"
-            facts = f'<p>{len(rows)} rows. <a href="{download}" download>Download</a></p>'
+            links = [
+                f'<a href="{app.builder.get_relative_uri(name, page)}">{app.env.titles[page].astext()}</a>'
+                for page in sorted(pages)
+            ]
+            links.append(f'<a href="{download}" download>Download</a>')
+            facts = f"<p>{len(rows)} rows. {' · '.join(links)}</p>"
             body = f"<h1>{path.name}</h1>{facts}{table(head, rows)}"
             yield name, {"title": path.name, "body": body}, "page.html"
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
-    """An HTML table."""
-    lines = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows]
+    """An HTML table, whose long names may break at each underscore."""
+    lines = ["".join(f"<td>{escape(cell).replace('_', '_<wbr>')}</td>" for cell in row) for row in rows]
     heads = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     return (
         f'<div class="table-wrapper"><table class="docutils"><thead><tr>{heads}</tr></thead><tbody>'
