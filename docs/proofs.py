@@ -20,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -270,23 +270,6 @@ def agreement(rows: dict[str, Facts]) -> str:
     )
 
 
-def machines(results: Results) -> str:
-    """The machines of all proofs, and the load."""
-    facts = [row["machine"] for part in SKETCHES for row in results[part].values()]
-    counts = Counter(f"{machine['processor']}, {count_cores(machine['cores'])}" for machine in facts)
-    named = "; ".join(f"{machine}: {count} proofs" for machine, count in counts.most_common())
-    loads = [machine["load"] for machine in facts]
-    return (
-        f"{named}. The load average was {min(loads):.1f} to {max(loads):.1f}; above the number of cores, "
-        "seconds are too long."
-    )
-
-
-def count_cores(cores: int) -> str:
-    """The number of cores in words."""
-    return "one core" if cores == 1 else f"{cores} cores"
-
-
 def flatten(facts: Facts) -> Facts:
     """The facts of a row without nested ones, whose names are joined by an underscore."""
     flat: Facts = {}
@@ -314,7 +297,6 @@ def files(results: Results) -> dict[str, str]:
     texts = {
         "generated": generated_line("python docs/proofs.py"),
         "most": f"{MOST_LABELS:,}",
-        "machines": machines(results),
         "agreement": agreement(results["optima"]),
         "solvers": solvers_table(results["solvers"]),
         "solvers_limit": f"{SECONDS['solvers']:g}",
