@@ -24,11 +24,11 @@ from crossfield.export.cli.tables import tables
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.models.errors import InputError
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
+from crossfield.models.formulations.latex import aligned, domain, objective_and_rows
 from crossfield.models.formulations.symbols import VARIABLES
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from crossfield.models.instance.symmetries import turned
 from crossfield.models.sketch.samples import SAMPLES
-from latex import aligned, domain, objective_and_rows
 
 DOCS = Path(__file__).resolve().parent
 

@@ -4,7 +4,7 @@ An expression is a sum of terms, and a term is a constant times powers of factor
 sums in brackets. Constants are rational multiples of powers of pi, so that nothing is rounded before it is
 evaluated. Products with whole numbers and fractions are distributed, like terms are added, and everything
 else is kept until `expanded` or `polynomial` asks for more. SymPy, whose import takes longer than most
-commands, only prints the formulas of the docs (docs/latex.py).
+commands, only prints formulas (`latex.py`).
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -131,6 +132,14 @@ class Problem:
             "rows": ", ".join(f"{family.count} {family.family.tag}" for family in self.rows) or "none",
         }
         return table_of(f"Problem {self.summary}", facts)
+
+    def _repr_latex_(self) -> str | None:
+        """The formulation in formulas, for notebooks; None without SymPy."""
+        if find_spec("sympy") is None:
+            return None
+        from .latex import model
+
+        return f"$$\n{model(self.formulation)}\n$$"
 
     @property
     def summary(self) -> str:

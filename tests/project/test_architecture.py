@@ -46,7 +46,7 @@ def test_no_arrow_leads_upwards_and_so_there_is_no_circle(listed):
 
 SOLVERS_AND_LAYOUT = {"casadi", "clarabel", "cplex", "gamspy_base", "gamspy_baron", "gurobipy", "highspy"}
 SOLVERS_AND_LAYOUT |= {"pyomo", "pyqplib", "pyscipopt", "pytoulbar2", "xpress"}
-SOLVERS_AND_LAYOUT |= {"jinja2", "matplotlib", "rich", "sympy", "typer"}
+SOLVERS_AND_LAYOUT |= {"jinja2", "matplotlib", "rich", "typer"}
 
 
 def imports(path):

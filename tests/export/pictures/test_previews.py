@@ -59,6 +59,13 @@ def test_problems_and_solutions_are_tables_that_load_nothing(problem, solution):
     assert len(list(roots[1].iter("img"))) == 1
 
 
+def test_a_problem_is_shown_in_formulas(problem):
+    formula = problem._repr_latex_()
+    assert formula.startswith("$$\n\\begin{aligned}")
+    assert formula.count(r"\text{(28), (29)}") == 1
+    assert r"p_{ij,1} \in \{0, 1\}" in formula
+
+
 def test_a_solution_without_a_point_is_reported(problem):
     from crossfield.export.statuses import Status
 

@@ -8,6 +8,7 @@ import sympy as sp
 from crossfield.models.formulations.catalogue import CUBIC, PARITY, QUARTIC, lift_products
 from crossfield.models.formulations.catalogue import declare as formulation_of
 from crossfield.models.formulations.expressions import PI, ZERO, Symbol, cos, floor, parity
+from crossfield.models.formulations.latex import to_sympy
 from crossfield.models.formulations.symbols import VARIABLES
 
 x, y, w = Symbol("x"), Symbol("y"), Symbol("w")
@@ -40,8 +41,7 @@ def test_polynomials_are_sorted_by_degree_and_a_cosine_is_none():
     assert list((x * cos(y)).polynomial([x])) == [(x,)]
 
 
-def test_values_are_those_of_sympy(docs_module):
-    to_sympy = docs_module("latex").to_sympy
+def test_values_are_those_of_sympy():
     mixed = floor(x / 2) + parity(y) * cos(PI * x) - PI / 4 * w
     lifted = [family.body for family in lift_products(formulation_of("minlp-quartic")).objective]
     bounds = [end for variable in VARIABLES.values() for end in (variable.lower, variable.upper) if end]

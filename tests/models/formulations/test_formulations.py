@@ -16,6 +16,7 @@ from crossfield.models.errors import FormulationError
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations import symbols as n
 from crossfield.models.formulations.catalogue import CUBIC, PARITY, QUARTIC, declare
+from crossfield.models.formulations.latex import to_sympy
 from crossfield.models.formulations.problem import formulate, with_integers_fixed
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
@@ -42,13 +43,7 @@ def objective_at(name, field, **options):
 # formulas
 
 
-@pytest.fixture(scope="module")
-def to_sympy(docs_module):
-    """The function that passes an expression to SymPy."""
-    return docs_module("latex").to_sympy
-
-
-def test_9_is_8_expanded_for_a_binary_p1(to_sympy):
+def test_9_is_8_expanded_for_a_binary_p1():
     a, b, x, y, p1, p2 = map(to_sympy, (n.alpha_i, n.alpha_j, n.beta_i, n.beta_j, n.p1, n.p2))
     pi = sp.pi
     printed = 2 * (
@@ -65,7 +60,7 @@ def test_9_is_8_expanded_for_a_binary_p1(to_sympy):
     assert sp.Poly(cubic, a, b, x, y, p1, p2).total_degree() == 3
 
 
-def test_parity_is_8_for_whole_jumps(to_sympy):
+def test_parity_is_8_for_whole_jumps():
     half = sp.Symbol("half", integer=True)
     p, p2 = to_sympy(n.p), to_sympy(n.p2)
     for parity in (0, 1):
@@ -74,7 +69,7 @@ def test_parity_is_8_for_whole_jumps(to_sympy):
         assert sp.expand(sp.simplify(whole) - split) == 0
 
 
-def test_hull_facets_force_the_product_and_the_printed_one_does_not(to_sympy):
+def test_hull_facets_force_the_product_and_the_printed_one_does_not():
     """By (26)-(29) at a binary p1 the interval left to z is the product; as printed,
     p1 = 0 leaves one open.
     """

@@ -1,4 +1,4 @@
-"""LaTeX of formulations, derived from their declarations by SymPy."""
+"""LaTeX of formulations, derived from their declarations by SymPy, which only notebooks and pages need."""
 
 from __future__ import annotations
 
@@ -6,17 +6,10 @@ from collections.abc import Iterable
 from typing import Final
 
 import sympy as sp
-from crossfield.models.formulations.declaration import Family, Formulation
-from crossfield.models.formulations.expressions import (
-    Expression,
-    Factor,
-    Function,
-    Operand,
-    Symbol,
-    Term,
-    expression_of,
-)
-from crossfield.models.formulations.symbols import LATEX, SLOTS, IndexSet, Variable, w, w_beta, w_strokes
+
+from .declaration import Family, Formulation
+from .expressions import Expression, Factor, Function, Operand, Symbol, Term, expression_of
+from .symbols import LATEX, SLOTS, IndexSet, Variable, w, w_beta, w_strokes
 
 _SUM: Final[dict[IndexSet, str]] = {
     "pixels": r"\sum_{i \in I}",
@@ -72,6 +65,15 @@ def expression(value: Operand) -> str:
 def aligned(lines: Iterable[str]) -> str:
     """Lines as one environment."""
     return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+
+
+def model(formulation: Formulation) -> str:
+    """Objective, rows and domains, the domains of an index set on one line."""
+    domains: dict[IndexSet, list[str]] = {}
+    for variable in map(formulation.variable, formulation.variables):
+        domains.setdefault(variable.over, []).append(domain(variable, formulation))
+    lines = ["& " + r", \qquad ".join(texts) + f" && {_FOR[over]}" for over, texts in domains.items()]
+    return aligned([*objective_and_rows(formulation), *lines])
 
 
 def objective_and_rows(formulation: Formulation) -> list[str]:
