@@ -7,7 +7,7 @@ from importlib.metadata import version as installed
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from docutils.nodes import SkipNode
+from docutils.nodes import SkipNode, section
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -19,12 +19,16 @@ from formulas import mathml, model_table
 project = "crossfield"
 author = "The crossfield authors"
 version = release = installed("crossfield")
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "command_pages", "csv_pages"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "command_pages", "csv_pages"]
 exclude_patterns = ["static", "studying"]
-source_suffix = {".md": "markdown"}
+source_suffix = {".md": "myst-nb"}
 
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4
+
+nb_execution_raise_on_error = True
+nb_execution_in_temp = True
+nb_execution_timeout = 300
 
 default_role = "code"
 html_theme = "furo"
@@ -50,9 +54,12 @@ def _inline(writer: Any, node: Any) -> None:
 
 def _block(writer: Any, node: Any) -> None:
     """Write a formula on lines of its own, and a model as a table."""
-    source = node.astext()
+    source = node.astext().strip()
     if source.startswith(r"\begin{aligned}"):
-        writer.body.append(model_table(node.parent[0].astext(), source))
+        parent = node.parent
+        while not isinstance(parent, section):
+            parent = parent.parent
+        writer.body.append(model_table(parent[0].astext(), source))
     else:
         writer.body.append(f'<div class="math">{mathml(source)}</div>')
     raise SkipNode
