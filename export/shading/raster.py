@@ -84,10 +84,18 @@ def view_of_box(box: Box, side: int | None = None) -> View:
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """Unit normals (h, w, 3), x right, y up, z towards the viewer, and opacity (h, w), of a picture."""
+    """Unit normals (..., 3) of a picture, x right, y up, z towards the viewer, and the depth (...) inside.
+
+    The depth is the distance from the outline in pixels of the picture, exact near it; positive inside.
+    """
 
     normals: Floats
-    opacity: Floats
+    depth: Floats
+
+    @property
+    def opacity(self) -> Floats:
+        """The part of each pixel inside of the outline (...)."""
+        return np.clip(0.5 + self.depth, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,17 +131,17 @@ def raster(
     else:
         outside = outline.level.min()
         depth = _interpolation(outline.view, view, rows)(outline.level - outside) + outside
-    # The part of each pixel inside of the outline.
     depth = np.pad(depth, ((0, 0), (1, 1)), mode="edge")
-    steepness = np.hypot(*np.gradient(depth))
-    opacity = np.clip(0.5 + depth / np.maximum(steepness, 1e-9), 0.0, 1.0)
-    return Raster(unit, opacity[1:-1, 1:-1])
+    depth /= np.maximum(np.hypot(*np.gradient(depth)), 1e-9)
+    return Raster(unit, depth[1:-1, 1:-1])
 
 
 def _normalise(vectors: Floats) -> Floats:
     """The vectors (..., 3) with length 1; towards the viewer where there is none."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.where(length > 1e-9, vectors / np.maximum(length, 1e-9), (0.0, 0.0, 1.0))
+    length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    unit = vectors / np.maximum(length, 1e-9)[..., None]
+    unit[length <= 1e-9] = (0.0, 0.0, 1.0)
+    return unit
 
 
 def _interpolation(values: View, view: View, rows: slice) -> Callable[[Floats], Floats]:
@@ -148,7 +156,10 @@ def _interpolation(values: View, view: View, rows: slice) -> Callable[[Floats], 
     )
     right = view.box[0] - values.box[0] + (np.arange(view.width, dtype=float) + 0.5) * wide
     up, across = _splines(values.height, down / step_y - 0.5), _splines(values.width, right / step_x - 0.5)
-    return lambda image: np.asarray(up @ (across @ image.T).T)
+    reached = np.unique(up.indices)
+    used = slice(reached[0], reached[-1] + 1) if len(reached) else slice(0)
+    up = up[:, used]
+    return lambda image: np.asarray(up @ (across @ image[used].T).T)
 
 
 def _depth_in_mask(mask: Bools, strokes: float, spread: Callable[[Floats], Floats]) -> Floats:

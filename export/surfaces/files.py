@@ -56,7 +56,10 @@ _ENCODING: Final = (
     "red, green, blue = round(255 (n + 1) / 2) of the unit normal n: red to the right, green up (OpenGL; for "
     "DirectX invert green), blue towards the viewer; numbers, not colours, so no colour profile applies"
 )
-_BAND: Final = 1 << 20  # pixels of a picture that are computed together
+_BAND: Final = 1 << 20  # pixels of a picture whose normals are computed together
+_CACHED: Final = 1 << 16  # pixels whose colours are: what they need fits into the processor's cache
+_COMPRESSION: Final = 4  # a fifth larger than by the usual 6, in half the time
+_RIM: Final = 4.0  # pixels beyond the outline with colours, so that programs can scale a picture
 _WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
 
@@ -170,16 +173,20 @@ def paint_surface(
 ) -> list[NDArray[np.uint8]]:
     """A picture of the surface, uint8 (h, w, 4), for each way to colour its normals.
 
-    It ends at the outline that is drawn, or at that of the mask.
+    It ends at the outline that is drawn, or at that of the mask. Colours continue for some pixels beyond it.
     """
     outline = find_outline(surface.instance, drawing) if drawing else None
-    pictures = [np.empty((view.height, view.width, 4), dtype=np.uint8) for _ in colours]
+    pictures = [np.zeros((view.height, view.width, 4), dtype=np.uint8) for _ in colours]
     band = max(1, _BAND // view.width)
     for top in range(0, view.height, band):
         rows = slice(top, top + band)
         part = raster(surface.instance, surface.normals, view, rows, outline)
-        for picture, colour in zip(pictures, colours, strict=True):
-            picture[rows] = to_eight_bit(colour(part))
+        near = np.flatnonzero(part.depth > -_RIM)
+        normals, depth = part.normals.reshape(-1, 3), part.depth.ravel()
+        for pixels in np.array_split(near, 1 + len(near) // _CACHED):
+            seen = Raster(normals[pixels], depth[pixels])
+            for picture, colour in zip(pictures, colours, strict=True):
+                picture[rows].reshape(-1, 4)[pixels] = to_eight_bit(colour(seen))
     return pictures
 
 
@@ -188,7 +195,7 @@ def encode_png(picture: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(picture).save(stream, "PNG")
+    Image.fromarray(picture).save(stream, "PNG", compress_level=_COMPRESSION)
     return stream.getvalue()
 
 

@@ -19,7 +19,7 @@ from ..pictures.layers import strokes_sheet
 from ..pictures.underlay import Underlay
 from ..shading.raster import Outline, grid_box, raster, view_of_box
 
-_SIDE: Final = 1536  # pixels of the longer side of the picture on which cells are found
+_SIDE: Final = 1024  # pixels of the longer side of the picture on which cells are found
 _MARGIN: Final = 0.25  # of the longer side of the grid round it, so that the paper outside is one large cell
 _WIDTH: Final = 0.25  # pixels of the grid that strokes are wide there: smaller gaps are closed
 _LEAST: Final = 2.0  # pixels of that picture that strokes are wide, so that they have no gaps

@@ -142,7 +142,7 @@ def test_a_matcap_has_one_colour_for_each_normal_and_all_are_colours():
     picture = fine(ball(16), 4)
     coloured = matcap(picture)
     assert ((coloured >= 0) & (coloured <= 1)).all()
-    turned = Raster(picture.normals[::-1], picture.opacity[::-1])
+    turned = Raster(picture.normals[::-1], picture.depth[::-1])
     assert (matcap(turned) == coloured[::-1]).all()
     light = coloured[picture.opacity == 1][:, :3].sum(axis=1)
     assert np.ptp(light) > 0.8
