@@ -139,7 +139,7 @@ def raster(
 def _normalise(vectors: Floats) -> Floats:
     """The vectors (..., 3) with length 1; towards the viewer where there is none."""
     length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
-    unit = vectors / np.maximum(length, 1e-9)[..., None]
+    unit: Floats = vectors / np.maximum(length, 1e-9)[..., None]
     unit[length <= 1e-9] = (0.0, 0.0, 1.0)
     return unit
 
