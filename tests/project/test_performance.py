@@ -1,4 +1,4 @@
-"""The benchmark of the writers runs, at sizes where nothing can be measured."""
+"""The benchmarks run, at sizes where nothing can be measured."""
 
 import re
 import shutil
@@ -9,18 +9,23 @@ import places
 import pytest
 
 
+def run_benchmark(folder, *arguments):
+    """The page after a benchmark."""
+    page = shutil.copy(places.ROOT / "docs" / "performance.md", folder / "page.md")
+    command = [sys.executable, str(places.ROOT / "tests" / "bench"), *arguments, "--page", str(page)]
+    subprocess.run(command, check=True, capture_output=True)
+    return page.read_text()
+
+
+@pytest.mark.slow
+def test_the_start_of_commands_is_measured(tmp_path):
+    page = run_benchmark(tmp_path, "start", "--runs", "1")
+    assert re.search(r"\| `crossfield --help` \| 0\.\d\d \|", page)
+
+
 @pytest.mark.slow
 def test_smoke_run_replaces_the_tables_of_a_page(tmp_path):
-    page = shutil.copy(places.ROOT / "docs" / "performance.md", tmp_path / "page.md")
-    command = [
-        sys.executable,
-        str(places.ROOT / "tests" / "bench"),
-        "writing",
-        "--smoke",
-        "--page",
-        str(page),
-    ]
-    subprocess.run(command, check=True, capture_output=True)
+    page = run_benchmark(tmp_path, "writing", "--smoke")
     # The LP of 8 x 8 pixels has a fixed length, so that what is measured is known to be the file.
-    assert re.search(r"\| 8 \| crossfield \| 0\.1\d* \|", page.read_text())
-    assert "| Pyomo |" in page.read_text()
+    assert re.search(r"\| 8 \| crossfield \| 0\.1\d* \|", page)
+    assert "| Pyomo |" in page
