@@ -30,9 +30,11 @@ from surface import SURFACES, angles, field_by, normal_error
 CELL: Final = 2.1
 """Inches of a picture's longer side."""
 DOTS: Final = 110
-HEADINGS: Final = ("strokes", "normal map", "shaded", "the true surface")
-
-
+WORDS: Final = 15
+"""Points of words, which are legible on a phone."""
+LINE: Final = 0.38
+"""Inches of a line of words."""
+HEADINGS: Final = ("strokes", "normal map", "shaded", "true surface")
 SIZE: Final = 48
 
 
@@ -53,22 +55,24 @@ def draw_rows(rows: list[Row], path: Path) -> Path:
     cells = [_cells(row, _view(row)) for row in rows]
     columns = max(map(len, cells))
     heights = [CELL * max(cell.shape[0] / max(cell.shape[:2]) for cell in line) for line in cells]
-    size = (columns * (CELL + 0.15), sum(heights) + 0.3 * len(rows) + 0.3)
+    size = (columns * (CELL + 0.15), sum(heights) + LINE * (len(rows) + 1))
     figure = Figure(figsize=size, dpi=DOTS, facecolor="white")
-    top = size[1] - 0.3
+    top = size[1] - LINE
     for line, row, height in zip(cells, rows, heights, strict=True):
-        figure.text(0.08 / size[0], top / size[1], row.title, va="center", fontsize=9, weight="bold")
+        middle = 1 - (size[1] - top + LINE / 2) / size[1]
+        figure.text(0.08 / size[0], middle, row.title, va="center", fontsize=WORDS, weight="bold")
         for number, cell in enumerate(line):
             left = number * (CELL + 0.15) + 0.075
             axes = figure.add_axes(
-                (left / size[0], (top - 0.15 - height) / size[1], CELL / size[0], height / size[1])
+                (left / size[0], (top - LINE - height) / size[1], CELL / size[0], height / size[1])
             )
             axes.imshow(cell, interpolation="hanning", interpolation_stage="rgba")
             axes.set_axis_off()
-        top -= height + 0.3
+        top -= height + LINE
     for number, heading in enumerate(HEADINGS[:columns]):
         middle = number * (CELL + 0.15) + 0.075 + CELL / 2
-        figure.text(middle / size[0], 1 - 0.12 / size[1], heading, ha="center", va="center", fontsize=9)
+        place = (middle / size[0], 1 - LINE / 2 / size[1])
+        figure.text(*place, heading, ha="center", va="center", fontsize=WORDS)
     stream = io.BytesIO()
     figure.savefig(stream, metadata={"Software": None})
     with Image.open(stream) as picture:
@@ -109,7 +113,7 @@ def known_rows() -> list[Row]:
         off = normal_error(estimate, true.normals)
         if off.mean() < angles(estimate.normals, true.normals).mean():
             estimate = estimate.flipped()
-        rows.append(Row(f"{name}, {off.mean():.1f} degrees off", estimate, true.normals))
+        rows.append(Row(f"{name}, {off.mean():.1f}° off", estimate, true.normals))
     return rows
 
 
