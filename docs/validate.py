@@ -273,13 +273,13 @@ small instance, in every formulation and format. {programs} programs read {right
 
 ## Reading
 
-A program refuses a file *as stated* if crossfield says beforehand that it cannot read that model.
+A program refuses a file *as stated* if crossfield lists beforehand that it cannot read that model.
 
 {reading}
 
 ## Licences
 
-The free licences of these programs end, except that of CPLEX. [licensed.json](licensed.json) keeps the
+The free licences of these programs end, but not the one of CPLEX. [licensed.json](licensed.json) keeps the
 last results of each. The tests also solve `.bar` files of up to 10 columns with BARON, which needs no
 licence for them.
 

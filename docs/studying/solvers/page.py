@@ -242,7 +242,7 @@ def claims(rows: list[Row]) -> str:
     wrong = [row for row in rows if problem(row) in best and contradicted(row, *best[problem(row)])]
     lost = [row for row in rows if row["status"] in {FAILED, "unknown"}]
     return (
-        f"Of {len(rows)} runs, {sum(map(is_solved, rows))} end with a proven optimum. Answers that "
+        f"{sum(map(is_solved, rows))} of {len(rows)} runs end with a proven optimum. Answers that "
         f"contradict another run: {_listed(wrong)}. Runs without a usable answer: {_listed(lost)}."
     )
 
