@@ -46,7 +46,7 @@ class Cycles(Walks):
 
 def find_cycles(domain: Domain, stroke_index: Ints) -> Cycles:
     """The basis for a domain with strokes at some points; the same for equal arguments."""
-    forest = _grow_forest(domain, stroke_index)
+    forest = grow_forest(domain, stroke_index)
     chords = np.ones(len(domain.first), dtype=bool)
     chords[forest.pair[forest.pair >= 0]] = False
     rings, replaced = _choose_rings(domain, np.nonzero(chords)[0].astype(np.int32), forest)
@@ -81,7 +81,8 @@ def integrate(cycles: Cycles, domain: Domain, turns: Floats, at_roots: Floats) -
     return values
 
 
-def _grow_forest(domain: Domain, stroke_index: Ints) -> Forest:
+def grow_forest(domain: Domain, stroke_index: Ints) -> Forest:
+    """Grow a forest in breadth from points with strokes, then from the first point of each other part."""
     first, second = domain.first, domain.second
     depth = np.full(domain.size, -1, dtype=np.int32)
     pair = depth.copy()

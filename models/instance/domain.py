@@ -7,7 +7,7 @@ the two, and asks the instance for its `grid` or its `mesh`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -52,10 +52,15 @@ class Rings(Walks):
         """The rings whose pairs all have a new number, not -1, in `number` (m,), renumbered."""
         length = np.diff(self.start)
         known = np.bincount(np.repeat(np.arange(len(length)), length), number[self.pair] >= 0, len(length))
-        kept = known == length
+        kept = self.keep(known == length)
+        return replace(kept, pair=number[kept.pair])
+
+    def keep(self, kept: Bools) -> Rings:
+        """Some of the rings, (r,)."""
+        length = np.diff(self.start)
         steps = np.repeat(kept, length)
         start = np.append(0, np.cumsum(length[kept])).astype(np.int32)
-        return Rings(start, number[self.pair[steps]], self.sign[steps], self.defect[kept])
+        return Rings(start, self.pair[steps], self.sign[steps], self.defect[kept])
 
 
 class Domain(ABC):

@@ -16,7 +16,6 @@ import itertools
 import math
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -33,15 +32,19 @@ RELATIVE = 1e-9
 FLAT = 1.1e-8  # radians; instances take smaller turns between frames as 0
 MOST_LEVELS = 64
 MOST_DIVISIONS = 10_000  # cells of a quarter turn
+STRIDE = 4 * MOST_DIVISIONS  # between keys of labels of two points
 MOST_COSTS = 1 << 27  # of two labels of all pairs of a level: some 10 GB
 MOST_RING = 64  # pairs of a ring
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
+AT_ONCE = 1 << 17  # numbers in a processor's cache
 MOST_CASES = 256  # of integers after the last level
 MOST_NUMBER = 1e6  # of a weight and of an angle
 
+TURNS = np.arange(-3, 4)
+CENTRAL = TURNS == 0
+
 Array = Any
 Ring = tuple[list[int], list[int], list[int]]
-Costs = tuple[list[Array], list[Array]]
 
 
 # Section 1: the instance and its rows ----------------------------------------------------------------------
@@ -60,8 +63,8 @@ class CentredRows:
     def __init__(self, arrays: dict[str, Array], limit: Array | None = None) -> None:
         """Read a certificate. limit: of Lemma 1, where it is known."""
         head = base.json_of(arrays, "instance_head")
-        base.require(head.get("gauge") == "strokes", "gauge", "is not strokes")
-        base.require(head.get("orthogonal") is True, "orthogonal", "is not true")
+        asked = {"gauge": "strokes", "orthogonal": True}
+        base.require([head.get(name) == asked[name] for name in asked], str([*asked]), "is another one")
         if "instance_faces" in arrays:
             n, first, second, kappa, point = pairs_of_mesh(arrays)
         else:
@@ -92,13 +95,13 @@ class CentredRows:
     def _fixed_points(self) -> Array:
         """The ground and the first point of each part that no row of weight joins to it."""
         first, second = self.first[self.weight > 0], self.second[self.weight > 0]
-        own = np.append(np.arange(1, self.size + 1), 0)
-        part, before = own, own + 1
+        number = np.append(np.arange(1, self.size + 1), 0)
+        part, before = number, number + 1
         while (part != before).any():
             before, part = part, part.copy()
             np.minimum.at(part, first, before[second])
             np.minimum.at(part, second, before[first])
-        return np.asarray(part == own)
+        return np.asarray(part == number)
 
 
 def pairs_of_mesh(arrays: dict[str, Array]) -> tuple[int, Array, Array, Array, Array]:
@@ -130,8 +133,7 @@ def pairs_of_mesh(arrays: dict[str, Array]) -> tuple[int, Array, Array, Array, A
 def rings_of(arrays: dict[str, Array], first: Array, second: Array) -> list[Ring]:
     """The rings: closed walks over different points. first, second (m,): the ends of pairs."""
     start = base.take_array(arrays, "ring_start", "<i4", None)
-    base.require(len(start) and start[0] == 0, "ring_start", "does not begin with 0")
-    base.require((np.diff(start) >= 3) & (np.diff(start) <= MOST_RING), "ring_start", "has a wrong length")
+    base.require(np.diff(start) <= MOST_RING, "ring_start", "has too long a ring")
     pair = base.take_array(arrays, "ring_pair", "<i4", int(start[-1]))
     sign = base.take_array(arrays, "ring_sign", "|i1", int(start[-1]))
     base.require((pair >= 0) & (pair < len(first)) & (np.abs(sign) == 1), "ring_pair", "is no pair")
@@ -150,132 +152,137 @@ def limits_of(rows: CentredRows) -> Array:
     if n > MOST_DENSE:
         return np.full(len(first), QUARTER)
     matrix = np.zeros((n + 1, n + 1))
-    for i, j, sign in ((first, first, 1), (second, second, 1), (first, second, -1), (second, first, -1)):
-        np.add.at(matrix, (i, j), sign * weight)
-    matrix += np.eye(n + 1) * 1e-9 * max(matrix.max(), 1e-300)
-    inverse = np.zeros((n + 1, n + 1))
-    inverse[:n, :n] = np.linalg.inv(matrix[:n, :n])
+    np.add.at(matrix, (first, second), weight)
+    degree = (matrix := matrix + matrix.T).sum(axis=1)
+    matrix = np.diag(degree + 1e-9 * max(degree.max(), 1e-300)) - matrix
+    inverse = np.pad(np.linalg.inv(matrix[:n, :n]), (0, 1))
     resistance = np.zeros(len(first))
     for e, (i, j) in enumerate(rows.ends):  # any potential gives a lower bound of the resistance
         potential = inverse[i] - inverse[j]
         drop = potential[first] - potential[second]
-        power = weight @ (drop * drop)
-        resistance[e] = drop[e] ** 2 / power if power > 0 else 0.0
+        resistance[e] = drop[e] ** 2 / max(weight @ (drop * drop), 1e-300)
     return QUARTER * np.clip(1 - weight * resistance * (1 - RELATIVE), 0.0, 1.0) + RELATIVE
 
 
 # Section 2: labels, cells and costs ------------------------------------------------------------------------
 
 
-@dataclass
+def starts_of(sizes: Array) -> Array:
+    """Where blocks of these sizes begin in a flat array, and its length."""
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+
+def spans(begin: Array, sizes: Array) -> Array:
+    """All places of blocks that begin there, block after block."""
+    return np.repeat(begin - starts_of(sizes)[:-1], sizes) + np.arange(np.sum(sizes))
+
+
+class RowTable:
+    """A matrix for each row of the energy, flat: an entry for each two items (cells or labels) of its points.
+
+    start (n + 2,): where the items of a point begin. begin (r + 1,), width (r,): where a matrix begins, and
+    its columns. row: of each entry. item: of the lines of all matrices, for first and for second points.
+    line: both lines of each entry. first_line (r + 1,): where a matrix begins among lines of first points.
+    """
+
+    def __init__(self, rows: CentredRows, point: Array) -> None:
+        """point: of each item."""
+        count = np.bincount(point, minlength=rows.size + 1)
+        self.start, height, self.width = starts_of(count), count[rows.first], count[rows.second]
+        fits = (count > 0).all() and np.sum((height + 1) * (self.width + 1)) <= MOST_COSTS
+        base.require(fits, "the level", "has too many labels, or a point with none")
+        self.begin = starts_of(height * self.width)
+        self.row = np.repeat(np.arange(len(height), dtype=np.int32), height * self.width)
+        self.item = spans(self.start[rows.first], height), spans(self.start[rows.second], self.width)
+        inside = np.divmod(np.arange(self.begin[-1]) - self.begin[self.row], self.width[self.row])
+        lines = self.first_line, _ = starts_of(height), starts_of(self.width)
+        self.line = [(line[self.row] + at).astype(np.int32) for line, at in zip(lines, inside)]
+        self._origin = self.begin[:-1] - self.start[rows.first] * self.width - self.start[rows.second]
+
+    def at_ends(self, numbers: Array) -> list[Array]:
+        """The numbers of the two items of each entry; numbers: of all items."""
+        return [numbers[item][line] for item, line in zip(self.item, self.line)]
+
+    def places(self, row: Array, first: Array, second: Array) -> Array:
+        """Where the entries of two items in a row lie."""
+        return self._origin[row] + first * self.width[row] + second
+
+    def have_partners(self, used: Array) -> Array:
+        """Whether each item has an entry in use in all its rows."""
+        kept = np.ones(self.start[-1], bool)
+        for item, line in zip(self.item, self.line):
+            in_use = np.zeros(len(item), bool)
+            in_use[line[used]] = True
+            kept[item[~in_use]] = False
+        return kept
+
+    def matrix(self, numbers: Array, row: int) -> Array:
+        """The entries of a row."""
+        return numbers[self.begin[row] : self.begin[row + 1]].reshape(-1, self.width[row])
+
+
 class CellLevel:
     """Labels centre + h (k + half / 2), h = pi/2 / divisions, with whole numbers k.
 
-    cells: of each point, the lower labels k, ascending, of cells that may hold the cross of an optimal field.
-    squares: of each pair, whether two cells may. labels: k of each point, ascending: the ends of its cells.
+    cells: the lower label k of each cell that may hold the cross of an optimal field, point after point,
+    ascending; owner: its point. allowed: whether two cells may, by entries of the table `squares`. label,
+    point: k and point of each label, in the same order; key: both as one number. ends (2, cells): the labels
+    at both ends of each cell. pairs: the table of labels.
     """
 
-    divisions: int
-    fixed: Array
-    cells: list[Array]
-    squares: list[Array]
+    def __init__(self, rows: CentredRows, divisions: int, owner: Array, cells: Array) -> None:
+        """All squares are allowed."""
+        self.rows, self.divisions, self.owner, self.cells = rows, divisions, owner, cells
+        key = owner * STRIDE + cells
+        self.key, ends = np.unique([key, key + ~rows.fixed[owner]], return_inverse=True)
+        self.ends, self.point = ends.reshape(2, -1), (self.key + STRIDE // 2) // STRIDE
+        self.label = self.key - STRIDE * self.point
+        self.squares, self.pairs = RowTable(rows, owner), RowTable(rows, self.point)
+        self.allowed = np.ones(len(self.squares.row), bool)
 
-    def __post_init__(self) -> None:
-        ends = zip(self.cells, self.fixed)
-        self.labels = [cells if fixed else np.union1d(cells, cells + 1) for cells, fixed in ends]
-        self.lower = [np.searchsorted(labels, cells) for labels, cells in zip(self.labels, self.cells)]
-
-    def corners(self, *points: int) -> Iterator[tuple[Array, ...]]:
-        """Where the corners of all cells of a point, or squares of two, lie among the labels."""
-        last = [len(self.labels[i]) - 1 for i in points]
-        for up in itertools.product((0, 1), repeat=len(points)):
-            yield np.ix_(*(np.minimum(self.lower[i] + u, end) for i, u, end in zip(points, up, last)))
-
-    def with_corner(self, labels: Array, *points: int) -> Array:
-        """Whether each cell, or square, has one of these labels, or two labels, at a corner."""
-        return np.logical_or.reduce([labels[at] for at in self.corners(*points)])
-
-    def corners_of(self, squares: Array, *points: int) -> Array:
-        """Whether each two labels are a corner of one of these squares."""
-        labels = np.zeros([len(self.labels[i]) for i in points], bool)
-        for at in self.corners(*points):
-            labels[at] |= squares
-        return labels
+    def corners(self) -> Iterator[Array]:
+        """Where the four corners of all squares lie in the table of labels."""
+        for first, second in itertools.product(*zip(*map(self.squares.at_ends, self.ends))):
+            yield self.pairs.places(self.squares.row, first, second)
 
 
 def first_level(rows: CentredRows, divisions: int) -> CellLevel:
     """All crosses: cells that span a quarter turn; label 0 alone where a point is fixed."""
-    check_size(rows, np.where(rows.fixed, 1, divisions))
+    count = np.where(rows.fixed, 1, divisions)
     lowest = np.where(rows.fixed, 0, -((divisions + rows.half) // 2))
-    cells = [low + np.arange(1 if fixed else divisions) for low, fixed in zip(lowest, rows.fixed)]
-    squares = [np.ones((len(cells[i]), len(cells[j])), bool) for i, j in rows.ends[: rows.pairs]]
-    return CellLevel(divisions, rows.fixed, cells, squares)
+    return CellLevel(rows, divisions, np.repeat(np.arange(len(count)), count), spans(lowest, count))
 
 
-def check_size(rows: CentredRows, cells: Array) -> None:
-    """Raise NotProvenError for a level with more costs than memory may hold. cells: of each point."""
-    costs = np.sum((cells[rows.first[: rows.pairs]] + 1) * (cells[rows.second[: rows.pairs]] + 1))
-    base.require(costs <= MOST_COSTS, "the level", "has too many labels")
-
-
-def cells_of(rows: CentredRows, level: CellLevel, squares: list[Array]) -> list[Array]:
-    """Whether each cell has a square with some cell of every neighbour."""
-    kept = [np.ones(len(cells), bool) for cells in level.cells]
-    for (i, j), square in zip(rows.ends, squares):
-        kept[i] &= square.any(axis=1)
-        kept[j] &= square.any(axis=0)
-    return kept
-
-
-def next_level(rows: CentredRows, level: CellLevel, squares: list[Array], factor: int) -> CellLevel:
+def next_level(level: CellLevel, squares: Array, factor: int) -> CellLevel:
     """The level whose cells are parts of those that are left: one of each (factor 1) or three."""
-    kept, parts = cells_of(rows, level, squares), np.where(rows.fixed, 1, factor)
-    check_size(rows, parts * np.array([left.sum() for left in kept]))
-    cells = [
-        (count * lower[left][:, None] + half * (count // 3) + np.arange(count)).ravel()
-        for lower, left, half, count in zip(level.cells, kept, rows.half, parts)
-    ]
-    finer = [
-        square[np.ix_(kept[i], kept[j])].repeat(parts[i], axis=0).repeat(parts[j], axis=1)
-        for (i, j), square in zip(rows.ends, squares)
-    ]
-    return CellLevel(level.divisions * factor, rows.fixed, cells, finer)
+    rows, left = level.rows, np.nonzero(level.squares.have_partners(squares))[0]
+    point = level.owner[left]
+    parts = np.where(rows.fixed, 1, factor)[point]
+    lowest, parent = parts * level.cells[left] + rows.half[point] * (parts // 3), np.repeat(left, parts)
+    finer = CellLevel(rows, level.divisions * factor, level.owner[parent], spans(lowest, parts))
+    finer.allowed = squares[level.squares.places(finer.squares.row, *finer.squares.at_ends(parent))]
+    return finer
 
 
-def cost_table(rows: CentredRows, divisions: int) -> Array:
-    """Lemma 2: costs of all rows at all differences of labels modulo the divisions; inf: excluded."""
-    h = HALF / divisions
+def costs_of(level: CellLevel) -> Array:
+    """Lemma 2: the cost of each two labels of a row; inf: excluded."""
+    rows, pairs, n, h = level.rows, level.pairs, level.divisions, HALF / level.divisions
     shift = (rows.half[rows.first] - rows.half[rows.second])[:, None] / 2
-    best = np.full((len(rows.first), divisions), np.inf)
-    for turn in (-2, -1, 0, 1):
-        x = np.arange(divisions) + divisions * turn + shift
+    best, usable = np.full((len(rows.first), n), np.inf), np.zeros(len(pairs.row), bool)
+    for turn in (-2, -1, 0, 1):  # of all differences of labels modulo n
+        x = np.arange(n) + n * turn + shift
         a = rows.residual[:, None] + h * x
         deducted = np.where((shift == 0) & (np.abs(x) <= 1), np.abs(x), 0.25)
         cost = rows.weight[:, None] * (a * a - h * h * deducted)
         within = np.abs(a) <= rows.limit[:, None] + h * (1 + RELATIVE)
         best = np.where(within, np.minimum(best, cost), best)
-    return best
-
-
-def costs_of(rows: CentredRows, level: CellLevel) -> Costs:
-    """The costs of the labels of each point by strokes, and of each two labels of each pair."""
-    n, labels = level.divisions, level.labels
-    table, ends = cost_table(rows, n), rows.ends[: rows.pairs]
-    unary = [np.zeros(len(of_point)) for of_point in labels]
-    for of_stroke, (i, _) in zip(table[rows.pairs :], rows.ends[rows.pairs :]):
-        unary[i] = unary[i] + of_stroke[labels[i] % n]
-    costs = [
-        np.where(level.corners_of(squares, i, j), of_pair[(labels[i][:, None] - labels[j]) % n], np.inf)
-        for of_pair, squares, (i, j) in zip(table, level.squares, ends)
-    ]
-    excluded = -1
-    while excluded != (excluded := sum(int(np.isinf(of_point).sum()) for of_point in unary)):
-        for e, (i, j) in enumerate(ends):  # labels without a partner are excluded, with all costs of theirs
-            used = np.isfinite(unary[i])[:, None] & np.isfinite(unary[j])
-            costs[e] = np.where(used, costs[e], np.inf)
-            unary[i] = np.where(np.isfinite(costs[e]).any(axis=1), unary[i], np.inf)
-            unary[j] = np.where(np.isfinite(costs[e]).any(axis=0), unary[j], np.inf)
-    return unary, costs
+    for corner in level.corners():
+        usable[corner[level.allowed]] = True
+    first, second = pairs.at_ends(level.label)
+    costs, excluded = np.where(usable, best[pairs.row, (first - second) % n], np.inf), -1
+    while excluded != (excluded := np.isinf(costs).sum()):  # with a label, all its costs are excluded
+        costs[~np.logical_and(*pairs.at_ends(pairs.have_partners(np.isfinite(costs))))] = np.inf
+    return costs
 
 
 # Section 3: bound and exclusion ----------------------------------------------------------------------------
@@ -284,139 +291,127 @@ def costs_of(rows: CentredRows, level: CellLevel) -> Costs:
 class Excess:
     """Lemma 3: the cost of any labelling is at least `bound` plus its excesses, none of which is negative.
 
-    points: excess of each label, r. pairs: of each two labels, s. tables: of each ring in use, for each of
-    its steps; least: the least sum of -tables along it. error: of all sums together.
+    points: excess of each label, r. pairs: of each two labels, s. rings: those in use, the tables of their
+    steps, and the least sum of -tables. error: of all sums together.
     """
 
-    def __init__(
-        self, rows: CentredRows, costs: Costs, shares: list[Array], tables: dict[int, list[Array]]
-    ) -> None:
-        """Compute them. shares: of each pair, one for each label of its first point."""
-        points, pairs = list(costs[0]), list(costs[1])
-        size = [greatest(cost) for cost in points]
-        for ring, of_ring in tables.items():
-            for e, table in zip(rows.rings[ring][0], of_ring):
-                pairs[e] = pairs[e] + table
-                size.append(3 * greatest(table))
-        for e, ((i, j), share) in enumerate(zip(rows.ends, shares)):
-            rest = pairs[e] - share[:, None]
-            other = rest.min(axis=0)  # the greatest share of the second point
-            pairs[e] = rest - np.where(np.isfinite(other), other, 0.0)
-            points[i], points[j] = points[i] + share, points[j] + other
-            size.append(2 * greatest(rest) + 2 * greatest(share))
-        least = [*(float(point.min()) for point in points[:-1]), 0.0]
-        self.points, self.pairs, self.tables = [p - bound for p, bound in zip(points, least)], pairs, tables
-        self.least = {ring: ring_least(rows, ring, pairs, of_ring) for ring, of_ring in tables.items()}
-        least += self.least.values()
-        base.require(np.isfinite(least).all(), "the level", "leaves not even the field")
-        self.error = MARGIN * math.fsum(size)
+    def __init__(self, level: CellLevel, costs: Array, shares: Array, rings: list[Any]) -> None:
+        """shares: of each label of the first points of pairs. rings: rings, and the tables of their steps."""
+        pairs, of_strokes = level.pairs, costs[level.pairs.begin[level.rows.pairs] :]
+        shares = np.append(shares, np.where(np.isfinite(of_strokes), of_strokes, 0.0))
+        self.level, self.pairs = level, costs.copy()
+        for ring, tables in rings:
+            for e, table in zip(ring[0], tables):
+                pairs.matrix(self.pairs, e)[:] += table
+        self.pairs -= shares[pairs.line[0]]
+        size = 2 * greatest(self.pairs, pairs.begin) + 2 * greatest(shares, pairs.first_line)
+        rest = np.full(len(pairs.item[1]), np.inf)  # the greatest shares of the second points
+        np.minimum.at(rest, pairs.line[1], self.pairs)
+        self.pairs -= np.where(np.isfinite(rest), rest, 0.0)[pairs.line[1]]
+        points = np.where(pairs.have_partners(np.isfinite(costs)), 0.0, np.inf)
+        np.add.at(points, pairs.item[0], shares)
+        np.add.at(points, pairs.item[1], rest)
+        self.rings = [(*ring, self._ring_least(*ring)) for ring in rings]
+        least = np.append(np.minimum.reduceat(points, pairs.start[:-1]), [ring[2] for ring in self.rings])
+        base.require(np.isfinite(least), "the level", "leaves not even the field")
+        self.points = points - least[level.point]
+        self.by_point = np.split(self.points, pairs.start[1:-1])
+        of_tables = [3 * np.abs(table).max() for _, tables in rings for table in tables]
+        self.error = MARGIN * math.fsum([*size, *of_tables])
         self.bound = math.fsum(least) - self.error
 
+    def _along(self, ring: Ring, tables: list[Array], combine: Any) -> list[Array]:
+        """Pairs combined with tables, step after step along a ring."""
+        pairs = (self.level.pairs.matrix(self.pairs, e) for e in ring[0])
+        return [m if sign > 0 else m.T for m, sign in zip(map(combine, pairs, tables), ring[1])]
 
-def greatest(numbers: Array) -> float:
-    """The greatest absolute value of finite numbers."""
-    return float(np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0))
+    def _ring_least(self, ring: Ring, tables: list[Array]) -> float:
+        """The least sum of -tables over labels of the points of a ring, each two of a pair in use."""
+        *steps, last = self._along(ring, tables, lambda s, table: np.where(np.isfinite(s), -table, np.inf))
+        return float((reduce(min_plus, steps) + last.T).min())
+
+    def ring_marginals(self, ring: Ring, tables: list[Array], least: float) -> list[Array]:
+        """Of each two labels of the pairs of a ring, the least sum of all excesses on it."""
+        steps = self._along(ring, tables, np.subtract)
+        steps = [s + self.by_point[i][:, None] for s, i in zip(steps, ring[2])]
+        before = list(itertools.accumulate(steps[:-1], min_plus))  # from the first point
+        after = list(itertools.accumulate(steps[:0:-1], lambda back, step: min_plus(step, back)))[::-1]
+        middle = [step + min_plus(back, on).T for step, on, back in zip(steps[1:-1], before, after[1:])]
+        marginals = zip([steps[0] + after[0].T, *middle, steps[-1] + before[-1].T], ring[1])
+        return [(marginal if sign > 0 else marginal.T) - least for marginal, sign in marginals]
+
+    def forest_marginals(self, forest: list[int]) -> Array:
+        """Of each label, the least sum of excesses on a forest; the pairs of a tree grow from one of them."""
+        edges, reached, pairs = list[tuple[int, int, Array]](), set[int](), self.level.pairs
+        up, message = list(self.by_point), dict[int, Array]()
+        for e in forest:
+            i, j = self.level.rows.ends[e]
+            child, parent = (j, i) if i in reached else (i, j)
+            base.require(child not in reached, "forests", "has a cycle")
+            reached |= {i, j}
+            matrix = pairs.matrix(self.pairs, e)
+            edges.append((child, parent, matrix if child == i else matrix.T))
+        for i, parent, matrix in reversed(edges):
+            message[i] = (matrix + up[i][:, None]).min(axis=0)
+            up[parent] = up[parent] + message[i]
+        whole = list(up)
+        for i, parent, matrix in edges:
+            rest = whole[parent] - np.where(np.isfinite(message[i]), message[i], 0.0)  # without i; inf stays
+            whole[i] = up[i] + (matrix + rest).min(axis=1)
+        return np.concatenate(whole)
+
+
+def greatest(numbers: Array, start: Array) -> Array:
+    """The greatest absolute value of finite numbers in each block."""
+    return np.maximum.reduceat(np.where(np.isfinite(numbers), np.abs(numbers), 0.0), start[:-1])
 
 
 def min_plus(one: Array, other: Array) -> Array:
     """The least sum over the middle labels."""
-    least = np.full((len(one), other.shape[1]), np.inf)
-    for column, row in zip(one.T, other):  # all at once would leave the processor's cache
-        np.minimum(least, column[:, None] + row, out=least)
-    return least
+    if one.size * other.shape[1] <= AT_ONCE:
+        return (one[:, :, None] + other).min(axis=1)
+    return np.array([(row[:, None] + other).min(axis=0) for row in one])
 
 
-def along_ring(rows: CentredRows, ring: int, matrices: list[Array]) -> list[Array]:
-    """Matrices of the steps of a ring, from first to second point, turned along the walk or back."""
-    return [matrix if sign > 0 else matrix.T for matrix, sign in zip(matrices, rows.rings[ring][1])]
-
-
-def ring_least(rows: CentredRows, ring: int, pairs: list[Array], tables: list[Array]) -> float:
-    """The least sum of -tables over labels of the points of a ring, each two of a pair in use."""
-    negative = [np.where(np.isfinite(pairs[e]), -t, np.inf) for e, t in zip(rows.rings[ring][0], tables)]
-    *steps, last = along_ring(rows, ring, negative)
-    return float((reduce(min_plus, steps) + last.T).min())
-
-
-def kept_of(rows: CentredRows, level: CellLevel, excess: Excess, forests: Array, most: float) -> list[Array]:
+def kept_of(level: CellLevel, excess: Excess, forests: Array, most: float) -> Array:
     """Lemma 4: the squares that an optimal field of energy `most` or less may use."""
-    ends, spare = rows.ends, (most - excess.bound + 2 * excess.error) * (1 + RELATIVE)
-    allowed = [point <= spare for point in excess.points]
+    spare = (most - excess.bound + 2 * excess.error) * (1 + RELATIVE)
+    labels, (first, second) = excess.points <= spare, level.pairs.at_ends(excess.points)
     for forest in forests:
-        for i, marginal in enumerate(forest_marginals(rows, excess, forest.tolist())):
-            allowed[i] &= marginal <= spare
-    cells = [level.with_corner(labels, i) for i, labels in enumerate(allowed)]
-    pairs = [
-        excess.points[i][:, None] + s + excess.points[j] <= spare for (i, j), s in zip(ends, excess.pairs)
-    ]
-    for ring in excess.tables:
-        for e, marginal in zip(rows.rings[ring][0], ring_marginals(rows, ring, excess)):
-            pairs[e] &= marginal <= spare
-    squares = [level.with_corner(labels, i, j) for (i, j), labels in zip(ends, pairs)]
-    squares = [square & within for square, within in zip(squares, level.squares)]
+        labels &= excess.forest_marginals(forest.tolist()) <= spare
+    pairs = first + excess.pairs + second <= spare
+    for ring, tables, least in excess.rings:
+        for e, marginal in zip(ring[0], excess.ring_marginals(ring, tables, least)):
+            level.pairs.matrix(pairs, e)[:] &= marginal <= spare
+    squares = level.allowed & np.logical_or.reduce([pairs[corner] for corner in level.corners()])
+    cells = labels[level.ends].any(axis=0)
     for _ in range(2):
-        squares = [square & cells[i][:, None] & cells[j] for (i, j), square in zip(ends, squares)]
-        cells = cells_of(rows, level, squares)
-    base.require(all(cell.any() for cell in cells), "the level", "leaves not even the field")
+        squares &= np.logical_and(*level.squares.at_ends(cells))
+        squares[level.squares.begin[level.rows.pairs] :] = True  # those of strokes are not stored
+        cells = level.squares.have_partners(squares)
     return squares
-
-
-def forest_marginals(rows: CentredRows, excess: Excess, forest: list[int]) -> list[Array]:
-    """Of each label, the least sum of the excesses of points and pairs on a forest.
-
-    forest: its pairs; all that are joined come one after the other, each with a point of those before.
-    """
-    edges, reached, up = list[tuple[int, int, Array]](), set[int](), list(excess.points)
-    for e in forest:
-        i, j = rows.ends[e]
-        child, parent = (j, i) if i in reached else (i, j)
-        base.require(child not in reached, "forests", "has a cycle")
-        reached |= {i, j}
-        edges.append((child, parent, excess.pairs[e] if child == i else excess.pairs[e].T))
-    message = dict[int, Array]()
-    for i, parent, matrix in reversed(edges):
-        message[i] = (matrix + up[i][:, None]).min(axis=0)
-        up[parent] = up[parent] + message[i]
-    whole = list(up)
-    for i, parent, matrix in edges:
-        rest = whole[parent] - np.where(np.isfinite(message[i]), message[i], 0.0)  # without i; inf stays
-        whole[i] = up[i] + (matrix + rest).min(axis=1)
-    return whole
-
-
-def ring_marginals(rows: CentredRows, ring: int, excess: Excess) -> list[Array]:
-    """Of each two labels of the pairs of a ring, the least sum of all excesses on it."""
-    pairs, _, points = rows.rings[ring]
-    own = [excess.pairs[e] - table for e, table in zip(pairs, excess.tables[ring])]
-    steps = [s + excess.points[i][:, None] for s, i in zip(along_ring(rows, ring, own), points)]
-    before = list(itertools.accumulate(steps[:-1], min_plus))  # from the first point
-    after = list(itertools.accumulate(steps[:0:-1], lambda back, step: min_plus(step, back)))[::-1]
-    middle = [step + min_plus(back, ahead).T for step, ahead, back in zip(steps[1:-1], before, after[1:])]
-    marginals = [steps[0] + after[0].T, *middle, steps[-1] + before[-1].T]
-    return along_ring(rows, ring, [marginal - excess.least[ring] for marginal in marginals])
 
 
 # Section 4: the last step ----------------------------------------------------------------------------------
 
 
-def possible_turns(rows: CentredRows, level: CellLevel, squares: list[Array]) -> list[list[int]]:
-    """Lemma 5: of each row, by how much more than the centre's its integer may be in an optimal field."""
-    h, turns, cells = HALF / level.divisions, list[list[int]](), cells_of(rows, level, squares)
-    reach = rows.limit + h * (1 + RELATIVE) + RELATIVE
-    position = [h * (lower + half / 2) for lower, half in zip(level.cells, rows.half.tolist())]
-    for row, (i, j) in enumerate(rows.ends):
-        square = squares[row] if row < rows.pairs else cells[i][:, None]
-        at = (rows.residual[row] + position[i][:, None] - position[j])[square]
-        turns.append([turn for turn in range(-3, 4) if (np.abs(at + HALF * turn) <= reach[row]).any()])
-    return turns
+def possible_turns(level: CellLevel, squares: Array) -> Array:
+    """Lemma 5: whether the integer of a row in an optimal field may exceed the centre's by TURNS, (r, 7)."""
+    rows, table, h = level.rows, level.squares, HALF / level.divisions
+    left = squares & np.logical_and(*table.at_ends(table.have_partners(squares)))
+    first, second = table.at_ends(h * (level.cells + rows.half[level.owner] / 2))
+    row, reach = table.row[left], rows.limit + h * (1 + RELATIVE) + RELATIVE
+    size = np.abs(rows.residual[row] + (first - second)[left] + HALF * TURNS[:, None]) - reach[row]
+    return np.array([np.bincount(row[of_turn <= 0], minlength=len(reach)) > 0 for of_turn in size]).T
 
 
-def cases_of(turns: list[list[int]]) -> list[tuple[int, ...]]:
+def cases_of(turns: Array) -> list[tuple[int, ...]]:
     """All choices of one turn for each row; none if there are too many."""
-    return list(itertools.product(*turns)) if math.prod(map(len, turns)) <= MOST_CASES else []
+    choices = [TURNS[of_row] for of_row in turns]
+    return list(itertools.product(*choices)) if math.prod(map(len, choices)) <= MOST_CASES else []
 
 
-def cases_bound(rows: CentredRows, turns: list[list[int]], angles: Array) -> float:
+def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
     """Lemma 6: a lower bound of the energy in all cases, by a tangent at the angles (k, n) of each."""
     cases = cases_of(turns)
     if not cases or len(cases) != len(angles):
@@ -446,78 +441,59 @@ def check_arrays(arrays: dict[str, Array], limit: Array | None = None) -> base.P
     energy, error = energy_of(arrays, rows)
     threshold = base.number_in(head, "threshold", energy + error, math.inf)
     divisions = base.take_array(arrays, "divisions", "<i4", None).tolist()
-    base.require(1 <= len(divisions) <= MOST_LEVELS, "divisions", "has too few or too many levels")
-    base.require(divisions[0] >= 3 and max(divisions) <= MOST_DIVISIONS, "divisions", "is out of range")
-    level, bounds, squares = first_level(rows, divisions[0]), list[float](), list[Array]()
+    fits = len(divisions) <= MOST_LEVELS and divisions[0] >= 3 and max(divisions) <= MOST_DIVISIONS
+    base.require(fits, "divisions", "is out of range")
+    level, bounds, squares = first_level(rows, divisions[0]), list[float](), np.zeros(0, bool)
     for number, count in enumerate(divisions):
         if number:
-            factor, stored = count // level.divisions, stored_squares(arrays, number - 1, level)
-            grows = count == factor * level.divisions and factor in (1, 3)
-            base.require(grows, "divisions", "grows otherwise")
-            covered = all((new | ~old).all() for new, old in zip(stored, squares))
-            base.require(covered, f"level {number}", "does not cover what the level before leaves")
-            level = next_level(rows, level, stored, factor)
-        excess = Excess(rows, costs_of(rows, level), *stored_shares(arrays, number, rows, level))
+            base.require(count in (level.divisions, 3 * level.divisions), "divisions", "grows otherwise")
+            size = int(level.squares.begin[rows.pairs])
+            packed = base.take_array(arrays, f"level_{number - 1}_squares", "|u1", (size + 7) // 8)
+            stored = level.allowed.copy()  # all squares of strokes
+            stored[:size] &= np.unpackbits(packed, count=size).astype(bool)
+            covers = (stored | ~squares).all()
+            base.require(covers, f"level {number}", "does not cover what the level before leaves")
+            level = next_level(level, stored, count // level.divisions)
+        excess = Excess(level, costs_of(level), *stored_shares(arrays, number, level))
         bounds.append(excess.bound)
         forests = base.take_array(arrays, f"level_{number}_forests", "<i4", None, None)
         base.require((forests >= 0).all() and (forests < rows.pairs).all(), "forests", "names no pair")
-        squares = kept_of(rows, level, excess, forests, threshold)
-    turns = possible_turns(rows, level, squares)
+        squares = kept_of(level, excess, forests, threshold)
+    turns = possible_turns(level, squares)
     angles = base.take_array(arrays, "cases", "<f8", None, rows.size)
     base.require(np.abs(angles).max(initial=0.0) <= MOST_NUMBER, "cases", "is too large")
     proven = max(0.0, min(max(*bounds, cases_bound(rows, turns, angles)), energy - error))
     bound = max(0.0, proven - base.SPARE * (1 + proven))
-    forced = np.array([of_row == [0] for of_row in turns[: rows.pairs]], bool)
-    claim = base.ProvenClaim(base.status_of(energy, bound), 2, energy, bound, forced, bounds)
+    status, forced = base.status_of(energy, bound), (turns[: rows.pairs] == CENTRAL).all(axis=1)
+    claim = base.ProvenClaim(status, 2, energy, bound, forced, bounds)
     base.check_claim(head, claim, proven, error)
     return claim
 
 
 def energy_of(arrays: dict[str, Array], rows: CentredRows) -> tuple[float, float]:
     """The energy of the field, and the greatest error of that number."""
-    n, m = rows.size, rows.pairs
-    alpha, p = base.take_array(arrays, "alpha", "<f8", n), base.take_array(arrays, "p", "<i4", m)
-    lower = np.zeros(n)
+    m, lower = rows.pairs, np.zeros(rows.size)
+    alpha, p = base.take_array(arrays, "alpha", "<f8", rows.size), base.take_array(arrays, "p", "<i4", m)
     lower[rows.first[m:]] = -rows.offset[m:] - QUARTER
     inside = (alpha >= lower - RELATIVE) & (alpha <= lower + HALF + RELATIVE)
     base.require(inside, "alpha", "is outside its window")
-    base.require(np.abs(p) <= 16, "p", "is too large")
     r = rows.residuals(np.append(alpha, 0.0))
     r[:m] += HALF * p
     return math.fsum(rows.weight * r * r), MARGIN * float(np.sum(rows.weight * (1 + r * r)))
 
 
-def stored_squares(arrays: dict[str, Array], number: int, level: CellLevel) -> list[Array]:
-    """The squares that a level keeps, as the certificate states them."""
-    shapes = [square.shape for square in level.squares]
-    size = sum(map(math.prod, shapes))
-    packed = base.take_array(arrays, f"level_{number}_squares", "|u1", (size + 7) // 8)
-    stored = split(np.unpackbits(packed, count=size).astype(bool), shapes)
-    return [square & within for square, within in zip(stored, level.squares)]
-
-
-def split(numbers: Array, shapes: list[Any]) -> list[Array]:
-    """Consecutive parts of a flat array, in these shapes."""
-    ends = np.cumsum([0, *map(math.prod, shapes)]).tolist()
-    return [numbers[a:b].reshape(shape) for a, b, shape in zip(ends, ends[1:], shapes)]
-
-
-def stored_shares(
-    arrays: dict[str, Array], number: int, rows: CentredRows, level: CellLevel
-) -> tuple[list[Array], dict[int, list[Array]]]:
-    """The shares of all pairs and the tables of rings of a level, as the certificate states them."""
-    rings = base.take_array(arrays, f"level_{number}_rings", "<i4", None).tolist()
-    known = all(0 <= ring < len(rows.rings) for ring in rings) and len(set(rings)) == len(rings)
-    base.require(known, f"level_{number}_rings", "names no ring, or one twice")
-    steps, size = [e for ring in rings for e in rows.rings[ring][0]], list(map(len, level.labels))
-    shapes: list[Any] = [(size[i],) for i, _ in rows.ends[: rows.pairs]]
-    shapes += [(size[i], size[j]) for i, j in map(rows.ends.__getitem__, steps)]
-    unit = float(base.take_array(arrays, f"level_{number}_unit", "<f8", 1)[0])
-    base.require(0 <= unit <= 1, f"level_{number}_unit", "is not in [0, 1]")
-    multiples = base.take_array(arrays, f"level_{number}_shares", "<i4", sum(map(math.prod, shapes)))
-    blocks = split(multiples * unit, shapes)
-    tables = iter(blocks[rows.pairs :])
-    return blocks[: rows.pairs], {ring: [next(tables) for _ in rows.rings[ring][0]] for ring in rings}
+def stored_shares(arrays: dict[str, Array], number: int, level: CellLevel) -> tuple[Array, list[Any]]:
+    """The shares of pairs, and rings with tables, of a level as the certificate states them."""
+    unit = base.take_array(arrays, f"level_{number}_unit", "<f8", 1)
+    base.require((unit >= 0) & (unit <= 1), f"level_{number}_unit", "is not in [0, 1]")
+    numbers = base.take_array(arrays, f"level_{number}_rings", "<i4", None)
+    pairs, rings = level.pairs, [level.rows.rings[ring] for ring in numbers]
+    steps = [e for ring in rings for e in ring[0]]
+    ends = pairs.first_line[level.rows.pairs] + starts_of(np.diff(pairs.begin)[steps])
+    multiples = base.take_array(arrays, f"level_{number}_shares", "<i4", int(ends[-1]))
+    shares, *blocks = np.split(multiples * unit, ends[:-1])
+    tables = iter([block.reshape(-1, pairs.width[e]) for block, e in zip(blocks, steps)])
+    return shares, [(ring, [next(tables) for _ in ring[0]]) for ring in rings]
 
 
 if __name__ == "__main__":

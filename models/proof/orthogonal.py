@@ -12,7 +12,7 @@ import heapq
 import math
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +20,14 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ..array_archive import Arrays
 from ..field.field import CrossField
-from ..instance.domain import Bools, Floats, Ints
+from ..instance.cycles import grow_forest
+from ..instance.domain import Bools, Domain, Floats, Ints
 from ..instance.file import instance_arrays
 from ..instance.instance import Instance
-from ..orthogonal.energy import OrthogonalEnergy, field_of, integers_of
+from ..orthogonal.energy import OrthogonalEnergy, field_of
+from ..orthogonal.search import IntegerSearch
 from ..processes.deadline import Progress
-from ..processes.limits import Limits
-from ..search.search import search
-from ..search.starts import best_start
+from ..search.integer_fields import starting_integers
 from . import check_orthogonal as checker
 from .check_certificate import OPTIMAL
 from .check_orthogonal import CellLevel, CentredRows
@@ -55,9 +55,10 @@ _FEW: Final = 0.4  # share of labels left below which a record of the level pays
 _CLOSER: Final = 0.3  # part of the gap of the last record, from which another one makes rings cheaper
 _ENOUGH: Final = 0.1  # the same for a tiny gap
 _TINY: Final = 1e-3  # relative gap below which finer labels follow
+_MANY: Final = 0.1  # share of new rings above which they come into use at the same spacing
 _CAP: Final = 3.0  # gaps from which sums on rings count alike, before a bound counts
 
-_WIDE: Final = 0.01  # relative gap; at the first level, a search for a better field follows
+_WIDE: Final = 0.01  # relative gap: a search follows, after a given field on a finer level
 _SEARCH: Final = 0.05  # share of the time left for it
 _ROUNDS: Final = 10  # of that search
 _BETTER: Final = 1e-9  # relative: a better field; also what a level keeps more than the checker asks for
@@ -71,8 +72,9 @@ def prove_orthogonal(
     The instance has the gauge `strokes`. The proof is checked after its limits.
     """
     began = time.monotonic()
-    first = best_start(instance, start, ends.over)
-    prover = _Prover(instance, OrthogonalEnergy.of(instance), integers_of(first), ends, progress, seed)
+    energy = OrthogonalEnergy.of(instance)
+    starts = starting_integers(instance, energy, start, ends.over)
+    prover = _Prover(instance, energy, starts, ends, progress, seed, searched=start is not None)
     proof = prover.proof(prover.run(), began)
     if not proof.levels:
         return proof
@@ -98,24 +100,16 @@ class _CentredLevels:
         return max([0.0, self.convex, *(level.bound for level in self.levels)])
 
 
-def two_colours(near: Neighbours, fixed: Bools) -> NDArray[np.uint8]:
+def two_colours(domain: Domain, near: Neighbours, fixed: Bools) -> NDArray[np.uint8]:
     """0 or 1 of each point, such that most pairs have both, and 0 where it is fixed; (n,)."""
-    side = [0] * len(near)
-    for begin in [*np.nonzero(fixed)[0].tolist(), *range(len(near))]:
-        waiting = [] if side[begin] else [begin]
-        side[begin] = side[begin] or 1
-        for i in waiting:
-            after = [j for j, _ in near[i] if not side[j]]
-            waiting += after
-            for j in after:
-                side[j] = -side[i]
+    side = 1 - 2 * (grow_forest(domain, np.zeros(0, np.int32)).depth % 2)
     turning = True
     while turning:
         turning = False
         for i in np.nonzero(~fixed)[0].tolist():
             if side[i] * sum(side[j] for j, _ in near[i]) > 0:
                 side[i], turning = -side[i], True
-    return np.array([one < 0 for one in side], dtype=np.uint8)
+    return np.array(side < 0, dtype=np.uint8)
 
 
 def spanning_forest(near: Neighbours, value: Floats) -> list[int]:
@@ -133,44 +127,41 @@ def spanning_forest(near: Neighbours, value: Floats) -> list[int]:
     return [pair for pair in forest if pair >= 0]
 
 
-def _rings_of(instance: Instance) -> Arrays:
-    """The rings of the domain that a certificate may have."""
-    rings = instance.domain.rings
-    lengths = np.diff(rings.start)
-    kept = (lengths >= 3) & (lengths <= checker.MOST_RING)
-    steps = np.repeat(kept, lengths)
-    start = np.cumsum([0, *lengths[kept]]).astype(np.int32)
-    return {
-        "ring_start": start,
-        "ring_pair": rings.pair[steps],
-        "ring_sign": rings.sign[steps].astype(np.int8),
-    }
-
-
 @dataclass
 class _Prover:
-    """The best field, and the chain that proves most. z: integers of the field; least: its energy."""
+    """The best field, and the chain that proves most. z: integers of the field; least: its energy.
+
+    starts: integers to begin with. searched: whether one of them is from a search.
+    """
 
     instance: Instance
     energy: OrthogonalEnergy
-    z: Ints
+    starts: list[Ints]
     ends: Termination
     progress: Progress
     seed: int = 0
+    searched: bool = False
 
     def __post_init__(self) -> None:
-        n, arrays = self.instance.domain.size, instance_arrays(self.instance).items()
-        self.arrays: Arrays = {f"instance_{name}": array for name, array in arrays} | _rings_of(self.instance)
-        if self.instance.domain.kappa is not None:
-            self.arrays["kappa"] = self.instance.domain.kappa
-        self.arrays |= {"centre": np.zeros(n), "half": np.zeros(n, dtype=np.uint8)}
+        domain, arrays = self.instance.domain, instance_arrays(self.instance).items()
+        length = np.diff(domain.rings.start)
+        rings = domain.rings.keep((length >= 3) & (length <= checker.MOST_RING))
+        self.arrays: Arrays = {f"instance_{name}": array for name, array in arrays}
+        self.arrays |= {"kappa": domain.kappa} if domain.kappa is not None else {}
+        self.arrays |= {
+            "ring_start": rings.start,
+            "ring_pair": rings.pair,
+            "ring_sign": rings.sign.astype("i1"),
+        }
+        self.arrays |= {"centre": np.zeros(domain.size), "half": np.zeros(domain.size, np.uint8)}
         rows, links = checker.CentredRows(self.arrays), self.energy.links
-        self.near: Neighbours = [[] for _ in range(n)]
+        self.near: Neighbours = [[] for _ in range(domain.size)]
         for pair, (i, j) in enumerate(rows.ends[: rows.pairs]):
             self.near[i].append((j, pair))
             self.near[j].append((i, pair))
         self.order = reverse_cuthill_mckee(links + links.T, symmetric_mode=True).astype(np.int64)
-        self.arrays["half"] = two_colours(self.near, rows.fixed[:-1])
+        self.arrays["half"] = two_colours(domain, self.near, rows.fixed[:-1])
+        self.z = min(self.starts, key=self.energy.least_total)
         self.limit, self.least = rows.limit, self.energy.least_total(self.z)
         self.proven = self._begin_chain()
 
@@ -196,10 +187,10 @@ class _Prover:
         if len(self.instance.domain.first) * (_COARSEST + 1) ** 2 > _MOST_COSTS:
             return "labels"
         chain = self._begin_chain()
-        rows, rings, level, before = chain.rows, list[int](), checker.first_level(chain.rows, _COARSEST), None
+        rings, level, before = list[int](), checker.first_level(chain.rows, _COARSEST), None
         while True:
-            costs = checker.costs_of(rows, level)
-            dual = RingDual(rows, level, costs, self.order, rings)
+            costs = checker.costs_of(level)
+            dual = RingDual(level, costs, self.order, rings)
             if before is not None:
                 dual.interpolate(before)
             closing = self._ascend(dual, chain)
@@ -210,15 +201,17 @@ class _Prover:
             if chain.bound >= self.proven.bound:
                 self.proven = chain
             reason = self._reason_to_end(chain)
-            wide = len(chain.levels) == 1 and self.least - chain.bound > _WIDE * self.least
+            first = before is None or before.level.divisions < level.divisions
+            late = level.divisions == _COARSEST * (3 if self.searched else 1)
+            wide = first and late and self.least - chain.bound > _WIDE * self.least
             if reason or self.least < least or (wide and self._search(_SEARCH * self.ends.deadline.left())):
                 return reason
             more = self._more_rings(dual)
-            factor = 1 if closing else self._next_factor(rows, level, squares, more=bool(more))
+            factor = 1 if closing else self._next_factor(level, squares, more=len(more) > _MANY * len(rings))
             if not factor:
                 return "labels"
             rings = rings + more
-            level, before = checker.next_level(rows, level, squares, factor), dual
+            level, before = checker.next_level(level, squares, factor), dual
 
     def _begin_chain(self) -> _CentredLevels:
         """A chain round the best field, without levels."""
@@ -258,29 +251,28 @@ class _Prover:
         """Whether the shares suggest a better field, which then is the best one."""
         improved = False
         for forward in (True, False):
-            z = self.energy.nearest(dual.decode(forward=forward))
+            z = self.energy.nearest(dual.decode())
             improved |= self._offer(self.energy.descend(z, over=self.ends.over)[0])
             dual.pass_over(math.inf, forward=forward)
         return improved
 
     def _search(self, seconds: float) -> bool:
         """Whether a short search finds a better field."""
-        limits = Limits().until(self.ends.deadline.within(seconds)) if math.isfinite(seconds) else None
-        start, stop = field_of(self.instance, self.z, self.energy), self.ends.stop
-        result = search(
-            self.instance, limits=limits, rounds=_ROUNDS, seed=self.seed, jobs=1, start=start, stop=stop
-        )
-        return self._offer(integers_of(result.field))
+        limit, starts = self.ends.deadline.within(seconds), [*self.starts, self.z]
+        hunt = IntegerSearch(self.energy, self.instance.domain.rings, starts, self.seed)
+        while hunt.round < _ROUNDS and not limit.passed() and not self.ends.over():
+            hunt.explore(lambda: limit.passed() or self.ends.over())
+        return self._offer(hunt.best.z)
 
     def _offer(self, z: Ints) -> bool:
         """Whether integers are better than the best ones, which they then are."""
         total = self.energy.least_total(z)
-        better = total < self.least * (1 - _BETTER) - 1e-12
+        better = bool(total < self.least * (1 - _BETTER) - 1e-12)
         if better:
             self.z, self.least = z, total
         return better
 
-    def _record(self, chain: _CentredLevels, dual: RingDual, costs: Any) -> list[Bools]:
+    def _record(self, chain: _CentredLevels, dual: RingDual, costs: Floats) -> Bools:
         """Add a level to its chain; the squares that the checker finds that it leaves, and a little more.
 
         Other processors round differently, and must not find more.
@@ -289,19 +281,19 @@ class _Prover:
         chain.gap, most = chain.threshold - dual.bound, chain.threshold * (1 + _BETTER) + 1e-12
         numbers = dual.arrays(max(chain.gap, 1e-6 * (1 + chain.threshold)))
         chain.arrays |= {prefix + name: array for name, array in numbers.items()}
-        shares = checker.stored_shares(chain.arrays, len(chain.levels), rows, level)
-        excess = checker.Excess(rows, costs, *shares)
-        spare = max(most - excess.bound, 0.0)
-        value = np.array([np.minimum(of_pair, spare).mean() for of_pair in excess.pairs])
-        other = value * np.random.default_rng(0).uniform(size=len(value))
-        forests = np.array([spanning_forest(self.near, v) for v in (value, other)], dtype=np.int32)
-        squares = checker.kept_of(rows, level, excess, forests, most)
-        bits = np.concatenate([np.zeros(0, dtype=bool), *(square.ravel() for square in squares)])
-        chain.arrays |= {f"{prefix}forests": forests, f"{prefix}squares": np.packbits(bits)}
+        shares = checker.stored_shares(chain.arrays, len(chain.levels), level)
+        excess = checker.Excess(level, costs, *shares)
+        count, lost = np.diff(level.pairs.begin), np.minimum(excess.pairs, max(most - excess.bound, 0.0))
+        value = (np.bincount(level.pairs.row, lost, len(count)) / count)[: rows.pairs]
+        varied = value * np.random.default_rng(0).uniform(size=len(value))
+        forests = np.array([spanning_forest(self.near, v) for v in (value, varied)], dtype=np.int32)
+        squares: Bools = checker.kept_of(level, excess, forests, most)
+        bits = np.packbits(squares[: level.squares.begin[rows.pairs]])
+        chain.arrays |= {f"{prefix}forests": forests, f"{prefix}squares": bits}
         chain.arrays["divisions"] = np.append(chain.arrays["divisions"], np.int32(level.divisions))
         chain.levels.append(LevelFacts(np.pi / 2 / level.divisions, len(dual.state.unary), excess.bound))
-        turns = checker.possible_turns(rows, level, squares)
-        chain.forced = sum(of_row == [0] for of_row in turns[: rows.pairs])
+        turns = checker.possible_turns(level, squares)
+        chain.forced = int((turns[: rows.pairs] == checker.CENTRAL).all(axis=1).sum())
         cases = [(rows.nearest + np.array(case)).astype(np.int32) for case in checker.cases_of(turns)]
         angles = np.array([self.energy.fit_angles(z) for z in cases]).reshape(-1, rows.size)
         chain.arrays["cases"] = angles
@@ -323,11 +315,12 @@ class _Prover:
         numbers = np.argsort(-gaps, kind="stable")
         return [int(number) for number in numbers if gaps[number] > 1e-6 * max(self.least, 1.0)]
 
-    def _next_factor(self, rows: CentredRows, level: CellLevel, squares: list[Bools], *, more: bool) -> int:
+    def _next_factor(self, level: CellLevel, squares: Bools, *, more: bool) -> int:
         """How many parts each cell has on the next level; 0 if no level helps."""
-        counts = np.array([3.0 * cells.sum() + 1 for cells in checker.cells_of(rows, level, squares)])
-        finer = sum(counts[i] * counts[j] for i, j in rows.ends[: rows.pairs])
-        narrow = counts.sum() < _NARROW * 3 * sum(map(len, level.cells))
+        left = level.owner[level.squares.have_partners(squares)]
+        counts, rows = 3.0 * np.bincount(left, minlength=level.rows.size + 1) + 1, level.rows
+        finer = counts[rows.first[: rows.pairs]] @ counts[rows.second[: rows.pairs]]
+        narrow = counts.sum() < _NARROW * 3 * len(level.cells)
         if more and level.divisions == _COARSEST:
             return 1
         if level.divisions < _FINEST and finer <= (_MOST_COSTS / 20 if narrow else _MOST_COSTS):

@@ -7,6 +7,7 @@ computes bounds anew from shares and tables, so nothing here has to be exact.
 
 from __future__ import annotations
 
+from itertools import pairwise, product
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 
 from ..array_archive import Arrays
 from ..instance.domain import Bools, Floats
-from ..processes.compilation import compiled, compiled_in_any_order
-from .check_orthogonal import CellLevel, CentredRows, Costs
+from ..processes.compilation import compiled, compiled_in_any_order, compiled_inside
+from .check_orthogonal import STRIDE, CellLevel, spans, starts_of
 
 Indices = NDArray[np.int64]
 
@@ -26,17 +27,18 @@ _MOST: Final = 2**31 - 1
 class DualArrays(NamedTuple):
     """The arrays of a level that compiled functions share, all flat; inf marks what is excluded.
 
-    Pair e has the slots 2 e and 2 e + 1, of its first and its second point.
+    Of m pairs, pair e has the slots e, of its first point, and m + e, of its second one.
 
-    order, rank: of the points in a pass. point: of each slot. around: slots of each point, from around_start.
-    unary: costs of labels, from start. costs: of two labels with all tables, from begin, those of the first
-    point in rows. shares: of the point of each slot, from share_start. low, high: columns of the first and
-    after the last cost in use of each row, at the shares of the first point.
+    order: of the points in a pass. point: of each slot. later: whether it comes after the other point of the
+    pair. around: slots of each point, from around_start. unary: costs of labels, from start. costs: of two
+    labels with all tables, from begin, those of the first point in rows. shares: of the point of each slot,
+    from share_start. low, high: columns of the first and after the last cost in use of each row. sums: room
+    for a number per label of a point.
     """
 
     order: Indices
-    rank: Indices
     point: Indices
+    later: Bools
     around_start: Indices
     around: Indices
     start: Indices
@@ -47,15 +49,20 @@ class DualArrays(NamedTuple):
     shares: Floats
     low: Indices
     high: Indices
+    sums: Floats
 
 
 class RingArrays(NamedTuple):
-    """Rings in use, their steps and the tables of these steps, flat, as pairs have them."""
+    """Rings in use, their steps and the tables of these steps, flat, as pairs have them.
+
+    walk: the steps of each ring, from the point with the fewest labels on. size: labels where a step begins.
+    """
 
     start: Indices
+    walk: Indices
     pair: Indices
     sign: Indices
-    point: Indices
+    size: Indices
     begin: Indices
     tables: Floats
 
@@ -63,31 +70,34 @@ class RingArrays(NamedTuple):
 class RingDual:
     """Shares and tables on a level, which rise to a better bound."""
 
-    def __init__(
-        self, rows: CentredRows, level: CellLevel, costs: Costs, order: Indices, rings: list[int]
-    ) -> None:
+    def __init__(self, level: CellLevel, costs: Floats, order: Indices, rings: list[int]) -> None:
         """Begin with shares and tables of 0. order: of the points in a pass. rings: those in use."""
-        self.rows, self.level, self.ring_numbers, self.bound = rows, level, rings, -np.inf
-        point = np.column_stack([rows.first, rows.second])[: rows.pairs].ravel().astype(np.int64)
-        counts = np.array([len(labels) for labels in level.labels])
-        sizes, share_start = counts[point].reshape(-1, 2).prod(axis=1), starts_of(counts[point])
-        windows = np.zeros((2, share_start[-1]), dtype=np.int64)
-        for e, cost in enumerate(costs[1]):
-            used = np.isfinite(cost)
-            ends = used.argmax(axis=1), cost.shape[1] - used[:, ::-1].argmax(axis=1)
-            windows[:, share_start[2 * e] : share_start[2 * e + 1]] = ends
-        self.state = DualArrays(
-            order, np.argsort(order), point,
-            starts_of(np.bincount(point, minlength=rows.size)), np.argsort(point, kind="stable"),
-            starts_of(counts[:-1]), np.concatenate(costs[0][:-1]),
-            starts_of(sizes), _join([cost.ravel() for cost in costs[1]], np.float64),
-            share_start, np.zeros(share_start[-1]), *windows,
-        )  # fmt: skip
-        pair, sign, on_ring = (
-            _join([rows.rings[ring][part] for ring in rings], np.int64) for part in range(3)
+        self.level, self.ring_numbers, self.bound = level, rings, -np.inf
+        rows, pairs, m = level.rows, level.pairs, level.rows.pairs
+        point, used, counts = (
+            np.append(rows.first[:m], rows.second[:m]),
+            np.isfinite(costs),
+            np.diff(pairs.start),
         )
-        begin, lengths = starts_of(sizes[pair]), [len(rows.rings[ring][0]) for ring in rings]
-        self.rings = RingArrays(starts_of(lengths), pair, sign, on_ring, begin, np.zeros(begin[-1]))
+        column = (np.arange(len(costs)) - pairs.begin[pairs.row]) % pairs.width[pairs.row]
+        low = np.full(pairs.first_line[-1], counts.max())
+        high, rank, share_start = np.zeros_like(low), np.argsort(order), starts_of(counts[point])
+        np.minimum.at(low, pairs.line[0][used], column[used])
+        np.maximum.at(high, pairs.line[0][used], column[used] + 1)
+        unary = np.where(pairs.have_partners(used), 0.0, np.inf)
+        unary[pairs.item[0][pairs.first_line[m] :]] += costs[pairs.begin[m] :]
+        self.state = DualArrays(
+            order, point, rank[point] > rank[np.roll(point, m)],
+            starts_of(np.bincount(point, minlength=rows.size)),
+            np.lexsort((np.tile(np.arange(m), 2), point)), pairs.start[:-1], unary[:-1],
+            pairs.begin[: m + 1], costs[: pairs.begin[m]].copy(), share_start, np.zeros(share_start[-1]),
+            low, high, np.empty(counts.max()),
+        )  # fmt: skip
+        walks = [rows.rings[ring] for ring in rings]
+        pair, sign, on_ring = (_join([walk[part] for walk in walks]) for part in range(3))
+        start, begin = starts_of([len(walk[0]) for walk in walks]), starts_of(np.diff(pairs.begin)[pair])
+        turned = [np.roll(np.arange(a, b), -counts[on_ring[a:b]].argmin()) for a, b in pairwise(start)]
+        self.rings = RingArrays(start, _join(turned), pair, sign, counts[on_ring], begin, np.zeros(begin[-1]))
 
     def pass_over(self, most: float, *, forward: bool) -> tuple[float, float]:
         """One pass: the bound, if no tables cost anything, and the share of labels that `most` leaves."""
@@ -102,169 +112,142 @@ class RingDual:
     def interpolate(self, old: RingDual) -> None:
         """Take shares and tables from those of a level whose cells contain the cells of this one.
 
-        Labels between two old ones get a mean. Two labels of a pair lie in a triangle of old ones, because
-        one threshold rounds both.
+        Labels between two old ones get a mean, two labels of a pair that of the corners of their square.
         """
-        places = self._places_in(old)
-        for slot, point in enumerate(self.state.point.tolist()):
-            low, up, part = places[point]
-            used = old.state.unary[old.state.start[point] : old.state.start[point + 1]] < np.inf
-            self.share(slot)[:] = _mean(old.share(slot), used, [(1 - part, (low,)), (part, (up,))])
-        for step, e in enumerate(old.rings.pair.tolist()):  # rings that are added come last
-            (low, up, part), (below, above, other) = (places[point] for point in self.rows.ends[e])
-            low, up, part = low[:, None], up[:, None], part[:, None]
-            corners = [
-                (np.minimum(part, other), (up, above)),
-                (
-                    np.abs(part - other),
-                    (np.where(part > other, up, low), np.where(part < other, above, below)),
-                ),
-                (1 - np.maximum(part, other), (low, below)),
-            ]
-            table, used = self.table(step), np.isfinite(self.costs(e))
-            table[used] = _mean(old.table(step), np.isfinite(old.costs(e)), corners)[used]
-            self.costs(e)[:] += table
+        pairs, state, before, steps = self.level.pairs, self.state, old.state, old.rings.pair
+        ends, used = self._ends_in(old), np.append(before.unary < np.inf, False)
+        label = spans(state.start[state.point], np.diff(state.share_start))
+        shift = np.repeat(before.share_start[:-1] - before.start[state.point], np.diff(state.share_start))
+        corners = [(share[label], used[at[label]], at[label] + shift) for share, at in ends]
+        state.shares[:] = _mean(before.shares, corners)
+        entry = spans(pairs.begin[steps], np.diff(pairs.begin)[steps])  # rings that are added come last
+        shift = np.repeat(old.rings.begin[:-1] - before.begin[steps], np.diff(pairs.begin)[steps])
+        first, second = (item[line[entry]] for item, line in zip(pairs.item, pairs.line, strict=True))
+        corners = []
+        for (share, up), (part, along) in product(ends, ends):
+            at = old.level.pairs.places(pairs.row[entry], up[first], along[second])
+            known = used[up[first]] & used[along[second]] & np.isfinite(before.costs.take(at, mode="clip"))
+            corners.append((share[first] * part[second], known, at + shift))
+        tables = np.where(np.isfinite(state.costs[entry]), _mean(old.rings.tables, corners), 0.0)
+        self.rings.tables[: len(tables)] = tables
+        np.add.at(state.costs, entry, tables)
 
-    def _places_in(self, old: RingDual) -> list[tuple[Indices, Indices, Floats]]:
-        """Of each point, where its labels lie: old labels below and above, or -1, and the place between."""
-        factor, places = self.level.divisions // old.level.divisions, []
-        for new, before, half in zip(self.level.labels, old.level.labels, self.rows.half, strict=True):
-            place = (new - half * (factor // 3)) / factor
-            lower = np.floor(place).astype(np.int64)
-            at = [np.searchsorted(before, label).clip(max=len(before) - 1) for label in (lower, lower + 1)]
-            low, up = (np.where(before[k] == lower + step, k, -1) for step, k in enumerate(at))
-            places.append((low, up, place - lower))
-        return places
-
-    def share(self, slot: int) -> Floats:
-        """The share of the point of a slot."""
-        return self.state.shares[self.state.share_start[slot] : self.state.share_start[slot + 1]]
-
-    def costs(self, pair: int) -> Floats:
-        """The costs of each two labels of a pair, with all tables."""
-        return self._square(self.state.costs, self.state.begin[pair], pair)
-
-    def table(self, step: int) -> Floats:
-        """The table of a step of a ring in use."""
-        return self._square(self.rings.tables, self.rings.begin[step], int(self.rings.pair[step]))
-
-    def _square(self, numbers: Floats, begin: int, pair: int) -> Floats:
-        rows, columns = (len(self.level.labels[point]) for point in self.rows.ends[pair])
-        return numbers[begin : begin + rows * columns].reshape(rows, columns)
+    def _ends_in(self, old: RingDual) -> list[tuple[Floats, Indices]]:
+        """Old labels below and above each label, -1 for none, after their shares in it."""
+        level, before, factor = self.level, old.level, self.level.divisions // old.level.divisions
+        place = (level.label - level.rows.half[level.point] * (factor // 3)) / factor
+        lower = np.floor(place).astype(np.int64)
+        key = level.point * STRIDE + lower
+        at = [np.searchsorted(before.key, key + step).clip(max=len(before.key) - 1) for step in (0, 1)]
+        low, up = (np.where(before.key[k] == key + step, k, -1) for step, k in enumerate(at))
+        return [(1 - place + lower, low), (place - lower, up)]
 
     def arrays(self, gap: float) -> Arrays:
         """Shares and tables as whole multiples of a unit: the arrays of a certificate, without prefix."""
-        shares = _join([self.share(slot) for slot in range(0, len(self.state.point), 2)], np.float64)
-        numbers = np.concatenate([shares, self.rings.tables])
-        unit = _PART_OF_GAP * gap / max(self.rows.pairs + len(self.rings.pair), 1)
+        m = self.level.rows.pairs
+        numbers = np.append(self.state.shares[: self.state.share_start[m]], self.rings.tables)
+        unit = _PART_OF_GAP * gap / max(m + len(self.rings.pair), 1)
         unit = max(unit, float(np.abs(numbers).max(initial=0.0)) / _MOST, 1e-300)
         rings, multiples = np.array(self.ring_numbers, np.int32), np.round(numbers / unit).astype(np.int32)
         return {"rings": rings, "shares": multiples, "unit": np.array([unit])}
 
-    def decode(self, *, forward: bool) -> Floats:
-        """The angles (n,) that the shares suggest: after a pass in the other direction."""
-        chosen = np.zeros(len(self.state.order), dtype=np.int64)
-        _decode(self.state, forward, chosen)
+    def decode(self) -> Floats:
+        """The angles (n,) of the labels that cost least with their shares."""
+        cost, state, rows = self.state.unary.copy(), self.state, self.level.rows
+        np.add.at(cost, spans(state.start[state.point], np.diff(state.share_start)), state.shares)
+        chosen = np.lexsort((cost, self.level.point[:-1]))[state.start[:-1]]
         h = np.pi / 2 / self.level.divisions
-        label = np.array([labels[x] for labels, x in zip(self.level.labels, chosen, strict=False)])
-        angles: Floats = self.rows.centre[:-1] + h * (label + self.rows.half[:-1] / 2)
+        angles: Floats = rows.centre[:-1] + h * (self.level.label[chosen] + rows.half[:-1] / 2)
         return angles
 
     def ring_gaps(self) -> Floats:
         """The cost of the pairs of each ring at the centre beyond their shares, (r,): where the gap lies."""
-        at = [int(np.abs(labels).argmin()) for labels in self.level.labels]
-        gaps = np.zeros(self.rows.pairs)
-        for e, (i, j) in enumerate(self.rows.ends[: self.rows.pairs]):
-            shares = self.share(2 * e)[at[i]] + self.share(2 * e + 1)[at[j]]
-            gaps[e] = self.costs(e)[at[i], at[j]] - shares
+        level, state, rows = self.level, self.state, self.level.rows
+        central = np.lexsort((np.abs(level.label), level.point))[level.pairs.start[:-1]]
+        ends = rows.first[: rows.pairs], rows.second[: rows.pairs]
+        first, second = (central[end] for end in ends)
+        shares = state.shares[state.share_start[:-1] + central[state.point] - state.start[state.point]]
+        costs = state.costs[level.pairs.places(np.arange(rows.pairs), first, second)]
+        gaps = costs - (shares[: rows.pairs] + shares[rows.pairs :])
         gaps[~np.isfinite(gaps)] = 0.0
-        return np.array([gaps[walk[0]].sum() for walk in self.rows.rings])
+        return np.array([gaps[walk[0]].sum() for walk in rows.rings])
 
 
-def _mean(old: Floats, used: Bools, corners: list[Any]) -> Floats:
-    """Means of old numbers in use with given weights at given places, -1 for none; 0 where none is in use."""
+def _mean(numbers: Floats, corners: list[Any]) -> Floats:
+    """Means of numbers at places, with their shares and whether they are known; 0 where none is."""
     total = weight = np.zeros(())
-    for share, at in corners:
-        known = np.logical_and.reduce(np.broadcast_arrays(used[at], *(place >= 0 for place in at)))
-        own = np.where(known, share + 1e-12, 0.0)
-        total, weight = total + own * np.where(known, old[at], 0.0), weight + own
+    for share, known, at in corners:
+        part = np.where(known, share + 1e-12, 0.0)
+        total, weight = total + part * np.where(known, numbers.take(at, mode="clip"), 0.0), weight + part
     return np.asarray(total / np.where(weight > 0, weight, 1.0))
 
 
-def starts_of(sizes: Any) -> Indices:
-    """Where blocks of these sizes begin in a flat array, and its length."""
-    return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)])
-
-
-def _join(parts: list[Any], kind: Any) -> Any:
-    """One array of all parts, which may be none."""
-    return np.concatenate([np.zeros(0, kind), *parts]).astype(kind)
+def _join(parts: list[Any]) -> Indices:
+    """One array of whole numbers of all parts, which may be none."""
+    return np.concatenate([np.zeros(0, np.int64), *parts]).astype(np.int64)
 
 
 @compiled_in_any_order
 def _send(state: DualArrays, slot: int) -> None:
     """Set the share of a slot to the least cost less the other point's share."""
-    own = state.shares[state.share_start[slot] : state.share_start[slot + 1]]
-    other = state.shares[state.share_start[slot ^ 1] : state.share_start[(slot ^ 1) + 1]]
-    costs = state.costs[state.begin[slot // 2] : state.begin[slot // 2 + 1]]
-    row, columns = state.share_start[slot - slot % 2], len(own) if slot % 2 else len(other)
-    own[:] = np.inf
-    for x in range(len(costs) // columns):
-        at, low, high = x * columns, state.low[row + x], state.high[row + x]
-        if slot % 2:
+    pairs = len(state.begin) - 1
+    e = slot % pairs
+    first, second, at = state.share_start[e], state.share_start[pairs + e], state.begin[e]
+    rows, columns = state.share_start[e + 1] - first, state.share_start[pairs + e + 1] - second
+    if slot >= pairs:
+        for y in range(columns):
+            state.shares[second + y] = np.inf
+    for x in range(rows):
+        low, high, share = state.low[first + x], state.high[first + x], state.shares[first + x]
+        if slot < pairs:
+            share = np.inf
             for y in range(low, high):
-                own[y] = min(own[y], costs[at + y] - other[x])
+                share = min(share, state.costs[at + y] - state.shares[second + y])
+            state.shares[first + x] = share
         else:
-            least = np.inf
             for y in range(low, high):
-                least = min(least, costs[at + y] - other[y])
-            own[x] = least
+                state.shares[second + y] = min(state.shares[second + y], state.costs[at + y] - share)
+        at += columns
+
+
+@compiled_inside
+def _collect(state: DualArrays, i: int, forward: bool) -> int:
+    """Add up costs and shares of the labels of a point, those with earlier points anew; return how many."""
+    earlier, begin, size = 0, state.start[i], state.start[i + 1] - state.start[i]
+    for x in range(size):
+        state.sums[x] = state.unary[begin + x]
+    for at in range(state.around_start[i], state.around_start[i + 1]):
+        slot = state.around[at]
+        if state.later[slot] == forward:
+            earlier += 1
+            _send(state, slot)
+        for x in range(size):
+            share = state.share_start[slot] + x
+            state.sums[x] += state.shares[share]
+            state.shares[share] = state.shares[share] if state.shares[share] < np.inf else 0.0
+    return earlier
 
 
 @compiled
 def _pass_over(state: DualArrays, spare: float, forward: bool) -> tuple[float, int]:
     """A pass over all points; the sum of their least costs, and the labels that cost at most `spare` more."""
-    total, left = 0.0, 0
-    for i in state.order if forward else state.order[::-1].copy():
-        unary = state.unary[state.start[i] : state.start[i + 1]]
-        cost, earlier, later = unary.copy(), 0, 0
-        for slot in state.around[state.around_start[i] : state.around_start[i + 1]]:
-            own = state.shares[state.share_start[slot] : state.share_start[slot + 1]]
-            if (state.rank[state.point[slot ^ 1]] < state.rank[i]) == forward:
-                earlier += 1
-                _send(state, slot)
-            else:
-                later += 1
-            cost += own
-            own[own == np.inf] = 0.0
-        least = cost.min()
+    total, left, sums = 0.0, 0, state.sums
+    for number in range(len(state.order)):
+        i = state.order[number if forward else -1 - number]
+        earlier, around = _collect(state, i, forward), range(state.around_start[i], state.around_start[i + 1])
+        least, parts = np.inf, max(earlier, len(around) - earlier, 1)
+        for x in range(state.start[i + 1] - state.start[i]):
+            least = min(least, sums[x])
         total += least
-        left += int((cost - least <= spare).sum())
-        unary[cost == np.inf] = np.inf
-        for slot in state.around[state.around_start[i] : state.around_start[i + 1]]:
-            if (state.rank[state.point[slot ^ 1]] < state.rank[i]) != forward:
-                own = state.shares[state.share_start[slot] : state.share_start[slot + 1]]
-                for x in range(len(cost)):
-                    if cost[x] < np.inf:
-                        own[x] -= (cost[x] - least) / max(earlier, later, 1)
+        for x in range(state.start[i + 1] - state.start[i]):
+            left += sums[x] - least <= spare
+            if sums[x] == np.inf:
+                state.unary[state.start[i] + x] = np.inf
+                continue
+            for at in around:
+                if state.later[state.around[at]] != forward:
+                    state.shares[state.share_start[state.around[at]] + x] -= (sums[x] - least) / parts
     return total, left
-
-
-@compiled
-def _decode(state: DualArrays, forward: bool, chosen: Indices) -> None:
-    """Choose a label for each point: of least cost to those that have one, and shares of the others."""
-    for i in state.order if forward else state.order[::-1].copy():
-        cost = state.unary[state.start[i] : state.start[i + 1]].copy()
-        for slot in state.around[state.around_start[i] : state.around_start[i + 1]]:
-            j, begin, share = state.point[slot ^ 1], state.begin[slot // 2], state.share_start[slot]
-            if (state.rank[j] < state.rank[i]) == forward:
-                step = 1 if slot % 2 else state.start[j + 1] - state.start[j]
-                at = begin + chosen[j] * (len(cost) if slot % 2 else 1)
-                for x in range(len(cost)):
-                    cost[x] += state.costs[at + x * step]
-            else:
-                cost += state.shares[share : share + len(cost)]
-        chosen[i] = cost.argmin()
 
 
 @compiled
@@ -273,93 +256,85 @@ def _update_rings(numbers: Indices, state: DualArrays, rings: RingArrays, cap: f
         _update_ring(rings.start[number], rings.start[number + 1], state, rings, cap)
 
 
-@compiled
+@compiled_inside
 def _update_ring(begin: int, end: int, state: DualArrays, rings: RingArrays, cap: float) -> None:
     """Give each pair of a ring an equal part of the least cost of the whole ring at its two labels.
 
-    The walk begins at the point with the fewest labels. All steps are first shifted so that no cost is
-    negative: partial sums above cap can then be left out.
+    All steps are first shifted so that no cost is negative: partial sums above cap can then be left out.
     """
-    steps, sizes = end - begin, np.diff(state.start)[rings.point[begin:end]]
-    order = begin + (np.arange(steps) + sizes.argmin()) % steps
-    size = np.append(sizes[order - begin], sizes.min())
-    cost = np.full((steps, size.max(), size.max()), np.inf)
-    least = np.empty(steps)
+    steps, moved, widest, size = end - begin, 0.0, len(state.sums), rings.size[rings.walk[begin:end]]
+    cost, least = np.empty((steps, widest, widest)), np.empty(steps)
+    walks = np.empty((2, steps + 1, widest, size[0]))  # least costs from, and to, each first label
     for k in range(steps):
-        matrix, share, table = _matrices_of(state, rings, order[k])
-        turned = matrix - share - table
-        cost[k, : size[k], : size[k + 1]] = turned if rings.sign[order[k]] > 0 else turned.T.copy()
-        least[k] = cost[k].min()
-    if least.max() == np.inf:
+        step = rings.walk[begin + k]
+        least[k] = _take_step(state, rings, step, cost[k])
+        moved += least[k]
+    if moved == np.inf:
         return
-    cap, moved = max(cap - least.sum(), 0.0), least.sum()
-    walks = np.full((steps + 1, size.max(), size[0]), cap)  # least costs from each first label to each label
-    for s in range(size[0]):
-        walks[0, s, s] = 0.0
+    cap = max(cap - moved, 0.0)
+    for x in range(size[0]):
+        for s in range(size[0]):
+            walks[0, 0, x, s] = walks[1, steps, x, s] = 0.0 if s == x else cap
     for k in range(steps):
-        cost[k] -= least[k]
-        _walk_on(walks[k], cost[k], cap, walks[k + 1])
-    back, further = walks[0].copy(), walks[0].copy()
+        _walk_on(walks[0, k], cost[k, : size[k], : size[(k + 1) % steps]], cap, walks[0, k + 1])
     for k in range(steps - 1, -1, -1):
-        best = _close_walks(walks[k], cost[k], back, cap)
-        _walk_on(back, cost[k].T, cap, further)
-        back, further = further, back
-        part = ((best + moved) / steps - cost[k] - least[k])[: size[k], : size[k + 1]]
-        matrix, _, table = _matrices_of(state, rings, order[k])
-        part = part.copy() if rings.sign[order[k]] > 0 else part.T.copy()
-        for x in range(matrix.shape[0]):
-            for y in range(matrix.shape[1]):
-                if matrix[x, y] < np.inf:
-                    matrix[x, y] += part[x, y] - table[x, y]
-                    table[x, y] = part[x, y]
+        step, along = rings.walk[begin + k], cost[k, : size[k], : size[(k + 1) % steps]]
+        _walk_on(walks[1, k + 1], along.T, cap, walks[1, k])
+        ends = (walks[0, k], walks[1, k + 1]) if rings.sign[step] > 0 else (walks[1, k + 1], walks[0, k])
+        e, offset = rings.pair[step], moved / steps - least[k]
+        _set_table(
+            state.costs[state.begin[e] : state.begin[e + 1]],
+            rings.tables[rings.begin[step] : rings.begin[step + 1]],
+            along if rings.sign[step] > 0 else along.T, ends, (cap, steps, offset),
+        )  # fmt: skip
 
 
-@compiled
-def _matrices_of(state: DualArrays, rings: RingArrays, step: int) -> tuple[Floats, Floats, Floats]:
-    """Costs with all tables, both shares together, and the own table of a step, by the labels of its pair."""
-    e = rings.pair[step]
-    one = state.shares[state.share_start[2 * e] : state.share_start[2 * e + 1]]
-    other = state.shares[state.share_start[2 * e + 1] : state.share_start[2 * e + 2]]
-    shape = (len(one), len(other))
-    table = rings.tables[rings.begin[step] : rings.begin[step + 1]].reshape(shape)
-    costs = state.costs[state.begin[e] : state.begin[e + 1]].reshape(shape)
-    return costs, one.reshape(-1, 1) + other, table
+@compiled_inside
+def _take_step(state: DualArrays, rings: RingArrays, step: int, cost: Floats) -> float:
+    """Fill in what a step costs beyond its shares, its table and the least, which is returned."""
+    e, at, least, turned = rings.pair[step], 0, np.inf, rings.sign[step] < 0
+    first, second = state.share_start[e], state.share_start[len(state.begin) - 1 + e]
+    rows = state.share_start[e + 1] - first
+    columns = (state.begin[e + 1] - state.begin[e]) // rows
+    matrix = cost[:columns, :rows].T if turned else cost[:rows, :columns]
+    for x in range(rows):
+        for y in range(columns):
+            shares = state.shares[first + x] + state.shares[second + y]
+            matrix[x, y] = state.costs[state.begin[e] + at] - shares - rings.tables[rings.begin[step] + at]
+            least, at = min(least, matrix[x, y]), at + 1
+    for x in range(rows):
+        for y in range(columns):
+            matrix[x, y] -= least
+    return least
 
 
 @compiled_in_any_order
 def _walk_on(walks: Floats, cost: Floats, cap: float, out: Floats) -> None:
     """Fill in the least costs, up to cap, of walks with one more step: [label, first label]."""
-    out[:] = cap
-    for x in range(walks.shape[0]):
-        low, high = _range_below(walks[x], cap)
-        for y in range(out.shape[0]):
+    for y in range(cost.shape[1]):
+        for s in range(walks.shape[1]):
+            out[y, s] = cap
+    for x in range(cost.shape[0]):
+        for y in range(cost.shape[1]):
             value = cost[x, y]
             if value < cap:
-                for s in range(low, high):
+                for s in range(walks.shape[1]):
                     out[y, s] = min(out[y, s], walks[x, s] + value)
 
 
 @compiled_in_any_order
-def _close_walks(walks: Floats, cost: Floats, back: Floats, cap: float) -> Floats:
-    """The least costs, up to cap, of closed walks that take each step."""
-    best = np.full(cost.shape, cap)
-    for x in range(walks.shape[0]):
-        low, high = _range_below(walks[x], cap)
-        for y in range(back.shape[0]):
-            if cost[x, y] < cap:
-                least = cap
-                for s in range(low, high):
-                    least = min(least, walks[x, s] + back[y, s])
-                best[x, y] = min(cap, least + cost[x, y])
-    return best
-
-
-@compiled
-def _range_below(numbers: Floats, cap: float) -> tuple[int, int]:
-    """The first number below cap, and the one after the last."""
-    low, high = 0, len(numbers)
-    while low < high and numbers[low] >= cap:
-        low += 1
-    while high > low and numbers[high - 1] >= cap:
-        high -= 1
-    return low, high
+def _set_table(costs: Floats, tables: Floats, excess: Floats, ends: Any, numbers: Any) -> None:
+    """Set the table of a step so that the excess of its labels is the part of the least walk through them."""
+    (there, back), (cap, steps, offset), at = ends, numbers, 0
+    for x in range(excess.shape[0]):
+        for y in range(excess.shape[1]):
+            least = cap
+            if excess[x, y] < cap:
+                for s in range(there.shape[1]):
+                    least = min(least, there[x, s] + back[y, s])
+                least = min(cap, least + excess[x, y])
+            if costs[at] < np.inf:
+                part = least / steps + offset - excess[x, y]
+                costs[at] += part - tables[at]
+                tables[at] = part
+            at += 1

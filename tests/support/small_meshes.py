@@ -99,7 +99,7 @@ def _forest_angles(energy, free):
 def prove_from(instance, z, *, levels=4):
     """A checked proof round the field of integers z, without a search for a better one."""
     ends = Termination(Deadline(), never, gap=0.0, work=math.inf)
-    prover = _Prover(instance, OrthogonalEnergy.of(instance), z, ends, silent)
+    prover = _Prover(instance, OrthogonalEnergy.of(instance), [z], ends, silent)
     next_factor, count = prover._next_factor, itertools.count(1)
     prover._find_better_field = prover._search = lambda _: False
     prover._next_factor = lambda *args, **more: next(count) < levels and next_factor(*args, **more)
@@ -129,17 +129,14 @@ def keeps_optimum(instance, best, proof):
     level, squares = checker.first_level(rows, divisions[0]), []
     for number, count in enumerate(divisions):
         if number:
-            level = checker.next_level(rows, level, squares, count // level.divisions)
-        squares = checker.stored_squares(arrays, number, level)
-        steps = turn / (np.pi / 2 / count) - rows.half / 2
-        within = [
-            np.abs((step - cells - 0.5 + count / 2) % count - count / 2) <= 0.5 + 1e-9
-            for step, cells in zip(steps, level.cells, strict=True)
-        ]
-        kept = checker.cells_of(rows, level, squares)
-        if not all((cells & here).any() for cells, here in zip(kept, within, strict=True)):
+            level = checker.next_level(level, squares, count // level.divisions)
+        squares, table = level.allowed.copy(), level.squares
+        stored = np.unpackbits(arrays[f"level_{number}_squares"], count=table.begin[rows.pairs])
+        squares[: len(stored)] &= stored.astype(bool)
+        steps = (turn / (np.pi / 2 / count) - rows.half / 2)[level.owner] - level.cells
+        within = np.abs((steps - 0.5 + count / 2) % count - count / 2) <= 0.5 + 1e-9
+        if len(np.unique(level.owner[table.have_partners(squares) & within])) <= rows.size:
             return False
-        ends = zip(rows.ends[: rows.pairs], squares, strict=True)
-        if not all((square & within[i][:, None] & within[j]).any() for (i, j), square in ends):
+        if len(np.unique(table.row[squares & np.logical_and(*table.at_ends(within))])) < len(rows.ends):
             return False
     return True

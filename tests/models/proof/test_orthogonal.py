@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import crossfield as cf
 import numpy as np
@@ -81,14 +82,14 @@ def test_partial_sums_on_rings_that_are_cut_off_lose_the_optimum(monkeypatch):
     _, z = try_all_integers(instance)
     complete, sums = checker.kept_of, checker.min_plus
 
-    def kept_of(rows, level, excess, forests, most):
+    def kept_of(level, excess, forests, most):
         def cut(one, other):
             total = sums(one, other)
             return np.where(total > most - excess.bound, np.inf, total)
 
         with monkeypatch.context() as patch:
             patch.setattr(checker, "min_plus", cut)
-            return complete(rows, level, excess, forests, most)
+            return complete(level, excess, forests, most)
 
     monkeypatch.setattr(checker, "kept_of", kept_of)
     assert not keeps_optimum(instance, z, prove_from(instance, z))
@@ -96,13 +97,13 @@ def test_partial_sums_on_rings_that_are_cut_off_lose_the_optimum(monkeypatch):
 
 def test_a_single_pair_of_labels_is_kept_with_its_square():
     # a cross between two labels is rounded to both, so one that may stay keeps all squares that it touches
-    level = checker.CellLevel(3, np.array([False, False]), [np.arange(3), np.arange(3)], [])
-    allowed = np.zeros((4, 4), dtype=bool)
-    allowed[1, 2] = True
-    assert np.argwhere(level.with_corner(allowed, 0, 1)).tolist() == [[0, 1], [0, 2], [1, 1], [1, 2]]
-    square = np.zeros((3, 3), dtype=bool)
-    square[1, 2] = True
-    assert np.argwhere(level.corners_of(square, 0, 1)).tolist() == [[1, 2], [1, 3], [2, 2], [2, 3]]
+    ends = {"first": np.array([0]), "second": np.array([1])}
+    rows = SimpleNamespace(size=2, fixed=np.array([False, False, True]), **ends)
+    level = checker.CellLevel(rows, 3, np.repeat([0, 1, 2], [3, 3, 1]), np.array([0, 1, 2, 0, 1, 2, 0]))
+    corners = np.array(list(level.corners())).reshape(4, 3, 3)
+    places = np.argwhere((corners == 4 * 1 + 2).any(axis=0))
+    assert places.tolist() == [[0, 1], [0, 2], [1, 1], [1, 2]]
+    assert sorted(corners[:, 1, 2].tolist()) == [4 * x + y for x in (1, 2) for y in (2, 3)]
 
 
 def minimise_by_gurobi(instance):
