@@ -424,7 +424,7 @@ def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
         away = np.abs(angle - rows.centre) + np.where(rows.fixed, 0.0, np.pi)
         size = float(np.sum(rows.weight * (1 + r * r) * (1 + np.abs(angle[rows.first])))) * (1 + away.max())
         bounds.append(math.fsum(rows.weight * r * r) - math.fsum(np.abs(slope) * away) - MARGIN * size)
-    return min(bounds)
+    return float(min(bounds))
 
 
 # The theorem -----------------------------------------------------------------------------------------------
