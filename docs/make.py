@@ -307,7 +307,7 @@ def write_gallery() -> None:
     for kind, title in table["kinds"].items():
         lines = []
         for row in (row for row in table["drawing"] if row["kind"] == kind):
-            line = f"{row['shows']} ({row['program']})"
+            line = row["shows"] + f" ({row['program']})" * (row["program"] != "browser")
             if "picture" in row:
                 other = f"![right answer]({where}/expected/{row['picture']}.png) " * (row["picture"] != USUAL)
                 line = f"![{row['file']}]({where}/{row['file']}) {other}{line}"

@@ -256,6 +256,8 @@ def licences() -> str:
     return table(rows)
 
 
+SHOWN: Final = ("program", "version", "agree", "refused, as stated", "differ")
+"""Columns of the table of readings in the page."""
 PAGE: Final = """# One instance, all routes
 
 {generated}
@@ -274,6 +276,7 @@ small instance, in every formulation and format. {programs} programs read {right
 ## Reading
 
 A program refuses a file *as stated* if crossfield lists beforehand that it cannot read that model.
+[reading.csv](validation/reading.csv) also has the formats that it reads.
 
 {reading}
 
@@ -324,7 +327,7 @@ def page() -> str:
         strokes=STROKES,
         seed=SEED,
         seconds=SECONDS,
-        reading=table(reading),
+        reading=table([{name: row[name] for name in SHOWN} for row in reading]),
         licences=licences(),
         optima=table(best),
         starts=table(starts),
