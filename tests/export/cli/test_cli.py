@@ -270,6 +270,30 @@ def test_files_are_written_and_read_without_solvers_proofs_and_libraries(crossfi
     assert not modules_of("read", "a.sol", "--manifest", manifest, "-o", "field.npz") & HEAVY
 
 
+def test_commands_without_proofs_compile_nothing(crossfield, instance_file, tmp_path):
+    code = (
+        "import sys; from numba.core.event import install_recorder\n"
+        "from crossfield.export.cli.app import invoke\n"
+        "with install_recorder('numba:compile') as compiled:\n"
+        "    codes = [invoke(line.split()) for line in sys.argv[1:]]\n"
+        "print(codes, len(compiled.buffer), file=sys.stderr)"
+    )
+    lines = (
+        "export tiny.json -f milp-mccormick -F mps -o set -q",
+        "solve tiny.json -f milp-mccormick -o set -q",
+        "read set/tiny.milp-mccormick.highs.sol --manifest set/tiny.milp-mccormick.manifest.json -o f.npz -q",
+        "draw f.npz -o f.png",
+        "shade ring --size 12 -o shaded -q",
+        "library get cf_cyl_n005_milp -o got -q",
+    )
+    settings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", code, *lines], env=settings, capture_output=True, text=True, check=True
+    )
+    assert done.stderr.splitlines()[-1] == f"{[0] * len(lines)} 0"
+    assert not (tmp_path / "cache").exists()  # nor do their child processes
+
+
 def test_the_version_is_that_of_the_package(crossfield):
     from importlib.metadata import version
 
