@@ -40,7 +40,7 @@ class Report:
     proven
         Proven bound of the 2-norm energy of all fields, or None.
     stages
-        Seconds of each stage, in order.
+        Seconds of each stage, in order; `beside` is the wait for what is done beside the others.
     surface
         Surface over the kept field; None if the run stopped earlier.
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -15,20 +18,25 @@ from ...models.field.file import write_field
 from ...models.instance.grid import Grid
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
-from ...models.processes.deadline import Deadline, Over, Progress, Stop, silent, stop_function
+from ...models.processes.child import Child, KilledError
+from ...models.processes.child_program import is_stopped
+from ...models.processes.deadline import Deadline, Progress, Stop, silent, stop_function
 from ...models.processes.limits import Limits
 from ...models.processes.process_groups import catch_interrupts
+from ...models.processes.process_pool import process_pool
 from ...models.search.starts import first_field
 from ...models.storage import make_folder, remove_file, replacing_files, write_bytes
 from ...models.surface.lift import surface
+from ...models.surface.surface import Surface
 from ..bundle.manifest import Manifest
 from ..bundle.problem_files import write_all
+from ..pictures.draw import ON_MESHES, draw, draw_layers
 from ..pictures.mask import has_mask, write_mask
 from ..pictures.underlay import Underlay, read_underlay
 from ..surfaces.files import NORMALS, SHADED, write_layers
-from .methods import METHODS, Candidate, Request, methods_of
+from .methods import METHODS, Candidate, Method, Request, methods_of
 from .proven import ProvenBound
-from .report import Report, Stopwatch
+from .report import KEPT, Report, Stopwatch
 from .run_page import REPORT, write_page
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
@@ -43,13 +51,19 @@ CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """Name of the field from which the methods of a run start: `first_field`, or the given one."""
 COMPILING: Final = "compiling"
+BESIDE: Final = "beside"
+"""Stage in which a run waits for methods and pictures beside the search and the proof."""
 
 
 def plan_sentence(limits: Limits, instance: Instance) -> str:
     """A sentence on the time limit of a run's searches, in all and each."""
-    timed = [method.name for method in methods_of(instance) if method.timed]
-    limits_of_methods = ", ".join(f"{name} {limits.time_limit:g}" for name in timed)
-    return f"at most {len(timed) * limits.time_limit:g} s: {limits_of_methods}; files and pictures on top"
+    timed, beside = [method for method in methods_of(instance) if method.timed], limits.threads != 1
+    one_by_one = sum(not (method.beside and beside) for method in timed)
+    limits_of_methods = ", ".join(
+        f"{'beside them ' * (method.beside and beside)}{method.name} {limits.time_limit:g}"
+        for method in sorted(timed, key=lambda method: method.beside)
+    )
+    return f"at most {one_by_one * limits.time_limit:g} s: {limits_of_methods}; files and pictures on top"
 
 
 @check_arguments
@@ -84,9 +98,10 @@ def run(
     Orthogonal crosses, and instances on meshes, get the methods that find such fields. On a mesh there are
     two pictures, `instance` and `crosses`, and the page turns the model.
 
-    The report names methods that failed and what interrupted the run. Ctrl-C ends the current method with its
-    best field; then no further method is tried and nothing is drawn. Before the solver files are written,
-    Ctrl-C raises KeyboardInterrupt.
+    The report names methods that failed and what interrupted the run. Unless `limits` allow one thread, the
+    method `two-stage` works beside the search and the proof, and so does a process that draws. Ctrl-C ends
+    the current methods with their best fields; then no further method is tried and nothing more is drawn.
+    Before the solver files are written, Ctrl-C raises KeyboardInterrupt.
 
     Parameters
     ----------
@@ -123,28 +138,64 @@ def run(
     limits, folder = Limits.finite_or_default(limits), make_folder(folder)
     progress(plan_sentence(limits, instance))
     watch = Stopwatch()
-    with _compiling_in_background(instance):
-        progress("greedy field")
-        start = first_field(instance)
-        watch.lap(START)
-        manifests = _write_models(instance, folder, start, progress)
-        watch.lap("models")
-        request = Request(instance, folder / "solve", limits, start, progress=progress, stop=should_stop)
-        results = _Results([Candidate(START, start, watch.stages[START])])
-        _find_fields(results, request, watch, timed=False)
-        results.interrupted = results.interrupted or _compile_functions(request)
-        watch.lap(COMPILING)
-    _find_fields(results, request, watch, timed=True)
-    report = Report(instance, results.ranked, manifests, results.failures, results.interrupted)
-    names = _write_fields(report, folder)
-    watch.lap("fields")
-    report = _write_certificate(report, folder / CERTIFICATE)
-    watch.lap("certificate")
-    report, pictures = _draw_all(report, folder, underlay, request, watch)
-    report = replace(report, stages=watch.stages)
-    names |= pictures | ({CERTIFICATE} if report.proven else set())
+    with _helper(limits) as helper, ExitStack() as stack:
+        with _compiling_in_background(instance):
+            progress("greedy field")
+            start = first_field(instance)
+            watch.lap(START)
+            manifests = _write_models(instance, folder, start, progress)
+            watch.lap("models")
+            request = Request(instance, folder / "solve", limits, start, progress=progress, stop=should_stop)
+            results = _Results([Candidate(START, start, watch.stages[START])])
+            _find_fields(results, request, lambda method: not method.timed, watch)
+            pressed = stack.enter_context(catch_interrupts())
+            request = replace(request, stop=lambda: should_stop() or pressed())
+            work = (request, folder, underlay, results.settled, results.interrupted)
+            beside = helper.submit(_work_beside, *work)
+            results.interrupted = results.interrupted or _compile_functions(request)
+            watch.lap(COMPILING)
+        if not request.stop():
+            _find_fields(results, request, lambda method: method.timed and not method.beside, watch)
+        others, pictures = beside.result()
+        results.add(others)
+        watch.lap(BESIDE)
+        report = Report(instance, results.ranked, manifests, results.failures, results.interrupted)
+        names = _write_fields(report, folder)
+        watch.lap("fields")
+        report = _write_certificate(report, folder / CERTIFICATE)
+        watch.lap("certificate")
+        if pictures is None:
+            pictures = _Pictures(report.kept.field, underlay, request, report.interrupted).draw_all(folder)
+            watch.lap("pictures")
+    report = replace(
+        report,
+        surface=pictures.surface,
+        failures=report.failures | pictures.failures,
+        interrupted=report.interrupted or pictures.interrupted,
+        stages=watch.stages,
+    )
+    names |= pictures.names | ({CERTIFICATE} if report.proven else set())
     _write_report(report, folder, names)
     return report
+
+
+def _helper(limits: Limits) -> AbstractContextManager[Executor]:
+    """A thread for work beside the main thread; with one thread, this thread, which does it first."""
+    return process_pool(1) if limits.threads == 1 else ThreadPoolExecutor(1)
+
+
+def _work_beside(
+    request: Request, folder: Path, underlay: Underlay | None, kept: CrossField | None, interrupted: str
+) -> tuple[_Results, _Pictures | None]:
+    """Find the fields of methods that occupy one processor, and draw the kept field if it is known.
+
+    interrupted: what was interrupted before, so that nothing is done any more.
+    """
+    results = _Results(interrupted=interrupted)
+    _find_fields(results, request, lambda method: method.beside)
+    if kept is None:
+        return results, None
+    return results, _Pictures(kept, underlay, request, results.interrupted).draw_all(folder)
 
 
 def _write_models(
@@ -175,6 +226,17 @@ class _Results:
     candidates: list[Candidate] = field(default_factory=list)
     failures: dict[str, str] = field(default_factory=dict)
     interrupted: str = ""
+
+    def add(self, others: _Results) -> None:
+        """Add what another thread found; what was interrupted first here counts."""
+        self.candidates += others.candidates
+        self.failures |= others.failures
+        self.interrupted = self.interrupted or others.interrupted
+
+    @property
+    def settled(self) -> CrossField | None:
+        """The field that is kept whatever else is found; None if that is still open."""
+        return next((found.field for found in self.candidates if found.method == KEPT), None)
 
     @property
     def ranked(self) -> tuple[Candidate, ...]:
@@ -209,12 +271,17 @@ def _compile_functions(request: Request) -> str:
     return ""
 
 
-def _find_fields(results: _Results, request: Request, watch: Stopwatch, *, timed: bool) -> None:
-    """Add the fields that the methods with or without a time limit find, until one is interrupted."""
+def _find_fields(
+    results: _Results,
+    request: Request,
+    is_chosen: Callable[[Method], bool],
+    watch: Stopwatch | None = None,
+) -> None:
+    """Add the fields that some methods find, until one is interrupted; the watch has a lap for each."""
     for method in methods_of(request.instance):
         if results.interrupted:
             break
-        if method.timed != timed:
+        if not is_chosen(method):
             continue
         try:
             for candidate in method.find(request):
@@ -226,7 +293,8 @@ def _find_fields(results: _Results, request: Request, watch: Stopwatch, *, timed
             results.interrupted = method.name
         if request.stop():
             results.interrupted = results.interrupted or method.name
-        watch.lap(method.name)
+        if watch is not None:
+            watch.lap(method.name)
 
 
 def _write_certificate(report: Report, path: Path) -> Report:
@@ -243,69 +311,72 @@ def _write_certificate(report: Report, path: Path) -> Report:
     return report
 
 
-def _draw_all(
-    report: Report, folder: Path, underlay: Underlay | None, request: Request, watch: Stopwatch
-) -> tuple[Report, set[str]]:
-    """Draw the kept field and its surface, unless the run was interrupted; return the names of the pictures.
+@dataclass
+class _Pictures:
+    """Pictures of the kept field and its surface, drawn in a child process.
 
-    The report says whether Ctrl-C or the caller ended that.
+    In this process they would hold up the other thread, because Python runs one of them at a time.
+
+    names: of the files. failures: reasons by name of what is missing. interrupted: `drawing` or `surface` if
+    Ctrl-C or the caller ended that; before, what they ended earlier, so that nothing is drawn.
     """
-    # An exception at Ctrl-C could be raised in a callback, where Python discards it.
-    with catch_interrupts() as pressed, replacing_files(folder) as new:
 
-        def stop() -> bool:
-            return request.stop() or pressed()
+    kept: CrossField
+    underlay: Underlay | None
+    request: Request
+    interrupted: str
+    names: set[str] = field(default_factory=set)
+    surface: Surface | None = None
+    failures: dict[str, str] = field(default_factory=dict)
 
-        if not report.interrupted:
-            report = _draw_field(report, new, underlay, request.progress, stop)
-            watch.lap("pictures")
-        if not report.interrupted and isinstance(report.instance.domain, Grid):
-            report = _draw_surface(report, new, underlay, request.progress, stop)
-            watch.lap("surface")
-        return report, {path.name for path in new.iterdir()}
+    def draw_all(self, folder: Path) -> _Pictures:
+        """Draw the field and its surface, unless the run was interrupted; return itself."""
+        if self.interrupted:
+            return self
+        with replacing_files(folder) as new, Child() as child:
+            try:
+                self._draw_field(child, new)
+                if not self.interrupted and isinstance(self.kept.instance.domain, Grid):
+                    self._draw_surface(child, new)
+            except KeyboardInterrupt:
+                self.interrupted = "drawing"
+            self.names = {path.name for path in new.iterdir()}
+        return self
 
-
-def _draw_field(
-    report: Report, folder: Path, underlay: Underlay | None, progress: Progress, stop: Over
-) -> Report:
-    """Draw the kept field; return the report, marked where Ctrl-C or the caller ended that."""
-    from ..pictures.draw import ON_MESHES, draw, draw_layers
-
-    ended = replace(report, interrupted="drawing")
-    on_mesh = isinstance(report.instance.domain, Mesh)
-    try:
+    def _draw_field(self, child: Child, folder: Path) -> None:
+        """Draw the field, until Ctrl-C or the caller ends that."""
+        on_mesh = isinstance(self.kept.instance.domain, Mesh)
         for kind in ON_MESHES if on_mesh else PICTURES:
-            if stop():
-                return ended
-            progress(f"drawing {kind}")
-            subject = report.instance if kind == "instance" else report.kept.field
-            draw(subject, folder / picture_name(kind), kind=kind)
-        if stop():
-            return ended
-        if not on_mesh:
-            progress("drawing overlay")
-            draw_layers(report.kept.field, [folder / name for name in OVERLAY], underlay)
-    except KeyboardInterrupt:
-        return ended
-    return report
+            if self.request.stop():
+                break
+            self.request.progress(f"drawing {kind}")
+            subject = self.kept.instance if kind == "instance" else self.kept
+            child.call(partial(draw, kind=kind), subject, folder / picture_name(kind))
+        if not (on_mesh or self.request.stop()):
+            self.request.progress("drawing overlay")
+            child.call(draw_layers, self.kept, [folder / name for name in OVERLAY], self.underlay)
+        self.interrupted = "drawing" if self.request.stop() else ""
+
+    def _draw_surface(self, child: Child, folder: Path) -> None:
+        """Lift the field to a surface, and draw it if nothing speaks against it."""
+        self.request.progress("surface over the kept field")
+        work = (lift_and_draw, self.kept, folder, self.underlay)
+        try:
+            self.surface, interrupted = child.call(*work, stop=self.request.stop)
+            self.interrupted = "surface" if interrupted else ""
+        except KilledError:
+            self.interrupted = "surface"
+        except CrossfieldError as error:
+            self.failures["surface"] = str(error)
 
 
-def _draw_surface(
-    report: Report, folder: Path, underlay: Underlay | None, progress: Progress, stop: Over
-) -> Report:
-    """Lift the kept field to a surface, and draw it if nothing speaks against it; return the report."""
+def lift_and_draw(kept: CrossField, folder: Path, underlay: Underlay | None) -> Surface:
+    """Lift a field to a surface, and draw that if nothing speaks against it; for a child process."""
     deadline = Deadline.after(LONGEST_LIFT)
-    try:
-        progress("surface over the kept field")
-        lifted = surface(report.kept.field, stop=lambda: deadline.passed() or stop(), progress=progress)
-        report = replace(report, surface=lifted, interrupted="surface" if stop() else "")
-        if report.surface is not None and report.shaded:
-            write_layers(report.surface, folder, underlay)
-    except CrossfieldError as error:
-        report.failures["surface"] = str(error)
-    except KeyboardInterrupt:
-        return replace(report, interrupted="surface")
-    return report
+    lifted = surface(kept, stop=lambda: deadline.passed() or is_stopped())
+    if not lifted.doubts:
+        write_layers(lifted, folder, underlay)
+    return lifted
 
 
 def _write_report(report: Report, folder: Path, names: set[str]) -> None:

@@ -7,9 +7,9 @@ import crossfield as cf
 import pytest
 from crossfield.export.cli.output import show_report
 from crossfield.export.pictures.underlay import read_underlay
-from crossfield.export.solving.methods import Candidate
+from crossfield.export.solving.methods import Candidate, Request
 from crossfield.export.solving.report import Report
-from crossfield.export.solving.run import _draw_surface
+from crossfield.export.solving.run import OVERLAY, PICTURES, _Pictures, picture_name
 from crossfield.export.surfaces.files import write_layers
 from crossfield.models.processes.deadline import never, silent
 from PIL import Image
@@ -23,11 +23,16 @@ def report():
     return Report(field.instance, (Candidate("bend", field, 0.1),), (), stages={"start": 0.1})
 
 
+def draw(report, folder, progress=silent, stop=never):
+    request = Request(report.instance, folder, progress=progress, stop=stop)
+    return _Pictures(report.field, None, request, "").draw_all(folder)
+
+
 def test_a_surface_without_doubts_is_drawn_and_one_with_is_not(report, tmp_path, capsys):
-    drawn = _draw_surface(report, tmp_path, None, silent, never)
-    trusted = not drawn.surface.doubts
-    assert drawn.shaded == trusted
-    assert {path.name for path in tmp_path.iterdir()} == ({"shaded.png", "normals.png"} if trusted else set())
+    drawn = draw(report, tmp_path)
+    layers = set() if drawn.surface.doubts else {"shaded.png", "normals.png"}
+    assert {path.name for path in tmp_path.iterdir()} == drawn.names
+    assert drawn.names == {*map(picture_name, PICTURES), *OVERLAY} | layers
     for surface, doubt in ((ball(8), ""), (replace(ball(8), doubts=("it is flat",)), "it is flat")):
         with_surface = replace(report, surface=surface)
         document = json.loads(json.dumps(with_surface.document()))["surface"]
@@ -40,16 +45,11 @@ def test_a_surface_without_doubts_is_drawn_and_one_with_is_not(report, tmp_path,
         assert ("no shaded surface" in text) == bool(doubt)
 
 
-def test_ctrl_c_before_the_surface_leaves_the_rest(report, tmp_path):
-    def pressed(line):
-        assert "surface" in line
-        raise KeyboardInterrupt
-
-    ended = _draw_surface(report, tmp_path, None, pressed, never)
+def test_a_request_to_stop_before_the_surface_keeps_the_pictures(report, tmp_path):
+    lines = []
+    ended = draw(report, tmp_path, lines.append, lambda: "surface" in str(lines[-1:]))
     assert ended.interrupted == "surface"
-    assert ended.surface is None
-    assert ended.document()["surface"] is None
-    assert not list(tmp_path.iterdir())
+    assert {path.name for path in tmp_path.iterdir()} >= {*map(picture_name, PICTURES), *OVERLAY}
 
 
 def test_the_layers_of_a_run_are_those_of_the_command(report, tmp_path):
