@@ -100,9 +100,9 @@ def support_rows(
     return rows
 
 
-INTRODUCTION = r"""This page states the problem of [a cross field](cross-field.md) in 13 formulations, printed
-from their declarations in the code. [The mathematics](mathematics.md) derives them. Four are for orthogonal
-crosses only ($\beta = 0$), on pixels or meshes.
+INTRODUCTION = rf"""This page states the problem of [a cross field](cross-field.md) in {len(FORMULATIONS)}
+formulations, printed from their declarations in the code. [The mathematics](mathematics.md) derives them.
+{sum(recipe.orthogonal for recipe in FORMULATIONS.values())} are for orthogonal crosses only ($\beta = 0$), on pixels or meshes.
 
 Their sizes for the sketch `mouse` at 24 pixels:"""
 
