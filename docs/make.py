@@ -102,7 +102,7 @@ def support_rows(
 
 INTRODUCTION = rf"""This page states the problem of [a cross field](cross-field.md) in {len(FORMULATIONS)}
 formulations, printed from their declarations in the code. [The mathematics](mathematics.md) derives them.
-{sum(recipe.orthogonal for recipe in FORMULATIONS.values())} are for orthogonal crosses only ($\beta = 0$), on pixels or meshes.
+Those named `-orthogonal` and `-cycle` are for orthogonal crosses only ($\beta = 0$), on pixels or meshes.
 
 Their sizes for the sketch `mouse` at 24 pixels:"""
 
