@@ -19,7 +19,10 @@ from formulas import mathml, model_table
 project = "crossfield"
 author = "The crossfield authors"
 version = release = installed("crossfield")
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "command_pages", "csv_pages"]
+extensions = [
+    *("myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"),
+    *("command_pages", "csv_pages", "sample_gallery"),
+]
 exclude_patterns = ["static", "studying"]
 source_suffix = {".md": "myst-nb"}
 

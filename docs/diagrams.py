@@ -31,7 +31,6 @@ from crossfield.models.field.jumps import best_jumps
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
-from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.smooth.polyvector import HOLDS
 from matplotlib.figure import Figure
 from PIL import Image
@@ -94,58 +93,56 @@ def panel(
     return axes, content
 
 
-def drawing_of(instance: Instance) -> Underlay:
-    """The drawing of a sample; of a computed one, the curvature lines whose pixels are strokes."""
-    if SAMPLES[instance.name].kind == "sketch":
-        return read_underlay(instance.name, on=instance)
+def drawing_of(instance: Instance, drawing: str | Path | None) -> Underlay:
+    """A file or sample on its instance; without one, the curvature lines whose pixels are strokes."""
+    if drawing:
+        return read_underlay(drawing, on=instance)
     segments = cf.analytic(instance.name, max(instance.mask.shape)).segments
     breaks = np.flatnonzero((segments[1:, 0] != segments[:-1, 1]).any(axis=1)) + 1
     return Underlay(grid_box(instance), {"red": np.split(segments, breaks)}, ("", ""), None)
 
 
-def draw_drawing(axes: Any, content: PanelContent) -> None:
+def draw_drawing(axes: Any, content: PanelContent, drawing: Underlay) -> None:
     """The drawing from which the instance of a panel was read."""
-    instance = content.instance
-    view = view_of_grid(instance, round(2 * content.unit))
-    draw_smooth_image(axes, draw_strokes(instance, drawing_of(instance), view), content.extent)
+    view = view_of_grid(content.instance, round(2 * content.unit))
+    draw_smooth_image(axes, draw_strokes(content.instance, drawing, view), content.extent)
 
 
 def strokes(figure: Figure) -> None:
     """The drawing, and its stroke pixels, each with its direction."""
     axes, content = panel(figure, mouse(20), PAGE)
     frame = content.frame
-    draw_drawing(axes, content)
+    draw_drawing(axes, content, drawing_of(content.instance, "mouse"))
     paint(axes, [frame.sides("#e4e4e4", 0.6, between=True), frame.sides(BORDER, 0.9)])
     paint(axes, frame.strokes(STROKE, 3.0))
 
 
 def front(figure: Figure) -> None:
     """The row of the mouse, for README and home page."""
-    draw_row(figure, mouse(48))
+    draw_row(figure, mouse(48), "mouse")
 
 
-def draw_row(figure: Figure, field: CrossField) -> None:
-    """The drawing of a sample, the lines of its field, and the surface, without words."""
+def draw_row(figure: Figure, field: CrossField, drawing: str | Path | None) -> None:
+    """A drawing, the lines of its field, and the surface, without words. drawing: as in `drawing_of`."""
     width, pitch = 0.64 * PAGE, 0.68 * PAGE
     panels = [panel(figure, field, width, 4, number * pitch) for number in range(3)]
     (strokes_of, content), (lines, _), (shape, _) = panels
-    draw_drawing(strokes_of, content)
+    instance, strokes = field.instance, drawing_of(field.instance, drawing)
+    draw_drawing(strokes_of, content, strokes)
     paint(lines, content.frame.streamlines(field, 1.1, 7.0))
     paint(lines, content.frame.singularities(field, 3.0))
-    instance, drawing = field.instance, drawing_of(field.instance)
-    outline = find_outline(instance, drawing) if SAMPLES[instance.name].kind == "sketch" else None
+    outline = find_outline(instance, strokes) if drawing else None
     view = view_of_grid(instance, round(2 * content.unit))
     shaded = raster(instance, cf.surface(field).normals, view, outline=outline)
     draw_smooth_image(shape, shade_by_light(shaded), content.extent)
 
 
-def draw_sample(name: str, path: Path) -> None:
-    """Draw the row of a sample as a PNG; the longer side of each grid has the same length."""
-    field = cf.bend_field(cf.polyvector_field(cf.sample(name, 48), hold=max(HOLDS)))
+def draw_thumbnail(field: CrossField, drawing: str | Path | None, path: Path) -> None:
+    """Draw a row as a PNG; the longer side of each grid has the same length."""
     height = 0.64 * PAGE * field.instance.grid.height / max(field.instance.mask.shape) + 8
     with fixed_settings(STYLE):
         figure = Figure(figsize=(2 * PAGE / 72, height / 72))
-        draw_row(figure, field)
+        draw_row(figure, field, drawing)
         stream = io.BytesIO()
         figure.savefig(stream, dpi=110, metadata={"Software": None})
     with Image.open(stream) as picture:

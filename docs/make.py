@@ -28,7 +28,6 @@ from crossfield.models.formulations.latex import aligned, domain, objective_and_
 from crossfield.models.formulations.symbols import VARIABLES
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from crossfield.models.instance.symmetries import turned
-from crossfield.models.sketch.samples import SAMPLES
 
 DOCS = Path(__file__).resolve().parent
 
@@ -241,19 +240,9 @@ rotation by 90 degrees changes it in {changed}. At a single stroke of 120 degree
 
 def write_samples() -> None:
     """Write docs/samples.md: drawing, field and surface of each sample."""
-    import diagrams
+    import sample_gallery
 
-    folder = DOCS / "pictures"
-    parts = [
-        "# Samples",
-        generated_line("python docs/make.py samples"),
-        samples_in_short(),
-    ]
-    for name, entry in SAMPLES.items():
-        diagrams.draw_sample(name, folder / f"{name}.png")
-        description = f"{entry.description[0].upper()}{entry.description[1:]}."
-        parts += [f"## `{name}`", description, f"![Strokes, field and surface](pictures/{name}.png)"]
-    (DOCS / "samples.md").write_text("\n\n".join(parts) + "\n")
+    sample_gallery.write_page()
 
 
 def draw_tutorials() -> None:
@@ -270,17 +259,6 @@ def draw_tutorials() -> None:
         cf.draw(field, pictures / "pebble_field.png", kind="overview")
         cf.write_surface(cf.surface(field), name, drawing=drawing, side=1000)
         shutil.copy(Path(name) / "overlay.png", pictures / "pebble_surface.png")
-
-
-def samples_in_short() -> str:
-    """Numbers of samples by kind, and the content of the pictures."""
-    known = [entry.kind for entry in SAMPLES.values()].count("analytic")
-    return (
-        f"There are {len(SAMPLES)} samples: "
-        f"{len(SAMPLES) - known} sketches and {known} computed surfaces with known crosses. Use a name in "
-        "place of a sketch, as in `crossfield run mouse -o out`. The pictures show the strokes, the field of "
-        "`bend` at 48 pixels, and its surface, on the default side."
-    )
 
 
 GALLERY = """crossfield reads what a person sees. Each of these small drawings is written as the named
