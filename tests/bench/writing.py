@@ -13,6 +13,7 @@ import gc
 import json
 import os
 import platform
+import resource
 import subprocess
 import sys
 import tempfile
@@ -31,7 +32,10 @@ from machine import processor_name
 
 MILP: Final = "milp-mccormick"
 SUFFIXES: Final = ("nl", "lp", "mps", "gms")
+"""Formats in which all formulations are compared with Pyomo."""
 SIZES: Final = (64, 128, 256, 512)
+GROWTH: Final = (64, 128, 256, 512, 724, 1024, 1448)
+"""Pixels per side of the files whose growth is drawn; the last one has 4.2 million pairs."""
 PEERS: Final = {"crossfield": "crossfield", "linopy": "linopy", "highs": "HiGHS", "pyomo": "Pyomo"}
 PACKAGES: Final = ("numpy", "sympy", "pyomo", "linopy", "highspy")
 WARM: Final = 6
@@ -43,8 +47,11 @@ LONG: Final = 75.0
 MUCH: Final = 8e9
 """Bytes of memory that it may be expected to need."""
 
+PARTS: Final = ("peers", "growth", "formulations")
+
 Row = dict[str, Any]
 Writer = Callable[[Instance, str, Path], None]
+Measure = Callable[..., Row | None]
 
 
 # The writers: from an instance and the name of a formulation to a closed file.
@@ -138,9 +145,11 @@ def time_writer(writer: Writer, instance: Instance, name: str, path: Path) -> Ro
     for written in path.parent.iterdir():
         written.unlink()
     gc.collect()
-    cpu, wall = time.process_time(), time.perf_counter()
+    before, wall = resource.getrusage(resource.RUSAGE_SELF), time.perf_counter()
     writer(instance, name, path)
-    return {"seconds": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
+    seconds, after = time.perf_counter() - wall, resource.getrusage(resource.RUSAGE_SELF)
+    user, system = after.ru_utime - before.ru_utime, after.ru_stime - before.ru_stime
+    return {"seconds": seconds, "cpu": user + system, "user": user}
 
 
 def measure_writer(writer: str, name: str, suffix: str, size: int, *, once: bool = False) -> Row:
@@ -195,49 +204,85 @@ def format_ratio(row: Row, ours: Row, column: str) -> str:
     return f"{value:.1f}" if value < 10 else f"{value:.0f}"
 
 
-def compare_peers(
-    measure: Callable[..., Row | None], suffix: str, sizes: Sequence[int], loads: list[float]
-) -> str:
-    """Ours and the peers, by size."""
+def compare_peers(measure: Measure, sizes: Sequence[int]) -> dict[str, str]:
+    """Ours and the peers, by size, for LP and MPS."""
     from make import markdown
 
-    rows, going = [], list(PEERS)
-    for size in sizes:
-        ours: Row = {}
-        for writer in list(going):
-            row = measure(writer, MILP, suffix, size)
-            if row is None or row["seconds"] * 4.2 > LONG or row["memory"] * 4.2 > MUCH:
-                going.remove(writer)
-            if row is None:
-                continue
-            ours = ours or row
-            loads.append(row["load"])
-            rate = f"{row['bytes'] / 1e6 / row['seconds']:.0f}"
-            cells = [
-                f"{row['bytes'] / 1e6:.3g}",
-                format_seconds(row),
-                format_seconds(row, "cpu"),
-                rate,
-                f"{row['memory'] / 1e6:.0f}",
-            ]
-            rows.append(
-                [
+    tables, loads = {}, []
+    for suffix in ("lp", "mps"):
+        rows, going = [], list(PEERS)
+        for size in sizes:
+            ours: Row = {}
+            for writer in list(going):
+                row = measure(writer, MILP, suffix, size)
+                if row is None or row["seconds"] * 4.2 > LONG or row["memory"] * 4.2 > MUCH:
+                    going.remove(writer)
+                if row is None:
+                    continue
+                ours = ours or row
+                loads.append(row["load"])
+                cells = [
                     str(size),
                     PEERS[writer],
-                    *cells,
+                    f"{row['bytes'] / 1e6:.3g}",
+                    format_seconds(row),
+                    format_seconds(row, "cpu"),
+                    f"{row['bytes'] / 1e6 / row['seconds']:.0f}",
+                    f"{row['memory'] / 1e6:.0f}",
                     format_ratio(row, ours, "seconds"),
                     format_ratio(row, ours, "cpu"),
                 ]
+                rows.append(cells)
+        head = ["size", "writer", "MB", "seconds", "CPU s", "MB/s", "peak MB", "seconds / ours", "CPU / ours"]
+        tables[suffix] = markdown(head, rows)
+    return {"writing": describe_machine(loads), **tables}
+
+
+def measure_growth(measure: Measure, sizes: Sequence[int], picture: Path) -> dict[str, str]:
+    """Time and memory of an MPS by its size, as a table and a picture with straight lines through them."""
+    from make import markdown
+    from studying.plots import INK, open_panels
+
+    rows = {size: row for size in sizes if (row := measure("crossfield", MILP, "mps", size)) is not None}
+    pairs = np.array([2 * size * (size - 1) for size in rows]) / 1e6
+    drawn = {
+        "CPU seconds of the program": ("s", np.array([row["user"] for row in rows.values()])),
+        "peak memory, MB": ("MB", np.array([row["memory"] / 1e6 for row in rows.values()])),
+    }
+    fits = []
+    with open_panels(picture, len(drawn), wide=8.0, high=3.0) as axes:
+        for axis, (title, (unit, values)) in zip(axes, drawn.items(), strict=True):
+            slope, level = np.polyfit(pairs, values, 1)
+            off = float(np.abs(values - level - slope * pairs).max())
+            fits.append(
+                f"{level:.3g} {unit} + {slope:.3g} {unit} per million pairs, at most {off:.2g} {unit} off"
             )
-    head = ["size", "writer", "MB", "seconds", "CPU s", "MB/s", "peak MB", "seconds / ours", "CPU / ours"]
-    return markdown(head, rows)
+            ends = np.array([0.0, pairs[-1]])
+            axis.plot(ends, level + slope * ends, color=INK[1], linewidth=1.2)
+            axis.plot(pairs, values, "o", color=INK[0], markersize=5)
+            axis.set(xlabel="pairs, millions", title=title, xlim=(0, None), ylim=(0, None))
+    cells = [
+        [
+            str(size),
+            f"{number:.3g}",
+            f"{row['bytes'] / 1e6:.4g}",
+            format_seconds(row),
+            format_seconds(row, "user"),
+            f"{row['cpu'] - row['user']:.3g}",
+            f"{row['memory'] / 1e6:.0f}",
+        ]
+        for number, (size, row) in zip(pairs, rows.items(), strict=True)
+    ]
+    head = ["size", "million pairs", "MB", "seconds", "CPU s of the program", "of the system", "peak MB"]
+    facts = describe_machine([row["load"] for row in rows.values()])
+    return {"growth": f"{facts}\n\nStraight lines: {'; '.join(fits)}.\n\n{markdown(head, cells)}"}
 
 
-def compare_formulations(measure: Callable[..., Row | None], names: Sequence[str], size: int) -> str:
+def compare_formulations(measure: Measure, names: Sequence[str], size: int) -> dict[str, str]:
     """Ours and Pyomo for every formulation and format."""
     from make import markdown
 
-    rows = []
+    rows, loads = [], []
     for name in names:
         cells = []
         for suffix in SUFFIXES:
@@ -245,16 +290,19 @@ def compare_formulations(measure: Callable[..., Row | None], names: Sequence[str
                 cells.append("")
                 continue
             ours, theirs = (measure(writer, name, suffix, size) for writer in ("crossfield", "pyomo"))
+            loads += [row["load"] for row in (ours, theirs) if row]
             cell = format_seconds(ours)
             if ours and theirs:
                 cell += f" / {format_seconds(theirs)} = {format_ratio(theirs, ours, 'seconds')}x"
             cells.append(cell)
         rows.append([f"`{name}`", *cells])
-    return markdown(["", *SUFFIXES], rows)
+    sentence = f"{size} x {size}: seconds of crossfield, of Pyomo (model and writer), and their ratio."
+    facts = describe_machine(loads)
+    return {"formulations": f"{facts}\n\n{sentence}\n\n{markdown(['', *SUFFIXES], rows)}"}
 
 
-def describe_machine() -> str:
-    """Facts about the machine that the numbers depend on, without the name of the host."""
+def describe_machine(loads: Sequence[float]) -> str:
+    """Facts that numbers depend on, without the name of the host. loads: load averages while measuring."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     packages = []
     for package in PACKAGES:
@@ -264,20 +312,9 @@ def describe_machine() -> str:
             packages.append(f"{package} not installed")
     return (
         f"{os.cpu_count()} cores, {processor_name()}, {memory:.0f} GB, {platform.system()}. "
-        f"Python {platform.python_version()}, {', '.join(packages)}."
+        f"Python {platform.python_version()}, {', '.join(packages)}.\n"
+        f"Load average while measuring: {min(loads):.1f} to {max(loads):.1f}."
     )
-
-
-def measure_tables(
-    measure: Callable[..., Row | None], sizes: Sequence[int], names: Sequence[str], middle: int
-) -> dict[str, str]:
-    """The generated parts of the page, by the names of their markers."""
-    loads: list[float] = []
-    tables = {suffix: compare_peers(measure, suffix, sizes, loads) for suffix in ("lp", "mps")}
-    formulations = compare_formulations(measure, names, middle)
-    facts = f"{describe_machine()}\nLoad average while measuring: {min(loads):.1f} to {max(loads):.1f}."
-    sentence = f"{middle} x {middle}: seconds of crossfield, of Pyomo (model and writer), and their ratio."
-    return {"writing": facts, **tables, "formulations": f"{sentence}\n\n{formulations}"}
 
 
 def main(page: Path, arguments: Sequence[str]) -> None:
@@ -285,6 +322,7 @@ def main(page: Path, arguments: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(
         prog="python tests/bench writing", description="Measure the writers next to those of other programs."
     )
+    parser.add_argument("parts", nargs="*", default=PARTS, metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--page", type=Path, default=page)
     parser.add_argument(
         "--smoke", action="store_true", help="sizes 4 and 8, one run each, in one process: shows that it runs"
@@ -294,11 +332,18 @@ def main(page: Path, arguments: Sequence[str]) -> None:
     if options.one:
         print(json.dumps(measure_writer(*json.loads(options.one))))
         return
-    if options.smoke:
-        tables = measure_tables(measure_here, (4, 8), ["minlp-quartic"], 8)
-    else:
-        tables = measure_tables(measure_in_child, SIZES, list_formulations(), 128)
     from make import replace_between
 
-    for name, table in tables.items():
-        replace_between(options.page, name, table)
+    small = options.smoke
+    measure = measure_here if small else measure_in_child
+    picture = options.page.parent / "pictures" / "performance.svg"
+    measured: dict[str, Callable[[], dict[str, str]]] = {
+        "peers": lambda: compare_peers(measure, (4, 8) if small else SIZES),
+        "growth": lambda: measure_growth(measure, (4, 8) if small else GROWTH, picture),
+        "formulations": lambda: compare_formulations(
+            measure, ["minlp-quartic"] if small else list_formulations(), 8 if small else 128
+        ),
+    }
+    for part in options.parts:
+        for name, table in measured[part]().items():
+            replace_between(options.page, name, table)
