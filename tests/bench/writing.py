@@ -41,9 +41,9 @@ PACKAGES: Final = ("numpy", "sympy", "pyomo", "linopy", "highspy")
 WARM: Final = 6
 """Pixels per side of the model that goes first."""
 ONCE: Final = 5.0
-"""Seconds above which a writer is measured once, instead of three times."""
+"""CPU seconds above which a writer is measured once, instead of three times."""
 LONG: Final = 75.0
-"""Seconds that the next size of a peer may be expected to take."""
+"""CPU seconds that the next size of a peer may be expected to take."""
 MUCH: Final = 8e9
 """Bytes of memory that it may be expected to need."""
 
@@ -153,7 +153,7 @@ def time_writer(writer: Writer, instance: Instance, name: str, path: Path) -> Ro
 
 
 def measure_writer(writer: str, name: str, suffix: str, size: int, *, once: bool = False) -> Row:
-    """A row of measurements: the median of three runs, or one run where it is long.
+    """A row of measurements: of three runs the one of median CPU time, or of one run where it is long.
 
     once: one run, and no small model before it.
     """
@@ -163,9 +163,9 @@ def measure_writer(writer: str, name: str, suffix: str, size: int, *, once: bool
             WRITERS[writer](make_square(WARM), name, path)
         runs = [time_writer(WRITERS[writer], make_square(size), name, path)]
         memory = peak_memory()
-        if not once and runs[0]["seconds"] <= ONCE:
+        if not once and runs[0]["cpu"] <= ONCE:
             runs += [time_writer(WRITERS[writer], make_square(size), name, path) for _ in range(2)]
-        middle = sorted(runs, key=lambda run: float(run["seconds"]))[len(runs) // 2]
+        middle = sorted(runs, key=lambda run: float(run["cpu"]))[len(runs) // 2]
         return middle | {"memory": memory, "bytes": path.stat().st_size, "load": os.getloadavg()[0]}
 
 
@@ -215,7 +215,7 @@ def compare_peers(measure: Measure, sizes: Sequence[int]) -> dict[str, str]:
             ours: Row = {}
             for writer in list(going):
                 row = measure(writer, MILP, suffix, size)
-                if row is None or row["seconds"] * 4.2 > LONG or row["memory"] * 4.2 > MUCH:
+                if row is None or row["cpu"] * 4.2 > LONG or row["memory"] * 4.2 > MUCH:
                     going.remove(writer)
                 if row is None:
                     continue
