@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from crossfield.export.library.building.executor import Tasks, open_executor, tasks_ahead
+from crossfield.export.library.building.executor import open_tasks
 from crossfield.export.library.documents.lock import library_lock
 from machine import machine_facts
 
@@ -55,13 +55,12 @@ def carry_out(
     """
     wanted = frozenset(parts)
     data.mkdir(parents=True, exist_ok=True)
-    with library_lock(data, "a study", progress), open_executor(jobs, scheduler) as chosen:
+    with library_lock(data, "a study", progress), open_tasks(jobs, scheduler) as tasks:
         rows_of = tables(data)
         for stage in stages(plan, folder):
             runs = [run for run in stage.runs if not wanted or run.part in wanted]
             runs = [run for run in runs if run.key not in rows_of[run.part].done]
             progress(f"{stage.name}: {len(runs)} of {len(stage.runs)} runs")
-            tasks = Tasks(chosen, tasks_ahead(jobs, scheduler))
             for run in reversed(runs):  # the last one added is the first to be done
                 tasks.add(perform, (run, folder), partial(_keep, rows_of[run.part], run))
             tasks.run()

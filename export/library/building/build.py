@@ -6,6 +6,7 @@ their files, the file that marks completion last. So an interrupted build contin
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -30,7 +31,7 @@ from ..ledger.ledger import LEDGER, Ledger, Record, merge_ledgers, read_ledger, 
 from ..plan.recipe import InstancePlan, plan_library, without_skipped
 from ..plan.spec import Spec
 from .entry_files import make_entry
-from .executor import Tasks, open_executor, tasks_ahead
+from .executor import Tasks, open_tasks
 from .index import write_index
 from .instance_files import make_instance_files
 from .tasks import BuildInputs, Files
@@ -99,8 +100,7 @@ def build_locked(
     plans = plan_library(spec)
     entries = [entry.name for planned in plans for entry in planned.entries]
     ledger = merge_ledgers(folder, ledger, entries, [planned.recipe.name for planned in plans])
-    with open_executor(jobs, scheduler) as chosen:
-        tasks = Tasks(chosen, tasks_ahead(jobs, scheduler))
+    with open_tasks(jobs, scheduler) as tasks:
         work = _Build(folder, BuildInputs(ledger, plans, points), tasks, progress)
         for planned in sorted(plans, key=lambda planned: -planned.recipe.size):
             work.begin(planned)  # the last task runs first: small ones, whose faults show at once
@@ -163,7 +163,7 @@ class _Build:
                 self.progress(f"skipped: {files}")
                 return
             self._write(files)
-            about = read_about(self.folder / about_file(task.name))
+            about = json.loads(files[about_file(task.name)])
             if task.given and task.given.instance != about["instance"]["sha256"]:
                 self.progress(f"{task.name}: the points given are of another instance; searched for others")
             self._schedule_entries(planned, about)

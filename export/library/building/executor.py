@@ -1,4 +1,4 @@
-"""Executors of tasks: this process, processes of this machine, or the workers of a dask scheduler.
+"""Tasks of a build: in this process, in processes of this machine, or by the workers of a dask scheduler.
 
 A task is a function from values to values that writes no files. If a dask worker dies during a task, another
 one repeats it.
@@ -7,8 +7,9 @@ one repeats it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
+from queue import SimpleQueue
 from typing import Any, Final, TypeVar
 
 from ....models.errors import CrossfieldError
@@ -18,7 +19,8 @@ from ....models.processes.process_pool import process_pool
 
 T = TypeVar("T")
 
-_AHEAD: Final = 64  # tasks submitted to a cluster at once: enough for its workers, at constant memory
+_AHEAD: Final = 64  # tasks submitted to a cluster at once, while it has few workers
+_PER_THREAD: Final = 2  # tasks submitted at once for each thread of a cluster or each process
 _TRIES: Final = 3  # of a task whose dask worker died
 
 
@@ -26,34 +28,34 @@ class BuildError(CrossfieldError):
     """Loss of workers."""
 
 
-def tasks_ahead(jobs: int, scheduler: str | None) -> int:
-    """Return the number of tasks submitted at once; a killed build loses the unfinished ones."""
-    return _AHEAD if scheduler else 1 if jobs == 1 else 2 * jobs
-
-
 @contextmanager
-def open_executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
-    """Yield an executor. Raises InputError without a scheduler or dask; BuildError when workers die."""
+def open_tasks(jobs: int, scheduler: str | None = None) -> Iterator[Tasks]:
+    """Yield tasks for that many processes, or for the workers of a scheduler, however many come and go.
+
+    A killed build loses the unfinished ones. Raises InputError without a scheduler or dask; BuildError when
+    workers die.
+    """
     try:
-        with _dask_executor(scheduler) if scheduler else process_pool(jobs) as chosen:
-            yield chosen
+        if scheduler is None:
+            with process_pool(jobs) as executor:
+                yield Tasks(executor, lambda: 1 if jobs == 1 else _PER_THREAD * jobs)
+            return
+        with connect_cluster(scheduler) as client:
+            executor = client.get_executor(pure=False, retries=_TRIES)
+            yield Tasks(executor, lambda: max(_AHEAD, _PER_THREAD * sum(client.nthreads().values())))
     except WorkerError as error:
         raise BuildError(f"{error}; complete files are kept") from error
 
 
-@contextmanager
-def _dask_executor(address: str) -> Iterator[Executor]:
-    with connect_cluster(address) as client:
-        yield client.get_executor(pure=False, retries=_TRIES)
-
-
 class Tasks:
-    """Tasks in progress, a limited number at once: function, value, and callback for the result."""
+    """Tasks in progress, a limited number at once: function, value, and callback for the result.
 
-    def __init__(self, chosen: Executor, most: int) -> None:
-        self._executor, self._most = chosen, most
+    count_ahead: the number of tasks to submit at once; called again from time to time.
+    """
+
+    def __init__(self, executor: Executor, count_ahead: Callable[[], int]) -> None:
+        self._executor, self._count_ahead = executor, count_ahead
         self._waiting: list[tuple[Callable[[Any], Any], Any, Callable[[Any], None]]] = []
-        self._running: dict[Future[Any], Callable[[Any], None]] = {}
 
     def add(self, function: Callable[[Any], T], value: Any, finish: Callable[[T], None]) -> None:
         """Schedule a call of the function, and of `finish` in this process with its result.
@@ -64,10 +66,17 @@ class Tasks:
 
     def run(self) -> None:
         """Run all tasks. Raises the error of a task."""
-        while self._waiting or self._running:
-            while self._waiting and len(self._running) < self._most:
+        running: dict[Future[Any], Callable[[Any], None]] = {}
+        done: SimpleQueue[Future[Any]] = SimpleQueue()
+        most = until_count = 0
+        while self._waiting or running:
+            if until_count == 0:  # a cluster is asked rarely
+                most = until_count = self._count_ahead()
+            while self._waiting and len(running) < most:
                 function, value, finish = self._waiting.pop()
-                self._running[self._executor.submit(function, value)] = finish
-            done, _ = wait(self._running, return_when=FIRST_COMPLETED)
-            for future in done:
-                self._running.pop(future)(future.result())
+                future = self._executor.submit(function, value)
+                running[future] = finish
+                future.add_done_callback(done.put)
+            future = done.get()
+            until_count -= 1
+            running.pop(future)(future.result())

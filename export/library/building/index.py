@@ -25,8 +25,7 @@ from ..documents.documents import (
     document_bytes,
     files_of_entry,
     files_of_instance,
-    read_about,
-    read_sidecar,
+    load_document,
 )
 from ..documents.standalone import standalone_program
 from ..ledger.ledger import LEDGER, read_ledger
@@ -53,13 +52,15 @@ def write_index(
     skipped: names of instances that the specification asks for and that are not in the plans, and why;
     earlier: checksums of the build before.
     """
-    sidecars = [read_sidecar(folder / f"{entry.name}.json") for planned in plans for entry in planned.entries]
+    sidecars = [
+        load_document(folder / f"{entry.name}.json") for planned in plans for entry in planned.entries
+    ]
     written = general_files(folder, spec, sidecars, skipped)
     for name, data in written.items():
         write_bytes(folder / name, data)
     abouts = [about_file(planned.recipe.name) for planned in plans]
     present = {*written, LEDGER, *read_ledger(folder).files, *abouts}
-    present |= {name for file in abouts for name in files_of_instance(read_about(folder / file))}
+    present |= {name for file in abouts for name in files_of_instance(load_document(folder / file))}
     for sidecar in sidecars:
         present |= {f"{sidecar['name']}.json", *files_of_entry(sidecar)}
     for name in earlier.keys() - present:  # files that were added by hand stay

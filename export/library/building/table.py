@@ -122,14 +122,14 @@ def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:
     Raises InputError, InstanceError for a missing or damaged file.
     """
     from ....models.field.file import read_field
-    from ..documents.documents import about_file, read_about
+    from ..documents.documents import about_file, load_document
 
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     vortices: dict[str, int] = {}
     for sidecar in sidecars:
-        about = read_about(folder / about_file(_instance_name(sidecar)))
+        about = load_document(folder / about_file(_instance_name(sidecar)))
         file = about["fields"][role_of(sidecar)]["file"]
         if file not in vortices:
             vortices[file] = len(read_field(folder / file).singularities.index)

@@ -28,7 +28,7 @@ from ..ledger.grades import FEASIBLE
 from ..ledger.known_points import all_points_of
 from ..ledger.ledger import LEDGER, read_ledger
 from .build import build_locked, has_unbuilt_records
-from .executor import Tasks, open_executor, tasks_ahead
+from .executor import open_tasks
 
 BUILD: Final = "build the library again"
 _FETCH: Final = f"fetch it again, or {BUILD}"
@@ -158,8 +158,7 @@ def _read_unpacked(path: Path) -> bytes:
 def _find_wrong_points(folder: Path, library: Library, named: Collection[str], jobs: int) -> list[Defect]:
     """Best known points that are not feasible in their .mps; damaged files are not checked."""
     defects: list[Defect] = []
-    with open_executor(jobs, None) as chosen:
-        tasks = Tasks(chosen, tasks_ahead(jobs, None))
+    with open_tasks(jobs) as tasks:
         for sidecar in library.entries:
             point = sidecar["best"]["point"]
             models = [file["name"] for file in sidecar["files"] if file["format"] == "mps"]

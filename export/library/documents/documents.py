@@ -83,6 +83,12 @@ def read_sidecar(path: str | Path) -> dict[str, Any]:
     return _read(Path(path), FORMAT, "library-entry")
 
 
+def load_document(path: Path) -> dict[str, Any]:
+    """Read a document of a build that has just written or checked it, without its schema."""
+    document: dict[str, Any] = json.loads(read_bytes(path))
+    return document
+
+
 def is_sidecar(path: Path) -> bool:
     """Whether a JSON file states the format of sidecars; False for other content."""
     try:

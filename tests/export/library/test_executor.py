@@ -4,14 +4,13 @@ import subprocess
 import sys
 
 import pytest
-from crossfield.export.library.building.executor import BuildError, Tasks, open_executor
+from crossfield.export.library.building.executor import BuildError, open_tasks
 
 TASKS = """import math
-from crossfield.export.library.building.executor import Tasks, open_executor
+from crossfield.export.library.building.executor import open_tasks
 
 print("the script runs")
-with open_executor(2, None) as chosen:
-    tasks = Tasks(chosen, 4)
+with open_tasks(2) as tasks:
     for number in (16, 25):
         tasks.add(math.isqrt, number, lambda root: open(f"root_{root}", "w").close())
     tasks.run()
@@ -35,8 +34,7 @@ def test_a_process_that_ends_early_ends_the_build_with_its_exit_code():
     from os import _exit
 
     def build():
-        with open_executor(2, None) as chosen:
-            tasks = Tasks(chosen, 4)
+        with open_tasks(2) as tasks:
             tasks.add(_exit, 3, print)
             tasks.run()
 
