@@ -31,13 +31,14 @@ HARMONIC: Final = 0.05  # weight of plain smoothness for strokes that tremble by
 TREMBLE: Final = np.radians(1.2)  # about what 3 degrees of noise on strokes cause at 48 pixels
 HOLD: Final = 0.25  # factor of the stroke weights; from 0.3 on, 3 degrees of noise show
 
-_LEAST_HARMONIC: Final = 0.01  # smallest deviation from clean strokes
+_LEAST: Final = 0.2  # of `HARMONIC`: smallest deviation from clean strokes
 _SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size
 _ROUNDS: Final = 20  # 2 to 6 are usual
 _FIRST: Final = 0.01  # relative residual of the system of the first round, whose step is the longest
 _RESIDUAL: Final = 0.05  # of later ones
 _STEPS: Final = 50  # of conjugate gradients; 5 to 15 are usual
 _FALL: Final = 1e-4  # least share of the energy that a round has to remove before another one
+_ROUGH: Final = 0.03  # likewise, of a field in which only the tremble of strokes is measured
 
 
 @check_arguments
@@ -60,16 +61,17 @@ def bend_field(
 
     Each round fixes the unit vectors and minimises over the angles: one sparse system, which conjugate
     gradients solve to a residual of 1 % in the first round and of 5 % in later ones. Their preconditioner
-    (two_levels.py) is made for the first round. Rounds end when the energy hardly decreases, and after 20
-    rounds at the latest; a round that increases it is discarded. Labels are then moved into the windows of
-    the instance, as by `CrossField.from_lines`. Deterministic unless `stop` ends it.
+    (two_levels.py) is made for the first round, also if the weight of smoothness changes later. Rounds end
+    when the energy hardly decreases, and after 20 rounds at the latest; a round that increases it is
+    discarded. Labels are then moved into the windows of the instance, as by `CrossField.from_lines`.
+    Deterministic unless `stop` ends it.
 
     Parameters
     ----------
     start
         The field to begin with.
     harmonic
-        Weight of plain smoothness, above 0. None measures the tremble of the strokes in the field of
+        Weight of plain smoothness, above 0. None measures the tremble of the strokes in a rough field of
         `HARMONIC`, takes that weight times (tremble / TREMBLE)^2, from 0.01 to 0.05, and goes on from there.
     hold
         Factor of the stroke weights, above 0.
@@ -95,14 +97,13 @@ def bend_field(
     if over():
         return start
     x = np.concatenate([start.u_angle, start.v_angle])
-    x = _Bend.of(start, HARMONIC if harmonic is None else harmonic, hold).least(x, over)
-    field = CrossField.from_lines(start.instance, *np.split(x, 2))
-    if harmonic is not None:
-        return field
-    wanted = max(HARMONIC * (tremble(field) / TREMBLE) ** 2, _LEAST_HARMONIC)
-    if wanted >= HARMONIC or over():
-        return field
-    x = _Bend.of(start, wanted, hold).least(x, over)
+    bend = _Bend.of(start, HARMONIC if harmonic is None else harmonic, hold)
+    inverse = bend.invert(x)
+    if harmonic is None:
+        x = bend.least(x, inverse, over, _ROUGH)
+        trembling = tremble(CrossField.from_lines(start.instance, *np.split(x, 2))) / TREMBLE
+        bend = _Bend.of(start, HARMONIC * float(np.clip(trembling**2, _LEAST, 1.0)), hold)
+    x = bend.least(x, inverse, over, _FALL)
     return CrossField.from_lines(start.instance, *np.split(x, 2))
 
 
@@ -155,17 +156,18 @@ class _Bend:
             np.concatenate(goal),
         )
 
-    def least(self, x: Floats, over: Over) -> Floats:
-        """Angles of low energy, in rounds that begin at x."""
+    def least(self, x: Floats, inverse: LinearOperator, over: Over, fall: float) -> Floats:
+        """Angles of low energy, in rounds that begin at x and end with one that removes less than `fall`."""
         energy, slope, along = self.at(x)
-        inverse = self._invert(along)
         for number in range(_ROUNDS):
+            if over():
+                break
             moved = x - self._step(along, slope, inverse, _RESIDUAL if number else _FIRST)
             there = self.at(moved)
             fallen = energy - there[0]
             if fallen > 0:
                 x, (energy, slope, along) = moved, there
-            if fallen <= _FALL * energy or over():
+            if fallen <= fall * energy:
                 break
         return x
 
@@ -181,9 +183,9 @@ class _Bend:
         """The matrix (2n, 2n) of the linear squares."""
         return (self.rows.T @ self.rows).tocsr()
 
-    def _invert(self, along: Any) -> LinearOperator:
-        """The approximate inverse of the system for fixed unit vectors."""
-        bend = along @ self.difference
+    def invert(self, x: Floats) -> LinearOperator:
+        """The approximate inverse of the system for the unit vectors at x."""
+        bend = self._along(x) @ self.difference
         matrix = bend.T @ bend + self.squares
         return LinearOperator(matrix.shape, approximate_inverse(matrix, self.grid, *self.links), dtype=float)
 
@@ -201,11 +203,15 @@ class _Bend:
 
     def _along(self, x: Floats) -> Any:
         """The matrix (q, 2m) from differences to derivatives along the other line; a quadrant counts 1/4."""
-        angle, count = x[self.across], len(self.across)
-        parts = np.stack([np.cos(angle), np.sin(angle)], axis=1).ravel() / 2
-        beside = np.stack([self.sideways, self.upward], axis=1).ravel()
-        begin = np.arange(0, 2 * count + 1, 2)
-        return sparse.csr_array((parts, beside, begin), shape=(count, len(self.offset)))
+        count, vectors = len(self.across), np.stack([np.cos(x), np.sin(x)], axis=1) / 2
+        parts = vectors[self.across].ravel()
+        return sparse.csr_array((parts, *self._structure), shape=(count, len(self.offset)))
+
+    @cached_property
+    def _structure(self) -> tuple[_Places, _Places]:
+        """Columns and beginnings of rows of the matrix from differences to derivatives."""
+        columns = np.stack([self.sideways, self.upward], axis=1).ravel()
+        return columns, np.arange(0, len(columns) + 1, 2)
 
 
 def _differences(field: CrossField) -> tuple[tuple[Ints, Ints], Any, Floats]:
