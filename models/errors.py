@@ -37,6 +37,11 @@ def shortened(text: object, most: int = QUOTED) -> str:
     return line if len(line) <= most else f"{line[:head]} ... {line[head + 5 - most :]}"
 
 
+def quote_line(line: bytes) -> str:
+    """A line of a file in quotes, for a message."""
+    return repr(shortened(line.decode("utf-8", "replace")))
+
+
 class CrossfieldError(Exception):
     """Base of all errors that crossfield raises on purpose."""
 

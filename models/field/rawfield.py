@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ..errors import InstanceError, shortened
+from ..errors import InstanceError, quote_line
 from ..input_limits import MAX_NUMBER
 from ..instance.domain import Bools, Floats
 from ..instance.instance import Instance
@@ -83,7 +83,7 @@ def _parse_head(head: bytes, instance: Instance) -> int:
     """The number of faces that the first line states."""
     words = head.split()
     if len(words) != 2 or not all(word.isdigit() and len(word) < MAX_NUMBER for word in words):
-        raise InstanceError(f"line 1: is {_quoted(head)}, not the degree 4 and the number of faces as text")
+        raise InstanceError(f"line 1: is {quote_line(head)}, not the degree 4 and a number of faces")
     degree, faces = map(int, words)
     if degree != 4:
         raise InstanceError(f"line 1: has {degree} vectors per face; crosses have 4: u, v, -u, -v")
@@ -108,12 +108,8 @@ def number_rows(body: list[tuple[int, bytes]], width: int, meaning: str) -> Floa
         if words != width:
             raise InstanceError(f"line {number}: has {words} numbers; give {width}, {meaning}")
         if not _NUMBERS.fullmatch(line):
-            raise InstanceError(f"line {number}: holds something other than numbers: {_quoted(line)}")
+            raise InstanceError(f"line {number}: holds something other than numbers: {quote_line(line)}")
     return np.array(b" ".join(line for _, line in body).split(), dtype=np.float64).reshape(-1, width)
-
-
-def _quoted(line: bytes) -> str:
-    return repr(shortened(line.decode("utf-8", "replace")))
 
 
 def unit_vectors(vectors: Floats, numbers: list[int], instance: Instance) -> Floats:

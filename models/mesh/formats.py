@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from ..arguments import whole_numbers
-from ..errors import InputError, MeshError, shortened
+from ..errors import InputError, MeshError, quote_line, shortened
 from ..input_limits import MAX_BYTES
 from ..instance.domain import Floats, Ints
 from ..instance.mesh import MOST_FACES, Mesh
@@ -59,7 +59,7 @@ def _read_obj(data: bytes) -> tuple[Mesh, Ints]:
                 else:
                     raise MeshError(f"line {number}: has a face of {len(corners)} corners; triangulate it")
         except (ValueError, IndexError) as error:
-            raise InputError(f"line {number}: is {_quoted(line)}, which is no OBJ; write it again") from error
+            raise InputError(f"line {number}: {quote_line(line)} is no OBJ; write it again") from error
         _check_size(max(len(vertices), len(edges)), len(faces))
     try:
         positions = np.array(vertices, dtype=np.float64).reshape(-1, 3)
@@ -75,10 +75,6 @@ def _vertex_of(corner: bytes, vertices: int) -> int:
     if number == 0:
         raise ValueError
     return number - 1 if number > 0 else max(vertices + number, -1)
-
-
-def _quoted(line: bytes) -> str:
-    return repr(shortened(line.decode("utf-8", "replace")))
 
 
 def _read_ply(data: bytes) -> tuple[Mesh, Ints]:

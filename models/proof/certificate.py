@@ -96,7 +96,7 @@ def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certi
     if isinstance(proof, OrthogonalProof):
         if proof.proven is None:
             raise InputError("would hold a proof that is not valid; prove it again", file=path)
-        write_bytes(path, proof.packed())
+        write_bytes(path, pack_arrays(proof.certificate()))
         return Certificate(proof.field, proof.energy, proof.bound, proof.proven)
     try:
         checked = proof if proof.proven is not None else check_proof(proof)

@@ -1,9 +1,8 @@
 """Proofs for orthogonal crosses on any domain: level after level of labels round the best field.
 
-docs/orthogonal-proofs.md has the lemmas. On every level a dual rises (orthogonal_dual.py), fields are rounded
-from it, and the checker (check_orthogonal.py) computes the bound and what is left. A level has a third of the
-spacing of the one before, or the same spacing with fewer labels. Rings that hold part of the gap become
-clusters.
+docs/orthogonal-proofs.md has the lemmas. On every level a dual rises (orthogonal_dual.py), a field is rounded
+from it, and the checker (check_orthogonal.py) computes the bound and what is left. The next level has a third
+of the spacing, or the same with fewer labels. Rings that hold part of the gap become clusters.
 """
 
 from __future__ import annotations
@@ -40,13 +39,11 @@ if TYPE_CHECKING:
 Neighbours = list[list[tuple[int, int]]]
 """Of each point, its neighbours and the pairs with them."""
 
-# Levels
 _COARSEST: Final = 15  # cells of a quarter turn
 _FINEST: Final = 3645
 _MOST_COSTS: Final = 40_000_000  # pairs of labels of a level: some 3 GB
+_SWEEPS: Final = 20  # over all points, in which colours change
 _NARROW: Final = 0.7  # share of the cells left below which the same spacing is worth another level
-
-# Passes
 _MOST_PASSES: Final = 200
 _PASSES: Final = 5  # between looks at the bound, and updates of rings if there are any
 _SLOW: Final = (0.08, 0.02)  # part of the gap: a smaller rise is slow; the latter for rings and wide gaps
@@ -57,7 +54,6 @@ _ENOUGH: Final = 0.1  # the same for a tiny gap
 _TINY: Final = 1e-3  # relative gap below which finer labels follow
 _MANY: Final = 0.1  # share of new rings above which they come into use at the same spacing
 _CAP: Final = 3.0  # gaps from which sums on rings count alike, before a bound counts
-
 _WIDE: Final = 0.01  # relative gap: a search follows, after a given field on a finer level
 _SEARCH: Final = 0.05  # share of the time left for it
 _ROUNDS: Final = 10  # of that search
@@ -74,7 +70,8 @@ def prove_orthogonal(
     began = time.monotonic()
     energy = OrthogonalEnergy.of(instance)
     starts = starting_integers(instance, energy, start, ends.over)
-    prover = _Prover(instance, energy, starts, ends, progress, seed, searched=start is not None)
+    search_at = _COARSEST if start is None else 3 * _COARSEST  # a given field is rarely far from the best
+    prover = _Prover(instance, energy, starts, ends, progress, seed, search_at)
     proof = prover.proof(prover.run(), began)
     if not proof.levels:
         return proof
@@ -103,27 +100,23 @@ class _CentredLevels:
 def two_colours(domain: Domain, near: Neighbours, fixed: Bools) -> NDArray[np.uint8]:
     """0 or 1 of each point, such that most pairs have both, and 0 where it is fixed; (n,)."""
     side = 1 - 2 * (grow_forest(domain, np.zeros(0, np.int32)).depth % 2)
-    turning = True
-    while turning:
-        turning = False
-        for i in np.nonzero(~fixed)[0].tolist():
-            if side[i] * sum(side[j] for j, _ in near[i]) > 0:
-                side[i], turning = -side[i], True
+    for i in np.tile(np.nonzero(~fixed)[0], _SWEEPS).tolist():
+        if side[i] * sum(side[j] for j, _ in near[i]) > 0:
+            side[i] = -side[i]
     return np.array(side < 0, dtype=np.uint8)
 
 
 def spanning_forest(near: Neighbours, value: Floats) -> list[int]:
     """Pairs of a forest, those of great value first, each with a point that is joined to those before."""
     forest, reached = list[int](), set[int]()
-    for root in range(len(near)):
-        waiting = [(0.0, root, -1)]
-        while waiting:
-            _, point, pair = heapq.heappop(waiting)
-            if point not in reached:
-                reached.add(point)
-                forest.append(pair)
-                for step in near[point]:
-                    heapq.heappush(waiting, (-value[step[1]], *step))
+    waiting = [(1.0, root, -1) for root in range(len(near))]
+    while waiting:
+        _, point, pair = heapq.heappop(waiting)
+        if point not in reached:
+            reached.add(point)
+            forest.append(pair)
+            for step in near[point]:
+                heapq.heappush(waiting, (-value[step[1]], *step))
     return [pair for pair in forest if pair >= 0]
 
 
@@ -131,7 +124,7 @@ def spanning_forest(near: Neighbours, value: Floats) -> list[int]:
 class _Prover:
     """The best field, and the chain that proves most. z: integers of the field; least: its energy.
 
-    starts: integers to begin with. searched: whether one of them is from a search.
+    starts: integers to begin with. search_at: cells per quarter turn of the level that the search may follow.
     """
 
     instance: Instance
@@ -140,7 +133,7 @@ class _Prover:
     ends: Termination
     progress: Progress
     seed: int = 0
-    searched: bool = False
+    search_at: int = _COARSEST
 
     def __post_init__(self) -> None:
         domain, arrays = self.instance.domain, instance_arrays(self.instance).items()
@@ -148,12 +141,9 @@ class _Prover:
         rings = domain.rings.keep((length >= 3) & (length <= checker.MOST_RING))
         self.arrays: Arrays = {f"instance_{name}": array for name, array in arrays}
         self.arrays |= {"kappa": domain.kappa} if domain.kappa is not None else {}
-        self.arrays |= {
-            "ring_start": rings.start,
-            "ring_pair": rings.pair,
-            "ring_sign": rings.sign.astype("i1"),
-        }
-        self.arrays |= {"centre": np.zeros(domain.size), "half": np.zeros(domain.size, np.uint8)}
+        self.arrays |= {"ring_start": rings.start, "ring_pair": rings.pair}
+        self.arrays |= {"ring_sign": rings.sign.astype(np.int8), "centre": np.zeros(domain.size)}
+        self.arrays["half"] = np.zeros(domain.size, np.uint8)
         rows, links = checker.CentredRows(self.arrays), self.energy.links
         self.near: Neighbours = [[] for _ in range(domain.size)]
         for pair, (i, j) in enumerate(rows.ends[: rows.pairs]):
@@ -201,9 +191,7 @@ class _Prover:
             if chain.bound >= self.proven.bound:
                 self.proven = chain
             reason = self._reason_to_end(chain)
-            first = before is None or before.level.divisions < level.divisions
-            late = level.divisions == _COARSEST * (3 if self.searched else 1)
-            wide = first and late and self.least - chain.bound > _WIDE * self.least
+            wide = level.divisions == self.search_at and self.least - chain.bound > _WIDE * self.least
             if reason or self.least < least or (wide and self._search(_SEARCH * self.ends.deadline.left())):
                 return reason
             more = self._more_rings(dual)
@@ -249,12 +237,8 @@ class _Prover:
 
     def _find_better_field(self, dual: RingDual) -> bool:
         """Whether the shares suggest a better field, which then is the best one."""
-        improved = False
-        for forward in (True, False):
-            z = self.energy.nearest(dual.decode())
-            improved |= self._offer(self.energy.descend(z, over=self.ends.over)[0])
-            dual.pass_over(math.inf, forward=forward)
-        return improved
+        z = self.energy.nearest(dual.decode())
+        return self._offer(self.energy.descend(z, over=self.ends.over)[0])
 
     def _search(self, seconds: float) -> bool:
         """Whether a short search finds a better field."""
@@ -262,13 +246,13 @@ class _Prover:
         hunt = IntegerSearch(self.energy, self.instance.domain.rings, starts, self.seed)
         while hunt.round < _ROUNDS and not limit.passed() and not self.ends.over():
             hunt.explore(lambda: limit.passed() or self.ends.over())
+        self.search_at = 0
         return self._offer(hunt.best.z)
 
     def _offer(self, z: Ints) -> bool:
         """Whether integers are better than the best ones, which they then are."""
         total = self.energy.least_total(z)
-        better = bool(total < self.least * (1 - _BETTER) - 1e-12)
-        if better:
+        if better := bool(total < self.least * (1 - _BETTER) - 1e-12):
             self.z, self.least = z, total
         return better
 
@@ -281,8 +265,7 @@ class _Prover:
         chain.gap, most = chain.threshold - dual.bound, chain.threshold * (1 + _BETTER) + 1e-12
         numbers = dual.arrays(max(chain.gap, 1e-6 * (1 + chain.threshold)))
         chain.arrays |= {prefix + name: array for name, array in numbers.items()}
-        shares = checker.stored_shares(chain.arrays, len(chain.levels), level)
-        excess = checker.Excess(level, costs, *shares)
+        excess = checker.Excess(level, costs, *checker.stored_shares(chain.arrays, len(chain.levels), level))
         count, lost = np.diff(level.pairs.begin), np.minimum(excess.pairs, max(most - excess.bound, 0.0))
         value = (np.bincount(level.pairs.row, lost, len(count)) / count)[: rows.pairs]
         varied = value * np.random.default_rng(0).uniform(size=len(value))
@@ -312,8 +295,8 @@ class _Prover:
         """Rings whose pairs cost more at the centre than their shares, and that are not in use."""
         gaps = dual.ring_gaps()
         gaps[dual.ring_numbers] = 0.0
-        numbers = np.argsort(-gaps, kind="stable")
-        return [int(number) for number in numbers if gaps[number] > 1e-6 * max(self.least, 1.0)]
+        order = np.argsort(-gaps, kind="stable")
+        return list(map(int, order[gaps[order] > 1e-6 * max(self.least, 1.0)]))
 
     def _next_factor(self, level: CellLevel, squares: Bools, *, more: bool) -> int:
         """How many parts each cell has on the next level; 0 if no level helps."""

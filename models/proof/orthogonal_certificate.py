@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..array_archive import Arrays, pack_arrays
+from ..array_archive import Arrays
 from ..field.field import Norm
 from ..instance.domain import Floats
 from . import check_orthogonal as checker
@@ -57,10 +57,6 @@ class OrthogonalProof(Claim):
         head = {name: getattr(self, name) for name in ("status", "energy", "bound", "threshold")}
         head |= {"format": checker.FORMAT, "version": checker.VERSION}
         return {"head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)} | self.arrays
-
-    def packed(self) -> bytes:
-        """The bytes of the certificate, equal for equal proofs."""
-        return pack_arrays(self.certificate())
 
 
 def check_proof(proof: OrthogonalProof, limit: Floats | None = None) -> OrthogonalProof:

@@ -32,8 +32,7 @@ class DualArrays(NamedTuple):
     order: of the points in a pass. point: of each slot. later: whether it comes after the other point of the
     pair. around: slots of each point, from around_start. unary: costs of labels, from start. costs: of two
     labels with all tables, from begin, those of the first point in rows. shares: of the point of each slot,
-    from share_start. low, high: columns of the first and after the last cost in use of each row. sums: room
-    for a number per label of a point.
+    from share_start. sums: room for a number per label of a point.
     """
 
     order: Indices
@@ -47,8 +46,6 @@ class DualArrays(NamedTuple):
     costs: Floats
     share_start: Indices
     shares: Floats
-    low: Indices
-    high: Indices
     sums: Floats
 
 
@@ -74,30 +71,29 @@ class RingDual:
         """Begin with shares and tables of 0. order: of the points in a pass. rings: those in use."""
         self.level, self.ring_numbers, self.bound = level, rings, -np.inf
         rows, pairs, m = level.rows, level.pairs, level.rows.pairs
-        point, used, counts = (
+        point, counts, rank = (
             np.append(rows.first[:m], rows.second[:m]),
-            np.isfinite(costs),
             np.diff(pairs.start),
+            np.argsort(order),
         )
-        column = (np.arange(len(costs)) - pairs.begin[pairs.row]) % pairs.width[pairs.row]
-        low = np.full(pairs.first_line[-1], counts.max())
-        high, rank, share_start = np.zeros_like(low), np.argsort(order), starts_of(counts[point])
-        np.minimum.at(low, pairs.line[0][used], column[used])
-        np.maximum.at(high, pairs.line[0][used], column[used] + 1)
-        unary = np.where(pairs.have_partners(used), 0.0, np.inf)
+        unary, share_start = (
+            np.where(pairs.have_partners(np.isfinite(costs)), 0.0, np.inf),
+            starts_of(counts[point]),
+        )
         unary[pairs.item[0][pairs.first_line[m] :]] += costs[pairs.begin[m] :]
         self.state = DualArrays(
             order, point, rank[point] > rank[np.roll(point, m)],
             starts_of(np.bincount(point, minlength=rows.size)),
             np.lexsort((np.tile(np.arange(m), 2), point)), pairs.start[:-1], unary[:-1],
             pairs.begin[: m + 1], costs[: pairs.begin[m]].copy(), share_start, np.zeros(share_start[-1]),
-            low, high, np.empty(counts.max()),
+            np.empty(counts.max()),
         )  # fmt: skip
         walks = [rows.rings[ring] for ring in rings]
-        pair, sign, on_ring = (_join([walk[part] for walk in walks]) for part in range(3))
+        pair, sign, on_ring = (np.array([x for walk in walks for x in walk[part]], int) for part in range(3))
         start, begin = starts_of([len(walk[0]) for walk in walks]), starts_of(np.diff(pairs.begin)[pair])
-        turned = [np.roll(np.arange(a, b), -counts[on_ring[a:b]].argmin()) for a, b in pairwise(start)]
-        self.rings = RingArrays(start, _join(turned), pair, sign, counts[on_ring], begin, np.zeros(begin[-1]))
+        turned = (np.roll(np.arange(a, b), -counts[on_ring[a:b]].argmin()) for a, b in pairwise(start))
+        walk = np.array([step for steps in turned for step in steps], int)
+        self.rings = RingArrays(start, walk, pair, sign, counts[on_ring], begin, np.zeros(begin[-1]))
 
     def pass_over(self, most: float, *, forward: bool) -> tuple[float, float]:
         """One pass: the bound, if no tables cost anything, and the share of labels that `most` leaves."""
@@ -156,20 +152,16 @@ class RingDual:
         cost, state, rows = self.state.unary.copy(), self.state, self.level.rows
         np.add.at(cost, spans(state.start[state.point], np.diff(state.share_start)), state.shares)
         chosen = np.lexsort((cost, self.level.point[:-1]))[state.start[:-1]]
-        h = np.pi / 2 / self.level.divisions
-        angles: Floats = rows.centre[:-1] + h * (self.level.label[chosen] + rows.half[:-1] / 2)
-        return angles
+        steps = self.level.label[chosen] + rows.half[:-1] / 2
+        return np.asarray(rows.centre[:-1] + np.pi / 2 / self.level.divisions * steps)
 
     def ring_gaps(self) -> Floats:
         """The cost of the pairs of each ring at the centre beyond their shares, (r,): where the gap lies."""
         level, state, rows = self.level, self.state, self.level.rows
         central = np.lexsort((np.abs(level.label), level.point))[level.pairs.start[:-1]]
-        ends = rows.first[: rows.pairs], rows.second[: rows.pairs]
-        first, second = (central[end] for end in ends)
         shares = state.shares[state.share_start[:-1] + central[state.point] - state.start[state.point]]
-        costs = state.costs[level.pairs.places(np.arange(rows.pairs), first, second)]
-        gaps = costs - (shares[: rows.pairs] + shares[rows.pairs :])
-        gaps[~np.isfinite(gaps)] = 0.0
+        at = level.pairs.places(np.arange(rows.pairs), *central[state.point].reshape(2, -1))
+        gaps = np.nan_to_num(state.costs[at] - shares.reshape(2, -1).sum(axis=0), posinf=0.0)
         return np.array([gaps[walk[0]].sum() for walk in rows.rings])
 
 
@@ -182,11 +174,6 @@ def _mean(numbers: Floats, corners: list[Any]) -> Floats:
     return np.asarray(total / np.where(weight > 0, weight, 1.0))
 
 
-def _join(parts: list[Any]) -> Indices:
-    """One array of whole numbers of all parts, which may be none."""
-    return np.concatenate([np.zeros(0, np.int64), *parts]).astype(np.int64)
-
-
 @compiled_in_any_order
 def _send(state: DualArrays, slot: int) -> None:
     """Set the share of a slot to the least cost less the other point's share."""
@@ -194,19 +181,17 @@ def _send(state: DualArrays, slot: int) -> None:
     e = slot % pairs
     first, second, at = state.share_start[e], state.share_start[pairs + e], state.begin[e]
     rows, columns = state.share_start[e + 1] - first, state.share_start[pairs + e + 1] - second
-    if slot >= pairs:
-        for y in range(columns):
-            state.shares[second + y] = np.inf
+    for y in range(columns if slot >= pairs else 0):
+        state.shares[second + y] = np.inf
     for x in range(rows):
-        low, high, share = state.low[first + x], state.high[first + x], state.shares[first + x]
-        if slot < pairs:
-            share = np.inf
-            for y in range(low, high):
+        share = np.inf if slot < pairs else state.shares[first + x]
+        for y in range(columns):
+            if slot < pairs:
                 share = min(share, state.costs[at + y] - state.shares[second + y])
-            state.shares[first + x] = share
-        else:
-            for y in range(low, high):
+            else:
                 state.shares[second + y] = min(state.shares[second + y], state.costs[at + y] - share)
+        if slot < pairs:
+            state.shares[first + x] = share
         at += columns
 
 
@@ -251,42 +236,36 @@ def _pass_over(state: DualArrays, spare: float, forward: bool) -> tuple[float, i
 
 
 @compiled
-def _update_rings(numbers: Indices, state: DualArrays, rings: RingArrays, cap: float) -> None:
-    for number in numbers:
-        _update_ring(rings.start[number], rings.start[number + 1], state, rings, cap)
-
-
-@compiled_inside
-def _update_ring(begin: int, end: int, state: DualArrays, rings: RingArrays, cap: float) -> None:
+def _update_rings(numbers: Indices, state: DualArrays, rings: RingArrays, most: float) -> None:
     """Give each pair of a ring an equal part of the least cost of the whole ring at its two labels.
 
-    All steps are first shifted so that no cost is negative: partial sums above cap can then be left out.
+    All steps are first shifted so that no cost is negative: partial sums above most can then be left out.
     """
-    steps, moved, widest, size = end - begin, 0.0, len(state.sums), rings.size[rings.walk[begin:end]]
-    cost, least = np.empty((steps, widest, widest)), np.empty(steps)
-    walks = np.empty((2, steps + 1, widest, size[0]))  # least costs from, and to, each first label
-    for k in range(steps):
-        step = rings.walk[begin + k]
-        least[k] = _take_step(state, rings, step, cost[k])
-        moved += least[k]
-    if moved == np.inf:
-        return
-    cap = max(cap - moved, 0.0)
-    for x in range(size[0]):
-        for s in range(size[0]):
-            walks[0, 0, x, s] = walks[1, steps, x, s] = 0.0 if s == x else cap
-    for k in range(steps):
-        _walk_on(walks[0, k], cost[k, : size[k], : size[(k + 1) % steps]], cap, walks[0, k + 1])
-    for k in range(steps - 1, -1, -1):
-        step, along = rings.walk[begin + k], cost[k, : size[k], : size[(k + 1) % steps]]
-        _walk_on(walks[1, k + 1], along.T, cap, walks[1, k])
-        ends = (walks[0, k], walks[1, k + 1]) if rings.sign[step] > 0 else (walks[1, k + 1], walks[0, k])
-        e, offset = rings.pair[step], moved / steps - least[k]
-        _set_table(
-            state.costs[state.begin[e] : state.begin[e + 1]],
-            rings.tables[rings.begin[step] : rings.begin[step + 1]],
-            along if rings.sign[step] > 0 else along.T, ends, (cap, steps, offset),
-        )  # fmt: skip
+    for number in numbers:
+        walk, moved, widest = rings.walk[rings.start[number] : rings.start[number + 1]], 0.0, len(state.sums)
+        steps, size = len(walk), rings.size[walk]
+        cost, least = np.empty((steps, widest, widest)), np.empty(steps)
+        walks = np.empty((2, steps + 1, widest, size[0]))  # least costs from, and to, each first label
+        for k in range(steps):
+            least[k] = _take_step(state, rings, walk[k], cost[k])
+            moved += least[k]
+        if moved == np.inf:
+            continue
+        cap = max(most - moved, 0.0)
+        for x in range(size[0]):
+            for s in range(size[0]):
+                walks[0, 0, x, s] = walks[1, steps, x, s] = 0.0 if s == x else cap
+        for k in range(steps):
+            _walk_on(walks[0, k], cost[k, : size[k], : size[(k + 1) % steps]], cap, walks[0, k + 1])
+        for k in range(steps - 1, -1, -1):
+            along, turned = cost[k, : size[k], : size[(k + 1) % steps]], rings.sign[walk[k]] < 0
+            _walk_on(walks[1, k + 1], along.T, cap, walks[1, k])
+            ends = (walks[1, k + 1], walks[0, k]) if turned else (walks[0, k], walks[1, k + 1])
+            e, begin = rings.pair[walk[k]], rings.begin[walk[k]]
+            _set_table(
+                state.costs[state.begin[e] : state.begin[e + 1]], rings.tables[begin:],
+                along.T if turned else along, ends, (cap, steps, moved / steps - least[k]),
+            )  # fmt: skip
 
 
 @compiled_inside

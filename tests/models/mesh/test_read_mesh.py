@@ -230,10 +230,10 @@ PLY = (
         ("a.stl", "", ""),
         ("a.stl", "solid a\nfacet\nouter loop\nvertex 1 2\nendloop\nendsolid", ""),
         ("a.obj", "", "has no face"),
-        ("a.obj", "v 0 0\n", "line 1: is 'v 0 0', which is no OBJ"),
+        ("a.obj", "v 0 0\n", "line 1: 'v 0 0' is no OBJ"),
         ("a.obj", "v 0 0 x\nf 1 1 1\n", "has a vertex that is no number"),
-        ("a.obj", "v 0 0 0\nf 1 1 a\n", "line 2: is 'f 1 1 a', which is no OBJ"),
-        ("a.obj", "v 0 0 0\nf 0 1 1\n", "line 2: is 'f 0 1 1', which is no OBJ"),
+        ("a.obj", "v 0 0 0\nf 1 1 a\n", "line 2: 'f 1 1 a' is no OBJ"),
+        ("a.obj", "v 0 0 0\nf 0 1 1\n", "line 2: 'f 0 1 1' is no OBJ"),
         ("a.step", "ISO-10303-21;", "has the suffix '.step', which is no mesh"),
     ],
 )
