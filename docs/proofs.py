@@ -20,7 +20,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,7 +37,7 @@ from crossfield.models.proof.prove import prove
 from crossfield.models.sketch.samples import SAMPLES, sample
 from drawings import PROVERS, SUFFIXES, Sketch, drawings_of, optimum, run_command, sketches, tiny_instances
 from machine import machine_facts
-from make import csv_text, generated_line, markdown
+from make import csv_text, generated_line
 from studying.plots import open_panels, styles
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -57,8 +56,6 @@ HARDEST: Final = ("mouse", "singular")
 """Samples of other sizes and weights."""
 SKETCHES: Final = ("samples", "paper", "middle", "fine", "large", "sketches", "collections")
 """Parts with a proof of each sketch."""
-KINDS: Final = ("cold", "tightened", "here")
-"""Files of a solver as they are and tightened, and `crossfield prove`."""
 MIP_SAMPLES: Final = ("bottle", "cylinder_bend", "mouse", "saddle", "singular")
 SECONDS: Final = {
     "samples": 60.0, "paper": 60.0, "sketches": 60.0, "collections": 60.0, "middle": 180.0, "fine": 300.0,
@@ -242,22 +239,6 @@ def difference(row: Facts) -> float:
     return float(abs(row["energy"] - row["other"]) / max(1.0, row["other"]))
 
 
-def solvers_table(rows: dict[str, Facts]) -> str:
-    """How many files each solver closes, and how many `crossfield prove` does."""
-    groups = defaultdict[tuple[str, str], list[Facts]](list)
-    for row in rows.values():
-        groups[row["formulation"], row["solver"]].append(row)
-    cells = [
-        [
-            f"`{formulation}`",
-            solver_title(solver),
-            *(f"{sum(row[kind]['proven'] for row in group)} of {len(group)}" for kind in KINDS),
-        ]
-        for (formulation, solver), group in sorted(groups.items())
-    ]
-    return markdown(("formulation", "solver", "cold", "tightened", "`prove`"), cells)
-
-
 def agreement(rows: dict[str, Facts]) -> str:
     """How often another solver proves the same optimum of a small instance."""
     known = [row for row in rows.values() if row["other"] is not None]
@@ -298,8 +279,6 @@ def files(results: Results) -> dict[str, str]:
         "generated": generated_line("python docs/proofs.py"),
         "most": f"{MOST_LABELS:,}",
         "agreement": agreement(results["optima"]),
-        "solvers": solvers_table(results["solvers"]),
-        "solvers_limit": f"{SECONDS['solvers']:g}",
     }
     page = re.sub(r"@(\w+)@", lambda match: texts[match[1]], TEMPLATE.read_text(encoding="utf-8"))
     return {
