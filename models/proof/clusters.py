@@ -129,7 +129,7 @@ def quad_slacks(lattice: Lattice, state: State, angles: tuple[Floats, Floats]) -
     grid = lattice.instance.grid
     corners = _corners(lattice, *angles)
     theta = np.empty(lattice.start[-1])
-    fill_reparametrised(0, len(state.least), state, theta)
+    fill_reparametrised(0, len(lattice.count), state, theta)
     begin = lattice.start[:-1]
     least = np.minimum.reduceat(theta, begin)
     at_pixel = np.mean([theta[begin + corner.label] for corner in corners], axis=0) - least
@@ -168,10 +168,10 @@ def _corners(lattice: Lattice, alpha: Floats, beta: Floats) -> list[_Corner]:
 
 def _pair_slacks(lattice: Lattice, state: State, corner: _Corner) -> Floats:
     """The costs of pairs with their tables, less their shares, at a corner of both ends."""
-    i, j = state.first, state.second
+    i, j = lattice.instance.grid.first, lattice.instance.grid.second
     cost = lattice.instance.pair_terms.least_costs(corner.alpha, corner.beta) - lattice.h**2
-    cost -= state.shares_first[state.start_first[:-1] + corner.label[i]]
-    cost -= state.shares_second[state.start_second[:-1] + corner.label[j]]
+    cost -= state.shares_first[state.pairs["start_first"][:-1] + corner.label[i]]
+    cost -= state.shares_second[state.pairs["start_second"][:-1] + corner.label[j]]
     clusters = state.clusters
     for numbers in clusters.of_pair.T:
         at = np.flatnonzero(numbers >= 0)
@@ -216,12 +216,12 @@ def _allowed_alphas(number: int, state: State) -> IndexTable:
     most = 0
     for place in range(4):
         pair = bottom if place < 2 else top
-        i = state.first[pair] if place in (0, 3) else state.second[pair]
-        most = max(most, state.alpha_count[i])
+        i = state.pairs[pair].first if place in (0, 3) else state.pairs[pair].second
+        most = max(most, state.pixels[i].alpha_count)
     alphas = np.empty((4, most + 1), np.int64)
     for place in range(4):
         pair = bottom if place < 2 else top
-        i = state.first[pair] if place in (0, 3) else state.second[pair]
+        i = state.pairs[pair].first if place in (0, 3) else state.pairs[pair].second
         begin, end = row_ends(i, state)
         count = 0
         for row in range(begin.size):
@@ -243,17 +243,17 @@ def _table_costs(table: int, rows: IndexTable, state: State, update: bool) -> Fl
         return negative
     column = table % 4
     pair = state.clusters.quads[table // 4, column]
-    i, j = state.first[pair], state.second[pair]
+    i, j = state.pairs[pair].first, state.pairs[pair].second
     rows_i, rows_j = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     shares_i, shares_j = _negative_shares(pair, i, rows_i, state), _negative_shares(pair, j, rows_j, state)
     ragged = RaggedMatrix(shares_j, _chosen_row_ends(j, rows_j, state))
-    in_alpha = np.empty((state.alpha_count[i], state.alpha_count[j]))
+    in_alpha = np.empty((state.pixels[i].alpha_count, state.pixels[j].alpha_count))
     half = np.empty((shares_j.shape[0], shares_i.shape[1]))
     best = np.empty((shares_i.shape[0], shares_j.shape[0]))
     best[:] = np.inf
     least, reached = least_of_rows(shares_i) + least_of_rows(shares_j), np.inf
     for turn in range(2):
-        odd = (state.odd[pair] + turn) % 2 == 1
+        odd = (state.pairs[pair].odd + turn) % 2 == 1
         betas_i, betas_j = beta_lines(pair, i, state, odd)
         cheapest = alpha_costs(pair, i, state, odd, in_alpha)
         cheapest += least_beta_cost(betas_i, betas_j, (shares_i.shape[1], shares_j.shape[1]), state.power)
@@ -295,8 +295,8 @@ def _add_matrix(matrix: Floats, addend: Floats, constant: float) -> None:
 @compiled_inside
 def _negative_shares(pair: int, i: int, rows: Indices, state: State) -> Floats:
     """Minus the shares of a pair at the allowed alphas of its end i; inf at labels that are not allowed."""
-    columns = state.beta_count[i]
-    share, begin = shares_at(pair, i, state), state.start[i]
+    columns = state.pixels[i].beta_count
+    share, begin = shares_at(pair, i, state), state.pixels[i].start
     negative = np.empty((rows[0], columns))
     for x in range(rows[0]):
         for y in range(columns):
@@ -311,7 +311,7 @@ def _negative_table(table: int, rows: IndexTable, state: State) -> Floats:
     column = table % 4
     rows_i, rows_j = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     begin = state.clusters.start[table]
-    wide = state.alpha_count[state.second[state.clusters.quads[table // 4, column]]]
+    wide = state.pixels[state.pairs[state.clusters.quads[table // 4, column]].second].alpha_count
     negative = np.empty((rows_i[0], rows_j[0]))
     for x in range(rows_i[0]):
         for y in range(rows_j[0]):
@@ -325,7 +325,7 @@ def _store_table(table: int, rows: IndexTable, state: State, f: Floats, rest: Fl
     column = table % 4
     rows_i, rows_j = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     begin = state.clusters.start[table]
-    wide = state.alpha_count[state.second[state.clusters.quads[table // 4, column]]]
+    wide = state.pixels[state.pairs[state.clusters.quads[table // 4, column]].second].alpha_count
     for x in range(f.shape[0]):
         for y in range(f.shape[1]):
             value = 0.25 * (f[x, y] + rest[x, y]) - f[x, y]

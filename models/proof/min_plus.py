@@ -182,8 +182,8 @@ class _Room(NamedTuple):
 @inlined
 def beta_lines(pair: int, i: int, state: State, odd: bool) -> tuple[Line, Line]:
     """The betas of end i of a pair, and those of the other end, negative for odd jumps."""
-    first = state.beta[state.first[pair] + state.second[pair] - i]
-    return (state.beta[i], state.h), ((-first, -state.h) if odd else (first, state.h))
+    first = state.pixels[state.pairs[pair].first + state.pairs[pair].second - i].beta
+    return (state.pixels[i].beta, state.h), ((-first, -state.h) if odd else (first, state.h))
 
 
 @inlined

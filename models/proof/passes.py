@@ -4,7 +4,7 @@ For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha an
 product is one over beta (models/proof/min_plus.py) and then one over alpha: O(N^3) for N^2 labels. A^2 is
 the least over all jumps of that parity: A is taken modulo pi.
 
-The first call compiles for some 15 s of CPU; cached code loads in 0.3 s. Cached code is not renewed when only
+The first call compiles for some 12 s of CPU; cached code loads in 0.3 s. Cached code is not renewed when only
 functions in other files that it calls have changed: delete `*.nbi` then. The names of `State` and
 `Clusters` are part of the cache: after renaming them, old files cannot be read.
 """
@@ -66,8 +66,8 @@ def work_on(  # noqa: PLR0917
 @inlined
 def visit_pixel(i: int, earlier: int, state: State) -> None:
     """Take from pairs to earlier pixels, columns from `earlier` of `around`; pass on to the other two."""
-    begin, end = state.start[i], state.start[i + 1]
-    mine, ends, columns = state.theta[begin:end], row_ends(i, state), state.beta_count[i]
+    begin, end = state.pixels[i].start, state.pixels[i + 1].start
+    mine, ends, columns = state.theta[begin:end], row_ends(i, state), state.pixels[i].beta_count
     _copy_used(state.unary[begin:end], ends, columns, mine)
     earlier_count, later_count = 0, 0
     for column in range(4):
@@ -82,7 +82,7 @@ def visit_pixel(i: int, earlier: int, state: State) -> None:
             later_count += 1
         _add_used(share, ends, columns, mine)
     least = _least_used(mine, ends, columns)
-    state.least[i] = least
+    state.pixels[i].least = least
     for column in range(2 - earlier, 4 - earlier):
         pair = state.around[i, column]
         if pair >= 0:
@@ -141,17 +141,17 @@ def add_to(target: Floats, values: Floats) -> None:
 @compiled
 def shares_at(pair: int, i: int, state: State) -> Floats:
     """The shares of a pair at its end i."""
-    if state.first[pair] == i:
-        return state.shares_first[state.start_first[pair] : state.start_first[pair + 1]]
-    return state.shares_second[state.start_second[pair] : state.start_second[pair + 1]]
+    if state.pairs[pair].first == i:
+        return state.shares_first[state.pairs[pair].start_first : state.pairs[pair + 1].start_first]
+    return state.shares_second[state.pairs[pair].start_second : state.pairs[pair + 1].start_second]
 
 
 @compiled
 def fill_reparametrised(begin: int, end: int, state: State, theta: Floats) -> None:
     """Fill in the cost of each label of some pixels plus the shares of all pairs there."""
     for i in range(begin, end):
-        costs = theta[state.start[i] : state.start[i + 1]]
-        copy_to(state.unary[state.start[i] : state.start[i + 1]], costs)
+        costs = theta[state.pixels[i].start : state.pixels[i + 1].start]
+        copy_to(state.unary[state.pixels[i].start : state.pixels[i + 1].start], costs)
         for pair in state.around[i]:
             if pair >= 0:
                 add_to(costs, shares_at(pair, i, state))
@@ -160,13 +160,13 @@ def fill_reparametrised(begin: int, end: int, state: State, theta: Floats) -> No
 @inlined
 def pair_minimum(pair: int, state: State) -> float:
     """The least c - shares of a pair over the allowed labels."""
-    i = state.first[pair]
+    i = state.pairs[pair].first
     share = shares_at(pair, i, state)
     most = np.empty(share.size)
     fill_product(pair, i, state, most)
-    unary = state.unary[state.start[i] : state.start[i + 1]]
+    unary = state.unary[state.pixels[i].start : state.pixels[i + 1].start]
     begin, end = row_ends(i, state)
-    least, columns = np.inf, state.beta_count[i]
+    least, columns = np.inf, state.pixels[i].beta_count
     for row in range(begin.size):
         for x in range(row * columns + begin[row], row * columns + end[row]):
             if unary[x] < np.inf:
@@ -180,20 +180,20 @@ def _follow(i: int, after: int, state: State, excesses: Floats, sums: Floats) ->
 
     after: the place of the next pixel in `State.around`.
     """
-    carried = excesses[state.start[i] : state.start[i + 1]].copy()
+    carried = excesses[state.pixels[i].start : state.pixels[i + 1].start].copy()
     while state.around[i, after] >= 0:
         pair = state.around[i, after]
-        j = state.first[pair] + state.second[pair] - i
+        j = state.pairs[pair].first + state.pairs[pair].second - i
         carried = _message(pair, i, carried, state)
-        add_to(sums[state.start[j] : state.start[j + 1]], carried)
-        add_to(carried, excesses[state.start[j] : state.start[j + 1]])
+        add_to(sums[state.pixels[j].start : state.pixels[j + 1].start], carried)
+        add_to(carried, excesses[state.pixels[j].start : state.pixels[j + 1].start])
         i = j
 
 
 @inlined
 def _message(pair: int, i: int, carried: Floats, state: State) -> Floats:
     """The least of the carried excess at end i plus c - shares of a pair, at labels of its share_j end."""
-    j = state.first[pair] + state.second[pair] - i
+    j = state.pairs[pair].first + state.pairs[pair].second - i
     share_i, share_j = shares_at(pair, i, state), shares_at(pair, j, state)
     before, message = share_i.copy(), share_j.copy()
     _subtract(share_i, carried)
@@ -216,9 +216,11 @@ def fill_product(pair: int, i: int, state: State, out: Floats) -> None:
 
     Labels that are not allowed get 0 between allowed ones of their row, and elsewhere keep their number.
     """
-    j = state.first[pair] + state.second[pair] - i
-    rows, columns = state.alpha_count[i], state.beta_count[i]
-    ragged = RaggedMatrix(np.empty((state.alpha_count[j], state.beta_count[j])), row_ends(j, state))
+    j = state.pairs[pair].first + state.pairs[pair].second - i
+    rows, columns = state.pixels[i].alpha_count, state.pixels[i].beta_count
+    ragged = RaggedMatrix(
+        np.empty((state.pixels[j].alpha_count, state.pixels[j].beta_count)), row_ends(j, state)
+    )
     rows_j, columns_j = ragged.values.shape
     many = max(rows_j, 4)
     terms = RightMatrix(np.empty((many, columns)), np.empty(many), np.empty(many))
@@ -233,7 +235,7 @@ def fill_product(pair: int, i: int, state: State, out: Floats) -> None:
     tabled = state.clusters.of_pair[pair, 0] >= 0
     in_alpha = np.empty((rows if tabled else 0, rows_j)), np.empty(rows + rows_j - 1)
     for turn in range(2):
-        odd = (state.odd[pair] + turn) % 2 == 1
+        odd = (state.pairs[pair].odd + turn) % 2 == 1
         line_i, line_j = beta_lines(pair, i, state, odd)
         if tabled:
             cheapest = alpha_costs(pair, i, state, odd, in_alpha[0])
@@ -243,7 +245,8 @@ def fill_product(pair: int, i: int, state: State, out: Floats) -> None:
         if cheapest + least < reached:
             fill_product_over_beta(ragged, line_i, line_j, state.power, terms.rows)
             reached = _lower_all(RaggedLabels(out, columns, ends), in_alpha, terms)
-    unary, less = state.unary[state.start[i] : state.start[i + 1]], state.h**2 if state.power == 2 else 0.0
+    unary = state.unary[state.pixels[i].start : state.pixels[i + 1].start]
+    less = state.h**2 if state.power == 2 else 0.0
     for row in range(rows):
         for x in range(row * columns + begin[row], row * columns + end[row]):
             out[x] = out[x] - less if unary[x] < np.inf else 0.0
@@ -296,7 +299,7 @@ def _put_back_rows(rows: RaggedLabels, first: int, targets: Floats, low: int) ->
 @inlined
 def row_ends(i: int, state: State) -> RowEnds:
     """The first allowed label of each row of a pixel, and the one after the last."""
-    low, high = state.row_start[i], state.row_start[i + 1]
+    low, high = state.pixels[i].row_start, state.pixels[i + 1].row_start
     return state.begin[low:high], state.end[low:high]
 
 
@@ -306,7 +309,7 @@ def _fill_negative_shares(pair: int, j: int, state: State, ragged: RaggedMatrix,
 
     Only what is in use is filled in. least: receives the least number of each row, inf without any.
     """
-    share, unary = shares_at(pair, j, state), state.unary[state.start[j] : state.start[j + 1]]
+    share, unary = shares_at(pair, j, state), state.unary[state.pixels[j].start : state.pixels[j + 1].start]
     (begin, end), values = ragged.ends, ragged.values
     for row in range(values.shape[0]):
         least[row] = np.inf
@@ -334,8 +337,8 @@ def step_costs(pair: int, i: int, state: State, odd: bool, of_steps: Floats) -> 
 
     By x - y, from the last x to minus the last y.
     """
-    j, last = state.first[pair] + state.second[pair] - i, state.alpha_count[i] - 1
-    a = state.alpha[i] - state.alpha[j]
+    j, last = state.pairs[pair].first + state.pairs[pair].second - i, state.pixels[i].alpha_count - 1
+    a = state.pixels[i].alpha - state.pixels[j].alpha
     if odd:
         a += _HALF
     for place in range(of_steps.size):
@@ -357,7 +360,7 @@ def alpha_costs(pair: int, i: int, state: State, odd: bool, cost: Floats) -> flo
     for place in range(2):
         number = state.clusters.of_pair[pair, place]
         if number >= 0:
-            _add_table(number, state.first[pair] == i, state, cost)
+            _add_table(number, state.pairs[pair].first == i, state, cost)
     return least_of_rows(cost)
 
 

@@ -83,12 +83,12 @@ def decode(state: State, *, forwards: bool) -> tuple[Floats, Floats]:
 def _decode(order: Indices, state: State, alpha: Floats, beta: Floats, fixed: Bools) -> None:
     """Fill in the angles, pixel by pixel in that order. fixed: the pixels that have theirs."""
     for i in order:
-        cost = state.unary[state.start[i] : state.start[i + 1]].copy()
+        cost = state.unary[state.pixels[i].start : state.pixels[i + 1].start].copy()
         for column in range(4):
             pair = state.around[i, column]
             if pair < 0:
                 continue
-            j = state.first[pair] + state.second[pair] - i
+            j = state.pairs[pair].first + state.pairs[pair].second - i
             if fixed[j]:
                 _add_distance(i, state, alpha[j], beta[j], cost)
             else:
@@ -97,20 +97,20 @@ def _decode(order: Indices, state: State, alpha: Floats, beta: Floats, fixed: Bo
         for label in range(1, cost.size):
             if cost[label] < cost[x]:
                 x = label
-        alpha[i] = state.alpha[i] + state.h * (x // state.beta_count[i])
-        beta[i] = state.beta[i] + state.h * (x % state.beta_count[i])
+        alpha[i] = state.pixels[i].alpha + state.h * (x // state.pixels[i].beta_count)
+        beta[i] = state.pixels[i].beta + state.h * (x % state.pixels[i].beta_count)
         fixed[i] = True
 
 
 @inlined
 def _add_distance(i: int, state: State, alpha: float, beta: float, cost: Floats) -> None:
     """Add the cost of a pair of pixel i with a fixed cross."""
-    columns = state.beta_count[i]
-    for row in range(state.alpha_count[i]):
-        even = state.alpha[i] + state.h * row - alpha
+    columns = state.pixels[i].beta_count
+    for row in range(state.pixels[i].alpha_count):
+        even = state.pixels[i].alpha + state.h * row - alpha
         even, odd = least_a(even), least_a(even + _HALF)
         for column in range(columns):
-            mine = state.beta[i] + state.h * column
+            mine = state.pixels[i].beta + state.h * column
             with_even = size_of(even, state.power) + size_of(mine - beta, state.power)
             with_odd = size_of(odd, state.power) + size_of(mine + beta, state.power)
             cost[row * columns + column] += 2 * min(with_even, with_odd)

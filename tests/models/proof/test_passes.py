@@ -28,7 +28,7 @@ def with_holes(lattice, rng):
 
 def dense_tables(state, pair, lattice):
     """The tables of a pair at all labels of its pixels."""
-    i, j = state.first[pair], state.second[pair]
+    i, j = state.pairs[pair]["first"], state.pairs[pair]["second"]
     rows, columns = (np.arange(lattice.count[end]) // lattice.beta_count[end] for end in (i, j))
     tables, clusters = np.zeros((len(rows), len(columns))), state.clusters
     for number in clusters.of_pair[pair][clusters.of_pair[pair] >= 0]:
