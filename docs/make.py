@@ -24,8 +24,8 @@ from crossfield.export.cli.tables import tables
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.models.errors import InputError
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
-from crossfield.models.formulations.latex import aligned, domain, objective_and_rows
-from crossfield.models.formulations.symbols import VARIABLES
+from crossfield.models.formulations.latex import aligned, domain, expression, objective_and_rows
+from crossfield.models.formulations.symbols import VARIABLES, A, B, R, kappa
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from crossfield.models.instance.symmetries import turned
 
@@ -68,12 +68,19 @@ def write_formulations() -> None:
         summary = f"{recipe.summary[0].upper()}{recipe.summary[1:]}."
         settable = ", ".join(f"`{option}`" for option in sorted(recipe.option_names - {"relax"}))
         summary += f" Options: {settable}." if settable else ""
-        parts += [f"## `{name}`", summary, f"$$\n{aligned(objective_and_rows(declare(name)))}\n$$"]
+        formulas = aligned(objective_and_rows(declare(name)))
+        for residual, letter in RESIDUALS.items():
+            formulas = formulas.replace(rf"\left({residual}\right)", letter).replace(residual, letter)
+        parts += [f"## `{name}`", summary, f"$$\n{formulas}\n$$"]
     _, formats = tables()["formulations"]
     (_, *solvers), answers = tables()["solvers"]
     columns = ("name", "short", "paper", "class", "minimises", "LP, MPS", *solvers)
     parts += ["## Formats and solvers", SUPPORT, markdown(columns, support_rows(formats, answers, solvers))]
     (DOCS / "formulations.md").write_text("\n\n".join(parts) + "\n")
+
+
+RESIDUALS = {expression(A - kappa): "A_{ij}", expression(B): "B_{ij}", expression(R): "R_i"}
+"""Expressions that the page on formulations writes as a letter."""
 
 
 def variable_row(name: str) -> list[str]:
@@ -99,35 +106,36 @@ def support_rows(
     return rows
 
 
-INTRODUCTION = rf"""This page states the problem of [a cross field](cross-field.md) in {len(FORMULATIONS)}
+INTRODUCTION = rf"""The problem of [a cross field](cross-field.md) in {len(FORMULATIONS)}
 formulations, printed from their declarations in the code. [The mathematics](mathematics.md) derives them.
 Those named `-orthogonal` and `-cycle` are for orthogonal crosses only ($\beta = 0$), on pixels or meshes.
+Sizes for the sketch `mouse` at 24 pixels:"""
 
-Their sizes for the sketch `mouse` at 24 pixels:"""
+SYMBOLS = rf"""$I$ are the pixels, $S_c$ the stroke pixels with direction $\theta_i$ and weight $w_i$, and $E$
+the pairs $(i, j)$, in which $j$ is the upper or right neighbour of $i$. $C$ is a basis of the
+[cycles](cycles.md#residuals-and-cycles) of pairs and strokes. $H_c$ is the sum of the turns
+$\pm\kappa_{{ij}}$ along a cycle, plus $\theta_i - \theta_j$ for a walk from stroke to stroke. Numbers in
+brackets are the paper's equations. Three residuals have letters; $\kappa_{{ij}} = 0$ between pixels:
 
-SYMBOLS = r"""$I$ are the pixels. $S_c$ are the stroke pixels, with direction $\theta_i$ and weight $w_i$. $E$
-are the pairs $(i, j)$, in which $j$ is the upper or right neighbour of $i$. $C$ is a basis of the
-[cycles](cycles.md#residuals-and-cycles) of pairs and strokes. $H_c$ is the sum of the turns $\pm\kappa_{ij}$
-along a cycle, plus $\theta_i - \theta_j$ for a walk from stroke to stroke. Numbers in brackets are the
-paper's equations.
+$$
+A_{{ij}} = {expression(A)}, \qquad B_{{ij}} = {expression(B)}, \qquad R_i = {expression(R)} .
+$$
 
-The windows of $\alpha$ follow from the [gauge](mathematics.md#4-gauges-and-windows), and $p^{\min}$ and
-$p^{\max}$ from the windows. $d^{\max}$ and $q^{\max}$ are $\pi/4$.
+The windows of $\alpha$ follow from the [gauge](mathematics.md#4-gauges-and-windows), and $p^{{\min}}$ and
+$p^{{\max}}$ from the windows. $d^{{\max}}$ and $q^{{\max}}$ are $\pi/4$.
 
 - `limits` replaces them by [smaller ones](cycles.md#limits-of-residuals), which cut off no optimum.
 - `facet=printed` replaces row (26) by the bound $z \ge -\pi/4$, as in the paper.
 - `stroke_norm` and `beta_norm` are 1 or 2.
 - `relax` makes integers continuous; every formulation except `qp-fixed` has this option."""
 
-SUPPORT = """Formulations that minimise the same are the same problem; their points carry over by name.
+SUPPORT = """Formulations that minimise the same are the same problem; their points carry over by name. `.nl`
+and GAMS files hold every formulation. `crossfield list` prints more formats and solvers.
 
-- `.nl` and GAMS files hold every formulation.
 - *Lifted*: each product of an integer and a continuous variable becomes one column and four rows, without
   loss. Instead of `minlp-parity`, which needs a cosine, write `minlp-quartic`.
-- *Relaxed*: the solver accepts the formulation only without integers. HiGHS solves linear problems and convex
-  QPs, Ipopt has no integers, and Bonmin is exact for convex problems only.
-
-`crossfield list` prints more formats and solvers."""
+- *Relaxed*: the solver accepts the formulation only without integers. Bonmin is exact for convex problems
+  only."""
 
 
 def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes") -> Instance:
