@@ -282,7 +282,7 @@ A program refuses a file *as stated* if crossfield lists beforehand that it cann
 
 ## Licences
 
-The free licences of these programs end, but not the one of CPLEX. [licensed.json](licensed.json) keeps the
+The free licences of these programs end, but not that of CPLEX. [licensed.json](licensed.json) keeps the
 last results of each. The tests also solve `.bar` files of up to 10 columns with BARON, which needs no
 licence for them.
 

@@ -106,7 +106,7 @@ def search(
         100 x 100 one second), and the last solve by 5 % and half a second. None: no time limit.
     rounds
         Number of rounds after which to end. With neither rounds nor a time limit the search ends after 200
-        kicks per pixel without success.
+        perturbations per pixel without success.
     seed
         Seed of all random choices.
     jobs

@@ -1,10 +1,12 @@
-"""The prose of the pages: no long sentences, and plain words in place of others."""
+"""The prose of pages and public docstrings: no long sentences, and plain words in place of others."""
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Iterator
 
+import crossfield as cf
 from places import ROOT
 
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -20,6 +22,13 @@ PLAIN = {
     r"simply|obviously|of course|powerful|blazing": "(omit it)",
     r"utili[sz]e[sd]?": "use",
     r"in order to": "to",
+    r"tells?|said": "states, reports",
+    r"very|really|quite": "(omit it)",
+    r"the one (?:that|of|with)": "(repeat the noun)",
+    r"by far": "(state the number)",
+    r"e\.g\.|i\.e\.|etc\.": "for example, that is, and others",
+    r"(?:do|does|is|are|can|wo)n't|can't|it's": "(write it out)",
+    r"and/or|via": "and, or, by",
     r"\+-": "±",
 }
 """Patterns, and what to write instead."""
@@ -33,15 +42,27 @@ def sentences(page: str) -> Iterator[str]:
         yield from re.split(r"(?<=[.:;?!])\s+", " ".join(paragraph.split()))
 
 
+def texts() -> Iterator[tuple[str, str]]:
+    """Pages, and docstrings of public names, which the site prints, with their places."""
+    for path in PAGES:
+        yield path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")
+    for name in cf.__all__:
+        public = getattr(cf, name)
+        members = vars(public).items() if isinstance(public, type) else ()
+        for member in [public, *(value for key, value in members if not key.startswith("_"))]:
+            headings = r"\n-+\n|\n(?=\w[\w, ]*\n {4})"
+            yield name, re.sub(headings, "\n\n", inspect.getdoc(member) or "")
+
+
 def test_sentences_are_short_and_words_are_plain():
     found = []
-    for path in PAGES:
-        for sentence in sentences(path.read_text(encoding="utf-8")):
+    for place, text in texts():
+        for sentence in sentences(text):
             advice = [
                 f"{m[0]!r}: {better}"
                 for p, better in PLAIN.items()
                 if (m := re.search(rf"(?<!\w)(?:{p})(?!\w)", sentence, re.IGNORECASE))
             ]
             advice += ["a shorter sentence"] * (len(sentence.split()) > LONGEST)
-            found += [f"{path.relative_to(ROOT)}: {words} in: {sentence}" for words in advice]
+            found += [f"{place}: {words} in: {sentence}" for words in advice]
     assert not found, "\n".join(found)
