@@ -21,7 +21,6 @@ T = TypeVar("T")
 
 _AHEAD: Final = 64  # tasks submitted to a cluster at once, while it has few workers
 _PER_THREAD: Final = 2  # tasks submitted at once for each thread of a cluster or each process
-_TRIES: Final = 3  # of a task whose dask worker died
 
 
 class BuildError(CrossfieldError):
@@ -41,7 +40,7 @@ def open_tasks(jobs: int, scheduler: str | None = None) -> Iterator[Tasks]:
                 yield Tasks(executor, lambda: 1 if jobs == 1 else _PER_THREAD * jobs)
             return
         with connect_cluster(scheduler) as client:
-            executor = client.get_executor(pure=False, retries=_TRIES)
+            executor = client.get_executor(pure=False)
             yield Tasks(executor, lambda: max(_AHEAD, _PER_THREAD * sum(client.nthreads().values())))
     except WorkerError as error:
         raise BuildError(f"{error}; complete files are kept") from error

@@ -1,4 +1,4 @@
-"""A library built on a cluster: a scheduler and two workers, one of which is killed during the build."""
+"""A library, some of it proven, built on a cluster: a scheduler and two workers, one of which is killed during the build."""
 
 import signal
 import subprocess
@@ -33,6 +33,13 @@ sample = "mouse"
 [[sketches]]
 name = "skew"
 sample = "skew"
+
+[[sketches]]
+name = "family"
+random = "full"
+seeds = "1-3"
+share = 0.1
+points = "proven"
 """
 
 BUILD = """import sys
