@@ -17,7 +17,7 @@ version = 1
 title = "a library for tests of clusters"
 
 [rungs.tiny]
-sizes = [3, 4]
+sizes = [3]
 formats = ["nl", "mps"]
 prove = false
 
@@ -37,8 +37,8 @@ sample = "skew"
 [[sketches]]
 name = "family"
 random = "full"
-seeds = "1-3"
-share = 0.1
+seeds = "1-2"
+share = 0.03
 points = "proven"
 """
 
