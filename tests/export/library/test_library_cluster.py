@@ -1,4 +1,4 @@
-"""A library, some of it proven, built on a cluster: a scheduler and two workers, one of which is killed during the build."""
+"""A library, partly proven, built on a cluster: a scheduler and two workers, one killed during the build."""
 
 import signal
 import subprocess
