@@ -173,7 +173,7 @@ class Mesh(Domain):
     @cached_property
     def _cross(self) -> Floats:
         """Normal of each face times twice its area, shape (n, 3)."""
-        return _cross_product(self._edge_vectors(0), -self._edge_vectors(2))
+        return np.cross(self._edge_vectors(0), -self._edge_vectors(2))
 
     @cached_property
     def normals(self) -> Floats:
@@ -189,7 +189,7 @@ class Mesh(Domain):
     def frames(self) -> Floats:
         """Unit x and y axis of each face, shape (n, 2, 3)."""
         x = _unit(self._edge_vectors(0))
-        return np.stack([x, _cross_product(self.normals, x)], axis=1)
+        return np.stack([x, np.cross(self.normals, x)], axis=1)
 
     @cached_property
     def centres(self) -> Floats:
@@ -329,15 +329,9 @@ class Mesh(Domain):
         return [len(self.vertices), self.size], [], arrays
 
 
-def _cross_product(one: Floats, other: Floats) -> Floats:
-    """Cross products of vectors (k, 3), shape (k, 3)."""
-    axes = ((1, 2), (2, 0), (0, 1))
-    return np.stack([one[:, a] * other[:, b] - one[:, b] * other[:, a] for a, b in axes], axis=1)
-
-
 def _angle_between(one: Floats, other: Floats) -> Floats:
     """Angles between vectors (k, 3) in [0, pi], shape (k,)."""
-    cross = _cross_product(one, other)
+    cross = np.cross(one, other)
     return arctangent(np.sqrt(_dot(cross, cross)), _dot(one, other))
 
 

@@ -36,14 +36,6 @@ class FaceStrokes:
     contradictory: Ints
 
 
-@dataclass(frozen=True, eq=False)
-class Directions:
-    """A direction (k, 3) at each of some faces (k,)."""
-
-    face: Ints
-    vector: Floats
-
-
 def feature_edges(mesh: Mesh, *, sharp: float | None, boundary: bool, lines: Ints) -> Ints:
     """Directed edges with a stroke on the face that has them, (k,).
 
@@ -72,8 +64,8 @@ def _edge_keys(mesh: Mesh, ends: NDArray[Any]) -> NDArray[np.int64]:
     return np.asarray(low * len(mesh.vertices) + high)
 
 
-def read_directions(path: Path, mesh: Mesh) -> Directions:
-    """Directions per face from a table `face,x,y,z` (CSV), or the first vectors of a .rawfield.
+def read_directions(path: Path, mesh: Mesh) -> tuple[Ints, Floats]:
+    """Faces (k,) and directions (k, 3) in a table `face,x,y,z` (CSV), or the first vectors of a .rawfield.
 
     A vector of length 0 is no direction. Raises InputError that names a row or a face.
     """
@@ -99,7 +91,7 @@ def read_directions(path: Path, mesh: Mesh) -> Directions:
     face, vector = face[size > 0], vector[size > 0] / size[size > 0, None]
     inside = np.abs(np.einsum("kac,kc->ka", mesh.frames[face], vector)).max(axis=1, initial=0)
     _refuse(inside < _UPRIGHT, face, "has a vector at right angles to it, which has no direction there")
-    return Directions(face, vector)
+    return face, vector
 
 
 def _refuse(wrong: Bools, face: Ints, reason: str) -> None:
@@ -107,7 +99,7 @@ def _refuse(wrong: Bools, face: Ints, reason: str) -> None:
         raise InputError(f"face {face[int(np.argmax(wrong))]}: {reason} ({int(wrong.sum())} such faces)")
 
 
-def combine_strokes(mesh: Mesh, edges: Ints, directions: Directions | None) -> FaceStrokes:
+def combine_strokes(mesh: Mesh, edges: Ints, directions: tuple[Ints, Floats] | None) -> FaceStrokes:
     """One stroke for each face with directions: of edges (k,), and given ones.
 
     Directions that differ by a right angle agree. Of several, the stroke has the mean, by the fourfold angle,
@@ -120,8 +112,7 @@ def combine_strokes(mesh: Mesh, edges: Ints, directions: Directions | None) -> F
     face = face[order]
     vector = (mesh.vertices[ends[:, 1]] - mesh.vertices[ends[:, 0]])[order]
     if directions is not None:
-        face = np.concatenate([directions.face, face])
-        vector = np.concatenate([directions.vector, vector])
+        face, vector = np.append(directions[0], face), np.concatenate([directions[1], vector])
     theta = mesh.angle_in(face, vector)
     faces, first, count = np.unique(face, return_index=True, return_counts=True)
     number = np.searchsorted(faces, face)
