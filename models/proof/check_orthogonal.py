@@ -39,8 +39,7 @@ MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi
 AT_ONCE = 1 << 17  # numbers in a processor's cache
 MOST_CASES = 256  # of integers after the last level
 MOST_NUMBER = 1e6  # of a weight and of an angle
-
-TURNS = np.arange(-3, 4)
+TURNS = np.arange(-3, 4)  # by which an integer may differ from that of the centre
 CENTRAL = TURNS == 0
 
 Array = Any
@@ -186,7 +185,6 @@ class RowTable:
     """
 
     def __init__(self, rows: CentredRows, point: Array) -> None:
-        """point: of each item."""
         count = np.bincount(point, minlength=rows.size + 1)
         self.start, height, self.width = starts_of(count), count[rows.first], count[rows.second]
         fits = (count > 0).all() and np.sum((height + 1) * (self.width + 1)) <= MOST_COSTS
@@ -194,10 +192,12 @@ class RowTable:
         self.begin = starts_of(height * self.width)
         self.row = np.repeat(np.arange(len(height), dtype=np.int32), height * self.width)
         self.item = spans(self.start[rows.first], height), spans(self.start[rows.second], self.width)
-        inside = np.divmod(np.arange(self.begin[-1]) - self.begin[self.row], self.width[self.row])
         lines = self.first_line, _ = starts_of(height), starts_of(self.width)
-        self.line = [(line[self.row] + at).astype(np.int32) for line, at in zip(lines, inside)]
-        self._origin = self.begin[:-1] - self.start[rows.first] * self.width - self.start[rows.second]
+        origin = self.begin[:-1] - self.start[rows.first] * self.width - self.start[rows.second]
+        numbers = origin, self.width, self.begin
+        self._origin, self._width, begin = (array.astype("i4") for array in numbers)  # modulo 2^32
+        inside = np.divmod(np.arange(begin[-1], dtype=np.int32) - begin[self.row], self._width[self.row])
+        self.line = [line.astype("i4")[self.row] + at for line, at in zip(lines, inside)]
 
     def at_ends(self, numbers: Array) -> list[Array]:
         """The numbers of the two items of each entry; numbers: of all items."""
@@ -205,7 +205,7 @@ class RowTable:
 
     def places(self, row: Array, first: Array, second: Array) -> Array:
         """Where the entries of two items in a row lie."""
-        return self._origin[row] + first * self.width[row] + second
+        return self._origin[row] + first * self._width[row] + second
 
     def have_partners(self, used: Array) -> Array:
         """Whether each item has an entry in use in all its rows."""
@@ -231,19 +231,19 @@ class CellLevel:
     """
 
     def __init__(self, rows: CentredRows, divisions: int, owner: Array, cells: Array) -> None:
-        """All squares are allowed."""
         self.rows, self.divisions, self.owner, self.cells = rows, divisions, owner, cells
         key = owner * STRIDE + cells
         self.key, ends = np.unique([key, key + ~rows.fixed[owner]], return_inverse=True)
-        self.ends, self.point = ends.reshape(2, -1), (self.key + STRIDE // 2) // STRIDE
-        self.label = self.key - STRIDE * self.point
+        self.ends, self.point = ends.reshape(2, -1).astype("i4"), (self.key + STRIDE // 2) // STRIDE
+        self.label = (self.key - STRIDE * self.point).astype("i4")
         self.squares, self.pairs = RowTable(rows, owner), RowTable(rows, self.point)
         self.allowed = np.ones(len(self.squares.row), bool)
 
     def corners(self) -> Iterator[Array]:
         """Where the four corners of all squares lie in the table of labels."""
-        for first, second in itertools.product(*zip(*map(self.squares.at_ends, self.ends))):
-            yield self.pairs.places(self.squares.row, first, second)
+        (first, second), (row, column) = self.squares.item, self.squares.line
+        for one, two in itertools.product(self.ends, repeat=2):
+            yield self.pairs.places(self.squares.row, one[first][row], two[second][column])
 
 
 def first_level(rows: CentredRows, divisions: int) -> CellLevel:
@@ -255,7 +255,7 @@ def first_level(rows: CentredRows, divisions: int) -> CellLevel:
 
 def next_level(level: CellLevel, squares: Array, factor: int) -> CellLevel:
     """The level whose cells are parts of those that are left: one of each (factor 1) or three."""
-    rows, left = level.rows, np.nonzero(level.squares.have_partners(squares))[0]
+    rows, left = level.rows, np.nonzero(level.squares.have_partners(squares))[0].astype("i4")
     point = level.owner[left]
     parts = np.where(rows.fixed, 1, factor)[point]
     lowest, parent = parts * level.cells[left] + rows.half[point] * (parts // 3), np.repeat(left, parts)
@@ -376,10 +376,10 @@ def min_plus(one: Array, other: Array) -> Array:
 def kept_of(level: CellLevel, excess: Excess, forests: Array, most: float) -> Array:
     """Lemma 4: the squares that an optimal field of energy `most` or less may use."""
     spare = (most - excess.bound + 2 * excess.error) * (1 + RELATIVE)
-    labels, (first, second) = excess.points <= spare, level.pairs.at_ends(excess.points)
+    labels, pairs = excess.points <= spare, np.add(*level.pairs.at_ends(excess.points))
     for forest in forests:
         labels &= excess.forest_marginals(forest.tolist()) <= spare
-    pairs = first + excess.pairs + second <= spare
+    pairs = pairs + excess.pairs <= spare
     for ring, tables, least in excess.rings:
         for e, marginal in zip(ring[0], excess.ring_marginals(ring, tables, least)):
             level.pairs.matrix(pairs, e)[:] &= marginal <= spare
