@@ -2,15 +2,12 @@
 
     python docs/cycle_study.py [--minutes N] [--limit SECONDS] [--data FILE]
     python docs/cycle_study.py --skewed [--limit SECONDS] [--data FILE]
-    python docs/cycle_study.py --narrowed [--limit SECONDS]
     python docs/cycle_study.py --page
 
 It does the runs that have no row yet, one after the other on one thread, and continues after an interruption.
 Each solver reads a file without a start. Other work on the machine delays runs: the rows have the processor
-time too. --skewed adds rows of cycles and limits to the
-file of miqp-exact, for crosses that may be skewed. --narrowed proves
-each sketch for that time, and counts the limits that say more than its narrowed windows, as a table of
-docs/cycles.md. --page draws the plots of that page.
+time too. --skewed adds rows of cycles and limits to the file of miqp-exact, for crosses that may be skewed.
+--page draws the plots of docs/cycles.md.
 """
 
 from __future__ import annotations
@@ -42,8 +39,6 @@ from crossfield.models.instance.cycles import find_cycles
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.mesh import Mesh
 from crossfield.models.mesh.shapes import blocks
-from crossfield.models.proof.tightening import remaining_windows
-from make import markdown, replace_between
 from studying.plots import open_panels, styles
 from studying.rows import DATA as FOLDER
 from studying.rows import Keyed, Row, Rows
@@ -243,24 +238,6 @@ def _answer_of_cplex(path: Path, limit: float) -> tuple[str, float | None, float
 _ANSWERS: Final = {"scip": _answer_of_scip, "cplex": _answer_of_cplex}
 
 
-def narrowed_table(limit: float) -> str:
-    """Share of limits below what a proof leaves of the change of direction, as a table."""
-    lines = []
-    for name in GRIDS:
-        instance = make_instance(name)
-        proof = cf.prove(instance, limits=cf.Limits(limit, gap=0), jobs=1)
-        with tempfile.TemporaryDirectory(prefix="crossfield-cycles-") as folder:
-            windows = remaining_windows(cf.write_certificate(proof, Path(folder) / "it.npz"))
-        pairs, one_step = instance.pair_terms, limit_residuals(instance)[0]
-        skew = np.maximum(np.abs(windows.beta_lower), np.abs(windows.beta_upper))
-        both = np.minimum(one_step + 4 / np.pi * skew[pairs.first] * skew[pairs.second], 2 * one_step)
-        least, _ = pairs.range_a(windows.alpha_lower, windows.alpha_upper, windows.p_min)
-        _, most = pairs.range_a(windows.alpha_lower, windows.alpha_upper, windows.p_max)
-        shares = (windows.p_max > windows.p_min).mean(), (both < np.maximum(-least, most) - GAP).mean()
-        lines.append([name, str(len(both)), *(f"{share:.0%}" for share in shares)])
-    return markdown(("sketch", "pairs", "jumps left open", "limits that are narrower"), lines)
-
-
 def _child_seconds() -> float:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
@@ -280,12 +257,8 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=LIMIT)
     parser.add_argument("--data", type=Path)
     parser.add_argument("--skewed", action="store_true")
-    parser.add_argument("--narrowed", action="store_true")
     parser.add_argument("--page", action="store_true")
     options = parser.parse_args()
-    if options.narrowed:
-        replace_between(PAGE, "narrowed", narrowed_table(options.limit))
-        return
     if options.page:
         rows = table(DATA).rows
         draw_runs(rows, TWO_NORM, ("scip", "gurobi"), PAGE.parent / "pictures" / "cycles_squares.svg")
