@@ -269,16 +269,15 @@ def draw_tutorials() -> None:
         shutil.copy(Path(name) / "overlay.png", pictures / "pebble_surface.png")
 
 
-GALLERY = """crossfield reads what a person sees. Each of these small drawings is written as the named
-program writes it, and has something that is easily misread. Most show the same body, a black outline and two
-red lines, and have the same right answer on the grid:
+GALLERY = """Each drawing is written as the named program writes it, and has something that is easily
+misread. Most show the same body, a black outline and two red lines, and have the same right answer on the
+grid:
 
 ![The mask in grey, and two coloured lines]({answer})
 
-White is outside, grey is the mask, and the colour of a curvature line is its direction. Other answers stand
-below their drawings. They are computed from the shapes alone, and no pixel may be more than one pixel off
-(`test_a_drawing_is_read_as_it_looks`). [drawings.csv](gallery/drawings.csv) has the options and the messages
-of `crossfield instance`."""
+Other answers stand beside their drawings. No pixel may be more than one pixel off
+(`test_a_drawing_is_read_as_it_looks`). [drawings.csv](gallery/drawings.csv) has options and messages of
+`crossfield instance`."""
 USUAL = "leaf"
 """The right answer of most drawings."""
 
