@@ -37,7 +37,7 @@ SIZES: Final = (64, 128, 256, 512)
 GROWTH: Final = (64, 128, 256, 512, 724, 1024, 1448)
 """Pixels per side of the files whose growth is drawn; the last one has 4.2 million pairs."""
 PEERS: Final = {"crossfield": "crossfield", "linopy": "linopy", "highs": "HiGHS", "pyomo": "Pyomo"}
-PACKAGES: Final = ("numpy", "sympy", "pyomo", "linopy", "highspy")
+PACKAGES: Final = ("numpy", "pyomo", "linopy", "highspy")
 WARM: Final = 6
 """Pixels per side of the model that goes first."""
 ONCE: Final = 5.0
