@@ -26,7 +26,7 @@ from crossfield.export.cli.tables import smallest_problems
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, suitability
 from crossfield.export.verify.checks import Check, Verdict, Verification
 from crossfield.export.verify.verify import verify
-from crossfield.models.formulations.catalogue import FORMULATIONS, list_formulations
+from crossfield.models.formulations.catalogue import list_formulations
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from make import csv_text, generated_line, markdown
@@ -230,7 +230,6 @@ def optima(routes: list[dict[str, str]]) -> list[dict[str, str]]:
         proven = [float(row["objective"]) for row in mine if row["result"] == OPTIMAL]
         facts = {
             "formulation": f"`{name}`",
-            "minimises": FORMULATIONS[name].minimises,
             "best objective": min((row["objective"] for row in mine if row["objective"]), key=float),
             "proofs": f"{len(proven)} of {len(mine)}",
             "proofs differ by": f"{max(proven) - min(proven):.1g}" if proven else "",
@@ -262,14 +261,13 @@ PAGE: Final = """# One instance, all routes
 
 {generated}
 
-A route is a written file and a solver that reads it. This page has the results of free programs on one
-small instance, in every formulation and format. {programs} programs read {right} files correctly and
+A route is a written file and a solver that reads it. Here free programs take every route of one small
+instance. {programs} programs read {right} files correctly and
 {wrong} wrongly. The routes that prove an optimum agree to {apart}.
 
-- The instance has {shape} pixels and the skew weight 0.001. {strokes} pixels have a stroke in a random
-  direction (seed {seed}).
-- Each solve may take {seconds:g} s, on one thread where that can be set.
-- Objectives are recomputed from the declaration at the solver's point. Optima must agree to 1e-6.
+The instance has {shape} pixels, {strokes} random strokes (seed {seed}) and the skew weight 0.001. A solve
+may take {seconds:g} s, on one thread where that can be set. Objectives are recomputed from the declaration
+at the solver's point. Optima must agree to 1e-6.
 
 `crossfield verify DIR --solve SECONDS` makes the same checks for any folder, and writes `verify.json`.
 
@@ -283,8 +281,7 @@ A program refuses a file *as stated* if crossfield lists beforehand that it cann
 ## Licences
 
 The free licences of these programs end, but not that of CPLEX. [licensed.json](licensed.json) keeps the
-last results of each. The tests also solve `.bar` files of up to 10 columns with BARON, which needs no
-licence for them.
+last results of each.
 
 {licences}
 
@@ -292,12 +289,9 @@ licence for them.
 
 {optima}
 
-Formulations that minimise the same energy have the same optimum. [routes.csv](validation/routes.csv) has
-objective, bound and seconds of each route. Seconds depend on the load of the machine.
-
-[variants.csv](validation/variants.csv) has the effect of the two [misprints of the paper](errata.md): the
-printed facet (26) lowers the optimum below the energy of its field, and the printed box (1) raises the
-optimum.
+[Formulations that minimise the same energy](formulations.md#formats-and-solvers) have the same optimum.
+[routes.csv](validation/routes.csv) has objective, bound and seconds of each route, and
+[variants.csv](validation/variants.csv) the effect of the two [misprints of the paper](errata.md).
 
 ## Solvers and formulations
 
