@@ -21,6 +21,7 @@ from ...models.instance.mesh import Mesh
 from ...models.processes.child import Child, KilledError
 from ...models.processes.child_program import is_stopped
 from ...models.processes.deadline import Deadline, Progress, Stop, silent, stop_function
+from ...models.processes.job_counts import cores
 from ...models.processes.limits import Limits
 from ...models.processes.process_groups import catch_interrupts
 from ...models.processes.process_pool import process_pool
@@ -57,7 +58,7 @@ BESIDE: Final = "beside"
 
 def plan_sentence(limits: Limits, instance: Instance) -> str:
     """A sentence on the time limit of a run's searches, in all and each."""
-    timed, beside = [method for method in methods_of(instance) if method.timed], limits.threads != 1
+    timed, beside = [method for method in methods_of(instance) if method.timed], _has_processors(limits)
     one_by_one = sum(not (method.beside and beside) for method in timed)
     limits_of_methods = ", ".join(
         f"{'beside them ' * (method.beside and beside)}{method.name} {limits.time_limit:g}"
@@ -98,7 +99,7 @@ def run(
     Orthogonal crosses, and instances on meshes, get the methods that find such fields. On a mesh there are
     two pictures, `instance` and `crosses`, and the page turns the model.
 
-    The report names methods that failed and what interrupted the run. Unless `limits` allow one thread, the
+    The report names methods that failed and what interrupted the run. With more than one processor, the
     method `two-stage` works beside the search and the proof, and so does a process that draws. Ctrl-C ends
     the current methods with their best fields; then no further method is tried and nothing more is drawn.
     Before the solver files are written, Ctrl-C raises KeyboardInterrupt.
@@ -180,8 +181,13 @@ def run(
 
 
 def _helper(limits: Limits) -> AbstractContextManager[Executor]:
-    """A thread for work beside the main thread; with one thread, this thread, which does it first."""
-    return process_pool(1) if limits.threads == 1 else ThreadPoolExecutor(1)
+    """A thread for work beside the main thread; with one processor, this thread, which does it first."""
+    return ThreadPoolExecutor(1) if _has_processors(limits) else process_pool(1)
+
+
+def _has_processors(limits: Limits) -> bool:
+    """Whether a run may occupy more than one processor."""
+    return (limits.threads or cores()) > 1
 
 
 def _work_beside(
