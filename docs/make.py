@@ -19,7 +19,7 @@ from typing import Any
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.cli.domains import BOTH, DOMAINS
+from crossfield.export.cli.domains import SKETCHES_ONLY
 from crossfield.export.cli.tables import tables
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.models.errors import InputError
@@ -349,7 +349,7 @@ def write_architecture() -> None:
 
     (DOCS / "architecture.svg").write_text(rooms.picture(DOCS.parent))
     (DOCS / "architecture" / "folders.csv").write_text(csv_text(rooms.table(DOCS.parent)))
-    some = ", ".join(f"`{command}`" for command, kinds in DOMAINS.items() if kinds != BOTH)
+    some = ", ".join(f"`{command}`" for command in SKETCHES_ONLY)
     text = f"Every command takes sketches and meshes, except these, which take sketches only: {some}."
     replace_between(DOCS / "architecture.md", "domains", text)
 

@@ -9,12 +9,10 @@ from pathlib import Path
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.cli.app import app, invoke
-from crossfield.export.cli.domains import DOMAINS
+from crossfield.export.cli.app import invoke
+from crossfield.export.cli.domains import SKETCHES_ONLY
 from loops import for_each
 from meshes import box, flat_sheet, write_obj
-
-REFUSING = [command for command, kinds in DOMAINS.items() if "face" not in kinds]
 
 
 @pytest.fixture(autouse=True)
@@ -93,12 +91,7 @@ def test_the_options_of_a_mesh_and_of_a_sketch_are_kept_apart(capsys):
     assert cf.read_instance("x.json").orthogonal
 
 
-def test_every_command_has_its_domains_in_the_table():
-    commands = [command.name for command in app.registered_commands]
-    assert sorted([*commands, "library"]) == sorted(DOMAINS)
-
-
-@for_each("command", REFUSING)
+@for_each("command", SKETCHES_ONLY)
 def test_commands_for_pixels_refuse_meshes_in_one_line(command, capsys):
     output = [] if command == "studio" else ["-o", "x.png" if command == "draw" else "x"]
     sources = {"draw": ["start.json", "cube.json"], "studio": ["cube.obj"]}
