@@ -6,6 +6,7 @@ import csv
 import re
 import subprocess
 import sys
+import zipfile
 
 import places
 import pytest
@@ -95,6 +96,15 @@ def test_a_model_has_every_term_and_equation_of_its_declaration(browser, address
         assert {row.paper for row in declared.rows if row.paper not in ", ".join(equations)} == set(), name
 
 
+def test_every_thumbnail_of_the_gallery_has_an_archive_with_its_field(site):
+    page = (site / "samples.html").read_text(encoding="utf-8")
+    archives = re.findall(r'href="(gallery/[^"]+\.zip)"', page)
+    assert len(archives) == page.count('loading="lazy"') >= 24
+    for path in archives:
+        with zipfile.ZipFile(site / path) as archive:
+            assert "field.npz" in archive.namelist()
+
+
 def test_a_link_to_a_csv_file_opens_a_page_with_its_rows(browser, address):
     browser.get(f"{address}/files.html")
     browser.execute_script("""document.querySelector("a[href$='files/keys.html']").click()""")
@@ -105,7 +115,16 @@ def test_a_link_to_a_csv_file_opens_a_page_with_its_rows(browser, address):
 
 
 @pytest.mark.parametrize(
-    "page", ["index", "cross-field", "tutorials/drawing", "guides/solvers", "reference/api"]
+    "page",
+    [
+        "index",
+        "cross-field",
+        "tutorials/drawing",
+        "guides/solvers",
+        "reference/api",
+        "samples",
+        "notebooks/family",
+    ],
 )
 def test_a_phone_shows_a_page_without_scrolling_sideways(browser, address, page):
     show(browser, width=390, height=844)
