@@ -204,15 +204,20 @@ def format_ratio(row: Row, ours: Row) -> str:
     return f"{value:.1f}" if value < 10 else f"{value:.0f}"
 
 
-def compare_peers(measure: Measure, sizes: Sequence[int]) -> dict[str, str]:
-    """Ours and the peers, by size, for LP and MPS; compared by CPU time, which the load changes little."""
-    from make import markdown
+def compare_peers(measure: Measure, sizes: Sequence[int], folder: Path) -> dict[str, str]:
+    """Ours and the peers, by size, for LP and MPS; compared by CPU time, which the load changes little.
+
+    folder: for a CSV file with a row per writer and size.
+    """
+    from make import csv_text, markdown
 
     tables, loads = {}, []
+    folder.mkdir(exist_ok=True)
     for suffix in ("lp", "mps"):
-        rows, going = [], list(PEERS)
+        rows, lines, going = [], [], list(PEERS)
         for size in sizes:
             ours: Row = {}
+            line = dict.fromkeys(PEERS, "")
             for writer in list(going):
                 row = measure(writer, MILP, suffix, size)
                 if row is None or row["cpu"] * 4.2 > LONG or row["memory"] * 4.2 > MUCH:
@@ -221,18 +226,21 @@ def compare_peers(measure: Measure, sizes: Sequence[int]) -> dict[str, str]:
                     continue
                 ours = ours or row
                 loads.append(row["load"])
-                cells = [
-                    str(size),
-                    PEERS[writer],
-                    f"{row['bytes'] / 1e6:.3g}",
-                    format_seconds(row),
-                    format_seconds(row, "cpu"),
-                    f"{row['memory'] / 1e6:.0f}",
-                    format_ratio(row, ours),
-                ]
-                rows.append(cells)
-        head = ["size", "writer", "MB", "seconds", "CPU s", "peak MB", "CPU / ours"]
-        tables[suffix] = markdown(head, rows)
+                seconds = format_seconds(row, "cpu")
+                line[writer] = seconds if row is ours else f"{seconds} ({format_ratio(row, ours)}x)"
+                facts = {
+                    "size": size,
+                    "writer": PEERS[writer],
+                    "MB": f"{row['bytes'] / 1e6:.3g}",
+                    "seconds": format_seconds(row),
+                    "CPU s": seconds,
+                    "peak MB": f"{row['memory'] / 1e6:.0f}",
+                    "CPU / ours": format_ratio(row, ours),
+                }
+                rows.append(facts)
+            lines.append([str(size), *line.values()])
+        (folder / f"{suffix}.csv").write_text(csv_text(rows))
+        tables[suffix] = markdown(["size", *PEERS.values()], lines)
     return {"writing": describe_machine(loads), **tables}
 
 
@@ -291,10 +299,10 @@ def compare_formulations(measure: Measure, names: Sequence[str], size: int) -> d
             loads += [row["load"] for row in (ours, theirs) if row]
             cell = format_seconds(ours, "cpu")
             if ours and theirs:
-                cell += f" / {format_seconds(theirs, 'cpu')} = {format_ratio(theirs, ours)}x"
+                cell += f" ({format_ratio(theirs, ours)}x)"
             cells.append(cell)
         rows.append([f"`{name}`", *cells])
-    sentence = f"{size} x {size}: CPU seconds of crossfield, of Pyomo (model and writer), and their ratio."
+    sentence = f"{size} x {size}: CPU seconds of crossfield, and how many times as many Pyomo takes."
     facts = describe_machine(loads)
     return {"formulations": f"{facts}\n\n{sentence}\n\n{markdown(['', *SUFFIXES], rows)}"}
 
@@ -336,7 +344,9 @@ def main(page: Path, arguments: Sequence[str]) -> None:
     measure = measure_here if small else measure_in_child
     picture = options.page.parent / "pictures" / "performance.svg"
     measured: dict[str, Callable[[], dict[str, str]]] = {
-        "peers": lambda: compare_peers(measure, (4, 8) if small else SIZES),
+        "peers": lambda: compare_peers(
+            measure, (4, 8) if small else SIZES, options.page.with_name("performance")
+        ),
         "growth": lambda: measure_growth(measure, (4, 8) if small else GROWTH, picture),
         "formulations": lambda: compare_formulations(
             measure, ["minlp-quartic"] if small else list_formulations(), 8 if small else 128
