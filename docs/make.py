@@ -73,9 +73,8 @@ def write_formulations() -> None:
             formulas = formulas.replace(rf"\left({residual}\right)", letter).replace(residual, letter)
         parts += [f"## `{name}`", summary, f"$$\n{formulas}\n$$"]
     _, formats = tables()["formulations"]
-    (_, *solvers), answers = tables()["solvers"]
-    columns = ("name", "short", "paper", "class", "minimises", "LP, MPS", *solvers)
-    parts += ["## Formats and solvers", SUPPORT, markdown(columns, support_rows(formats, answers, solvers))]
+    columns = ("name", "short", "paper", "class", "minimises", "LP, MPS")
+    parts += ["## Formats and solvers", SUPPORT, markdown(columns, list(map(support_row, formats)))]
     (DOCS / "formulations.md").write_text("\n\n".join(parts) + "\n")
 
 
@@ -90,20 +89,11 @@ def variable_row(name: str) -> list[str]:
     return [f"`{name}`", variable.over, variable.meaning, " or ".join(f"${text}$" for text in domains)]
 
 
-def support_rows(
-    formats: list[dict[str, Any]], answers: list[dict[str, Any]], solvers: list[str]
-) -> list[list[str]]:
-    """Names and class of each formulation, and whether LP, MPS and the bundled solvers take it."""
-    taken = {row["formulation"]: [row[solver] == "yes" for solver in solvers] for row in answers}
-    rows = []
-    for row in formats:
-        whole, relaxed = (taken.get(row["name"] + suffix, [False] * 3) for suffix in ("", ", relaxed"))
-        both = zip(whole, relaxed, strict=True)
-        words = ["yes" if all_of_it else "relaxed" if loose else "no" for all_of_it, loose in both]
-        held = {"yes": "yes", "lifted": "lifted", "refused": "no"}[re.split("[,:]", row["lp"])[0]]
-        names = f"`{row['name']}`", f"`{row['short']}`", row["paper"], row["class"]
-        rows.append([*names, FORMULATIONS[row["name"]].minimises, held, *words])
-    return rows
+def support_row(row: dict[str, Any]) -> list[str]:
+    """Names, class and objective of a formulation, and whether LP and MPS hold it."""
+    held = {"yes": "yes", "lifted": "lifted", "refused": "no"}[re.split("[,:]", row["lp"])[0]]
+    minimises = FORMULATIONS[row["name"]].minimises
+    return [f"`{row['name']}`", f"`{row['short']}`", row["paper"], row["class"], minimises, held]
 
 
 INTRODUCTION = rf"""The problem of [a cross field](cross-field.md) in {len(FORMULATIONS)}
@@ -130,12 +120,9 @@ $p^{{\max}}$ from the windows. $d^{{\max}}$ and $q^{{\max}}$ are $\pi/4$.
 - `relax` makes integers continuous; every formulation except `qp-fixed` has this option."""
 
 SUPPORT = """Formulations that minimise the same are the same problem; their points carry over by name. `.nl`
-and GAMS files hold every formulation. `crossfield list` prints more formats and solvers.
-
-- *Lifted*: each product of an integer and a continuous variable becomes one column and four rows, without
-  loss. Instead of `minlp-parity`, which needs a cosine, write `minlp-quartic`.
-- *Relaxed*: the solver accepts the formulation only without integers. Bonmin is exact for convex problems
-  only."""
+and GAMS files hold every formulation. [solvers.csv](validation/solvers.csv) states which solver takes which.
+*Lifted*: each product of an integer and a continuous variable becomes one column and four rows, without loss.
+Instead of `minlp-parity`, which needs a cosine, write `minlp-quartic`."""
 
 
 def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes") -> Instance:
