@@ -69,8 +69,8 @@ def write_formulations() -> None:
         settable = ", ".join(f"`{option}`" for option in sorted(recipe.option_names - {"relax"}))
         summary += f" Options: {settable}." if settable else ""
         formulas = aligned(objective_and_rows(declare(name)))
-        for residual, letter in RESIDUALS.items():
-            formulas = formulas.replace(rf"\left({residual}\right)", letter).replace(residual, letter)
+        for text, short in SHORT.items():
+            formulas = formulas.replace(rf"\left({text}\right)", short).replace(text, short)
         parts += [f"## `{name}`", summary, f"$$\n{formulas}\n$$"]
     _, formats = tables()["formulations"]
     columns = ("name", "short", "paper", "class", "minimises", "LP, MPS")
@@ -78,8 +78,16 @@ def write_formulations() -> None:
     (DOCS / "formulations.md").write_text("\n\n".join(parts) + "\n")
 
 
-RESIDUALS = {expression(A - kappa): "A_{ij}", expression(B): "B_{ij}", expression(R): "R_i"}
-"""Expressions that the page on formulations writes as a letter."""
+STROKES = r"\sum_{i \in S_c} w_{\mathrm{strokes}} \, w_i \, R_i^{2}"
+SKEW = r"\sum_{i \in I} w_{\beta} \, \beta_i^{2}"
+SHORT = {
+    expression(A - kappa): "A_{ij}",
+    expression(B): "B_{ij}",
+    expression(R): "R_i",
+    STROKES: r"\text{strokes}",
+    SKEW: r"\text{skew}",
+}
+"""Expressions that the page on formulations writes once, and their names."""
 
 
 def variable_row(name: str) -> list[str]:
@@ -105,10 +113,11 @@ SYMBOLS = rf"""$I$ are the pixels, $S_c$ the stroke pixels with direction $\thet
 the pairs $(i, j)$, in which $j$ is the upper or right neighbour of $i$. $C$ is a basis of the
 [cycles](cycles.md#residuals-and-cycles) of pairs and strokes. $H_c$ is the sum of the turns
 $\pm\kappa_{{ij}}$ along a cycle, plus $\theta_i - \theta_j$ for a walk from stroke to stroke. Numbers in
-brackets are the paper's equations. Three residuals have letters; $\kappa_{{ij}} = 0$ between pixels:
+brackets are the paper's equations. Some expressions have names; $\kappa_{{ij}} = 0$ between pixels:
 
 $$
-A_{{ij}} = {expression(A)}, \qquad B_{{ij}} = {expression(B)}, \qquad R_i = {expression(R)} .
+A_{{ij}} = {expression(A)}, \qquad B_{{ij}} = {expression(B)}, \qquad R_i = {expression(R)}, \qquad
+\text{{strokes}} = {STROKES}, \qquad \text{{skew}} = {SKEW} .
 $$
 
 The windows of $\alpha$ follow from the [gauge](mathematics.md#4-gauges-and-windows), and $p^{{\min}}$ and
