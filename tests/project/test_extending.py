@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shlex
@@ -9,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import textwrap
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -28,6 +30,9 @@ def apply(before: str, code: str, folder: Path) -> bool:
         text = path.read_text(encoding="utf-8")
         place = re.search(rf"^( *){re.escape(add[2])}", text, re.MULTILINE)
         assert place, add[0]
+        with suppress(SyntaxError):
+            ast.parse(code, mode="eval")
+            code = f"{code.rstrip()},\n"  # an entry of a table
         lines = textwrap.indent(code, place[1])
         path.write_text(text[: place.start()] + lines + text[place.start() :], encoding="utf-8")
     return bool(create or add)
