@@ -39,15 +39,14 @@ TITLES: Final = {
     "mesh": "Meshes",
     "drawing": "Drawings of other programs",
 }
-SHORT: Final = """Drawing, field and surface of all samples. Use the name of a sample in place of a sketch or
-mesh:
+SHORT: Final = """Use the name of a sample in place of a sketch or mesh:
 
 - `crossfield solve mouse --size 48 --method bend -o out` makes the field of a drawing or computed surface,
   and `crossfield shade out/mouse.bend.field.npz -o out` the surface;
 - `crossfield solve cube --method search -o out` makes the field of a mesh.
 
-On the site, *Files* holds the field, the surface and the layers. The crosses of computed surfaces are known,
-so fields can be measured on them. [Drawings of many programs](gallery.md) has more drawings."""
+On the site, *Files* holds the field, the surface and the layers. [Drawings of many programs](gallery.md)
+has more drawings."""
 
 
 @dataclass(frozen=True)
