@@ -73,7 +73,7 @@ def hidden_table() -> Table:
     cells = []
     for method in values("method", **facts):
         heads, line = by_origin(lambda m=method, **case: over_drawings(rows_with(method=m, **facts, **case)))
-        cells.append([f"`{method}`", *line])
+        cells.append([method, *line])
     return ("method", *heads), cells
 
 
@@ -186,7 +186,18 @@ def mean(rows: list[Row]) -> float:
 
 
 def draw(pictures: Path) -> None:
-    """The plot of the table of weights, without its standard errors."""
+    """The plots of the tables of methods and weights, without their standard errors."""
+    by_method: dict[tuple[str, str], dict[str, plots.Line]] = {}
+    (_, *heads), cells = hidden_table()
+    for name, *line in cells:
+        for head, cell in zip(heads, line, strict=True):
+            origin, size = head.removesuffix(" pixels").split(", ")
+            panel = by_method.setdefault(("pixels", f"degrees, drawings {origin}"), {})
+            if cell != "-":
+                at, error = panel.setdefault(name, ([], []))
+                at.append(float(size))
+                error.append(float(cell.split()[0]))
+    plots.lines_by_value(pictures / "evidence_hidden.svg", by_method)
     (_, *heads), cells = weight_table()
     weights = [float(line[0]) for line in cells]
     panels: dict[tuple[str, str], dict[str, plots.Line]] = {}

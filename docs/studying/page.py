@@ -24,7 +24,7 @@ from .wording import percent, series
 RowsByPart = dict[str, list[Row]]
 TEMPLATE: Final = Path(__file__).with_name("evidence.template")
 COMMAND: Final = "python docs/study.py --page"
-SHOWN: Final = {"hidden-curves", "surfaces", "solved"}
+SHOWN: Final = {"surfaces", "solved"}
 """Tables in the page; the others are CSV files."""
 
 
