@@ -43,14 +43,16 @@ def lines_of(source: str) -> tuple[dict[str, str], ...]:
         over = rest[0].removeprefix("&").strip() if rest else ""
         label = _LABEL.search(over)
         role = "subject to" if rest else "minimise"
-        line = {"role": "" if role == last else role, "formula": mathml(formula)}
+        domains = formula.split(r" \qquad ")
+        text = " ".join(mathml(domain, whole=True) for domain in domains) if domains[1:] else mathml(formula)
+        line = {"role": "" if role == last else role, "formula": text}
         lines.append(line | {"over": mathml(_LABEL.sub("", over)), "label": label[1] if label else ""})
         last = role
     return tuple(lines)
 
 
-def mathml(formula: str) -> str:
-    """Return trusted LaTeX as MathML in display style, in pieces between which a line may break.
+def mathml(formula: str, *, whole: bool = False) -> str:
+    """Return trusted LaTeX as MathML in display style; unless `whole`, in pieces where a line may break.
 
     Browsers break no line inside an element `math`. Environments such as `aligned` are not supported:
     `lines_of` splits them.
@@ -61,7 +63,7 @@ def mathml(formula: str) -> str:
     for bar in (operator for operator in root.iter("mo") if operator.text == "|"):
         bar.attrib |= {"lspace": "0", "rspace": "0"}  # a bracket, which browsers take for a relation
     pieces: list[str] = []
-    for children in _pieces(list(root[0])):
+    for children in [list(root[0])] if whole else _pieces(list(root[0])):
         math = ET.Element("math", {"xmlns": "http://www.w3.org/1998/Math/MathML", "displaystyle": "true"})
         if pieces and children[0].text in _BREAKING:
             children[0].set("form", "infix")  # at the beginning of an element it would be a sign
