@@ -271,9 +271,9 @@ grid:
 
 ![The mask in grey, and two coloured lines]({answer})
 
-Other answers stand beside their drawings. No pixel may be more than one pixel off
-(`test_a_drawing_is_read_as_it_looks`). [drawings.csv](gallery/drawings.csv) has options and messages of
-`crossfield instance`."""
+Grey is the mask, and the colour of a line its direction. Other answers stand beside their drawings. No pixel
+may be more than one pixel off (`test_a_drawing_is_read_as_it_looks`). [drawings.csv](gallery/drawings.csv)
+has options and messages of `crossfield instance`."""
 USUAL = "leaf"
 """The right answer of most drawings."""
 
