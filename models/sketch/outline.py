@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from ..instance.angles import cosine, line_of, sine
-from ..instance.domain import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats
 from .cover import LEAST_WEIGHT
 
 GAPS: Final = (0.03, 0.06, 0.12)  # shares of the longer side: gaps that count as closed, tried in turn
@@ -47,16 +47,17 @@ def convex_area(pixels: Bools) -> float:
     Importing SciPy's hulls takes longer than reading a drawing.
     """
     rows = np.flatnonzero(pixels.any(axis=1))
-    ends = np.repeat(pixels[rows].argmax(axis=1), 2), np.repeat(pixels[rows, ::-1].argmax(axis=1), 2)
-    borders = np.ravel([rows, rows + 1], order="F")
-    margins = sum(-_area_below_hull(borders, -end) for end in ends)
+    borders = np.ravel([rows, rows + 1], order="F").tolist()
+    margins = 0.0
+    for side in (pixels[rows], pixels[rows, ::-1]):
+        margins -= _area_below_hull(borders, (-side.argmax(axis=1).repeat(2)).tolist())
     return float((borders[-1] - borders[0]) * pixels.shape[1] - margins)
 
 
-def _area_below_hull(place: Ints, height: Ints) -> float:
+def _area_below_hull(places: list[int], heights: list[int]) -> float:
     """The area below the upper convex hull of points with ascending places."""
     hull: list[tuple[int, int]] = []
-    for x, y in sorted(zip(place.tolist(), height.tolist(), strict=True)):
+    for x, y in sorted(zip(places, heights, strict=True)):
         while len(hull) > 1:
             (x0, y0), (x1, y1) = hull[-2:]
             if (x1 - x0) * (y - y0) < (y1 - y0) * (x - x0):
