@@ -22,6 +22,7 @@ Indices = NDArray[np.int64]
 
 _PART_OF_GAP: Final = 0.02  # that rounding the shares and tables may cost
 _MOST: Final = 2**31 - 1
+_AT_ONCE: Final = 1 << 16  # entries of tables, to spare memory
 
 
 class DualArrays(NamedTuple):
@@ -106,27 +107,26 @@ class RingDual:
         _update_rings(numbers, self.state, self.rings, cap)
 
     def interpolate(self, old: RingDual) -> None:
-        """Take shares and tables from those of a level whose cells contain the cells of this one.
-
-        Labels between two old ones get a mean, two labels of a pair that of the corners of their square.
-        """
+        """Take shares and tables of a level whose cells contain these, by means of the old labels around."""
         pairs, state, before, steps = self.level.pairs, self.state, old.state, old.rings.pair
         ends, used = self._ends_in(old), np.append(before.unary < np.inf, False)
         label = spans(state.start[state.point], np.diff(state.share_start))
         shift = np.repeat(before.share_start[:-1] - before.start[state.point], np.diff(state.share_start))
         corners = [(share[label], used[at[label]], at[label] + shift) for share, at in ends]
         state.shares[:] = _mean(before.shares, corners)
-        entry = spans(pairs.begin[steps], np.diff(pairs.begin)[steps])  # rings that are added come last
-        shift = np.repeat(old.rings.begin[:-1] - before.begin[steps], np.diff(pairs.begin)[steps])
-        first, second = (item[line[entry]] for item, line in zip(pairs.item, pairs.line, strict=True))
-        corners = []
-        for (share, up), (part, along) in product(ends, ends):
-            at = old.level.pairs.places(pairs.row[entry], up[first], along[second])
-            known = used[up[first]] & used[along[second]] & np.isfinite(before.costs.take(at, mode="clip"))
-            corners.append((share[first] * part[second], known, at + shift))
-        tables = np.where(np.isfinite(state.costs[entry]), _mean(old.rings.tables, corners), 0.0)
-        self.rings.tables[: len(tables)] = tables
-        np.add.at(state.costs, entry, tables)
+        begin, sizes = self.rings.begin[: len(steps)], np.diff(pairs.begin)[steps]
+        for some in np.split(np.arange(len(steps)), np.nonzero(np.diff(begin // _AT_ONCE))[0] + 1):
+            entry, corners = spans(pairs.begin[steps[some]], sizes[some]), []
+            shift = np.repeat(old.rings.begin[some] - before.begin[steps[some]], sizes[some])
+            first, second = (item[line[entry]] for item, line in zip(pairs.item, pairs.line, strict=True))
+            for (share, up), (part, along) in product(ends, ends):
+                at = old.level.pairs.places(pairs.row[entry], up[first], along[second])
+                finite = np.isfinite(before.costs.take(at, mode="clip"))
+                known = used[up[first]] & used[along[second]] & finite
+                corners.append((share[first] * part[second], known, at + shift))
+            tables = np.where(np.isfinite(state.costs[entry]), _mean(old.rings.tables, corners), 0.0)
+            self.rings.tables[spans(begin[some], sizes[some])] = tables  # rings that are added come last
+            np.add.at(state.costs, entry, tables)
 
     def _ends_in(self, old: RingDual) -> list[tuple[Floats, Indices]]:
         """Old labels below and above each label, -1 for none, after their shares in it."""
