@@ -115,16 +115,16 @@ class Request:
 class Method:
     """A method. find: yields its fields one by one, because a later one may fail.
 
-    The last one is its answer. timed: whether it runs up to the time limit, or ends when it is done. beside:
-    whether a run does it beside other timed methods, because it occupies one processor. takes: whether it
-    finds fields of an instance.
+    The last one is its answer. timed: whether it runs up to the time limit, or ends when it is done.
+    in_parallel: whether a run does it during other timed methods, because it occupies one processor. takes:
+    whether it finds fields of an instance.
     """
 
     name: str
     summary: str
     find: Callable[[Request], Iterator[Candidate]]
     timed: bool = True
-    beside: bool = False
+    in_parallel: bool = False
     takes: Callable[[Instance], bool] = lambda _: True
 
 
@@ -286,7 +286,7 @@ METHODS: Final = {
             "two-stage",
             "section 5 of the paper: HiGHS on milp-mccormick up to the time limit, Ipopt on qp-fixed",
             _find_in_two_stages,
-            beside=True,
+            in_parallel=True,
         ),
         Method(
             "prove",

@@ -40,7 +40,7 @@ class Report:
     proven
         Proven bound of the 2-norm energy of all fields, or None.
     stages
-        Seconds of each stage, in order; `beside` is the wait for what is done beside the others.
+        Seconds of each stage, in order; `waiting` is the wait for what is computed during others.
     surface
         Surface over the kept field; None if the run stopped earlier.
 

@@ -52,17 +52,17 @@ CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """Name of the field from which the methods of a run start: `first_field`, or the given one."""
 COMPILING: Final = "compiling"
-BESIDE: Final = "beside"
-"""Stage in which a run waits for methods and pictures beside the search and the proof."""
+WAITING: Final = "waiting"
+"""Stage in which a run waits for the methods and pictures that are computed during search and proof."""
 
 
 def plan_sentence(limits: Limits, instance: Instance) -> str:
     """A sentence on the time limit of a run's searches, in all and each."""
-    timed, beside = [method for method in methods_of(instance) if method.timed], _has_processors(limits)
-    one_by_one = sum(not (method.beside and beside) for method in timed)
+    timed, in_parallel = [method for method in methods_of(instance) if method.timed], _has_processors(limits)
+    one_by_one = sum(not (method.in_parallel and in_parallel) for method in timed)
     limits_of_methods = ", ".join(
-        f"{'beside them ' * (method.beside and beside)}{method.name} {limits.time_limit:g}"
-        for method in sorted(timed, key=lambda method: method.beside)
+        f"{'meanwhile ' * (method.in_parallel and in_parallel)}{method.name} {limits.time_limit:g}"
+        for method in sorted(timed, key=lambda method: method.in_parallel)
     )
     return f"at most {one_by_one * limits.time_limit:g} s: {limits_of_methods}; files and pictures on top"
 
@@ -151,15 +151,15 @@ def run(
             _find_fields(results, request, lambda method: not method.timed, watch)
             pressed = stack.enter_context(catch_interrupts())
             request = replace(request, stop=lambda: should_stop() or pressed())
-            work = (request, folder, underlay, results.settled, results.interrupted)
-            beside = helper.submit(_work_beside, *work)
+            work = (request, folder, underlay, results.kept_field, results.interrupted)
+            parallel_work = helper.submit(_work_in_parallel, *work)
             results.interrupted = results.interrupted or _compile_functions(request)
             watch.lap(COMPILING)
         if not request.stop():
-            _find_fields(results, request, lambda method: method.timed and not method.beside, watch)
-        others, pictures = beside.result()
+            _find_fields(results, request, lambda method: method.timed and not method.in_parallel, watch)
+        others, pictures = parallel_work.result()
         results.add(others)
-        watch.lap(BESIDE)
+        watch.lap(WAITING)
         report = Report(instance, results.ranked, manifests, results.failures, results.interrupted)
         names = _write_fields(report, folder)
         watch.lap("fields")
@@ -190,7 +190,7 @@ def _has_processors(limits: Limits) -> bool:
     return (limits.threads or cores()) > 1
 
 
-def _work_beside(
+def _work_in_parallel(
     request: Request, folder: Path, underlay: Underlay | None, kept: CrossField | None, interrupted: str
 ) -> tuple[_Results, _Pictures | None]:
     """Find the fields of methods that occupy one processor, and draw the kept field if it is known.
@@ -198,7 +198,7 @@ def _work_beside(
     interrupted: what was interrupted before, so that nothing is done any more.
     """
     results = _Results(interrupted=interrupted)
-    _find_fields(results, request, lambda method: method.beside)
+    _find_fields(results, request, lambda method: method.in_parallel)
     if kept is None:
         return results, None
     return results, _Pictures(kept, underlay, request, results.interrupted).draw_all(folder)
@@ -240,7 +240,7 @@ class _Results:
         self.interrupted = self.interrupted or others.interrupted
 
     @property
-    def settled(self) -> CrossField | None:
+    def kept_field(self) -> CrossField | None:
         """The field that is kept whatever else is found; None if that is still open."""
         return next((found.field for found in self.candidates if found.method == KEPT), None)
 

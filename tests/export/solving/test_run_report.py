@@ -56,7 +56,7 @@ def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
     assert rows["start"]["energy_2_norm"] == first_field(instance).energy(2).total
     assert rows["start"]["seconds"] == document["stages"]["start"]
     untimed = [method.name for method in METHODS.values() if not method.timed]
-    rest = ["compiling", "search", "prove", "beside", "fields", "certificate"]
+    rest = ["compiling", "search", "prove", "waiting", "fields", "certificate"]
     assert list(document["stages"]) == ["start", "models", *untimed, *rest]
     assert {"MILP", "two-stage"} & set(rows)
     assert document["surface"]["picture"] or document["surface"]["doubts"]
