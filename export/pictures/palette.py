@@ -22,7 +22,7 @@ DARK: Final = {
     "plus": "#ff6b70",
     "minus": "#7c9cff",
 }
-"""The same on dark pages."""
+"""Colours of the same parts on dark pages."""
 
 ANGLE_MAP: Final = "magma"
 """The colours of angles between the lines, 0 to 90 degrees: a map of matplotlib."""

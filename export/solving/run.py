@@ -100,8 +100,9 @@ def run(
     two pictures, `instance` and `crosses`, and the page turns the model.
 
     The report names methods that failed and what interrupted the run. With more than one processor, the
-    method `two-stage` works beside the search and the proof, and so does a process that draws. Ctrl-C ends
-    the current methods with their best fields; then no further method is tried and nothing more is drawn.
+    method `two-stage` runs in parallel with the search and the proof, and so does a process that draws.
+    Ctrl-C ends the current methods with their best fields; then no further method is tried and nothing more
+    is drawn.
     Before the solver files are written, Ctrl-C raises KeyboardInterrupt.
 
     Parameters
@@ -139,7 +140,7 @@ def run(
     limits, folder = Limits.finite_or_default(limits), make_folder(folder)
     progress(plan_sentence(limits, instance))
     watch = Stopwatch()
-    with _helper(limits) as helper, ExitStack() as stack:
+    with _open_parallel_thread(limits) as parallel_thread, ExitStack() as stack:
         with _compiling_in_background(instance):
             progress("greedy field")
             start = first_field(instance)
@@ -152,7 +153,7 @@ def run(
             pressed = stack.enter_context(catch_interrupts())
             request = replace(request, stop=lambda: should_stop() or pressed())
             work = (request, folder, underlay, results.kept_field, results.interrupted)
-            parallel_work = helper.submit(_work_in_parallel, *work)
+            parallel_work = parallel_thread.submit(_work_in_parallel, *work)
             results.interrupted = results.interrupted or _compile_functions(request)
             watch.lap(COMPILING)
         if not request.stop():
@@ -180,8 +181,8 @@ def run(
     return report
 
 
-def _helper(limits: Limits) -> AbstractContextManager[Executor]:
-    """A thread for work beside the main thread; with one processor, this thread, which does it first."""
+def _open_parallel_thread(limits: Limits) -> AbstractContextManager[Executor]:
+    """A thread in parallel with the main thread; with one processor, the main thread, which works first."""
     return ThreadPoolExecutor(1) if _has_processors(limits) else process_pool(1)
 
 
@@ -253,7 +254,7 @@ class _Results:
 
 
 def _compiling_in_background(instance: Instance) -> AbstractContextManager[None]:
-    """Compiles the functions of proofs beside what needs none of them, where the methods of a run prove."""
+    """Compiles the functions of proofs while the run does what needs none of them, if its methods prove."""
     if METHODS["prove"] not in methods_of(instance):
         return nullcontext()
     from ...models.proof.compiling import compile_in_background  # it loads Numba

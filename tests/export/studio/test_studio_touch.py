@@ -6,6 +6,7 @@ import time
 
 import pytest
 from browsing import find, show
+from crossfield.export.pictures.palette import LIGHT
 from studio_pages import BOX, document, drag, pebble, settled, tool, until
 from studios import PEBBLE
 
@@ -191,10 +192,10 @@ def test_the_other_end_of_the_pen_erases(tablet, tmp_path):
 WIDTH = """
 const canvas = document.querySelector('#drawing');
 const data = canvas.getContext('2d').getImageData(arguments[0], 0, 1, canvas.height).data;
-const ink = k => Math.max(0, data[k] - data[k + 1]) * data[k + 3];
+const ink = k => Math.max(0, data[k] - data[k + 1]) * data[k + 3] / 255 / arguments[1];
 return data.reduce((sum, _, k) => sum + (k % 4 === 0 ? ink(k) : 0), 0);
 """
-"""Red ink in a column of the drawing, also that of half covered pixels."""
+"""Pixels of ink in a column of the drawing, half covered ones as a half; red above green of full ink."""
 
 
 def test_a_stroke_is_as_wide_as_its_pressure(tablet):
@@ -207,8 +208,10 @@ def test_a_stroke_is_as_wide_as_its_pressure(tablet):
     assert line["weight"] == pytest.approx(0.5, abs=0.05)
     find(tablet, "input[value=none]").click()
     tablet.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
-    thin, thick = (tablet.execute_script(WIDTH, x) for x in (100, 300))
-    assert thick > 2 * thin > 0
+    red, green, _ = bytes.fromhex(LIGHT["stroke"][1:])
+    full = red - green
+    thin, thick = (tablet.execute_script(WIDTH, x, full) for x in (100, 300))
+    assert thick > 2 * thin > 1
 
     tool(tablet, "erase")
     drag(tablet, [(200, 280), (200, 320)])
