@@ -212,7 +212,6 @@ def compare_peers(measure: Measure, sizes: Sequence[int], folder: Path) -> dict[
     from make import csv_text, markdown
 
     tables, loads = {}, []
-    folder.mkdir(exist_ok=True)
     for suffix in ("lp", "mps"):
         rows, lines, going = [], [], list(PEERS)
         for size in sizes:
@@ -244,9 +243,12 @@ def compare_peers(measure: Measure, sizes: Sequence[int], folder: Path) -> dict[
     return {"writing": describe_machine(loads), **tables}
 
 
-def measure_growth(measure: Measure, sizes: Sequence[int], picture: Path) -> dict[str, str]:
-    """Time and memory of an MPS by its size, as a table and a picture with straight lines through them."""
-    from make import markdown
+def measure_growth(measure: Measure, sizes: Sequence[int], folder: Path) -> dict[str, str]:
+    """Time and memory of an MPS by its size, as a CSV file and a picture with straight lines through them.
+
+    folder: for the CSV file. The picture belongs into `pictures` next to it.
+    """
+    from make import csv_text
     from studying.plots import INK, open_panels
 
     rows = {size: row for size in sizes if (row := measure("crossfield", MILP, "mps", size)) is not None}
@@ -256,6 +258,7 @@ def measure_growth(measure: Measure, sizes: Sequence[int], picture: Path) -> dic
         "peak memory, MB": ("MB", np.array([row["memory"] / 1e6 for row in rows.values()])),
     }
     fits = []
+    picture = folder.with_name("pictures") / "performance.svg"
     with open_panels(picture, len(drawn), wide=8.0, high=3.0) as axes:
         for axis, (title, (unit, values)) in zip(axes, drawn.items(), strict=True):
             slope, level = np.polyfit(pairs, values, 1)
@@ -267,21 +270,21 @@ def measure_growth(measure: Measure, sizes: Sequence[int], picture: Path) -> dic
             axis.plot(ends, level + slope * ends, color=INK[1], linewidth=1.2)
             axis.plot(pairs, values, "o", color=INK[0], markersize=5)
             axis.set(xlabel="pairs, millions", title=title, xlim=(0, None), ylim=(0, None))
-    cells = [
-        [
-            str(size),
-            f"{number:.3g}",
-            f"{row['bytes'] / 1e6:.4g}",
-            format_seconds(row),
-            format_seconds(row, "user"),
-            f"{row['cpu'] - row['user']:.3g}",
-            f"{row['memory'] / 1e6:.0f}",
-        ]
+    facts = [
+        {
+            "size": size,
+            "million pairs": f"{number:.3g}",
+            "MB": f"{row['bytes'] / 1e6:.4g}",
+            "seconds": format_seconds(row),
+            "CPU s of the program": format_seconds(row, "user"),
+            "CPU s of the system": f"{row['cpu'] - row['user']:.3g}",
+            "peak MB": f"{row['memory'] / 1e6:.0f}",
+        }
         for number, (size, row) in zip(pairs, rows.items(), strict=True)
     ]
-    head = ["size", "million pairs", "MB", "seconds", "CPU s of the program", "of the system", "peak MB"]
-    facts = describe_machine([row["load"] for row in rows.values()])
-    return {"growth": f"{facts}\n\nStraight lines: {'; '.join(fits)}.\n\n{markdown(head, cells)}"}
+    (folder / "growth.csv").write_text(csv_text(facts))
+    loads = describe_loads([row["load"] for row in rows.values()])
+    return {"growth": f"Straight lines: {'; '.join(fits)}. {loads}"}
 
 
 def compare_formulations(measure: Measure, names: Sequence[str], size: int) -> dict[str, str]:
@@ -318,9 +321,13 @@ def describe_machine(loads: Sequence[float]) -> str:
             packages.append(f"{package} not installed")
     return (
         f"{os.cpu_count()} cores, {processor_name()}, {memory:.0f} GB, {platform.system()}. "
-        f"Python {platform.python_version()}, {', '.join(packages)}.\n"
-        f"Load average while measuring: {min(loads):.1f} to {max(loads):.1f}."
+        f"Python {platform.python_version()}, {', '.join(packages)}. {describe_loads(loads)}"
     )
+
+
+def describe_loads(loads: Sequence[float]) -> str:
+    """The range of load averages while measuring."""
+    return f"Load average: {min(loads):.1f} to {max(loads):.1f}."
 
 
 def main(page: Path, arguments: Sequence[str]) -> None:
@@ -342,12 +349,11 @@ def main(page: Path, arguments: Sequence[str]) -> None:
 
     small = options.smoke
     measure = measure_here if small else measure_in_child
-    picture = options.page.parent / "pictures" / "performance.svg"
+    folder = options.page.with_name("performance")
+    folder.mkdir(exist_ok=True)
     measured: dict[str, Callable[[], dict[str, str]]] = {
-        "peers": lambda: compare_peers(
-            measure, (4, 8) if small else SIZES, options.page.with_name("performance")
-        ),
-        "growth": lambda: measure_growth(measure, (4, 8) if small else GROWTH, picture),
+        "peers": lambda: compare_peers(measure, (4, 8) if small else SIZES, folder),
+        "growth": lambda: measure_growth(measure, (4, 8) if small else GROWTH, folder),
         "formulations": lambda: compare_formulations(
             measure, ["minlp-quartic"] if small else list_formulations(), 8 if small else 128
         ),
