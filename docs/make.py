@@ -20,12 +20,11 @@ from typing import Any
 import crossfield as cf
 import numpy as np
 from crossfield.export.cli.domains import SKETCHES_ONLY
-from crossfield.export.cli.tables import tables
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.models.errors import InputError
-from crossfield.models.formulations.catalogue import FORMULATIONS, declare
+from crossfield.models.formulations.catalogue import A_WHOLE, FORMULATIONS, declare
 from crossfield.models.formulations.latex import aligned, domain, expression, objective_and_rows
-from crossfield.models.formulations.symbols import VARIABLES, A, B, R, kappa
+from crossfield.models.formulations.symbols import VARIABLES, A, B, R, beta, kappa, p1, p2
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from crossfield.models.instance.symmetries import turned
 
@@ -62,76 +61,105 @@ def write_formulations() -> None:
         "![Columns, rows, integers and nonlinear terms of each formulation](pictures/formulation_sizes.svg)",
         "## Variables and data",
         SYMBOLS,
-        markdown(("variable", "over", "meaning", "domain"), list(map(variable_row, VARIABLES))),
+        "\n".join(map(variable_line, VARIABLES)),
     ]
     for name, recipe in FORMULATIONS.items():
-        summary = f"{recipe.summary[0].upper()}{recipe.summary[1:]}."
-        settable = ", ".join(f"`{option}`" for option in sorted(recipe.option_names - {"relax"}))
-        summary += f" Options: {settable}." if settable else ""
-        formulas = aligned(objective_and_rows(declare(name)))
-        for text, short in SHORT.items():
-            formulas = formulas.replace(rf"\left({text}\right)", short).replace(text, short)
-        parts += [f"## `{name}`", summary, f"$$\n{formulas}\n$$"]
-    _, formats = tables()["formulations"]
-    columns = ("name", "short", "paper", "class", "minimises", "LP, MPS")
-    parts += ["## Formats and solvers", SUPPORT, markdown(columns, list(map(support_row, formats)))]
+        facts = [f"`{recipe.short}`", recipe.kind, recipe.source]
+        summary = f"{'; '.join(facts)}. {recipe.summary[0].upper()}{recipe.summary[1:]}."
+        parts += [f"## `{name}`", summary + options_of(name)]
+        parts += [] if name in SQUARED else [formulas_of(name)]
+    optima: dict[str, list[str]] = {}
+    for name, recipe in FORMULATIONS.items():
+        optima.setdefault(recipe.minimises, []).append(f"`{name}`")
+    equal = "\n".join(f"- {energy}: {', '.join(names)}" for energy, names in optima.items() if names[1:])
+    parts += ["## Formats and solvers", EQUAL, equal, SUPPORT]
     (DOCS / "formulations.md").write_text("\n\n".join(parts) + "\n")
 
 
-STROKES = r"\sum_{i \in S_c} w_{\mathrm{strokes}} \, w_i \, R_i^{2}"
-SKEW = r"\sum_{i \in I} w_{\beta} \, \beta_i^{2}"
+def options_of(name: str) -> str:
+    """Sentence on the options of a formulation, or on its difference from another one."""
+    if name in SQUARED:
+        return f" It is `{SQUARED[name]}` with both norms 2, without rows (22) to (25)."
+    options = sorted(FORMULATIONS[name].option_names - {"relax"})
+    return f" Options: {', '.join(f'`{option}`' for option in options)}." if options else ""
+
+
+def formulas_of(name: str) -> str:
+    """Objective and rows of a formulation, with short names for long expressions."""
+    formulas = aligned(objective_and_rows(declare(name)))
+    for text, short in SHORT.items():
+        formulas = formulas.replace(rf"\left({text}\right)", short).replace(text, short)
+    one_line = formulas.replace(" \\\\\n\\quad & +", " +")
+    return f"$$\n{one_line}\n$$"
+
+
+SQUARED = {"miqcp-bilinear": "miqcp-bilinear-l1", "miqp-mccormick": "milp-mccormick"}
+"""Formulations with squares of stroke and skew terms, and those printed, which have absolute values."""
+JUMP = p1 + 2 * p2
+SUMS = {
+    r"\text{strokes}_1": r"\sum_{i \in S_c} w_{\mathrm{strokes}} \, w_i \, \gamma_i",
+    r"\text{strokes}_2": r"\sum_{i \in S_c} w_{\mathrm{strokes}} \, w_i \, R_i^{2}",
+    r"\text{skew}_1": r"\sum_{i \in I} w_{\beta} \, \psi_i",
+    r"\text{skew}_2": r"\sum_{i \in I} w_{\beta} \, \beta_i^{2}",
+}
 SHORT = {
     expression(A - kappa): "A_{ij}",
+    expression(A_WHOLE - kappa): "A_{ij}",
+    expression(JUMP): "p_{ij}",
     expression(B): "B_{ij}",
     expression(R): "R_i",
-    STROKES: r"\text{strokes}",
-    SKEW: r"\text{skew}",
-}
+    expression(R - beta): "R_i",
+} | {text: name for name, text in SUMS.items()}
 """Expressions that the page on formulations writes once, and their names."""
+NAMED = r", \qquad ".join(
+    f"{name} = {text}"
+    for name, text in {
+        "p_{ij}": expression(JUMP),
+        "A_{ij}": expression(A_WHOLE),
+        "B_{ij}": expression(B),
+        "R_i": expression(R),
+        **SUMS,
+    }.items()
+)
 
 
-def variable_row(name: str) -> list[str]:
-    """Name, index set, meaning and domain of a variable."""
+def variable_line(name: str) -> str:
+    """Name, domain and meaning of a variable."""
     variable, users = VARIABLES[name], [user for user in map(declare, FORMULATIONS) if name in user.variables]
     domains = dict.fromkeys(domain(user.variable(name), user) for user in users)
-    return [f"`{name}`", variable.over, variable.meaning, " or ".join(f"${text}$" for text in domains)]
+    return f"- `{name}`, {' or '.join(f'${text}$' for text in domains)}: {variable.meaning}"
 
 
-def support_row(row: dict[str, Any]) -> list[str]:
-    """Names, class and objective of a formulation, and whether LP and MPS hold it."""
-    held = {"yes": "yes", "lifted": "lifted", "refused": "no"}[re.split("[,:]", row["lp"])[0]]
-    minimises = FORMULATIONS[row["name"]].minimises
-    return [f"`{row['name']}`", f"`{row['short']}`", row["paper"], row["class"], minimises, held]
+INTRODUCTION = rf"""The problem of [a cross field](cross-field.md) in {len(FORMULATIONS)} formulations. Those
+named `-orthogonal` and `-cycle` are for orthogonal crosses only ($\beta = 0$), on pixels or meshes. Sections
+and numbers in brackets are the paper's. Sizes for the sketch `mouse` at 24 pixels:"""
 
-
-INTRODUCTION = rf"""The problem of [a cross field](cross-field.md) in {len(FORMULATIONS)}
-formulations, printed from their declarations in the code. [The mathematics](mathematics.md) derives them.
-Those named `-orthogonal` and `-cycle` are for orthogonal crosses only ($\beta = 0$), on pixels or meshes.
-Sizes for the sketch `mouse` at 24 pixels:"""
-
-SYMBOLS = rf"""$I$ are the pixels, $S_c$ the stroke pixels with direction $\theta_i$ and weight $w_i$, and $E$
-the pairs $(i, j)$, in which $j$ is the upper or right neighbour of $i$. $C$ is a basis of the
-[cycles](cycles.md#residuals-and-cycles) of pairs and strokes. $H_c$ is the sum of the turns
-$\pm\kappa_{{ij}}$ along a cycle, plus $\theta_i - \theta_j$ for a walk from stroke to stroke. Numbers in
-brackets are the paper's equations. Some expressions have names; $\kappa_{{ij}} = 0$ between pixels:
+SYMBOLS = rf"""[The mathematics](mathematics.md) defines the pixels $I$, the stroke pixels $S_c$ with
+$\theta_i$ and $w_i$, the pairs $E$, and the [windows](mathematics.md#4-gauges-and-windows) of $\alpha$, from
+which $p^{{\min}}$ and $p^{{\max}}$ follow. $C$ is a basis of the [cycles](cycles.md#residuals-and-cycles) of
+pairs and strokes. $H_c$ is the sum of the turns $\pm\kappa_{{ij}}$ along a cycle, plus $\theta_i - \theta_j$
+for a walk from stroke to stroke. Between pixels, $\kappa_{{ij}} = 0$.
 
 $$
-A_{{ij}} = {expression(A)}, \qquad B_{{ij}} = {expression(B)}, \qquad R_i = {expression(R)}, \qquad
-\text{{strokes}} = {STROKES}, \qquad \text{{skew}} = {SKEW} .
+{NAMED}
 $$
 
-The windows of $\alpha$ follow from the [gauge](mathematics.md#4-gauges-and-windows), and $p^{{\min}}$ and
-$p^{{\max}}$ from the windows. $d^{{\max}}$ and $q^{{\max}}$ are $\pi/4$.
+Options:
 
-- `limits` replaces them by [smaller ones](cycles.md#limits-of-residuals), which cut off no optimum.
-- `facet=printed` replaces row (26) by the bound $z \ge -\pi/4$, as in the paper.
-- `stroke_norm` and `beta_norm` are 1 or 2.
-- `relax` makes integers continuous; every formulation except `qp-fixed` has this option."""
+- `limits` replaces $d^{{\max}} = q^{{\max}} = \pi/4$ by [smaller ones](cycles.md#limits-of-residuals), which
+  cut off no optimum.
+- `facet=printed` replaces row (26) by the paper's bound $z \ge -\pi/4$.
+- `stroke_norm` and `beta_norm`, 1 or 2, are the indices of $\text{{strokes}}$ and $\text{{skew}}$.
+- `relax` makes integers continuous, except in `qp-fixed`.
 
-SUPPORT = """Formulations that minimise the same are the same problem; their points carry over by name. `.nl`
-and GAMS files hold every formulation. [solvers.csv](validation/solvers.csv) states which solver takes which.
-*Lifted*: each product of an integer and a continuous variable becomes one column and four rows, without loss.
-Instead of `minlp-parity`, which needs a cosine, write `minlp-quartic`."""
+Variables:"""
+
+EQUAL = "These minimise the same, and points carry over by name:"
+
+SUPPORT = """`.nl` and GAMS files hold every formulation, and LP and MPS files all except `minlp-parity`. They
+hold `minlp-quartic` and `minlp-cubic` *lifted*: each product of an integer and a continuous variable becomes
+one column and four rows, without loss unless relaxed. [solvers.csv](validation/solvers.csv) states which
+solver takes which formulation."""
 
 
 def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes") -> Instance:
