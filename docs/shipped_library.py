@@ -27,11 +27,11 @@ DOCS: Final = Path(__file__).resolve().parent
 MEASURED: Final = DOCS / "library.json"
 POINTS: Final = DEFAULT.parent / "known" / "points"
 PURPOSES: Final = {
-    "tiny": "all solvers of the class, in seconds; both gauges, both facets",
+    "tiny": "all solvers, in seconds; both gauges, both facets",
     "small": "proofs of optimality",
-    "medium": "`crossfield prove` closes most of them in minutes",
-    "large": "reading, presolve, relaxations, heuristics",
-    "mesh": "orthogonal crosses on surfaces",
+    "medium": "`crossfield prove` closes most in minutes",
+    "large": "presolve, relaxations, heuristics",
+    "mesh": "orthogonal crosses",
 }
 Facts = list[dict[str, Any]]
 
@@ -54,10 +54,9 @@ def rungs(entries: Facts) -> str:
     for rung in RUNGS:
         mine = [facts for facts in entries if facts["rung"] == rung]
         instances = {facts["instance"]: facts for facts in mine}.values()
-        sizes = "-" if rung == "mesh" else span([facts["size"] for facts in instances])
         points = span([facts["pixels"] or facts["faces"] for facts in instances])
-        rows.append([rung, sizes, points, str(len(instances)), str(len(mine)), PURPOSES[rung]])
-    heads = ("rung", "longer side", "pixels in the mask, or faces", "instances", "entries", "purpose")
+        rows.append([rung, points, str(len(instances)), str(len(mine)), PURPOSES[rung]])
+    heads = ("rung", "pixels or faces", "instances", "entries", "purpose")
     return markdown(heads, rows)
 
 
@@ -79,9 +78,9 @@ def counts(entries: Facts) -> str:
     tightened = sum(facts["tightened"] for facts in entries)
     certificates = len(list(POINTS.glob("*.certificate.npz")))
     return (
-        f"The library has {len(entries)} entries of {instances} instances: {status['optimal']} are proven "
-        f"optimal, {status['claimed']} claimed and {status['open']} open. {tightened} entries are "
-        f"[tightened](#tightened-entries). Its points include {certificates} certificates."
+        f"{len(entries)} entries of {instances} instances: {status['optimal']} proven optimal, "
+        f"{status['claimed']} claimed and {status['open']} open; {tightened} "
+        f"[tightened](#tightened-entries). They come with {certificates} certificates."
     )
 
 
@@ -93,7 +92,7 @@ def names() -> str:
         if sketch.kind == "sample" and sketch.name != sketch.what
     ]
     return (
-        "Sketches of the library that ships are [samples](samples.md), some under a shorter name: "
+        "Sketches of the library that ships are [samples](samples.md), some with a shorter name: "
         f"{', '.join(short)}."
     )
 
@@ -107,15 +106,12 @@ def main() -> None:
     entries = [dict(entry.facts) for entry in cf.entries()]
     page = DOCS / "library.md"
     replace_between(page, "shipped", f"{rungs(entries)}\n\n{counts(entries)}")
-    replace_between(
-        page, "build", f"A build then only writes files and checks certificates: it takes {minutes()}."
-    )
     replace_between(page, "names", names())
     instances = {facts["instance"] for facts in entries}
     replace_between(
         DOCS / "guides" / "libraries.md",
         "shipped",
-        f"The built-in specification `default` builds the library that ships: {len(entries)} entries of "
+        f"The specification `default` builds the library that ships: {len(entries)} entries of "
         f"{len(instances)} instances, in {minutes()}.",
     )
 
