@@ -104,6 +104,7 @@ def build_locked(
         work = _Build(folder, BuildInputs(ledger, plans, points), tasks, progress)
         for planned in sorted(plans, key=lambda planned: -planned.recipe.size):
             work.begin(planned)  # the last task runs first: small ones, whose faults show at once
+        progress("points and bounds of instances")
         tasks.run()
     complete = without_skipped(plans, work.skipped)
     if not complete:
