@@ -29,7 +29,7 @@ from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.sketch.surfaces import CurvaturePatch, analytic_instance, rotation_by
 from crossfield.models.surface.trust import OFF, right_angle_deviation
 from drawings import SUFFIXES
-from make import csv_text, markdown, replace_between
+from make import csv_text, replace_between
 from studying.plots import open_panels, styles
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -219,9 +219,10 @@ def measure_part(part: str, folder: Path | None, jobs: int) -> Rows:
 
 
 def by_time(rows: Rows) -> str:
-    """Seconds by pixels."""
-    table = [[row["drawing"], str(row["pixels"]), f"{row['seconds']:.1f}"] for row in rows]
-    return markdown(("drawing", "pixels", "processor seconds"), table)
+    """Sentence on one surface at several sizes."""
+    name, _ = TIMED[-1]
+    texts = [f"{row['seconds']:.1f} s at {row['pixels']} pixels" for row in rows if row["drawing"] == name]
+    return f"Processor time (`{name}`): {' and '.join(texts)}."
 
 
 def short_summary(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
@@ -235,17 +236,16 @@ def short_summary(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
     own = [bool(row["doubts"]) for row in drawings if row["drawing"] in SAMPLES]
     others = [bool(row["doubts"]) for row in drawings if row["drawing"] not in SAMPLES]
     return f"""\
-- **Good on clean nets of curvature lines.** On {len(errors)} known surfaces at {max(SIZES)} pixels, the
-  normals from bend fields have mean errors of {min(errors):.1f} to {max(errors):.1f} degrees.
+- **Good on clean nets of curvature lines.** On {len(errors)} known surfaces at {max(SIZES)} pixels, normals
+  from bend fields have mean errors of {min(errors):.1f} to {max(errors):.1f} degrees.
 - **Poor on most drawings by others.** crossfield [flags](#confidence-and-doubts) {sum(others)} of
-  {len(others)} surfaces over them, and {sum(own)} of {len(own)} over our samples.
-- **No doubt is no guarantee.** On a known surface without doubts, the mean error is {max(undoubted):.1f}
+  {len(others)} of their surfaces, and {sum(own)} of {len(own)} of our samples.
+- **No doubt is no guarantee.** A known surface without doubts has a mean error of {max(undoubted):.1f}
   degrees.
-- **The side is a guess.** The default side is right in {sum(sides):.0f} of {len(sides)} cases on known
-  surfaces. Catenoids and saddle sheets look alike inside out: there it is right in {sum(even):.0f} of
-  {len(even)} views.
-- **`confidence` hardly shows errors**: its rank correlation with the true error over the pixels of a surface
-  is {min(ranks):.1f} to {max(ranks):.1f}."""
+- **The side is a guess.** It is right in {sum(sides):.0f} of {len(sides)} cases on known surfaces, but for
+  catenoids and saddle sheets, which look alike inside out, in {sum(even):.0f} of {len(even)} views.
+- **`confidence` hardly shows errors**: its rank correlation with them is {min(ranks):.1f} to
+  {max(ranks):.1f}."""
 
 
 def draw_errors(rows: dict[str, Rows], path: Path) -> None:
@@ -300,7 +300,7 @@ def cell_of(doubts: Any) -> Any:
 
 
 def write_page(rows: dict[str, Rows]) -> None:
-    """Replace the summary and the table of the page, and write its plot and its rows as CSV."""
+    """Replace the summary and the times of the page, and write its plot and its rows as CSV."""
     summary = short_summary(rows["known"], rows["trust"], rows["sides"])
     replace_between(DOCS / "surface.md", "summary", summary)
     replace_between(DOCS / "surface.md", "times", by_time(rows["times"]))
