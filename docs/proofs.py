@@ -243,11 +243,10 @@ def agreement(rows: dict[str, Facts]) -> str:
     """How often another solver proves the same optimum of a small instance."""
     known = [row for row in rows.values() if row["other"] is not None]
     same = sum(difference(row) <= AGREE and row["status"] == "optimal" for row in known)
-    programs = ", ".join(sorted({solver_title(row["by"]) for row in known}))
+    programs = " or ".join(sorted({solver_title(row["by"]) for row in known}))
     return (
-        f"Other solvers ({programs}) prove the optimum of {len(known)} instances with sides of at most "
-        f"{max(int(side) for row in known for side in row['grid'].split(' x '))} pixels. In {same} of them, "
-        f"both optima agree to {AGREE:g} ([list](proofs/optima.csv))."
+        f"On {same} of {len(known)} small instances, {programs} proves the same optimum "
+        "([list](proofs/optima.csv))."
     )
 
 

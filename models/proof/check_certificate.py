@@ -583,6 +583,16 @@ def stroke_costs(level: Level, terms: EnergyTerms, i: int, labels: tuple[Array, 
     """The least over lines and turns of R^2 less its deduction (section 3), or of d (section 9).
 
     labels: alpha, beta and s of each.
+
+    A cross at the fractions f, g of a cell has R at the variance f (1 - f) + g (1 - g), in units of h^2. In
+    the 2-norm, the mean deduction exceeds it by f^2 + g^2 - 3/2 f g >= 0 in a cell whose lower corner has
+    s = 0, by (1 - f - g)^2 for s = -1, by f^2 + g^2 + 1/2 f g - 3/2 (f + g) + 1 >= 1/10 for s = 1, and
+    likewise for s = -2 and -3. Other cells have 1/2.
+
+    In other norms, R goes to three values h apart, with mean r. If all are near, d is linear on them, so its
+    mean is l r or l r - l^2/4. Otherwise no two signs differ in the 1-norm, so |R| is linear, and d <= |R|.
+    In the mixed norm, (R - l/2)/h has the values y, y + 1, y + 2 with y >= 0, or minus these. For y >= 1,
+    each loses at least 1/2, and for y < 1 at least 0, 1 and 1/2, as with s = 0.
     """
     (alpha, beta, s), square, theta = labels, level.h * level.h, terms.theta[i]
     u, v = alpha + beta - theta, alpha + HALF - beta - theta
@@ -705,7 +715,7 @@ class PruningTest:
 class ForwardPass:
     """A forward pass over a level: the bound L of Lemma 2, and the tests of Lemmas 3 and 3a.
 
-    The pass starts from the greatest shares of the later pixels, so that the last sum of Lemma 2 is zero.
+    The shares of later pixels are always the greatest that those of the earlier ones allow.
     """
 
     def __init__(self, level: Level, terms: EnergyTerms, most: float) -> None:
