@@ -239,20 +239,13 @@ def optima(routes: list[dict[str, str]]) -> list[dict[str, str]]:
 
 
 def licences() -> str:
-    """The table of the last runs with a licence."""
-    rows = []
+    """Sentence on the last runs with a licence."""
+    texts = []
     for name, last in json.loads(RECORD.read_text()).items():
-        titles = [PROGRAMS[name].title, *(SOLVERS[solver].title for solver in PROGRAMS[name].solvers)]
         agree, *bad = last["files"]
-        facts = {
-            "program": ", ".join(dict.fromkeys(titles)),
-            "version": last["version"],
-            "last run with a licence": last["date"],
-            "files that agree": str(agree),
-            "differ or fail": str(sum(bad)),
-        }
-        rows.append(facts)
-    return table(rows)
+        found = f"{agree} files agree" + f", {sum(bad)} do not" * any(bad)
+        texts.append(f"{PROGRAMS[name].title} {last['version'].split()[0]} on {last['date']} ({found})")
+    return f"Last runs with a licence: {', '.join(texts)}."
 
 
 SHOWN: Final = ("program", "version", "agree", "refused, as stated", "differ")
@@ -261,15 +254,13 @@ PAGE: Final = """# One instance, all routes
 
 {generated}
 
-A route is a written file and a solver that reads it. Here free programs take every route of one small
-instance. {programs} programs read {right} files correctly and
-{wrong} wrongly. The routes that prove an optimum agree to {apart}.
+A route is a written file and a solver that reads it. Here free programs take every route of one instance.
+{programs} programs read {right} files correctly and {wrong} wrongly. The routes that prove an optimum agree
+to {apart}.
 
-The instance has {shape} pixels, {strokes} random strokes (seed {seed}) and the skew weight 0.001. A solve
-may take {seconds:g} s, on one thread where that can be set. Objectives are recomputed from the declaration
-at the solver's point. Optima must agree to 1e-6.
-
-`crossfield verify DIR --solve SECONDS` makes the same checks for any folder, and writes `verify.json`.
+The instance has {shape} pixels, {strokes} random strokes and the skew weight 0.001. A solve may take
+{seconds:g} s, on one thread where that can be set. Objectives are recomputed at the solver's point.
+`crossfield verify DIR --solve SECONDS` makes the same checks for any folder.
 
 ## Reading
 
@@ -278,25 +269,16 @@ A program refuses a file *as stated* if crossfield lists beforehand that it cann
 
 {reading}
 
-## Licences
-
-The free licences of these programs end, but not that of CPLEX. [licensed.json](licensed.json) keeps the
-last results of each.
-
-{licences}
+{licences} [licensed.json](licensed.json) has their results.
 
 ## Optima
 
 {optima}
 
-[Formulations that minimise the same energy](formulations.md#formats-and-solvers) have the same optimum.
-[routes.csv](validation/routes.csv) has objective, bound and seconds of each route, and
-[variants.csv](validation/variants.csv) the effect of the two [misprints of the paper](errata.md).
-
-## Solvers and formulations
-
-[solvers.csv](validation/solvers.csv) states which solver takes which formulation (`local`: it answers
-without proof), and [refusals.csv](validation/refusals.csv) why a solver does not take one.
+[routes.csv](validation/routes.csv) has each route, and [variants.csv](validation/variants.csv) the effect of
+the two [misprints of the paper](errata.md). [solvers.csv](validation/solvers.csv) states which solver takes
+which formulation (`local`: it answers without proof), and [refusals.csv](validation/refusals.csv) why one
+does not.
 
 ## Starting points
 
@@ -307,10 +289,7 @@ without proof), and [refusals.csv](validation/refusals.csv) why a solver does no
 def page() -> str:
     """The page, from the stored rows."""
     reading, best = read_rows("reading"), optima(read_rows("routes"))
-    starts = [
-        {"solver": SOLVERS[name].title, "suffix": entry.suffix, "how": f"`{entry.use}`"}
-        for name, entry in STARTS.items()
-    ]
+    starts = [{"solver": SOLVERS[name].title, "how": f"`{entry.use}`"} for name, entry in STARTS.items()]
     return PAGE.format(
         generated=generated_line("python docs/validate.py"),
         programs=sum(row["version"] != "absent" for row in reading),
@@ -319,9 +298,8 @@ def page() -> str:
         apart=max((row["proofs differ by"] for row in best if row["proofs differ by"]), key=float),
         shape=" x ".join(map(str, SHAPE)),
         strokes=STROKES,
-        seed=SEED,
         seconds=SECONDS,
-        reading=table([{name: row[name] for name in SHOWN} for row in reading]),
+        reading=table([{name: row[name] for name in SHOWN} for row in reading if row["version"] != "absent"]),
         licences=licences(),
         optima=table(best),
         starts=table(starts),
