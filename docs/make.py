@@ -294,14 +294,13 @@ def draw_tutorials() -> None:
 
 
 GALLERY = """Each drawing is written as the named program writes it, and has something that is easily
-misread. Most show the same body, a black outline and two red lines, and have the same right answer on the
-grid:
+misread. Most show the same body, a black outline and two red lines, and have this right answer on the grid;
+others stand beside their drawings:
 
 ![The mask in grey, and two coloured lines]({answer})
 
-Grey is the mask, and the colour of a line its direction. Other answers stand beside their drawings. No pixel
-may be more than one pixel off (`test_a_drawing_is_read_as_it_looks`). [drawings.csv](gallery/drawings.csv)
-has options and messages of `crossfield instance`."""
+Grey is the mask, and the colour of a line its direction. [drawings.csv](gallery/drawings.csv) has options and
+messages of `crossfield instance`."""
 USUAL = "leaf"
 """The right answer of most drawings."""
 
@@ -318,7 +317,7 @@ def write_gallery() -> None:
         for row in (row for row in table["drawing"] if row["kind"] == kind):
             line = row["shows"] + f" ({row['program']})" * (row["program"] != "browser")
             if "picture" in row:
-                other = f"![right answer]({where}/expected/{row['picture']}.png) " * (row["picture"] != USUAL)
+                other = f"![answer]({where}/expected/{row['picture']}.png) " * (row["picture"] != USUAL)
                 line = f"![{row['file']}]({where}/{row['file']}) {other}{line}"
             lines.append(f"- {line}")
         parts += [f"## {title}", "\n".join(lines)]
