@@ -270,8 +270,8 @@ rotation by 90 degrees changes it in {changed}. At a single stroke of 120 degree
 {angles["box"]} degrees apart with the box, and {angles["strokes"]} with a window around the stroke."""
 
 
-def write_samples() -> None:
-    """Write docs/samples.md: drawing, field and surface of each sample."""
+def write_gallery() -> None:
+    """Write docs/gallery.md: drawing, field and surface of each sample."""
     import sample_gallery
 
     sample_gallery.write_page()
@@ -293,25 +293,25 @@ def draw_tutorials() -> None:
         shutil.copy(Path(name) / "overlay.png", pictures / "pebble_surface.png")
 
 
-GALLERY = """Each drawing is written as the named program writes it, and has something that is easily
+DRAWINGS = """Each drawing is written as the named program writes it, and has something that is easily
 misread. Most show the same body, a black outline and two red lines, and have this right answer on the grid;
 others stand beside their drawings:
 
 ![The mask in grey, and two coloured lines]({answer})
 
-Grey is the mask, and the colour of a line its direction. [drawings.csv](gallery/drawings.csv) has options and
-messages of `crossfield instance`."""
+Grey is the mask, and the colour of a line its direction. [drawings.csv](drawings/drawings.csv) has options
+and messages of `crossfield instance`."""
 USUAL = "leaf"
 """The right answer of most drawings."""
 
 
-def write_gallery() -> None:
-    """Write docs/gallery.md, drawings of many programs, and docs/gallery/drawings.csv, what is reported."""
+def write_drawings() -> None:
+    """Write docs/drawings.md, drawings of many programs, and docs/drawings/drawings.csv, what is reported."""
     folder = DOCS.parent / "tests" / "data" / "drawings"
     where = f"../{folder.relative_to(DOCS.parent).as_posix()}"
     table = tomllib.loads((folder / "drawings.toml").read_text())
-    text = GALLERY.format(answer=f"{where}/expected/{USUAL}.png")
-    parts = ["# Drawings of many programs", generated_line("python docs/make.py gallery"), text]
+    text = DRAWINGS.format(answer=f"{where}/expected/{USUAL}.png")
+    parts = ["# Drawings of many programs", generated_line("python docs/make.py drawings"), text]
     for kind, title in table["kinds"].items():
         lines = []
         for row in (row for row in table["drawing"] if row["kind"] == kind):
@@ -321,9 +321,9 @@ def write_gallery() -> None:
                 line = f"![{row['file']}]({where}/{row['file']}) {other}{line}"
             lines.append(f"- {line}")
         parts += [f"## {title}", "\n".join(lines)]
-    (DOCS / "gallery.md").write_text("\n\n".join(parts) + "\n")
+    (DOCS / "drawings.md").write_text("\n\n".join(parts) + "\n")
     rows = [drawing_row(folder, row) for row in table["drawing"]]
-    (DOCS / "gallery" / "drawings.csv").write_text(csv_text(rows))
+    (DOCS / "drawings" / "drawings.csv").write_text(csv_text(rows))
 
 
 def drawing_row(folder: Path, row: dict[str, Any]) -> dict[str, str]:
@@ -386,8 +386,8 @@ def replace_between(page: Path, name: str, text: str) -> None:
 PAGES: dict[str, Callable[[], None]] = {
     "formulations": write_formulations,
     "errata": write_errata,
-    "samples": write_samples,
     "gallery": write_gallery,
+    "drawings": write_drawings,
     "tutorials": draw_tutorials,
     "figures": draw_figures,
     "traps": write_traps,

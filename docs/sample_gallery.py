@@ -1,6 +1,6 @@
-"""The gallery, docs/samples.md: a thumbnail of every sample, and an archive of its files.
+"""The gallery, docs/gallery.md: a thumbnail of every sample, and an archive of its files.
 
-`python docs/make.py samples` writes page and thumbnails. As a Sphinx extension, this module makes the
+`python docs/make.py gallery` writes page and thumbnails. As a Sphinx extension, this module makes the
 archives, and adds a link to each below its thumbnail.
 """
 
@@ -45,7 +45,7 @@ SHORT: Final = """Use the name of a sample in place of a sketch or mesh:
   and `crossfield shade out/mouse.bend.field.npz -o out` the surface;
 - `crossfield solve cube --method search -o out` makes the field of a mesh.
 
-On the site, *Files* holds the field, the surface and the layers. [Drawings of many programs](gallery.md)
+On the site, *Files* holds the field, the surface and the layers. [Drawings of many programs](drawings.md)
 has more drawings."""
 
 
@@ -86,11 +86,11 @@ def entries() -> list[Entry]:
 
 
 def write_page() -> None:
-    """Write docs/samples.md and its thumbnails."""
+    """Write docs/gallery.md and its thumbnails."""
     import diagrams
     from make import generated_line
 
-    parts = ["# Gallery", generated_line("python docs/make.py samples"), SHORT]
+    parts = ["# Gallery", generated_line("python docs/make.py gallery"), SHORT]
     for kind, title in TITLES.items():
         lines = []
         for entry in (entry for entry in entries() if entry.kind == kind):
@@ -102,7 +102,7 @@ def write_page() -> None:
             description = f"{entry.description[0].upper()}{entry.description[1:]}."
             lines.append(f"- ![{entry.name}](pictures/{path.name})\n\n  **`{entry.name}`** {description}")
         parts += [f"## {title}", "\n".join(lines)]
-    (DOCS / "samples.md").write_text("\n\n".join(parts) + "\n")
+    (DOCS / "gallery.md").write_text("\n\n".join(parts) + "\n")
 
 
 def draw_mesh_thumbnail(field: cf.CrossField, path: Path) -> None:
@@ -139,7 +139,7 @@ def link_archives(_: Sphinx, doctree: document, name: str) -> None:
     """Add a link to its archive to the text below each thumbnail."""
     from docutils.nodes import Text, image, list_item, reference
 
-    if name == "samples":
+    if name == "gallery":
         cards = [item for item in doctree.findall(list_item) if any(item.findall(image))]
         for entry, item in zip(entries(), cards, strict=True):
             next(item.findall(image))["loading"] = "lazy"

@@ -92,7 +92,7 @@ def names() -> str:
         if sketch.kind == "sample" and sketch.name != sketch.what
     ]
     return (
-        "Sketches of the library that ships are [samples](samples.md), some with a shorter name: "
+        "Sketches of the library that ships are [samples](gallery.md), some with a shorter name: "
         f"{', '.join(short)}."
     )
 

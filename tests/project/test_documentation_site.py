@@ -103,7 +103,7 @@ def test_a_model_has_every_term_and_equation_of_its_declaration(browser, address
 
 
 def test_every_thumbnail_of_the_gallery_has_an_archive_with_its_field(site):
-    page = (site / "samples.html").read_text(encoding="utf-8")
+    page = (site / "gallery.html").read_text(encoding="utf-8")
     archives = re.findall(r'href="(gallery/[^"]+\.zip)"', page)
     assert len(archives) == page.count('loading="lazy"') >= 24
     for path in archives:
@@ -128,7 +128,7 @@ def test_a_link_to_a_csv_file_opens_a_page_with_its_rows(browser, address):
         "tutorials/drawing",
         "guides/solvers",
         "reference/api",
-        "samples",
+        "gallery",
         "notebooks/family",
     ],
 )
