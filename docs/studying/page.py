@@ -64,13 +64,11 @@ def counts(rows_of: RowsByPart) -> dict[str, Any]:
     """Numbers of drawings and surfaces, and the machine."""
     fields = [row for part in PARTS for row in rows_of[part]]
     known = {row["instance"] for row in fields if row["instance"] in surfaces()}
-    loads = [row["load"] for row in fields]
     return {
         "drawings": len({row["instance"] for row in fields} - known),
         "surfaces_count": len(known),
         "machine": ", ".join(sorted({row["machine"] for row in fields})),
         "version": ", ".join(sorted({row["version"] for row in fields})),
-        "load": f"{float(np.median(loads)):.1f}",
     }
 
 

@@ -98,28 +98,22 @@ def smallest_error(rows: list[Row]) -> str:
     )
     return (
         f"On our own drawings, at {min(by_size)} to {max(by_size)} pixels, `{best}` has the smallest error, "
-        f"{mean[best]:.1f} degrees, and `{second}` is next: the difference is {effect}."
+        f"{mean[best]:.1f} degrees, and differs from `{second}`, the next, by {effect}."
     )
 
 
 def lowest_energy(rows: list[Row]) -> str:
-    """Sentence on the methods with the lowest energies, and on proofs."""
-    by_size = results(rows)
-    best = [
-        f"`{method}`"
-        for method in next(iter(by_size.values()))
-        if all(of[method].excess < _SAME for of in by_size.values())
-    ]
+    """Sentence on the fields that are proven optimal, and on the energies of `two-stage`."""
     proven = [
         f"{of.optimal} of {of.fields} fields at {size} pixels"
-        for size, methods in by_size.items()
+        for size, methods in results(rows).items()
         for of in methods.values()
         if of.optimal
     ]
     lower, tried = below_all_others(rows, MILP_WAY)
     return (
-        f"{series(best)} have the lowest median energy at every size, and `prove` proves {series(proven)} "
-        f"optimal. `{MILP_WAY}` is below all other methods for {lower} of {tried} fields."
+        f"`prove` proves {series(proven)} optimal. "
+        f"`{MILP_WAY}` is below all other methods for {lower} of {tried} fields."
     )
 
 

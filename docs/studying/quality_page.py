@@ -11,7 +11,7 @@ from crossfield.models.instance.instance import SKEW_WEIGHT, STROKE_WEIGHT
 from . import errors, plots
 from .errors import Change, Kind, change, is_default, is_surface, rows_with_error
 from .rows import Row, Table
-from .wording import percent
+from .wording import percent, series
 
 RowsByPart = dict[str, list[Row]]
 
@@ -71,13 +71,14 @@ def kind_of(row: Row) -> str:
 
 
 def sure_changes(rows: list[Row]) -> str:
-    """Sentence on the changes beyond two standard errors."""
-    parts = []
-    for surfaces, where in ((False, "At hidden curves"), (True, "On surfaces")):
-        effects = changes(rows, surfaces=surfaces).items()
-        sure = [f"{name} ({effect})" for name, effect in effects if effect and effect.sure]
-        parts.append(f"{where}: {'; '.join(sure)}.")
-    return f"Beyond two standard errors are these. {' '.join(parts)}"
+    """Sentence on the changes beyond two standard errors and one degree."""
+    sure = [
+        f"{name} ({effect}, {where})"
+        for surfaces, where in ((False, "hidden curves"), (True, "surfaces"))
+        for name, effect in changes(rows, surfaces=surfaces).items()
+        if effect and effect.sure and abs(effect.mean) > 1
+    ]
+    return f"Beyond two standard errors and one degree are {series(sure)}."
 
 
 def correlation_text(rows: list[Row]) -> str:
@@ -102,7 +103,7 @@ def harmless_gaps(rows: list[Row]) -> str:
     gap, _, more, _ = errors.quartiles([field[1] for field in fields], [field[2] for field in fields])
     after = max(place + 1 for place, field in enumerate(more) if field <= HARM)
     return (
-        f"The median error at hidden curves rises by more than {HARM:g} degrees only above "
+        f"The median error rises by more than {HARM:g} degrees only above "
         f"{percent(gap[after - 1])} to {percent(gap[after])} more energy than the optimum."
     )
 

@@ -56,23 +56,23 @@ def with_interval(values: np.ndarray, statistic: statistics.Statistic, form: str
     return f"{statistic(values):{form}} [{low:{form}}, {high:{form}}]"
 
 
+def solvers_of(formulation: str) -> list[str]:
+    """The solvers that read the files of a formulation."""
+    return [solver for name, solver in PAIRS if name == formulation]
+
+
 def solved_table(rows: list[Row], plan: Plan) -> Table:
     """Numbers of instances that at least one solver solves, and `prove`."""
     cells = []
     for formulation in PROBLEMS:
-        solvers = [solver for name, solver in PAIRS if name == formulation]
-        titles = ", ".join(map(solver_title, solvers))
-        for names, start, words in (
-            *((solvers, start, [titles, start]) for start in STARTS),
-            ([PROVE], "cold", [f"`{PROVE}`", ""]),
-        ):
+        runs = *((solvers_of(formulation), start, start) for start in STARTS), ([PROVE], "cold", f"`{PROVE}`")
+        for names, start, words in runs:
             solved = [
                 {row["instance"] for name in names for row in of[formulation, name, start] if is_solved(row)}
                 for of in groups(rows, plan).values()
             ]
-            cells.append([f"`{formulation}`", *words, *(str(len(instances)) for instances in solved)])
-    heads = (f"{count} pairs" for count in plan.instances)
-    return ("formulation", "at least one of", "start", *heads), cells
+            cells.append([f"`{formulation}`, {words}", *(str(len(instances)) for instances in solved)])
+    return ("file and start", *(f"{count} pairs" for count in plan.instances)), cells
 
 
 def details_table(rows: list[Row], plan: Plan) -> Table:
@@ -273,8 +273,11 @@ def sentences(rows: list[Row], plan: Plan) -> dict[str, Any]:
     closed = [row for row in long_runs if is_solved(row)]
     return {
         "claims": claims(rows),
-        "solved_cold": series(solved[0][3:]),
-        "solved_by_prove": series(solved[2][3:]),
+        "solved_cold": series(solved[0][1:]),
+        "solvers": " or of ".join(
+            f"{series(map(solver_title, solvers_of(formulation)))} (`{formulation}`)"
+            for formulation in PROBLEMS
+        ),
         "turned": f"{ratios[0]} to {ratios[-1]}",
         "long_by_solvers": sum(row["solver"] != PROVE for row in closed),
         "long_runs": sum(row["solver"] != PROVE for row in long_runs),
