@@ -111,8 +111,8 @@ SHORT = {
     expression(R - beta): "R_i",
 } | {text: name for name, text in SUMS.items()}
 """Expressions that the page on formulations writes once, and their names."""
-NAMED = r", \qquad ".join(
-    f"{name} = {text}"
+NAMED = "\n".join(
+    f"- ${name} = {text}$"
     for name, text in {
         "p_{ij}": expression(JUMP),
         "A_{ij}": expression(A_WHOLE),
@@ -140,9 +140,9 @@ which $p^{{\min}}$ and $p^{{\max}}$ follow. $C$ is a basis of the [cycles](cycle
 pairs and strokes. $H_c$ is the sum of the turns $\pm\kappa_{{ij}}$ along a cycle, plus $\theta_i - \theta_j$
 for a walk from stroke to stroke. Between pixels, $\kappa_{{ij}} = 0$.
 
-$$
+Expressions:
+
 {NAMED}
-$$
 
 Options:
 
