@@ -19,6 +19,7 @@ from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField, Norm
 from ..instance.file import instance_arrays, instance_of_arrays
 from ..instance.instance import Instance
+from ..processes.process_pool import parallel_map
 from ..storage import read_bytes, write_bytes
 from . import check_certificate, check_orthogonal
 from .check_certificate import ProvenClaim
@@ -29,6 +30,8 @@ REFUSALS: Final = (check_certificate.NotProvenError, check_certificate.Unreadabl
 """Errors of the checker for a proof that does not hold."""
 
 _PREFIX: Final = "instance_"
+_FEW, _MANY = 400_000, 10_000_000
+"""Labels of a proof whose check takes longer than to start processes, and 1 GB of memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +114,16 @@ def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certi
     return Certificate(checked.field, checked.energy, checked.bound, proven)
 
 
-def check_proof(proof: Proof) -> Proof:
+def check_proof(proof: Proof, jobs: int = 1) -> Proof:
     """The proof with the checker's findings, and with the bound and the forced jumps that it confirms.
 
-    Raises one of `REFUSALS` for a proof that does not hold.
+    jobs: processes that share the levels, where that saves time and memory allows it. Raises one of
+    `REFUSALS` for a proof that does not hold, and WorkerError when a process dies.
     """
     arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
-    passed = check_certificate.pass_levels(arrays)
+    shares = _FEW <= sum(level.size for level in proof.levels) <= _MANY
+    with parallel_map(check_certificate.pass_level, min(jobs, len(proof.levels)) if shares else 1) as do_all:
+        passed = check_certificate.pass_levels(arrays, lambda _, tasks: do_all(tasks))
     pieces = _last_step_arrays(proof, passed)
     proven = check_certificate.check_last_step(arrays | pieces, passed)
     ended = "optimal" if proven.status == "optimal" else proof.ended

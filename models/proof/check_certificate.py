@@ -54,7 +54,8 @@ MOST_ANGLE = 16.0
 MOST_JUMP = 64
 MOST_WEIGHT = 1e6
 MOST_UNIT = 1.0  # of a share or a table
-ROWS, BLOCK = 32, 1 << 16  # rows of a product, and numbers, that NumPy handles at once
+ROWS, BLOCK = 32, 1 << 16  # rows of a large product, and numbers, that NumPy handles at once
+SMALL = 1 << 19  # terms of a product up to which leaving some out costs more than it saves
 
 PARTS = (
     "head", "instance_head", "instance_origin", "instance_mask", "instance_stroke_pixels", "instance_theta",
@@ -459,7 +460,8 @@ class Level:
 
     alpha, beta (n,): the centres. least (n, 2): the least k and l of each pixel. allowed: of each pixel, by k
     and l. offset (n,): o. shares: what each pair gives to the allowed labels of its earlier pixel, row by
-    row. rows, columns: the numbers of the alphas and betas of each pixel that have an allowed label.
+    row. rows, columns: the numbers of the alphas and betas of each pixel that have an allowed label. sides,
+    used: these alphas and betas, and which of their labels are allowed.
     """
 
     h: float
@@ -473,11 +475,18 @@ class Level:
     tables: dict[int, Array] = field(init=False)  # the sum at each pair that has some
     rows: list[Array] = field(init=False)
     columns: list[Array] = field(init=False)
+    sides: list[tuple[Array, Array]] = field(init=False)
+    used: list[Array] = field(init=False)
 
     def __post_init__(self) -> None:
         self.rows, self.columns = (
             [np.flatnonzero(allowed.any(axis=axis)) for allowed in self.allowed] for axis in (1, 0)
         )
+        self.sides, self.used = [], []
+        for i, (rows, columns) in enumerate(zip(self.rows, self.columns)):
+            alpha, beta = self.angles(i)
+            self.sides.append((alpha[rows], beta[columns]))
+            self.used.append(self.allowed[i][np.ix_(rows, columns)])
         self.tables = {}
         for quad in self.quads:
             for e, table in zip(quad.pairs, quad.tables):
@@ -625,32 +634,24 @@ class PairCost:
 
     def __init__(self, level: Level, terms: EnergyTerms, e: int) -> None:
         i, j = int(terms.first[e]), int(terms.second[e])
-        (alpha_i, beta_i), (alpha_j, beta_j) = (
-            (alpha[level.rows[x]], beta[level.columns[x]])
-            for x in (i, j)
-            for alpha, beta in [level.angles(x)]
-        )
+        (alpha_i, beta_i), (alpha_j, beta_j) = level.sides[i], level.sides[j]
         lowest = math.ceil(-2 * float(alpha_i[-1] - alpha_j[0]) / math.pi - 1 - 1e-6)
         highest = math.floor(-2 * float(alpha_i[0] - alpha_j[-1]) / math.pi + 1 + 1e-6)
         table: Any = level.tables[e][np.ix_(level.rows[i], level.rows[j])] if e in level.tables else 0.0
-        reach = sum(float(np.abs(x).max()) for x in (alpha_i, beta_i, alpha_j, beta_j))
+        reach = sum(max(abs(float(x[0])), abs(float(x[-1]))) for x in (*level.sides[i], *level.sides[j]))
         self.size = (1.0 + reach + HALF * max(-lowest, highest, 0)) ** 2 + float(np.abs(table).max())
-        self.allowed = [level.allowed[x][np.ix_(level.rows[x], level.columns[x])] for x in sorted((i, j))]
+        self.allowed = [level.used[x] for x in sorted((i, j))]
         parts = []
-        for parity in (0, 1):
-            jumps = [p for p in range(lowest, highest + 1) if p % 2 == parity]
-            if not jumps:
-                continue
-            a = np.abs(alpha_i[:, None] - alpha_j + HALF * jumps[0])
-            for p in jumps[1:]:
-                a = np.minimum(a, np.abs(alpha_i[:, None] - alpha_j + HALF * p))
-            b = np.abs((1 - 2 * parity) * beta_i[:, None] - beta_j)
+        for jumps in (range(lowest, highest + 1, 2), range(lowest + 1, highest + 1, 2)):
+            a = functools.reduce(np.minimum, (np.abs(alpha_i[:, None] - alpha_j + HALF * p) for p in jumps))
+            b = np.abs((1 - 2 * (jumps[0] % 2)) * beta_i[:, None] - beta_j)
             if terms.norm == 2:
                 a, b = a * a - level.h * level.h / 2, b * b
             a, b = 2 * a + table, 2 * b
             parts.append((a, b) if i < j else (a.T, b.T))
-        most = min(float(a.max() + b.max()) for a, b in parts)
-        self.parts = [(a, b) for a, b in parts if a.min() + b.min() <= most]  # others are nowhere less
+        ranges = [(a.min() + b.min(), a.max() + b.max()) for a, b in parts]
+        most = min(greatest for _, greatest in ranges)
+        self.parts = [part for part, (least, _) in zip(parts, ranges) if least <= most]  # others nowhere less
 
     def least_sums(self, at_labels: Array, *, back: bool = False) -> Array:
         """The least at_labels(x) + c'(x, y) over x of the earlier pixel, for each label y of the later one.
@@ -673,8 +674,11 @@ class PairCost:
 def min_plus_product(left: Array, right: Array) -> Array:
     """The matrix of min over k of left[x, k] + right[k, y]; left may be inf, but no row of it.
 
-    Some rows are computed at a time, without the terms k that are nowhere less than the best one of its row.
+    Of a large product, some rows are computed at a time, without the terms k that are nowhere less than the
+    best one of its row.
     """
+    if left.size * right.shape[1] <= SMALL:
+        return _min_plus_block(left, right)
     product = np.empty((len(left), right.shape[1]))
     least, most = right.min(axis=1), right.max(axis=1)
     for begin in range(0, len(left), ROWS):
@@ -1090,8 +1094,33 @@ def check_arrays(arrays: dict[str, Array]) -> ProvenBoxes:
     return check_last_step(arrays, pass_levels(arrays))
 
 
-def pass_levels(arrays: dict[str, Array]) -> PassedLevels:
-    """Do the passes over all levels; check that the first is the whole strip and each covers what is left."""
+def arrays_for(arrays: dict[str, Array], number: int) -> dict[str, Array]:
+    """The arrays without those of other levels than one."""
+    wanted = f"level_{number}_"
+    return {
+        name: array
+        for name, array in arrays.items()
+        if name.startswith(wanted) or not name.startswith("level_")
+    }
+
+
+def pass_level(task: tuple[dict[str, Array], int, float]) -> tuple[float, list[Array]]:
+    """Do the pass over one level; return its bound, and the cells that it leaves at each pixel.
+
+    task: the arrays of the certificate without those of other levels, the number of the level, and the
+    greatest energy of interest.
+    """
+    arrays, number, most = task
+    terms, _, _ = terms_with_strokes(arrays, *terms_of(arrays))
+    passed = ForwardPass(level_of(arrays, number, terms), terms, most)
+    return passed.bound, passed.remaining_cells(most)
+
+
+def pass_levels(arrays: dict[str, Array], do_all: Callable[..., Any] = map) -> PassedLevels:
+    """Do the passes over all levels; check that the first is the whole strip and each covers what is left.
+
+    do_all: does `pass_level` on a list of tasks, here or in other processes.
+    """
     whole, at = terms_of(arrays)
     alpha, beta, p = field_of(arrays, whole)
     energy, error = energy_of(whole, alpha, beta, p)
@@ -1099,16 +1128,16 @@ def pass_levels(arrays: dict[str, Array]) -> PassedLevels:
     count = level_count(head_of(arrays))
     slack = sliver_slack(terms.weight, terms.w_beta, count)
     most = energy + error + slack
+    tasks = [(arrays_for(arrays, number), number, most) for number in range(count)]
     bounds: list[float] = []
     level, cells = level_of(arrays, 0, terms), list[Array]()
     check_whole_strip(level)
-    for number in range(count):
+    for number, (bound, left) in enumerate(do_all(pass_level, tasks)):
         if number:
             before, level = level, level_of(arrays, number, terms)
             check_covered(before, cells, level, number)
-        passed = ForwardPass(level, terms, most)
-        bounds.append(passed.bound)
-        cells = passed.remaining_cells(most)
+        bounds.append(bound)
+        cells = left
     last = None
     if all(left.any() for left in cells):
         boxes = boxes_of(level, cells, 2 * (count + 1) * SLIVER)

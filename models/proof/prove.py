@@ -10,6 +10,7 @@ from ..arguments import check_arguments, check_count
 from ..errors import InputError
 from ..field.field import CrossField, Norm, check_norm, field_in_windows
 from ..instance.instance import Instance
+from ..processes.child_program import WorkerError
 from ..processes.compilation import crew
 from ..processes.deadline import Deadline, Progress, Stop, silent, stop_function
 from ..processes.job_counts import check_jobs
@@ -71,7 +72,7 @@ def prove(
     seed
         Seed of the search that follows a level with a wide gap.
     jobs
-        Number of processes of that search.
+        Number of processes of that search, and of the check of many labels.
     progress
         Receives a line of text every few passes.
     stop
@@ -135,6 +136,6 @@ def prove(
         return proof
     progress("checking the levels")
     try:
-        return check_proof(proof)
-    except (*REFUSALS, MemoryError):  # `write_certificate` names the reason
+        return check_proof(proof, chosen.threads or jobs)
+    except (*REFUSALS, MemoryError, WorkerError):  # `write_certificate` names the reason
         return replace(proof, bound=0.0, forced=0)

@@ -22,6 +22,7 @@ from crossfield.export.cli.app import invoke
 from crossfield.models.array_archive import pack_arrays
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
+from crossfield.models.processes.process_pool import parallel_map
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.last_step import minimise_on_boxes
@@ -79,6 +80,15 @@ def test_the_same_proof_gives_the_same_bytes(tmp_path):
     for name in ("one.npz", "other.npz"):
         write_certificate(proven(1), tmp_path / name)
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()
+
+
+def test_levels_that_two_processes_check_give_the_same(written):
+    _, arrays = written(1)
+    alone = check_certificate.pass_levels(arrays)
+    with parallel_map(check_certificate.pass_level, 2) as check_in_processes:
+        shared = check_certificate.pass_levels(arrays, lambda _, tasks: check_in_processes(tasks))
+    assert shared.bounds == alone.bounds
+    np.testing.assert_array_equal(shared.last.boxes, alone.last.boxes)
 
 
 @pytest.mark.parametrize("norm", [2, 1, "mixed"])
