@@ -58,7 +58,8 @@ _ENCODING: Final = (
 )
 _BAND: Final = 1 << 20  # pixels of a picture whose normals are computed together
 _CACHED: Final = 1 << 16  # pixels whose colours are: what they need fits into the processor's cache
-_COMPRESSION: Final = 4  # a fifth larger than by the usual 6, in half the time
+_COMPRESSION: Final[dict[str, Any]] = {"compress_level": 1, "compress_type": 3}
+"""Of PNG files: repeated bytes alone (`Z_RLE` of zlib); other repetitions are rare in smooth colours."""
 _RIM: Final = 4.0  # pixels beyond the outline with colours, so that programs can scale a picture
 _WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
@@ -195,7 +196,7 @@ def encode_png(picture: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(picture).save(stream, "PNG", compress_level=_COMPRESSION)
+    Image.fromarray(picture).save(stream, "PNG", **_COMPRESSION)
     return stream.getvalue()
 
 

@@ -8,7 +8,7 @@ import pytest
 from crossfield.export.library.building import fields
 from crossfield.export.library.building.build import build
 from crossfield.export.library.plan.recipe import plan_library
-from crossfield.export.library.plan.spec import default_spec, read_spec, spec_of
+from crossfield.export.library.plan.spec import DEFAULT, default_spec, read_spec, spec_of
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import read_field
 from loops import for_each
@@ -50,6 +50,10 @@ def built(tmp_path_factory):
 
 
 # The specification
+
+
+def test_the_specification_that_ships_obeys_its_schema():
+    assert read_spec(DEFAULT) == default_spec()
 
 
 @for_each(
