@@ -42,8 +42,8 @@ def prove_command(
     """Compute a field and prove how far its energy can be from the minimum.
 
     The certificate in the folder can be checked with --check, or by a separate program without crossfield.
-    The check of the certificate comes after the time limit. Ctrl-C ends the search, and keeps all that is
-    proven so far.
+    The check of the certificate comes after the time limit, and for orthogonal crosses within it. Ctrl-C ends
+    the search, and keeps all that is proven so far.
     """
     if check is not None:
         if source is not None or output is not None:

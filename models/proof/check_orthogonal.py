@@ -30,13 +30,12 @@ FORMAT, VERSION = "crossfield-orthogonal-certificate", 2
 HALF, QUARTER, MARGIN = base.HALF, base.QUARTER, base.ROUNDING * base.PRECISION
 RELATIVE = 1e-9
 FLAT = 1.1e-8  # radians; instances take smaller turns between frames as 0
-MOST_LEVELS = 64
-MOST_DIVISIONS = 10_000  # cells of a quarter turn
+MOST_LEVELS, MOST_DIVISIONS = 64, 10_000  # of a certificate; cells of a quarter turn
 STRIDE = 4 * MOST_DIVISIONS  # between keys of labels of two points
 MOST_COSTS = 1 << 27  # of two labels of all pairs of a level: some 10 GB
 MOST_RING = 64  # pairs of a ring
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
-AT_ONCE = 1 << 17  # numbers in a processor's cache
+AT_ONCE = 1 << 16  # sums of numbers below which fewer steps are faster than less memory
 MOST_CASES = 256  # of integers after the last level
 MOST_NUMBER = 1e6  # of a weight and of an angle
 TURNS = np.arange(-3, 4)  # by which an integer may differ from that of the centre
@@ -330,10 +329,11 @@ class Excess:
         *steps, last = self._along(ring, tables, lambda s, table: np.where(np.isfinite(s), -table, np.inf))
         return float((reduce(min_plus, steps) + last.T).min())
 
-    def ring_marginals(self, ring: Ring, tables: list[Array], least: float) -> list[Array]:
-        """Of each two labels of the pairs of a ring, the least sum of all excesses on it."""
-        steps = self._along(ring, tables, np.subtract)
-        steps = [s + self.by_point[i][:, None] for s, i in zip(steps, ring[2])]
+    def ring_marginals(self, ring: Ring, tables: list[Array], least: float, left: list[Array]) -> list[Array]:
+        """Of each two labels that are left of the pairs of a ring, the least sum of all excesses on it."""
+        steps, here = self._along(ring, tables, np.subtract), [left[i] for i in ring[2]]
+        inside = map(np.ix_, here, [*here[1:], here[0]])
+        steps = [(s + self.by_point[i][:, None])[labels] for s, i, labels in zip(steps, ring[2], inside)]
         before = list(itertools.accumulate(steps[:-1], min_plus))  # from the first point
         after = list(itertools.accumulate(steps[:0:-1], lambda back, step: min_plus(step, back)))[::-1]
         middle = [step + min_plus(back, on).T for step, on, back in zip(steps[1:-1], before, after[1:])]
@@ -370,26 +370,27 @@ def min_plus(one: Array, other: Array) -> Array:
     """The least sum over the middle labels."""
     if one.size * other.shape[1] <= AT_ONCE:
         return (one[:, :, None] + other).min(axis=1)
-    return np.array([(row[:, None] + other).min(axis=0) for row in one])
+    least, total = one[:, :1] + other[0], np.empty((len(one), other.shape[1]))
+    for column, row in zip(one.T[1:, :, None], other[1:]):
+        np.minimum(least, np.add(column, row, out=total), out=least)
+    return np.asarray(least)
 
 
 def kept_of(level: CellLevel, excess: Excess, forests: Array, most: float) -> Array:
     """Lemma 4: the squares that an optimal field of energy `most` or less may use."""
     spare = (most - excess.bound + 2 * excess.error) * (1 + RELATIVE)
-    labels, pairs = excess.points <= spare, np.add(*level.pairs.at_ends(excess.points))
-    for forest in forests:
-        labels &= excess.forest_marginals(forest.tolist()) <= spare
-    pairs = pairs + excess.pairs <= spare
-    for ring, tables, least in excess.rings:
-        for e, marginal in zip(ring[0], excess.ring_marginals(ring, tables, least)):
-            level.pairs.matrix(pairs, e)[:] &= marginal <= spare
+    marginals = [excess.forest_marginals(forest.tolist()) for forest in forests]
+    labels = np.maximum.reduce([excess.points, *marginals]) <= spare
+    pairs = np.add(*level.pairs.at_ends(np.where(labels, excess.points, np.inf))) + excess.pairs <= spare
+    labels &= level.pairs.have_partners(pairs)
+    left = [np.nonzero(kept)[0] for kept in np.split(labels, level.pairs.start[1:-1])]
+    for ring, tables, least in excess.rings if min(map(len, left)) else ():
+        for e, marginal in zip(ring[0], excess.ring_marginals(ring, tables, least, left)):
+            ends = np.ix_(*(left[i] for i in level.rows.ends[e]))
+            level.pairs.matrix(pairs, e)[ends] &= marginal <= spare
     squares = level.allowed & np.logical_or.reduce([pairs[corner] for corner in level.corners()])
-    cells = labels[level.ends].any(axis=0)
-    for _ in range(2):
-        squares &= np.logical_and(*level.squares.at_ends(cells))
-        squares[level.squares.begin[level.rows.pairs] :] = True  # those of strokes are not stored
-        cells = level.squares.have_partners(squares)
-    return squares
+    squares[level.squares.begin[level.rows.pairs] :] = True  # those of strokes are not stored
+    return squares & np.logical_and(*level.squares.at_ends(level.squares.have_partners(squares)))
 
 
 # Section 4: the last step ----------------------------------------------------------------------------------
@@ -451,8 +452,7 @@ def check_arrays(arrays: dict[str, Array], limit: Array | None = None) -> base.P
             packed = base.take_array(arrays, f"level_{number - 1}_squares", "|u1", (size + 7) // 8)
             stored = level.allowed.copy()  # all squares of strokes
             stored[:size] &= np.unpackbits(packed, count=size).astype(bool)
-            covers = (stored | ~squares).all()
-            base.require(covers, f"level {number}", "does not cover what the level before leaves")
+            base.require(stored | ~squares, f"level {number}", "does not cover what the level before leaves")
             level = next_level(level, stored, count // level.divisions)
         excess = Excess(level, costs_of(level), *stored_shares(arrays, number, level))
         bounds.append(excess.bound)

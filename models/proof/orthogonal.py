@@ -31,13 +31,12 @@ from . import check_orthogonal as checker
 from .check_certificate import OPTIMAL
 from .check_orthogonal import CellLevel, CentredRows
 from .orthogonal_certificate import LevelFacts, OrthogonalProof, check_proof
-from .orthogonal_dual import RingDual
+from .orthogonal_dual import RingDual, update_rings
 
 if TYPE_CHECKING:
     from .descent import Termination
 
-Neighbours = list[list[tuple[int, int]]]
-"""Of each point, its neighbours and the pairs with them."""
+Neighbours = list[list[tuple[int, int]]]  # of each point, its neighbours and the pairs with them
 
 _COARSEST: Final = 15  # cells of a quarter turn
 _FINEST: Final = 3645
@@ -52,9 +51,10 @@ _FEW: Final = 0.4  # share of labels left below which a record of the level pays
 _CLOSER: Final = 0.3  # part of the gap of the last record, from which another one makes rings cheaper
 _ENOUGH: Final = 0.1  # the same for a tiny gap
 _TINY: Final = 1e-3  # relative gap below which finer labels follow
-_MANY: Final = 0.1  # share of new rings above which they come into use at the same spacing
-_CAP: Final = 3.0  # gaps from which sums on rings count alike, before a bound counts
-_WIDE: Final = 0.01  # relative gap: a search follows, after a given field on a finer level
+_MOST_OF: Final = 0.9  # of what rings cost: those with the rest come into use later, unless the gap is loose
+_MANY: Final = 0.1  # share of new rings above which they may come into use at the same spacing
+_LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one
+_WIDE: Final = 0.01  # relative gap after which a search follows, from the second spacing on
 _SEARCH: Final = 0.05  # share of the time left for it
 _ROUNDS: Final = 10  # of that search
 _BETTER: Final = 1e-9  # relative: a better field; also what a level keeps more than the checker asks for
@@ -65,13 +65,12 @@ def prove_orthogonal(
 ) -> OrthogonalProof:
     """Find a field of orthogonal crosses, and prove a lower bound of the energy of all.
 
-    The instance has the gauge `strokes`. The proof is checked after its limits.
+    The instance has the gauge `strokes`. The time limit includes the check, whose seconds are forecast.
     """
     began = time.monotonic()
     energy = OrthogonalEnergy.of(instance)
     starts = starting_integers(instance, energy, start, ends.over)
-    search_at = _COARSEST if start is None else 3 * _COARSEST  # a given field is rarely far from the best
-    prover = _Prover(instance, energy, starts, ends, progress, seed, search_at)
+    prover = _Prover(instance, energy, starts, ends, progress, seed)
     proof = prover.proof(prover.run(), began)
     if not proof.levels:
         return proof
@@ -90,6 +89,8 @@ class _CentredLevels:
     forced: int = 0
     convex: float = -math.inf
     gap: float = math.inf  # at the last level
+    seconds: float = 0.0  # that the checker took
+    pace: float = 0.0  # seconds per unit of work at the last level
 
     @property
     def bound(self) -> float:
@@ -124,7 +125,7 @@ def spanning_forest(near: Neighbours, value: Floats) -> list[int]:
 class _Prover:
     """The best field, and the chain that proves most. z: integers of the field; least: its energy.
 
-    starts: integers to begin with. search_at: cells per quarter turn of the level that the search may follow.
+    starts: integers to begin with. searched: whether a search was made.
     """
 
     instance: Instance
@@ -133,7 +134,7 @@ class _Prover:
     ends: Termination
     progress: Progress
     seed: int = 0
-    search_at: int = _COARSEST
+    searched: bool = False
 
     def __post_init__(self) -> None:
         domain, arrays = self.instance.domain, instance_arrays(self.instance).items()
@@ -172,7 +173,8 @@ class _Prover:
 
     def _go_through_levels(self) -> str:
         """Go through the levels round the best field; the reason of the end, empty for a better field."""
-        if reason := self.ends.reason():
+        reason, small = self.ends.reason(), self.instance.domain.size <= checker.MOST_DENSE
+        if reason and (reason != "time" or self.proven.levels or not small):
             return reason
         if len(self.instance.domain.first) * (_COARSEST + 1) ** 2 > _MOST_COSTS:
             return "labels"
@@ -181,9 +183,12 @@ class _Prover:
         while True:
             costs = checker.costs_of(level)
             dual = RingDual(level, costs, self.order, rings)
+            ahead = max(chain.seconds + 2 * dual.work * chain.pace, self.proven.seconds)
+            if chain.levels and self.ends.over(ahead):
+                return self.ends.reason() or "time"
             if before is not None:
                 dual.interpolate(before)
-            closing = self._ascend(dual, chain)
+            closing = self._ascend(dual, chain, ahead)
             if self._find_better_field(dual) and not self.ends.over():
                 return ""
             least = self.least
@@ -191,11 +196,14 @@ class _Prover:
             if chain.bound >= self.proven.bound:
                 self.proven = chain
             reason = self._reason_to_end(chain)
-            wide = level.divisions == self.search_at and self.least - chain.bound > _WIDE * self.least
-            if reason or self.least < least or (wide and self._search(_SEARCH * self.ends.deadline.left())):
+            search = not self.searched and level.divisions > _COARSEST and chain.gap > _WIDE * self.least
+            if reason or self.least < least or (search and self._search(_SEARCH * self.ends.deadline.left())):
                 return reason
-            more = self._more_rings(dual)
-            factor = 1 if closing else self._next_factor(level, squares, more=len(more) > _MANY * len(rings))
+            loose = self.least - chain.bound > _LOOSE * self.least
+            more = self._more_rings(dual, 1.0 if loose else _MOST_OF)
+            many = len(more) > _MANY * len(rings)
+            closing |= many and loose and level.divisions == _COARSEST
+            factor = 1 if closing else self._next_factor(level, squares, more=many)
             if not factor:
                 return "labels"
             rings = rings + more
@@ -209,20 +217,18 @@ class _Prover:
         energy, error = checker.energy_of({"alpha": best.alpha, "p": best.p}, rows)
         return _CentredLevels(rows, energy * (1 + _BETTER) + 2 * error, arrays)
 
-    def _ascend(self, dual: RingDual, chain: _CentredLevels) -> bool:
-        """Passes until the bound rises slowly, or few labels are left; whether rings close much of it."""
+    def _ascend(self, dual: RingDual, chain: _CentredLevels, ahead: float) -> bool:
+        """Passes until the bound rises slowly, or few labels or seconds are left; whether rings close it."""
         reached, rings, closing, most = -math.inf, bool(dual.ring_numbers), False, chain.threshold
-        if rings:
-            dual.update_rings(_CAP * max(most - self.proven.bound, 0.0) + 0.1, backward=False)
         for number in range(_MOST_PASSES):
             for _ in range(_BETWEEN if rings else 1):
                 dual.pass_over(most, forward=True)
                 bound, left = dual.pass_over(most, forward=False)
             if rings:
-                dual.update_rings(max(most - bound, 0.0), backward=bool(number % 2))
+                update_rings(dual.state, dual.rings, max(most - bound, 0.0))
             gap = most - bound
             closing = rings and number > 1 and _TINY * most < gap < _CLOSER * chain.gap
-            if self.ends.over() or closing or (rings and gap < _ENOUGH * chain.gap):
+            if self.ends.over(ahead) or closing or (rings and gap < _ENOUGH * chain.gap):
                 break
             if number % _PASSES == _PASSES - 1:
                 if bound - reached < _SLOW[rings and gap > _WIDE * most] * gap or left < _FEW:
@@ -246,7 +252,7 @@ class _Prover:
         hunt = IntegerSearch(self.energy, self.instance.domain.rings, starts, self.seed)
         while hunt.round < _ROUNDS and not limit.passed() and not self.ends.over():
             hunt.explore(lambda: limit.passed() or self.ends.over())
-        self.search_at = 0
+        self.searched = True
         return self._offer(hunt.best.z)
 
     def _offer(self, z: Ints) -> bool:
@@ -262,14 +268,14 @@ class _Prover:
         Other processors round differently, and must not find more.
         """
         prefix, level, rows = f"level_{len(chain.levels)}_", dual.level, chain.rows
+        began = self.ends.deadline.clock()
         chain.gap, most = chain.threshold - dual.bound, chain.threshold * (1 + _BETTER) + 1e-12
         numbers = dual.arrays(max(chain.gap, 1e-6 * (1 + chain.threshold)))
         chain.arrays |= {prefix + name: array for name, array in numbers.items()}
         excess = checker.Excess(level, costs, *checker.stored_shares(chain.arrays, len(chain.levels), level))
         count, lost = np.diff(level.pairs.begin), np.minimum(excess.pairs, max(most - excess.bound, 0.0))
         value = (np.bincount(level.pairs.row, lost, len(count)) / count)[: rows.pairs]
-        varied = value * np.random.default_rng(0).uniform(size=len(value))
-        forests = np.array([spanning_forest(self.near, v) for v in (value, varied)], dtype=np.int32)
+        forests = np.array([spanning_forest(self.near, value)], dtype=np.int32)
         squares: Bools = checker.kept_of(level, excess, forests, most)
         bits = np.packbits(squares[: level.squares.begin[rows.pairs]])
         chain.arrays |= {f"{prefix}forests": forests, f"{prefix}squares": bits}
@@ -283,6 +289,8 @@ class _Prover:
         chain.convex = checker.cases_bound(rows, turns, angles)
         for z in cases:
             self._offer(z)
+        seconds = self.ends.deadline.clock() - began
+        chain.seconds, chain.pace = chain.seconds + seconds, seconds / dual.work
         return squares
 
     def _reason_to_end(self, chain: _CentredLevels) -> str:
@@ -291,12 +299,13 @@ class _Prover:
             return "optimal"
         return "gap" if self.least - self.proven.bound <= self.ends.gap * self.least else self.ends.reason()
 
-    def _more_rings(self, dual: RingDual) -> list[int]:
-        """Rings whose pairs cost more at the centre than their shares, and that are not in use."""
+    def _more_rings(self, dual: RingDual, share: float) -> list[int]:
+        """Rings with that share of what pairs cost at the centre beyond their shares, and not in use."""
         gaps = dual.ring_gaps()
         gaps[dual.ring_numbers] = 0.0
         order = np.argsort(-gaps, kind="stable")
-        return list(map(int, order[gaps[order] > 1e-6 * max(self.least, 1.0)]))
+        gaps, before = gaps[order], np.cumsum(gaps[order]) - gaps[order]
+        return list(map(int, order[(gaps > 1e-6 * max(self.least, 1.0)) & (before < share * gaps.sum())]))
 
     def _next_factor(self, level: CellLevel, squares: Bools, *, more: bool) -> int:
         """How many parts each cell has on the next level; 0 if no level helps."""
@@ -304,8 +313,6 @@ class _Prover:
         counts, rows = 3.0 * np.bincount(left, minlength=level.rows.size + 1) + 1, level.rows
         finer = counts[rows.first[: rows.pairs]] @ counts[rows.second[: rows.pairs]]
         narrow = counts.sum() < _NARROW * 3 * len(level.cells)
-        if more and level.divisions == _COARSEST:
-            return 1
         if level.divisions < _FINEST and finer <= (_MOST_COSTS / 20 if narrow else _MOST_COSTS):
             return 3
         return 1 if narrow or more else 0

@@ -23,6 +23,7 @@ Indices = NDArray[np.int64]
 _PART_OF_GAP: Final = 0.02  # that rounding the shares and tables may cost
 _MOST: Final = 2**31 - 1
 _AT_ONCE: Final = 1 << 16  # entries of tables, to spare memory
+_OF_PAIRS: Final = 60  # work for two labels of a pair, next to that for three of a ring
 
 
 class DualArrays(NamedTuple):
@@ -72,15 +73,10 @@ class RingDual:
         """Begin with shares and tables of 0. order: of the points in a pass. rings: those in use."""
         self.level, self.ring_numbers, self.bound = level, rings, -np.inf
         rows, pairs, m = level.rows, level.pairs, level.rows.pairs
-        point, counts, rank = (
-            np.append(rows.first[:m], rows.second[:m]),
-            np.diff(pairs.start),
-            np.argsort(order),
-        )
-        unary, share_start = (
-            np.where(pairs.have_partners(np.isfinite(costs)), 0.0, np.inf),
-            starts_of(counts[point]),
-        )
+        point = np.append(rows.first[:m], rows.second[:m])
+        counts, rank = np.diff(pairs.start), np.argsort(order)
+        unary = np.where(pairs.have_partners(np.isfinite(costs)), 0.0, np.inf)
+        share_start = starts_of(counts[point])
         unary[pairs.item[0][pairs.first_line[m] :]] += costs[pairs.begin[m] :]
         self.state = DualArrays(
             order, point, rank[point] > rank[np.roll(point, m)],
@@ -95,16 +91,12 @@ class RingDual:
         turned = (np.roll(np.arange(a, b), -counts[on_ring[a:b]].argmin()) for a, b in pairwise(start))
         walk = np.array([step for steps in turned for step in steps], int)
         self.rings = RingArrays(start, walk, pair, sign, counts[on_ring], begin, np.zeros(begin[-1]))
+        self.work = _OF_PAIRS * len(pairs.row) + float((counts[on_ring] ** 3).sum())  # of the checker
 
     def pass_over(self, most: float, *, forward: bool) -> tuple[float, float]:
         """One pass: the bound, if no tables cost anything, and the share of labels that `most` leaves."""
         self.bound, left = _pass_over(self.state, most - self.bound, forward)
         return self.bound, left / len(self.state.unary)
-
-    def update_rings(self, cap: float, *, backward: bool) -> None:
-        """Move what rings cost into their pairs, one ring after the other; sums above cap count as cap."""
-        numbers = np.arange(len(self.ring_numbers))[:: -1 if backward else 1].copy()
-        _update_rings(numbers, self.state, self.rings, cap)
 
     def interpolate(self, old: RingDual) -> None:
         """Take shares and tables of a level whose cells contain these, by means of the old labels around."""
@@ -236,12 +228,13 @@ def _pass_over(state: DualArrays, spare: float, forward: bool) -> tuple[float, i
 
 
 @compiled
-def _update_rings(numbers: Indices, state: DualArrays, rings: RingArrays, most: float) -> None:
+def update_rings(state: DualArrays, rings: RingArrays, most: float) -> None:
     """Give each pair of a ring an equal part of the least cost of the whole ring at its two labels.
 
-    All steps are first shifted so that no cost is negative: partial sums above most can then be left out.
+    One ring follows the other. All steps are first shifted so that no cost is negative: partial sums above
+    most can then be left out.
     """
-    for number in numbers:
+    for number in range(len(rings.start) - 1):
         walk, moved, widest = rings.walk[rings.start[number] : rings.start[number + 1]], 0.0, len(state.sums)
         steps, size = len(walk), rings.size[walk]
         cost, least = np.empty((steps, widest, widest)), np.empty(steps)

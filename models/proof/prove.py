@@ -50,9 +50,11 @@ def prove(
     before the time limit begins, in up to a minute.
 
     Orthogonal crosses, on any domain, have a proof of their own, on one thread. It has the same properties.
+    With a time limit, a level is begun only if its check is expected to end in time. Up to 6,000 points, the
+    coarsest level is completed under any time limit, so there is a bound with a certificate.
 
-    The checker of certificates checks the levels at the end, after the time limit. Bound, status and forced
-    jumps are those that it confirms, and `write_certificate` writes them.
+    The checker of certificates checks the levels at the end, after the time limit; for orthogonal crosses
+    within it. Bound, status and forced jumps are those that it confirms, and `write_certificate` writes them.
 
     Parameters
     ----------

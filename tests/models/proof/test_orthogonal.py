@@ -20,9 +20,12 @@ from crossfield.models.errors import InputError
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.mesh import Mesh
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, integers_of
+from crossfield.models.processes.deadline import Deadline, never, silent
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof import check_orthogonal as checker
 from crossfield.models.proof.check_certificate import NotProvenError, UnreadableError, unpack_archive
+from crossfield.models.proof.descent import Termination
+from crossfield.models.proof.orthogonal import prove_orthogonal
 from small_meshes import (
     beyond_forest,
     keeps_optimum,
@@ -78,7 +81,7 @@ def test_all_levels_keep_the_crosses_of_the_optimum(seed):
 
 def test_partial_sums_on_rings_that_are_cut_off_lose_the_optimum(monkeypatch):
     # steps of a ring may cost less than nothing, so that a sum above the gap can still come down
-    instance = random_instance(21)
+    instance = random_instance(40)
     _, z = try_all_integers(instance)
     complete, sums = checker.kept_of, checker.min_plus
 
@@ -161,6 +164,23 @@ def test_a_fan_is_proven_and_its_certificate_read(tmp_path):
     assert np.array_equal(again.field.alpha, proof.field.alpha)
     cf.write_certificate(cf.prove(fan()), tmp_path / "again.npz")
     assert path.read_bytes() == (tmp_path / "again.npz").read_bytes()
+
+
+def test_the_shortest_time_limit_leaves_a_bound_that_is_checked(tmp_path):
+    proof = cf.prove(cf.sample("disc"), limits=cf.Limits(1e-9, gap=0.0))
+    assert (proof.ended, len(proof.levels)) == ("time", 1)
+    assert 0 < cf.write_certificate(proof, tmp_path / "disc.npz").bound == proof.bound
+    assert cf.read_certificate(tmp_path / "disc.npz").bound == proof.bound
+
+
+def test_levels_end_while_there_is_time_for_their_check(monkeypatch):
+    # a clock by which the exclusions of a level take a second, in the prover and in the check
+    seconds, complete = [], checker.kept_of
+    monkeypatch.setattr(checker, "kept_of", lambda *parts: seconds.append(1) or complete(*parts))
+    ends = Termination(Deadline.after(12, lambda: float(len(seconds))), never, gap=0.0, work=math.inf)
+    proof = prove_orthogonal(cf.sample("disc").with_gauge("strokes"), None, ends, silent)
+    assert proof.ended == "time"
+    assert 0 < len(seconds) <= 12
 
 
 def test_the_checker_runs_without_crossfield(tmp_path):
