@@ -52,6 +52,3 @@ class AbsoluteDescent(Descent):
 
     def _add_clusters(self, dual: Dual) -> None:
         """Add none: in the same time, passes without them close more."""
-
-    def _raise_near_gap(self, dual: Dual) -> None:
-        """Do nothing: slacks are known for the 2-norm only."""

@@ -120,29 +120,26 @@ def independent_clusters(grid: Grid, clusters: Clusters) -> list[Indices]:
     return [order[colour[order] == part] for part in (0, 1)]
 
 
-def point_slacks(lattice: Lattice, state: State, angles: tuple[Floats, Floats]) -> Floats:
-    """The slack of each pixel, and half of the slack of its pairs; shape (n,).
+def quad_slacks(lattice: Lattice, state: State, angles: tuple[Floats, Floats]) -> Floats:
+    """The slack of the four pixels of pixel quad, and half of the slack of pixel of their pairs; shape (q,).
 
     Pairs count as after a pass, when their least value is 0. Without a label near the field, a slack is 0.
     angles: alpha and beta of a field, as from `nearest_labels`.
     """
+    grid = lattice.instance.grid
     corners = _corners(lattice, *angles)
     theta = np.empty(lattice.start[-1])
     fill_reparametrised(0, len(lattice.count), state, theta)
     begin = lattice.start[:-1]
     least = np.minimum.reduceat(theta, begin)
-    at_pixel: Floats = np.mean([theta[begin + corner.label] for corner in corners], axis=0) - least
+    at_pixel = np.mean([theta[begin + corner.label] for corner in corners], axis=0) - least
     at_pair = np.mean([_pair_slacks(lattice, state, corner) for corner in corners], axis=0) / 2
-    grid = lattice.instance.grid
     for ends in (grid.first, grid.second):
         np.add.at(at_pixel, ends, at_pair)
-    return np.where(np.isfinite(at_pixel), at_pixel, 0.0)
-
-
-def corners_of_quads(grid: Grid, quads: Indices) -> Indices:
-    """The four pixels of quads, shape (q, 4). quads (q, 4): their pairs, as in `Grid.quads`."""
-    bottom, _, top, _ = quads.T
-    return np.stack([grid.first[bottom], grid.second[bottom], grid.first[top], grid.second[top]], axis=1)
+    bottom, _, top, _ = grid.quads.T
+    pixels = (grid.first[bottom], grid.second[bottom], grid.first[top], grid.second[top])
+    slacks: Floats = np.sum([at_pixel[pixel] for pixel in pixels], axis=0)
+    return np.where(np.isfinite(slacks), slacks, 0.0)
 
 
 class _Corner:

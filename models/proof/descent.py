@@ -9,9 +9,6 @@ anew round it. On a finer lattice little is lost where the centre is another fie
 The labels of a level are those that the gap of the level before leaves. While passes close that gap, most of
 them can be dropped, and the work of a pass falls faster than the gap. A record of the level justifies that.
 
-Often most of the gap is at a few pixels, such as those round a vortex. Then some passes visit only pixels
-near them.
-
 Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
 lattices leave its gap. Then the quads that hold most of it become clusters (clusters.py): on the second
 level if the best field has a vortex, and on every level where the gap shrinks slowly.
@@ -54,9 +51,6 @@ _SETTLED: Final = 4  # spacings after which little is lost where the centre is a
 
 # Passes
 _PASSES: Final = 3  # passes forwards and backwards between two roundings, which do another one
-_NEAR: Final = 0.5  # greatest share of labels that passes near the gap may visit
-_MOST_PASSES: Final = 12  # most passes near the gap between two over all pixels
-_MANY: Final = 100_000  # labels of which passes over all take long
 _MOST_ROUNDS: Final = 40  # roundings of a level, in case that the bound creeps
 _SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on, if labels do not grow
 _SLOWEST: Final = 0.005  # the same where the finer level would be too large
@@ -216,9 +210,7 @@ class Descent:
         record. patient: whether to go on while the bound rises at all, because no finer lattice may follow.
         """
         rounding, reached, rises = Rounding(dual, self.better_field), -math.inf, [math.inf] * 2
-        for number in range(_MOST_ROUNDS):
-            if number > 0:
-                self._raise_near_gap(dual)
+        for _ in range(_MOST_ROUNDS):
             bound = dual.ascend(_PASSES, self.ends.over, lambda: self._is_closing(dual))
             self.best = rounding.lower(self.best, lambda: self._is_closing(dual))
             energy = self.energy(self.best)
@@ -231,17 +223,6 @@ class Descent:
                 return True
             reached = bound
         return False
-
-    def _raise_near_gap(self, dual: Dual) -> None:
-        """Raise the bound by passes where most of the gap is, for as long as passes over all pixels take."""
-        count = dual.lattice.count
-        if count.sum() < _MANY:
-            return
-        pixels = dual.pixels_near_gap(self.best)
-        share = float(count[pixels].sum() / count.sum())
-        if share <= _NEAR:
-            times = min(_MOST_PASSES, int(_PASSES / share))
-            dual.ascend_near(pixels, times, lambda: self._is_closing(dual))
 
     def _slow_rise(self, dual: Dual, bound: float) -> float:
         """The share of the gap below which a rise is slow: passes pay if the next level has many labels."""

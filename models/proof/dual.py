@@ -32,10 +32,9 @@ from ..smooth.sparse_systems import stroke_weight
 from . import check_certificate
 from .clusters import (
     copy_tables,
-    corners_of_quads,
     independent_clusters,
     interpolate_clusters,
-    point_slacks,
+    quad_slacks,
     table_work,
     visit_clusters,
     zero_clusters,
@@ -52,8 +51,6 @@ _LOST: Final = 0.1  # share of the gap that rounding may cost at most; a fifth o
 _TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
 _LEVELS: Final = 64  # more than usual; the checker allows for the sides of domains at each
 _ALONE: Final = 30_000  # labels up to which sharing a pass among threads takes longer than it saves
-_HELD: Final = 0.5  # share of the slacks that pixels hold for which passes are made near them only
-_AROUND: Final = 6  # steps between neighbours from these pixels to the last ones that passes visit
 
 
 class Dual:
@@ -124,66 +121,22 @@ class Dual:
                 break
         return bound
 
-    def ascend_near(self, pixels: Indices, times: int, closing: Over = never) -> None:
-        """Raise the bound by passes forwards and backwards over some pixels, and their clusters.
-
-        The bound does not fall: pairs to other pixels keep the shares there. closing: returns whether not to
-        begin another two passes.
-        """
-        inside = np.zeros(len(self.lattice.count), bool)
-        inside[pixels] = True
-        fronts = [front[inside[front]] for front in self._fronts if inside[front].any()]
-        parts = [self._crew.parts(self.lattice.count[front]) for front in fronts]
-        grid, quads = self.lattice.instance.grid, self.quads
-        touched = inside[corners_of_quads(grid, quads)].any(axis=1)
-        for _ in range(times):
-            if closing():
-                return
-            for earlier, way in ((0, 1), (2, -1)):
-                self._visit_clusters(touched, way)
-                self._visit_fronts(earlier, fronts, parts, never)
-
-    def pixels_near_gap(self, field: CrossField) -> Indices:
-        """The pixels round those that hold most of the gap to the energy of a field.
-
-        Before: a backward pass.
-        """
-        grid = self.lattice.instance.grid
-        slack = point_slacks(self.lattice, self.state, nearest_labels(field, self.lattice)[:2])
-        order = np.argsort(-slack, kind="stable")
-        held = np.cumsum(slack[order])
-        near = np.zeros(len(slack), bool)
-        near[order[: np.searchsorted(held, _HELD * held[-1]) + 1]] = True
-        for _ in range(_AROUND):
-            reached = near[grid.first] | near[grid.second]
-            near[grid.first[reached]] = near[grid.second[reached]] = True
-        return np.flatnonzero(near)
-
     def _pass(self, earlier: int, over: Over) -> float:
         """The bound after a pass; earlier: 0 forwards, 2 backwards."""
-        began = time.monotonic()
-        if not self._visit_fronts(earlier, self._fronts, self._parts, over):
-            return -math.inf
-        self._pass_seconds = time.monotonic() - began
-        return math.fsum([*self.state.least, *self._least_of_clusters])
-
-    def _visit_fronts(
-        self, earlier: int, fronts: list[Indices], parts: list[list[slice]], over: Over
-    ) -> bool:
-        """Visit the pixels of anti-diagonals in a pass; False if time cut it off."""
-        way, nothing = 1 if earlier == 0 else -1, np.zeros(0)
+        began, way, nothing = time.monotonic(), 1 if earlier == 0 else -1, np.zeros(0)
 
         def visit(pixels: Indices) -> None:
             work_on(PASS, pixels, earlier, self.state, nothing, nothing)
 
         if self.lattice.start[-1] < _ALONE:
-            visit(np.concatenate(fronts[::way]))
-            return True
-        for front, of_threads in zip(fronts[::way], parts[::way], strict=True):
-            if over():
-                return False
-            self._crew.run(visit, [front[part] for part in of_threads])
-        return True
+            visit(np.concatenate(self._fronts[::way]))
+        else:
+            for front, parts in zip(self._fronts[::way], self._parts[::way], strict=True):
+                if over():
+                    return -math.inf
+                self._crew.run(visit, [front[part] for part in parts])
+        self._pass_seconds = time.monotonic() - began
+        return math.fsum([*self.state.least, *self._least_of_clusters])
 
     @property
     def _values(self) -> tuple[Floats, Floats, Floats]:
@@ -194,27 +147,25 @@ class Dual:
 
         Before: a backward pass.
         """
-        grid = self.lattice.instance.grid
-        of_pixel = point_slacks(self.lattice, self.state, nearest_labels(field, self.lattice)[:2])
-        slack = of_pixel[corners_of_quads(grid, grid.quads)].sum(axis=1)
-        slack[np.isin(grid.quads[:, 0], self.quads[:, 0])] = np.inf
+        alpha, beta, _ = nearest_labels(field, self.lattice)
+        quads = self.lattice.instance.grid.quads
+        slack = quad_slacks(self.lattice, self.state, (alpha, beta))
+        slack[np.isin(quads[:, 0], self.quads[:, 0])] = np.inf
         numbers = np.sort(np.argsort(-slack, kind="stable")[: len(self.quads) + count])
         self._adopt_clusters(copy_tables(self.state.clusters, zero_clusters(self.lattice, numbers)))
 
     def update_clusters(self, way: int = 1) -> None:
         """Update all clusters; way: -1 for the reverse order."""
+        if not len(self.quads):
+            return
         began = time.monotonic()
-        self._visit_clusters(np.ones(len(self.quads), bool), way)
-        self._table_seconds = time.monotonic() - began
-
-    def _visit_clusters(self, chosen: Bools, way: int) -> None:
-        """Update some clusters."""
-        for numbers in self._cluster_fronts[::way]:
-            front = numbers[chosen[numbers]]
+        self._least_of_clusters = np.zeros(len(self.quads))
+        for front in self._cluster_fronts[::way]:
             self._crew.run(
-                lambda part: visit_clusters(part, self.state, True, self._least_of_clusters),  # noqa: FBT003
+                lambda numbers: visit_clusters(numbers, self.state, True, self._least_of_clusters),  # noqa: FBT003
                 [front[k : k + 1] for k in range(len(front))],
             )
+        self._table_seconds = time.monotonic() - began
 
     def _find_least_of_clusters(self) -> Floats:
         """The least of the negative tables of each cluster."""
