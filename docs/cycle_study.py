@@ -290,8 +290,10 @@ def draw_runs(
             best[name] = min(row["objective"], best.get(name, np.inf))
     titles = {form: f"{form[0]}{', limits' * form[1]}" for form in formulations}
     looks = styles(list(titles.values()))
-    ticks = [*map(_place_of_seconds, _SECONDS), *map(_place_of_gap, (0.0, 0.5, 1.0))]
-    words = [*(f"{seconds:g} s" for seconds in _SECONDS), "0 %", "50 %", "100 %"]
+    limit = max(row["limit"] for (solver, _, _), row in runs.items() if solver in solvers)
+    seconds = [*(each for each in _SECONDS if each < limit), limit]
+    ticks = [*(_place_of_seconds(each, limit) for each in seconds), *map(_place_of_gap, (0.0, 0.5, 1.0))]
+    words = [*(f"{each:g} s" for each in seconds), "0 %", "50 %", "100 %"]
     with open_panels(path, len(solvers), high=0.7 + 2.3 * len(solvers), wide=WIDE, stacked=True) as axes:
         for axis, solver in zip(axes, solvers, strict=True):
             names = [
@@ -301,32 +303,34 @@ def draw_runs(
             ]
             for form, title in titles.items():
                 mine = [(number, runs.get((solver, name, form))) for number, name in enumerate(names)]
-                points = [(_place(row, best[names[number]]), number) for number, row in mine if row]
+                points = [(_place(row, best[names[number]], limit), number) for number, row in mine if row]
                 look = looks[title] | {"linestyle": "none", "markersize": 7, "alpha": 0.85}
                 axis.plot(*zip(*points, strict=True), label=title, **look)
             version = next(row["version"] for row in rows if row["solver"] == solver).split(" ")[0]
-            axis.set_title(f"{SOLVERS[solver].title} {version}: proven in, or gap after 30 s", fontsize=9)
+            axis.set_title(
+                f"{SOLVERS[solver].title} {version}: proven in, or gap after {limit:g} s", fontsize=9
+            )
             axis.set_xticks(ticks, words)
             axis.set_yticks(range(len(names)), names)
-            axis.axvline((_place_of_seconds(30) + _place_of_gap(0)) / 2, color="#888888", linewidth=0.8)
+            axis.axvline((1 + _place_of_gap(0)) / 2, color="#888888", linewidth=0.8)
             axis.set(xlim=(-0.04, ticks[-1] + 0.04), ylim=(len(names) - 0.5, -0.5))
         axes[0].figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
 
 
 WIDE: Final = 4.9
 """Inches, for words that are legible on a phone."""
-_SECONDS: Final = (0.1, 1.0, 10.0, 30.0)
+_SECONDS: Final = (0.1, 1.0, 10.0, 100.0)
 
 
-def _place(row: Row, best: float) -> float:
+def _place(row: Row, best: float, limit: float) -> float:
     """Place on the axis: seconds to a proven optimum, or the gap to the best objective of all runs."""
     if row["status"] in {str(Status.OPTIMAL_GLOBAL), str(Status.OPTIMAL_LOCAL)}:  # all are convex
-        return _place_of_seconds(row["wall"])
+        return _place_of_seconds(row["wall"], limit)
     return _place_of_gap(1 - max(row["bound"] or 0.0, 0.0) / best)
 
 
-def _place_of_seconds(seconds: float) -> float:
-    return float(np.log(max(seconds, 0.05) / 0.05) / np.log(30 / 0.05))
+def _place_of_seconds(seconds: float, limit: float) -> float:
+    return float(np.log(max(seconds, 0.05) / 0.05) / np.log(limit / 0.05))
 
 
 def _place_of_gap(gap: float) -> float:
