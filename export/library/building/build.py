@@ -104,7 +104,6 @@ def build_locked(
         work = _Build(folder, BuildInputs(ledger, plans, points), tasks, progress)
         for planned in sorted(plans, key=lambda planned: -planned.recipe.size):
             work.begin(planned)  # the last task runs first: small ones, whose faults show at once
-        progress("points and bounds of instances")
         tasks.run()
     complete = without_skipped(plans, work.skipped)
     if not complete:
@@ -169,6 +168,7 @@ class _Build:
                 self.progress(f"{task.name}: the points given are of another instance; searched for others")
             self._schedule_entries(planned, about)
 
+        self.progress(f"points and bounds of {task.name}")
         self.tasks.add(make_instance_files, task, finish)
 
     def _complete_document(
