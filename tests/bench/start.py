@@ -24,14 +24,12 @@ SET: Final = "files/mouse.milp-mccormick"
 COMMANDS: Final = {
     "Python with NumPy": "import numpy",
     "`crossfield --help`": ["--help"],
-    "`export` of an instance of 4 pixels per side": ["export", "mouse.json", "-f", "milp", "-o", "files"],
-    "`export mouse --size 4 -f milp`": ["export", "mouse", "--size", "4", "-f", "milp", "-o", "files"],
+    "`export mouse.json`, 4 x 4 pixels": ["export", "mouse.json", "-f", "milp", "-o", "files"],
+    "`export mouse --size 4`": ["export", "mouse", "--size", "4", "-f", "milp", "-o", "files"],
     "`read` of its answer": ["read", "mouse.sol", "--manifest", f"{SET}.manifest.json", "-o", "mouse.npz"],
     "`shade mouse`": ["shade", "mouse", "-o", "surface"],
     "`cf.entries()`": "import crossfield as cf; cf.entries()",
-    '`cf.entry("cf_mouse_n004_exact").problem`': (
-        "import crossfield as cf; cf.entry('cf_mouse_n004_exact').problem"
-    ),
+    "`cf.entry(...).problem`": "import crossfield as cf; cf.entry('cf_mouse_n004_exact').problem",
 }
 """What is measured, and the code or the arguments of `crossfield` that do it."""
 

@@ -259,7 +259,7 @@ def measure_growth(measure: Measure, sizes: Sequence[int], folder: Path) -> dict
     }
     fits = []
     picture = folder.with_name("pictures") / "performance.svg"
-    with open_panels(picture, len(drawn), wide=8.0, high=3.0) as axes:
+    with open_panels(picture, len(drawn), wide=4.9, high=5.0, stacked=True) as axes:
         for axis, (title, (unit, values)) in zip(axes, drawn.items(), strict=True):
             slope, level = np.polyfit(pairs, values, 1)
             off = float(np.abs(values - level - slope * pairs).max())
