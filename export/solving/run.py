@@ -61,7 +61,7 @@ def plan_sentence(limits: Limits, instance: Instance) -> str:
     timed, in_parallel = [method for method in methods_of(instance) if method.timed], _has_processors(limits)
     one_by_one = sum(not (method.in_parallel and in_parallel) for method in timed)
     limits_of_methods = ", ".join(
-        f"{'meanwhile ' * (method.in_parallel and in_parallel)}{method.name} {limits.time_limit:g}"
+        f"{method.name} {limits.time_limit:g}{' in parallel' * (method.in_parallel and in_parallel)}"
         for method in sorted(timed, key=lambda method: method.in_parallel)
     )
     return f"at most {one_by_one * limits.time_limit:g} s: {limits_of_methods}; files and pictures on top"
