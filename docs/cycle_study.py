@@ -290,8 +290,8 @@ def draw_runs(
             best[name] = min(row["objective"], best.get(name, np.inf))
     titles = {form: f"{form[0]}{', limits' * form[1]}" for form in formulations}
     looks = styles(list(titles.values()))
-    limit = max(row["limit"] for (solver, _, _), row in runs.items() if solver in solvers)
-    seconds = [*(each for each in _SECONDS if each < limit), limit]
+    limit = max(row["limit"] for (by, _, form), row in runs.items() if by in solvers and form in formulations)
+    seconds = [*(each for each in _SECONDS if each < limit / 5), limit]
     ticks = [*(_place_of_seconds(each, limit) for each in seconds), *map(_place_of_gap, (0.0, 0.5, 1.0))]
     words = [*(f"{each:g} s" for each in seconds), "0 %", "50 %", "100 %"]
     with open_panels(path, len(solvers), high=0.7 + 2.3 * len(solvers), wide=WIDE, stacked=True) as axes:
@@ -319,7 +319,7 @@ def draw_runs(
 
 WIDE: Final = 4.9
 """Inches, for words that are legible on a phone."""
-_SECONDS: Final = (0.1, 1.0, 10.0, 100.0)
+_SECONDS: Final = (0.1, 1.0, 10.0)
 
 
 def _place(row: Row, best: float, limit: float) -> float:
