@@ -93,7 +93,10 @@ def table_row(name: str, row: Row) -> dict[str, str]:
         "bound": bound,
         "gap": gap,
         **{f"singularities, {kind}": str(row[kind]["singularities"]) for kind in ("greedy", "best")},
-        **{f"s, {part}": "-" if s is None else f"{s:.2g}" if s < 100 else f"{s:.0f}" for part, s in row["seconds"].items()},
+        **{
+            f"s, {part}": "-" if s is None else f"{s:.2g}" if s < 100 else f"{s:.0f}"
+            for part, s in row["seconds"].items()
+        },
     }
 
 
