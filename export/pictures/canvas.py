@@ -6,13 +6,11 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .marks import Area, Dots, Lines, Mark, Sheet
 from .underlay import ink_colours
 
 _SIDE: Final = 400.0  # points of the longer side of the page
-_TIP: Final = 1e-3  # of a pixel: else a side could be rounded down by a pixel
 
 
 def draw_sheet(sheet: Sheet) -> Any:
@@ -31,20 +29,6 @@ def draw_sheet(sheet: Sheet) -> Any:
         if layer.shown:
             paint(axes, layer.parts, scale, layer.opacity)
     return figure
-
-
-def render_sheet(sheet: Sheet, width: int, height: int) -> NDArray[np.uint8]:
-    """Red, green, blue and opacity (height, width, 4) of the layers on a page without paper."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    figure = draw_sheet(sheet)
-    figure.patch.set_visible(False)
-    dots = 72 * max(width, height) / _SIDE
-    figure.set_dpi(dots)
-    figure.set_size_inches((width + _TIP) / dots, (height + _TIP) / dots)
-    canvas: Any = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.array(canvas.buffer_rgba(), dtype=np.uint8)
 
 
 def set_coordinates(axes: Any, x: float, y: float, width: float, height: float) -> None:

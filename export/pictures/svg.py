@@ -19,6 +19,7 @@ from .underlay import Underlay, ink_colours, size_in_units
 
 _FINENESS: Final = 20_000.0  # steps of coordinates along the longer side of the page, at least
 _COARSE: Final = 3_000.0  # the same for a browser
+_PARTS: Final = 16.0  # the same for each pixel of a picture
 _SPACES: Final = (
     'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
     'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'
@@ -45,6 +46,17 @@ def web_sheet_svg(sheet: Sheet, dark: dict[str, str]) -> bytes:
     return _svg_document(
         'xmlns="http://www.w3.org/2000/svg"', sheet, size_in_units(sheet.page), [style, *body]
     )
+
+
+def render_sheet(sheet: Sheet, width: int, height: int) -> NDArray[np.uint8]:
+    """Red, green, blue and opacity (height, width, 4) of the layers on a page without paper."""
+    import resvg_py
+    from PIL import Image
+
+    body = [*_svg_body(sheet, _PARTS * max(width, height))]
+    text = _svg_document(f'{_SPACES} preserveAspectRatio="none"', sheet, (str(width), str(height)), body)
+    picture = resvg_py.svg_to_bytes(svg_string=text.decode(), skip_system_fonts=True)
+    return np.asarray(Image.open(io.BytesIO(bytes(picture))).convert("RGBA"))
 
 
 def _svg_document(spaces: str, sheet: Sheet, size: tuple[str, str], body: list[str]) -> bytes:

@@ -20,7 +20,7 @@ from ...models.input_limits import MAX_PIXELS, MAX_SIDE
 from ...models.instance.domain import Bools, Floats
 from ...models.instance.instance import Instance
 
-SIDE: Final = 2048  # pixels, about, of the longer side of a picture of a page unless a side is given
+SIDE: Final = 1024  # pixels, about, of the longer side of a picture of a page unless a side is given
 _BLUR: Final = 2.0  # pixels of the grid over which stairs are smoothed
 _MOVED: Final = 0.33  # at most, of the share of a place that is inside
 _MOVED_THIN: Final = 0.12  # where the mask or a gap is one or two pixels thin
@@ -118,22 +118,33 @@ def raster(
     """
     from scipy import ndimage
 
-    mask, pixel = np.pad(instance.mask, _REACH), instance.pixel_size
-    height, width = mask.shape
-    x, y = (start - _REACH * pixel for start in instance.origin)
-    spread = _interpolation(View((x, y, width * pixel, height * pixel), width, height), view, rows)
+    mask = np.pad(instance.mask, _REACH)
+    spread = _interpolation(_padded_grid(instance), view, rows)
     image = np.zeros((*mask.shape, 3))
     image[mask] = normals
     image[~mask] = _normalise(ndimage.gaussian_filter(image, (_BLUR, _BLUR, 0), mode="constant")[~mask])
     unit = _normalise(np.stack([spread(part)[1:-1] for part in np.moveaxis(image, -1, 0)], axis=-1))
+    return Raster(unit, depth_inside(instance, view, rows, outline))
+
+
+def depth_inside(instance: Instance, view: View, rows: slice = ALL, outline: Outline | None = None) -> Floats:
+    """The depth of some rows of a view, as that of a `Raster`. outline: replaces that of the mask."""
     if outline is None:
-        depth = _depth_in_mask(mask, border_width(instance), spread)
+        spread = _interpolation(_padded_grid(instance), view, rows)
+        depth = _depth_in_mask(np.pad(instance.mask, _REACH), border_width(instance), spread)
     else:
         outside = outline.level.min()
         depth = _interpolation(outline.view, view, rows)(outline.level - outside) + outside
     depth = np.pad(depth, ((0, 0), (1, 1)), mode="edge")
     depth /= np.maximum(np.hypot(*np.gradient(depth)), 1e-9)
-    return Raster(unit, depth[1:-1, 1:-1])
+    return depth[1:-1, 1:-1]
+
+
+def _padded_grid(instance: Instance) -> View:
+    """The grid with a border as wide as a spline reaches, with one pixel for each of its own."""
+    pixel, (height, width) = instance.pixel_size, np.add(instance.mask.shape, 2 * _REACH).tolist()
+    x, y = (start - _REACH * pixel for start in instance.origin)
+    return View((x, y, width * pixel, height * pixel), width, height)
 
 
 def _normalise(vectors: Floats) -> Floats:

@@ -24,9 +24,8 @@ from ...models.storage import make_folder, write_bytes
 from ...models.surface.surface import Surface
 from ...models.surface.trust import describe_support, right_angle_deviation
 from ..formats.registry import program_version
-from ..pictures.canvas import render_sheet
-from ..pictures.draw import fixed_settings
 from ..pictures.layers import strokes_sheet
+from ..pictures.svg import render_sheet
 from ..pictures.underlay import Underlay, read_underlay
 from ..shading.colours import UPPER_LEFT, Light, colour_normals, matcap, shade_by_light, to_eight_bit
 from ..shading.raster import Box, Raster, View, grid_box, raster, view_of_box
@@ -91,7 +90,7 @@ def write_surface(
         Position of the lamp.
     side
         Pixels on the longer side of the pictures. None: those of a drawing that is a picture, else about
-        2048.
+        1024.
     about
         Facts for the report on how the surface was made.
 
@@ -209,8 +208,7 @@ def lay_over(above: NDArray[np.uint8], below: NDArray[np.uint8]) -> NDArray[np.u
 
 def draw_strokes(instance: Instance, drawing: Underlay | None, view: View) -> NDArray[np.uint8]:
     """Red, green, blue and opacity, uint8 (h, w, 4), of the strokes of the drawing, or of the instance."""
-    with fixed_settings():
-        return render_sheet(strokes_sheet(instance, view.box, drawing), view.width, view.height)
+    return render_sheet(strokes_sheet(instance, view.box, drawing), view.width, view.height)
 
 
 def surface_document(surface: Surface, view: View, about: Mapping[str, Any] | None = None) -> dict[str, Any]:

@@ -13,17 +13,17 @@ import numpy as np
 from scipy import ndimage
 
 from ...models.instance.instance import Instance
-from ..pictures.canvas import render_sheet
-from ..pictures.draw import fixed_settings
 from ..pictures.layers import strokes_sheet
+from ..pictures.svg import render_sheet
 from ..pictures.underlay import Underlay
-from ..shading.raster import Outline, grid_box, raster, view_of_box
+from ..shading.raster import Outline, depth_inside, grid_box, view_of_box
 
 _SIDE: Final = 1024  # pixels of the longer side of the picture on which cells are found
 _MARGIN: Final = 0.25  # of the longer side of the grid round it, so that the paper outside is one large cell
 _WIDTH: Final = 0.25  # pixels of the grid that strokes are wide there: smaller gaps are closed
 _LEAST: Final = 2.0  # pixels of that picture that strokes are wide, so that they have no gaps
 _FULL: Final = 0.6  # least share of a cell near the mask that makes it inside
+_COARSE: Final = 4  # pixels of that picture between those whose distances from the mask are computed
 _BLUR: Final = 2.0  # pixels of that picture over which the outline is smoothed
 _DEEP: Final = 1.0  # pixels of the grid from the border of the mask: a cell with none so deep is outside
 _NEAR: Final = 1.5  # pixels of the grid from the mask
@@ -35,20 +35,18 @@ def find_outline(instance: Instance, drawing: Underlay) -> Outline:
     x, y, width, height = grid_box(instance)
     margin = _MARGIN * max(width, height)
     view = view_of_box((x - margin, y - margin, width + 2 * margin, height + 2 * margin), _SIDE)
-    with fixed_settings():
-        thick = max(_WIDTH, _LEAST * max(view.pixel) / instance.pixel_size)
-        sheet = strokes_sheet(instance, view.box, drawing, thick)
-        ink = render_sheet(sheet, view.width, view.height)[..., 3] > 127
-    normals = np.broadcast_to((0.0, 0.0, 1.0), (instance.grid.size, 3))
-    mask = raster(instance, normals, view).opacity > 0.5
-    away, depth = (
-        ndimage.distance_transform_edt(side, view.pixel[::-1]) / instance.pixel_size for side in (~mask, mask)
-    )
+    thick = max(_WIDTH, _LEAST * max(view.pixel) / instance.pixel_size)
+    sheet = strokes_sheet(instance, view.box, drawing, thick)
+    ink = render_sheet(sheet, view.width, view.height)[..., 3] > 127
+    mask = depth_inside(instance, view) > 0
+    at = np.ix_(*(np.arange(side) // _COARSE for side in mask.shape))
+    side, rough = _COARSE * np.array(view.pixel[::-1]) / instance.pixel_size, mask[::_COARSE, ::_COARSE]
+    away, depth = (ndimage.distance_transform_edt(area, side)[at] for area in (~rough, rough))
     cells, count = ndimage.label(~ink)
     size, near, deep = (
         np.bincount(cells[area], minlength=count + 1) for area in (cells >= 0, away <= _NEAR, depth > _DEEP)
     )
     full, divided = near >= _FULL * size, deep > 0
     inside = np.where(full[cells], away <= _FAR, mask & divided[cells])
-    gap = [ndimage.distance_transform_edt(~(side & ~ink)) for side in (~inside, inside)]
-    return Outline(view, ndimage.gaussian_filter(np.subtract(*gap), _BLUR))
+    nearest = ndimage.distance_transform_edt(ink, return_distances=False, return_indices=True)
+    return Outline(view, ndimage.gaussian_filter(np.where(inside[*nearest], 1.0, -1.0), _BLUR))
