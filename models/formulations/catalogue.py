@@ -364,12 +364,11 @@ def _declare(
     )
 
 
-def norm_of(formulation: Formulation) -> Norm | None:
-    """The norm whose energy a formulation minimises with its options; None for another objective."""
-    if formulation.declaration.minimises in {TWO_NORM, AT_JUMPS, RIGHT_TWO_NORM}:
+def norm_of(declaration: Declaration, options: Options) -> Norm | None:
+    """The norm whose energy a formulation minimises with some options; None for another objective."""
+    if declaration.minimises in {TWO_NORM, AT_JUMPS, RIGHT_TWO_NORM}:
         return 2
-    options = formulation.options
-    if formulation.declaration.orthogonal:
+    if declaration.orthogonal:
         return 1 if options.stroke_norm == 1 else "mixed"
     norms: dict[tuple[int, int], Norm] = {(1, 1): 1, (2, 2): "mixed"}
     return norms.get((options.stroke_norm, options.beta_norm)) if options.facet == "hull" else None

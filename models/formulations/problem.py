@@ -189,7 +189,7 @@ class Problem:
         """How its windows were narrowed, one line; empty if they were not."""
         if self.windows is None:
             return ""
-        if norm_of(self.formulation) == self.windows.norm:
+        if norm_of(self.formulation.declaration, self.formulation.options) == self.windows.norm:
             return f"{self.windows.summary}; the optimum stays"
         return f"{self.windows.summary}; in another norm the optimum may rise"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache, cached_property
 from pathlib import Path
@@ -267,17 +267,21 @@ def _spec() -> Spec:
 
 
 @cache
-def _plans() -> dict[str, tuple[InstancePlan, EntryRecipe]]:
+def _plans(sketch: str) -> dict[str, tuple[InstancePlan, EntryRecipe]]:
+    """The plans of all entries of a sketch by name; those of all sketches take ten times as long."""
     from ..plan.recipe import plan_library
 
-    return {recipe.name: (planned, recipe) for planned in plan_library(_spec()) for recipe in planned.entries}
+    spec = _spec()
+    alone = replace(spec, sketches=tuple(each for each in spec.sketches if each.name == sketch))
+    return {recipe.name: (planned, recipe) for planned in plan_library(alone) for recipe in planned.entries}
 
 
 def _plan_of(name: str) -> tuple[InstancePlan, EntryRecipe]:
     """The plan of an entry. Raises InputError where the table has entries that the specification lacks."""
-    if name not in _plans():
-        raise InputError(f"{name} is not in the specification; build the library again", file=SHIPPED)
-    return _plans()[name]
+    for sketch in _spec().sketches:
+        if name.startswith(f"cf_{sketch.name}_") and (plan := _plans(sketch.name).get(name)):
+            return plan
+    raise InputError(f"{name} is not in the specification; build the library again", file=SHIPPED)
 
 
 def _points_folder() -> Path:

@@ -11,11 +11,12 @@ import hashlib
 import json
 from collections.abc import Container, Iterable
 from dataclasses import asdict, dataclass, fields, replace
+from functools import cache
 from typing import Any, Final
 
 from ....models.errors import InputError
 from ....models.field.field import Norm
-from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, declare, norm_of
+from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, norm_of
 from .spec import Rung, Sketch, Spec
 
 LONGEST: Final = 32  # characters of a name before its suffix
@@ -121,12 +122,13 @@ def plan_library(spec: Spec) -> tuple[InstancePlan, ...]:
     return plans
 
 
+@cache
 def norm_minimised(formulation: str, facet: str = "hull") -> Norm | None:
     """Return the norm whose energy the entries of a formulation minimise over all jumps; None for others."""
     declared = FORMULATIONS[formulation]
     if declared.minimises == AT_JUMPS:
         return None
-    return norm_of(declare(formulation, facet=facet if "facet" in declared.option_names else None))
+    return norm_of(declared, declared.options({"facet": facet} if "facet" in declared.option_names else {}))
 
 
 def norms_of(formulations: Iterable[str]) -> tuple[Norm, ...]:

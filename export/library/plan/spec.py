@@ -227,7 +227,7 @@ class Spec:
 
 
 def default_spec() -> Spec:
-    """Read the specification that ships with crossfield; a test checks its form."""
+    """Read the specification that ships with crossfield; a test checks its form and its entries."""
     return _read_document(tomllib.loads(DEFAULT.read_text("utf-8")), DEFAULT.parent)
 
 
@@ -247,7 +247,9 @@ def spec_of(document: dict[str, Any], path: Path) -> Spec:
     """Return the specification of a document with files next to `path`. Raises InputError."""
     with naming(path):
         _check_form(document)
-        return _read_document(document, path.parent)
+        spec = _read_document(document, path.parent)
+        _check_entries(spec)
+    return spec
 
 
 def _check_form(document: dict[str, Any]) -> None:
@@ -288,13 +290,6 @@ def _read_document(document: dict[str, Any], folder: Path) -> Spec:
         raise InputError(
             f"sketches[{name[0]}].name: {name[1]!r} is the name of two sketches; give each its own"
         )
-    _check_entries(formulations, [rung for rung in rungs if any(rung.name in s.rungs for s in sketches)])
-    proven = [sketch.name for sketch in sketches if sketch.points == "proven"]
-    if proven and all(FORMULATIONS[formulation].minimises == AT_JUMPS for formulation in formulations):
-        raise InputError(
-            f"formulations: {proven[0]} has proven points, and no formulation has jumps to prove; "
-            "add miqp-exact, or choose other points"
-        )
     ledger = folder / document["ledger"] if "ledger" in document else None
     if ledger is not None and not ledger.is_file():
         raise InputError(f"ledger: there is no file {ledger.name}; omit the key, or give a ledger.json")
@@ -311,15 +306,19 @@ def facets_of(formulation: str, gauge: str = "strokes", *, orthogonal: bool = Fa
 
     Only hull, unless it has the option and crosses may have any angle.
     """
+    declaration = FORMULATIONS[formulation]
+    if not orthogonal:
+        any_facets = FACETS if "facet" in declaration.option_names else ("hull",)
+        return () if declaration.orthogonal else any_facets
     smallest = smallest_problem(declare(formulation)).instance
-    instance = replace(smallest, gauge=cast("Gauge", gauge), orthogonal=orthogonal)
-    if reason_against(declare(formulation, instance), instance):
-        return ()
-    return FACETS if "facet" in FORMULATIONS[formulation].option_names and not orthogonal else ("hull",)
+    instance = replace(smallest, gauge=cast("Gauge", gauge), orthogonal=True)
+    return () if reason_against(declare(formulation, instance), instance) else ("hull",)
 
 
-def _check_entries(formulations: tuple[str, ...], rungs: Sequence[Rung]) -> None:
-    """Check that every formulation and every rung has entries, and every entry a model file."""
+def _check_entries(spec: Spec) -> None:
+    """Check that every formulation and rung has entries, every entry a model file, and a proof jumps."""
+    formulations = spec.formulations
+    rungs = [rung for rung in spec.rungs if any(rung.name in sketch.rungs for sketch in spec.sketches)]
     present = {
         rung.name: list(
             dict.fromkeys(name for gauge in rung.gauges for name, _ in rung.entries(formulations, gauge))
@@ -342,6 +341,12 @@ def _check_entries(formulations: tuple[str, ...], rungs: Sequence[Rung]) -> None
                     f"rungs.{rung.name}.formats: none of {', '.join(rung.formats)} holds {name}; "
                     "add nl or gms, or omit the formulation"
                 )
+    proven = [sketch.name for sketch in spec.sketches if sketch.points == "proven"]
+    if proven and all(FORMULATIONS[formulation].minimises == AT_JUMPS for formulation in formulations):
+        raise InputError(
+            f"formulations: {proven[0]} has proven points, and no formulation has jumps to prove; "
+            "add miqp-exact, or choose other points"
+        )
 
 
 def _can_hold(file_format: str, formulation: str) -> bool:

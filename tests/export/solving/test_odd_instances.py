@@ -114,13 +114,13 @@ def assert_answers_of(seed, solvers, folder):
         if problem.is_convex or not problem.formulation.options.relax:
             assert_equal_optima(instance, optima(solutions))
         count.update((problem.name, *key) for key, solution in solutions.items() if solution is not None)
-    norm = norm_of(problems[0].formulation)
+    norm = norm_of(problems[0].formulation.declaration, problems[0].formulation.options)
     if norm is None:
         return count
     best = fit_in_box(field) if norm == 2 else fit_absolute(field, norm)[0]
     for other in SKEWED:
         problem = cf.formulate(instance, other, p=field.p if FORMULATIONS[other].fixed else None)
-        if norm_of(problem.formulation) == norm:
+        if norm_of(problem.formulation.declaration, problem.formulation.options) == norm:
             pinned = problem if FORMULATIONS[other].fixed else cf.with_integers_fixed(problem, field)
             solutions = answers(pinned, solvers, folder, only=("ipopt",))
             assert_equal_optima(instance, optima(solutions), best.energy(norm).total)
