@@ -23,7 +23,7 @@ _MARGIN: Final = 0.25  # of the longer side of the grid round it, so that the pa
 _WIDTH: Final = 0.25  # pixels of the grid that strokes are wide there: smaller gaps are closed
 _LEAST: Final = 2.0  # pixels of that picture that strokes are wide, so that they have no gaps
 _FULL: Final = 0.6  # least share of a cell near the mask that makes it inside
-_COARSE: Final = 4  # pixels of that picture between those whose distances from the mask are computed
+_FINE: Final = 6.0  # places along a pixel of the grid, at least, whose distances from the mask are computed
 _BLUR: Final = 2.0  # pixels of that picture over which the outline is smoothed
 _DEEP: Final = 1.0  # pixels of the grid from the border of the mask: a cell with none so deep is outside
 _NEAR: Final = 1.5  # pixels of the grid from the mask
@@ -39,9 +39,10 @@ def find_outline(instance: Instance, drawing: Underlay) -> Outline:
     sheet = strokes_sheet(instance, view.box, drawing, thick)
     ink = render_sheet(sheet, view.width, view.height)[..., 3] > 127
     mask = depth_inside(instance, view) > 0
-    at = np.ix_(*(np.arange(side) // _COARSE for side in mask.shape))
-    side, rough = _COARSE * np.array(view.pixel[::-1]) / instance.pixel_size, mask[::_COARSE, ::_COARSE]
-    away, depth = (ndimage.distance_transform_edt(area, side)[at] for area in (~rough, rough))
+    side = np.array(view.pixel[::-1]) / instance.pixel_size
+    step = max(1, int(1 / (_FINE * side.max())))
+    rough, at = mask[::step, ::step], np.ix_(*(np.arange(length) // step for length in mask.shape))
+    away, depth = (ndimage.distance_transform_edt(area, step * side)[at] for area in (~rough, rough))
     cells, count = ndimage.label(~ink)
     size, near, deep = (
         np.bincount(cells[area], minlength=count + 1) for area in (cells >= 0, away <= _NEAR, depth > _DEEP)
