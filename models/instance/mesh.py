@@ -56,36 +56,33 @@ class Mesh(Domain):
 
     def __post_init__(self) -> None:
         """Store read-only copies in the documented types."""
-        for name, array in (
-            ("vertices", float_array(self.vertices, "vertices", MeshError)),
-            ("faces", whole_numbers(self.faces, "faces", MeshError)),
-        ):
+        for name, convert in (("vertices", float_array), ("faces", whole_numbers)):
+            array = convert(getattr(self, name), name, MeshError)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
     def check(self) -> None:
         """Raise MeshError, with numbers of faces, unless the mesh is an oriented manifold of triangles."""
         self._check_arrays()
-        self._check_shapes()
-        start, end = self._edges
-        key = _edge_keys(start, end, len(self.vertices))
-        order = np.argsort(key, kind="stable")
-        twice = key[order][1:] == key[order][:-1]
-        if twice.any():
-            at = np.concatenate([order[1:][twice], order[:-1][twice]])
-            raise MeshError(
-                f"{list_faces(at // 3)} go along the same edge in the same direction: they are turned "
-                "against their neighbours, or more than two share it; orient all faces alike and remove "
-                "inner walls"
-            )
-        used = np.unique(start)
-        faces_in_fan = np.bincount(self._walk_around(used)[1], minlength=len(used))
-        split = used[faces_in_fan != np.bincount(start)[used]]
+        longest = _length(self._sides).max(axis=1)
+        _refuse(
+            ~(2 * self.areas > _THINNEST * longest * longest),
+            "no area in {}: two corners are one, or all lie on a line; merge close vertices and remove such "
+            "faces",
+        )
+        _, number, count = np.unique(self._edge_keys[0], return_inverse=True, return_counts=True)
+        _refuse(
+            (count[number] > 1).reshape(-1, 3).any(axis=1),
+            "{} go along the same edge in the same direction: they are turned against their neighbours, or "
+            "more than two share it; orient all faces alike and remove inner walls",
+        )
+        used, count = np.unique(self.faces, return_counts=True)
+        split = used[np.bincount(self._walk_around(used)[1], minlength=len(used)) != count]
         if len(split):
-            at = np.nonzero(np.isin(self.faces, split).any(axis=1))[0]
-            raise MeshError(
-                f"{list_faces(at)} touch others at vertex {int(split[0])} alone; "
-                "split it, so that each vertex has one fan of faces"
+            _refuse(
+                np.isin(self.faces, split).any(axis=1),
+                f"{{}} touch others at vertex {split[0]} alone; "
+                "split it, so that each vertex has one fan of faces",
             )
 
     def _check_arrays(self) -> None:
@@ -99,20 +96,8 @@ class Mesh(Domain):
             raise MeshError(f"has {len(self.faces)} faces; at most {MOST_FACES} are allowed, simplify it")
         if not (np.abs(self.vertices) <= _FARTHEST).all():
             raise MeshError(f"has a coordinate that is not a number up to {_FARTHEST:g}")
-        wrong = ((self.faces < 0) | (self.faces >= len(self.vertices))).any(axis=1)
-        if wrong.any():
-            raise MeshError(f"a vertex does not exist in {list_faces(np.nonzero(wrong)[0])}")
-
-    def _check_shapes(self) -> None:
-        edges = [self._edge_vectors(corner) for corner in range(3)]
-        longest = np.sqrt(np.maximum.reduce([_dot(edge, edge) for edge in edges]))
-        twice_area = np.sqrt(_dot(self._cross, self._cross))
-        thin = ~(twice_area > _THINNEST * longest * longest)
-        if thin.any():
-            raise MeshError(
-                f"no area in {list_faces(np.nonzero(thin)[0])}: two corners are one, or all lie on a "
-                "line; merge close vertices and remove such faces"
-            )
+        wrong = (self.faces < 0) | (self.faces >= len(self.vertices))
+        _refuse(wrong.any(axis=1), "a vertex does not exist in {}")
 
     @property
     def size(self) -> int:
@@ -124,13 +109,17 @@ class Mesh(Domain):
         """First and second vertex of each directed edge, (3 n,): edge 3 f + k leaves corner k of face f."""
         return self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
 
+    @property
+    def _edge_keys(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """A number for each directed edge and for its reverse, (3 n,)."""
+        start, end = (vertex.astype(np.int64) for vertex in self._edges)
+        return start * len(self.vertices) + end, end * len(self.vertices) + start
+
     @cached_property
     def _opposite(self) -> Ints:
         """The directed edge that is each one reversed, -1 at the boundary, (3 n,)."""
-        start, end = self._edges
-        key = _edge_keys(start, end, len(self.vertices))
+        key, reversed_key = self._edge_keys
         order = np.argsort(key, kind="stable")
-        reversed_key = _edge_keys(end, start, len(self.vertices))
         at = np.minimum(np.searchsorted(key[order], reversed_key), len(key) - 1)
         return np.where(key[order][at] == reversed_key, order[at], -1).astype(np.int32)
 
@@ -165,15 +154,17 @@ class Mesh(Domain):
         start, end = self._edges
         return np.stack([start[edges], end[edges]], axis=1)
 
-    def _edge_vectors(self, corner: int) -> Floats:
-        """The edge that leaves a corner of each face, shape (n, 3)."""
+    @property
+    def _sides(self) -> Floats:
+        """The edges that leave the three corners of each face, shape (n, 3, 3)."""
         corners = self.vertices[self.faces]
-        return np.asarray(corners[:, (corner + 1) % 3] - corners[:, corner])
+        return np.asarray(np.roll(corners, -1, axis=1) - corners)
 
     @cached_property
     def _cross(self) -> Floats:
         """Normal of each face times twice its area, shape (n, 3)."""
-        return np.cross(self._edge_vectors(0), -self._edge_vectors(2))
+        sides = self._sides
+        return np.cross(sides[:, 0], -sides[:, 2])
 
     @cached_property
     def normals(self) -> Floats:
@@ -183,12 +174,12 @@ class Mesh(Domain):
     @cached_property
     def areas(self) -> Floats:
         """Area of each face, shape (n,)."""
-        return np.asarray(np.sqrt(_dot(self._cross, self._cross)) / 2)
+        return np.asarray(_length(self._cross) / 2)
 
     @cached_property
     def frames(self) -> Floats:
         """Unit x and y axis of each face, shape (n, 2, 3)."""
-        x = _unit(self._edge_vectors(0))
+        x = _unit(self._sides[:, 0])
         return np.stack([x, np.cross(self.normals, x)], axis=1)
 
     @cached_property
@@ -228,15 +219,13 @@ class Mesh(Domain):
         low, high = self.pair_vertices.T
         edge = self.vertices[high] - self.vertices[low]
         middle = (self.vertices[high] + self.vertices[low]) / 2
-        to_first, to_second = (self.centres[face] - middle for face in (self.first, self.second))
-        across = np.sqrt(_dot(to_first, to_first)) + np.sqrt(_dot(to_second, to_second))
-        return np.asarray(np.sqrt(_dot(edge, edge)) / across)
+        across = [_length(self.centres[face] - middle) for face in (self.first, self.second)]
+        return np.asarray(_length(edge) / sum(across))
 
     @cached_property
     def defect(self) -> Floats:
         """2 pi less the angles of the faces around each vertex, in radians, shape (v,)."""
-        edges = [self._edge_vectors(corner) for corner in range(3)]
-        angles = np.stack([_angle_between(edges[corner], -edges[corner - 1]) for corner in range(3)], axis=1)
+        angles = _angle_between(self._sides, -np.roll(self._sides, 1, axis=1))
         around = np.bincount(self.faces.ravel(), angles.ravel(), len(self.vertices))
         return np.asarray(2 * np.pi - around)
 
@@ -263,18 +252,21 @@ class Mesh(Domain):
         first = np.full(len(self.vertices), -1, dtype=np.int32)
         first[start[::-1]] = np.arange(len(start) - 1, -1, -1, dtype=np.int32)
         first[start[self.boundary]] = self.boundary  # where an open fan begins
-        place = np.arange(len(vertices), dtype=np.int32)
-        begin = first[vertices]
-        at, places, returning = begin, [place], []
+        place, begin, steps = (
+            np.arange(len(vertices), dtype=np.int32),
+            first[vertices],
+            [np.zeros((2, 0), "i4")],
+        )
+        at = begin
         while len(place):
             incoming = at - at % 3 + (at + 2) % 3
-            returning.append(incoming)
+            steps.append(np.stack([incoming, place]))
             at = self._opposite[incoming]
             open_ = (at >= 0) & (at != begin[place])
             place, at = place[open_], at[open_]
-            places.append(place)
-        order = np.argsort(np.concatenate(places[:-1] or [place]), kind="stable")
-        return np.concatenate(returning or [at])[order], np.concatenate(places[:-1] or [place])[order]
+        edges, places = np.concatenate(steps, axis=1)
+        order = np.argsort(places, kind="stable")
+        return edges[order], places[order]
 
     @cached_property
     def rings(self) -> Rings:
@@ -330,22 +322,27 @@ class Mesh(Domain):
 
 
 def _angle_between(one: Floats, other: Floats) -> Floats:
-    """Angles between vectors (k, 3) in [0, pi], shape (k,)."""
-    cross = np.cross(one, other)
-    return arctangent(np.sqrt(_dot(cross, cross)), _dot(one, other))
+    """Angles between vectors (..., 3), in [0, pi]."""
+    return arctangent(_length(np.cross(one, other)), _dot(one, other))
 
 
 def _dot(one: Floats, other: Floats) -> Floats:
-    """Scalar products of vectors (k, 3), summed from left to right, shape (k,)."""
-    return np.asarray(one[:, 0] * other[:, 0] + one[:, 1] * other[:, 1] + one[:, 2] * other[:, 2])
+    """Scalar products of vectors (..., 3), summed from left to right."""
+    return np.asarray(one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1] + one[..., 2] * other[..., 2])
+
+
+def _length(vectors: Floats) -> Floats:
+    return np.sqrt(_dot(vectors, vectors))
 
 
 def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.sqrt(_dot(vectors, vectors))[:, None])
+    return np.asarray(vectors / _length(vectors)[..., None])
 
 
-def _edge_keys(start: Ints, end: Ints, vertices: int) -> NDArray[np.int64]:
-    return start.astype(np.int64) * vertices + end
+def _refuse(wrong: Any, reason: str) -> None:
+    """Raise MeshError, with the faces in the braces of the reason, if any of them is wrong, (n,)."""
+    if wrong.any():
+        raise MeshError(reason.format(list_faces(np.nonzero(wrong)[0])))
 
 
 def list_faces(numbers: NDArray[Any]) -> str:
