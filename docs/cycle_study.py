@@ -118,8 +118,7 @@ def _with_features(name: str, mesh: Mesh) -> Instance:
     from crossfield.models.mesh.strokes import combine_strokes, feature_edges
 
     edges = feature_edges(mesh, sharp=35.0, boundary=True, lines=np.zeros((0, 2), np.int32))
-    strokes = combine_strokes(mesh, edges, None)
-    return Instance.on_faces(name, mesh, strokes.face, strokes.theta, strokes.w, stroke_coefficient=20.0)
+    return Instance.on_faces(name, mesh, *combine_strokes(mesh, edges, None)[:3], stroke_coefficient=20.0)
 
 
 def measure(run: Run, limit: float) -> Row:

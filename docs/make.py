@@ -19,7 +19,7 @@ from typing import Any
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.cli.domains import SKETCHES_ONLY
+from crossfield.export.cli.mesh_options import SKETCHES_ONLY
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.models.errors import InputError
 from crossfield.models.formulations.catalogue import A_WHOLE, FORMULATIONS, declare

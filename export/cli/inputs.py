@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import CrossfieldError, InputError, InstanceError
-from .domains import check_domain
+from .mesh_options import check_domain
 
 if TYPE_CHECKING:
     from ...models.field.field import CrossField

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from ...models.errors import InputError, naming
-from .domains import check_domain, is_mesh_file
-from .mesh_options import MeshOptions
+from .mesh_options import MeshOptions, check_domain, is_mesh_file
 from .output import print_warnings
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from ...models.errors import InputError
-from .domains import is_mesh_file
+from .mesh_options import is_mesh_file
 from .output import print_line, show_progress
 
 

@@ -46,7 +46,7 @@ class Cycles(Walks):
 
 def find_cycles(domain: Domain, stroke_index: Ints) -> Cycles:
     """The basis for a domain with strokes at some points; the same for equal arguments."""
-    forest = grow_forest(domain, stroke_index)
+    forest = grow_forest(domain.size, domain.first, domain.second, stroke_index)
     chords = np.ones(len(domain.first), dtype=bool)
     chords[forest.pair[forest.pair >= 0]] = False
     rings, replaced = _choose_rings(domain, np.nonzero(chords)[0].astype(np.int32), forest)
@@ -81,12 +81,14 @@ def integrate(cycles: Cycles, domain: Domain, turns: Floats, at_roots: Floats) -
     return values
 
 
-def grow_forest(domain: Domain, stroke_index: Ints) -> Forest:
-    """Grow a forest in breadth from points with strokes, then from the first point of each other part."""
-    first, second = domain.first, domain.second
-    depth = np.full(domain.size, -1, dtype=np.int32)
+def grow_forest(size: int, first: Ints, second: Ints, roots: Ints | list[int]) -> Forest:
+    """Grow a forest over pairs of points in breadth from roots, then from the first point of each other part.
+
+    size: number of points. first, second: of each pair, (m,).
+    """
+    depth = np.full(size, -1, dtype=np.int32)
     pair = depth.copy()
-    depth[stroke_index] = 0
+    depth[roots] = 0
     open_ = np.arange(len(first), dtype=np.int32)
     while True:
         reached = depth[first[open_]] >= 0, depth[second[open_]] >= 0

@@ -70,7 +70,7 @@ class Mesh(Domain):
             "no area in {}: two corners are one, or all lie on a line; merge close vertices and remove such "
             "faces",
         )
-        _, number, count = np.unique(self._edge_keys[0], return_inverse=True, return_counts=True)
+        _, number, count = np.unique(self.edge_keys[0], return_inverse=True, return_counts=True)
         _refuse(
             (count[number] > 1).reshape(-1, 3).any(axis=1),
             "{} go along the same edge in the same direction: they are turned against their neighbours, or "
@@ -110,7 +110,7 @@ class Mesh(Domain):
         return self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
 
     @property
-    def _edge_keys(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def edge_keys(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """A number for each directed edge and for its reverse, (3 n,)."""
         start, end = (vertex.astype(np.int64) for vertex in self._edges)
         return start * len(self.vertices) + end, end * len(self.vertices) + start
@@ -118,7 +118,7 @@ class Mesh(Domain):
     @cached_property
     def _opposite(self) -> Ints:
         """The directed edge that is each one reversed, -1 at the boundary, (3 n,)."""
-        key, reversed_key = self._edge_keys
+        key, reversed_key = self.edge_keys
         order = np.argsort(key, kind="stable")
         at = np.minimum(np.searchsorted(key[order], reversed_key), len(key) - 1)
         return np.where(key[order][at] == reversed_key, order[at], -1).astype(np.int32)

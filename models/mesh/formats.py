@@ -24,7 +24,7 @@ from ..storage import read_bytes
 
 _MOST_VERTICES: Final = 3 * MOST_FACES
 _HEAD: Final = 1 << 16  # bytes in which a file states the numbers of its vertices and faces
-_NONE: Final = np.zeros((0, 2), dtype=np.int32)
+NO_LINES: Final = np.zeros((0, 2), dtype=np.int32)
 
 
 def read_mesh_file(path: Path) -> tuple[Mesh, Ints]:
@@ -95,11 +95,11 @@ def _read_stated(suffix: str, data: bytes, vertices: bytes | None, faces: bytes 
         raise InputError(f"does not begin as {suffix}, with the numbers of its vertices and faces")
     _check_size(int(vertices), int(faces))
     if not int(faces):
-        return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)), _NONE
+        return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)), NO_LINES
     mesh = Mesh(*_load_by_trimesh(suffix, data))
     if len(mesh.faces) != int(faces):
         raise MeshError(f"has {int(faces)} faces, which are {len(mesh.faces)} triangles; triangulate it")
-    return mesh, _NONE
+    return mesh, NO_LINES
 
 
 def _check_size(vertices: int, faces: int) -> None:
@@ -117,9 +117,7 @@ def _read_stl(data: bytes) -> tuple[Mesh, Ints]:
     _check_size(0, len(faces))
     vertices, first, number = np.unique(corners + 0.0, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    return Mesh(vertices[order], rank[number.ravel()][faces]), _NONE
+    return Mesh(vertices[order], np.argsort(order)[number.ravel()][faces]), NO_LINES
 
 
 def _load_by_trimesh(suffix: str, data: bytes) -> tuple[Floats, Any]:

@@ -1,4 +1,4 @@
-"""Read a mesh as an instance: faces with strokes along its features."""
+"""Meshes as instances: faces with strokes along features, of files and of the built-in meshes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from ..arguments import check_arguments
 from ..errors import InputError, naming
 from ..instance.instance import STROKE_WEIGHT, Gauge, Instance, Reading, name_from_text
 from ..instance.mesh import list_faces
-from .formats import read_mesh_file
+from .formats import NO_LINES, read_mesh_file
+from .shapes import MESHES
 from .strokes import combine_strokes, feature_edges, read_directions
 
 PairWeights = Literal["unit", "dual"]
 PAIR_WEIGHTS: Final[tuple[PairWeights, ...]] = get_args(PairWeights)
+_SHARP: Final = 35.0  # degrees between two faces of a built-in mesh from which their edge is a stroke on both
+_SMOOTH: Final = frozenset({"bump", "half_torus", "doughnut"})  # their edges bend a coarse smooth surface
 
 
 @check_arguments
@@ -81,20 +84,41 @@ def read_mesh(
     if directions is not None:
         with naming(directions):
             directed = read_directions(Path(directions), mesh)
-    strokes = combine_strokes(mesh, edges, directed)
+    *strokes, contradictory = combine_strokes(mesh, edges, directed)
     warnings: tuple[str, ...] = ()
-    if len(strokes.contradictory):
-        warnings = (f"no stroke on {list_faces(strokes.contradictory)}, where directions cancel out",)
+    if len(contradictory):
+        warnings = (f"no stroke on {list_faces(contradictory)}, where directions cancel out",)
     return Instance.on_faces(
         name or name_from_text(path.stem, "mesh"),
         mesh,
-        strokes.face,
-        strokes.theta,
-        strokes.w,
+        *strokes,
         stroke_coefficient=STROKE_WEIGHT,
         orthogonal=orthogonal,
         pair_weights=mesh.dual_weights if weights == "dual" else None,
         gauge=gauge,
         source=path.name,
         reading=Reading(None, warnings),
+    )
+
+
+def mesh_sample(
+    name: str,
+    *,
+    gauge: Gauge = "strokes",
+    stroke_weight: float = STROKE_WEIGHT,
+    orthogonal: bool = True,
+) -> Instance:
+    """Instance of a built-in mesh. Raises InputError for an unknown name, InstanceError for a weight."""
+    if name not in MESHES:
+        raise InputError(f"there is no mesh {name!r}; choose one of {', '.join(MESHES)}")
+    mesh = MESHES[name][1]()
+    edges = feature_edges(mesh, sharp=None if name in _SMOOTH else _SHARP, boundary=True, lines=NO_LINES)
+    return Instance.on_faces(
+        name,
+        mesh,
+        *combine_strokes(mesh, edges, None)[:3],
+        stroke_coefficient=stroke_weight,
+        gauge=gauge,
+        orthogonal=orthogonal,
+        source=f"the built-in mesh {name}",
     )

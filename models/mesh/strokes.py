@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arguments import whole_numbers
 from ..errors import InputError, MeshError, shortened
@@ -23,19 +21,6 @@ _UPRIGHT: Final = 1e-6  # share of a vector that must lie in its face
 _DECIMALS: Final = 9  # of lengths of means, so that ties are decided alike on every processor
 
 
-@dataclass(frozen=True, eq=False)
-class FaceStrokes:
-    """Face (s,), direction theta (s,) in its frame and reliability w (s,) of each stroke.
-
-    contradictory: faces left without a stroke, because their directions cancel each other, (k,).
-    """
-
-    face: Ints
-    theta: Floats
-    w: Floats
-    contradictory: Ints
-
-
 def feature_edges(mesh: Mesh, *, sharp: float | None, boundary: bool, lines: Ints) -> Ints:
     """Directed edges with a stroke on the face that has them, (k,).
 
@@ -44,8 +29,8 @@ def feature_edges(mesh: Mesh, *, sharp: float | None, boundary: bool, lines: Int
     that is no edge of the mesh.
     """
     at = np.zeros(0, np.int32) if sharp is None else np.degrees(mesh.dihedral) >= sharp - _EQUAL
-    keys = _edge_keys(mesh, mesh.edge_vertices(np.arange(3 * mesh.size, dtype=np.int32)))
-    of_lines = np.where((lines < len(mesh.vertices)).all(axis=1), _edge_keys(mesh, lines), -1)
+    keys, (low, high) = np.minimum(*mesh.edge_keys), np.sort(lines.astype(np.int64), axis=1).T
+    of_lines = np.where(high < len(mesh.vertices), low * len(mesh.vertices) + high, -1)
     missing = ~np.isin(of_lines, keys)
     if missing.any():
         one, other = lines[int(np.argmax(missing))] + 1
@@ -56,12 +41,6 @@ def feature_edges(mesh: Mesh, *, sharp: float | None, boundary: bool, lines: Int
     of_boundary = keys[mesh.boundary] if boundary else keys[:0]
     chosen = np.concatenate([keys[mesh.pair_edges[at]], of_boundary, of_lines])
     return np.nonzero(np.isin(keys, chosen))[0].astype(np.int32)
-
-
-def _edge_keys(mesh: Mesh, ends: NDArray[Any]) -> NDArray[np.int64]:
-    """A number for each undirected edge [vertex, vertex] (k, 2)."""
-    low, high = ends.min(axis=1).astype(np.int64), ends.max(axis=1)
-    return np.asarray(low * len(mesh.vertices) + high)
 
 
 def read_directions(path: Path, mesh: Mesh) -> tuple[Ints, Floats]:
@@ -99,8 +78,13 @@ def _refuse(wrong: Bools, face: Ints, reason: str) -> None:
         raise InputError(f"face {face[int(np.argmax(wrong))]}: {reason} ({int(wrong.sum())} such faces)")
 
 
-def combine_strokes(mesh: Mesh, edges: Ints, directions: tuple[Ints, Floats] | None) -> FaceStrokes:
+def combine_strokes(
+    mesh: Mesh, edges: Ints, directions: tuple[Ints, Floats] | None
+) -> tuple[Ints, Floats, Floats, Ints]:
     """One stroke for each face with directions: of edges (k,), and given ones.
+
+    Returns the face, the direction theta in its frame and the reliability w of each stroke, (s,); and faces
+    without a stroke because their directions cancel each other, (k,).
 
     Directions that differ by a right angle agree. Of several, the stroke has the mean, by the fourfold angle,
     and the length of this mean as its reliability; below 1/2 there is no stroke. Of the four directions of
@@ -122,11 +106,7 @@ def combine_strokes(mesh: Mesh, edges: Ints, directions: tuple[Ints, Floats] | N
     length = np.round(np.sqrt(along * along + across * across) / count, _DECIMALS)
     mean = arctangent(across, along) / 4
     mean = mean + HALF * np.round((theta[first] - mean) / HALF)
-    several = count > 1
-    kept: Bools = ~several | (length >= _LEAST_AGREEMENT)
-    return FaceStrokes(
-        face=faces[kept].astype(np.int32),
-        theta=np.where(several, mean, theta[first])[kept],
-        w=np.where(several, np.minimum(length, 1.0), 1.0)[kept],
-        contradictory=faces[~kept].astype(np.int32),
-    )
+    single = count == 1
+    theta, w = np.where(single, theta[first], mean), np.where(single, 1.0, np.minimum(length, 1.0))
+    kept = single | (length >= _LEAST_AGREEMENT)
+    return faces[kept], theta[kept], w[kept], faces[~kept]

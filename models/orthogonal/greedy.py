@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from ..instance.angles import HALF
+from ..instance.cycles import grow_forest
 from ..instance.domain import Bools, Ints
 from ..processes.deadline import Over, never
 from ..smooth.sparse_systems import factor_matrix, one_thread
@@ -27,7 +28,7 @@ def round_greedily(energy: OrthogonalEnergy, over: Over = never) -> Ints:
     With more than 6,000 points a fifth of the open integers are rounded per factorisation, those nearest to
     whole numbers. Once time is over, all that are open are rounded.
     """
-    z, known = np.zeros(len(energy.first), dtype=np.int32), grow_forest(energy)
+    z, known = np.zeros(len(energy.first), dtype=np.int32), find_forest_rows(energy)
     while not known.all():
         weight = np.where(known, energy.weight, 0.0)
         solve = factor_matrix(energy.matrix_of(weight), pull=0.0)
@@ -54,14 +55,9 @@ def round_greedily(energy: OrthogonalEnergy, over: Over = never) -> Ints:
     return z
 
 
-def grow_forest(energy: OrthogonalEnergy) -> Bools:
-    """Whether each row is a stroke or in the forest grown breadth first from strokes and pins, (r,)."""
-    strokes, used = energy.second == energy.size, energy.weight > 0
-    reached = np.zeros(energy.size + 1, dtype=bool)
-    reached[energy.size] = reached[energy.pins] = reached[energy.first[strokes & used]] = True
-    chosen: Bools = strokes.copy()
-    while len(rows := np.nonzero(used & (reached[energy.first] != reached[energy.second]))[0]):
-        ends = np.where(reached[energy.first[rows]], energy.second[rows], energy.first[rows])
-        points, at = np.unique(ends, return_index=True)
-        chosen[rows[at]] = reached[points] = True
-    return chosen
+def find_forest_rows(energy: OrthogonalEnergy) -> Bools:
+    """Whether each row is a stroke or in the forest grown in breadth from the ground, (r,)."""
+    used, known = np.nonzero(energy.weight > 0)[0], energy.second == energy.size
+    forest = grow_forest(energy.size + 1, energy.first[used], energy.second[used], [energy.size])
+    known[used[forest.pair[forest.pair >= 0]]] = True
+    return np.asarray(known)

@@ -100,7 +100,7 @@ class _CentredLevels:
 
 def two_colours(domain: Domain, near: Neighbours, fixed: Bools) -> NDArray[np.uint8]:
     """0 or 1 of each point, such that most pairs have both, and 0 where it is fixed; (n,)."""
-    side = 1 - 2 * (grow_forest(domain, np.zeros(0, np.int32)).depth % 2)
+    side = 1 - 2 * (grow_forest(domain.size, domain.first, domain.second, []).depth % 2)
     for i in np.tile(np.nonzero(~fixed)[0], _SWEEPS).tolist():
         if side[i] * sum(side[j] for j, _ in near[i]) > 0:
             side[i] = -side[i]

@@ -9,7 +9,7 @@ from typing import Final, Literal
 from ..arguments import check_arguments
 from ..errors import InputError
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
-from ..mesh.samples import mesh_sample
+from ..mesh.read import mesh_sample
 from ..mesh.shapes import MESHES
 from .read import DEFAULT_SIZE, Silhouette, check_silhouette, check_size, instance_of_drawing
 from .surfaces import analytic

@@ -11,7 +11,7 @@ from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, formulate
 from ....models.instance.domain import Ints
 from ....models.instance.instance import Gauge, Instance
-from ....models.mesh.samples import mesh_sample
+from ....models.mesh.read import mesh_sample
 from ....models.sketch.drawing_file import parse_drawing
 from ....models.sketch.random_strokes import random_instance
 from ....models.sketch.read import instance_of_drawing, read_mask

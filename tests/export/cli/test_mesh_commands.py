@@ -10,7 +10,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.cli.domains import SKETCHES_ONLY
+from crossfield.export.cli.mesh_options import SKETCHES_ONLY
 from loops import for_each
 from meshes import box, flat_sheet, write_obj
 

@@ -14,7 +14,7 @@ from crossfield.models.instance.angles import HALF
 from crossfield.models.orthogonal import greedy as greedy_module
 from crossfield.models.orthogonal import search as search_module
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, field_of
-from crossfield.models.orthogonal.greedy import grow_forest, round_greedily
+from crossfield.models.orthogonal.greedy import find_forest_rows, round_greedily
 from crossfield.models.orthogonal.search import IntegerSearch
 from crossfield.models.smooth.sparse_systems import factor_matrix
 from meshes import (
@@ -180,7 +180,7 @@ def test_single_faces_have_fields(faces, orthogonal):
 def test_greedy_is_one_solution_of_exact_rounds_and_one_of_many_at_once(monkeypatch):
     energy = OrthogonalEnergy.of(on_edges(shaken(torus(12, 6), 1, 0.05), sharp=9))
     exact = round_greedily(energy)
-    assert not exact[grow_forest(energy)].any()
+    assert not exact[find_forest_rows(energy)].any()
     monkeypatch.setattr(greedy_module, "MOST_DENSE", 0)
     many, at_once = round_greedily(energy), round_greedily(energy, over=lambda: True)
     totals = [energy.least_total(z) for z in (exact, many, at_once)]
@@ -191,7 +191,7 @@ def test_greedy_is_one_solution_of_exact_rounds_and_one_of_many_at_once(monkeypa
 def test_the_rounds_of_greedy_have_the_best_angles_in_between():
     """The rounds of a plain program, which solves again after each."""
     energy = OrthogonalEnergy.of(on_edges(shaken(box(2), 1, 0.1), sharp=9))
-    known, z = grow_forest(energy), np.zeros(len(energy.first), dtype=np.int32)
+    known, z = find_forest_rows(energy), np.zeros(len(energy.first), dtype=np.int32)
     while not known.all():
         weight = energy.weight * known
         alpha = np.linalg.solve(energy.matrix_of(weight).toarray(), -energy.force(weight, z))
