@@ -1,4 +1,8 @@
-"""Files of other programs with directions on triangles (triangles.py): .rosy, .ply and .vtk, all as text.
+"""Files of other programs with directions on triangles (triangles.py), all as text.
+
+`.rawfield`, of Directional: a line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z,
+counter-clockwise. Its singularities (.sings) and its mesh (.obj) are files of their own. Other fields are
+read too: vectors of any length and order that form two pairs of opposite vectors in the plane of their face.
 
 `.rosy`, of QuadWild and others: the number of faces, 4, and for each face one vector of an orthogonal cross,
 in the plane of its face. A skewed cross is written as the orthogonal cross between its lines.
@@ -9,33 +13,71 @@ The .vtk also has the index of each vertex, 0 at most of them.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from ..errors import InstanceError
+from ..errors import InstanceError, quote_line
 from ..input_limits import MAX_NUMBER
 from ..instance.domain import Floats
 from ..instance.instance import Instance
+from ..instance.mesh import Mesh
 from .field import CrossField
-from .rawfield import check_triangles, number_rows, text_of_rows, unit_vectors
 from .triangles import field_of_vectors, mesh_of, singular_vertices, triangle_counts, vectors_of
+
+Lines = list[tuple[int, bytes]]
+"""Lines of a file and their numbers, from 1."""
+
+OF_MESH: Final = b"# the mesh of a cross field of crossfield: "
+"""How the .obj of a mesh begins, by which it differs from the user's own mesh."""
 
 _COMPONENTS: Final = ("ux", "uy", "uz", "vx", "vy", "vz")
 _PER_FACE: Final = 20  # numbers about a face and its vertices in any of these files, and words of a head
+_OPPOSITE: Final = 1e-3  # radians by which the two vectors of a line may fail to be opposite
+_FLAT: Final = 1e-6  # share of a vector that may point out of the plane
+_NUMBERS: Final = re.compile(
+    rb"(?:[ \t]*+[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?(?![^ \t]))*+[ \t]*+"
+)
 
 
-def to_rosy(field: CrossField) -> bytes:
+def _to_rawfield(field: CrossField) -> bytes:
+    """The text of the .rawfield of a field."""
+    vectors = vectors_of(field)
+    rows = _text_of_rows(np.concatenate([vectors, -vectors], axis=1).reshape(-1, 12) + 0.0)
+    return f"4 {len(vectors)}\n{rows}".encode()
+
+
+def to_obj(instance: Instance) -> bytes:
+    """The mesh: vertices and, 1-based, faces."""
+    mesh, on_mesh = mesh_of(instance), isinstance(instance.domain, Mesh)
+    of_pixels = (
+        f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, row by row; y up"
+    )
+    head = OF_MESH + instance.name.encode() if on_mesh else of_pixels.encode()
+    rows = _text_of_rows(mesh.vertices, "v ") + _text_of_rows(mesh.faces + 1, "f ")
+    return head + b"\n" + rows.encode()
+
+
+def to_sings(field: CrossField) -> bytes:
+    """The text of the singularities: a line `4 k`, then vertex, from 0 as in the .obj, and 4 index."""
+    vertex, index = singular_vertices(field)
+    quarters = np.round(4 * index).astype(np.int64)
+    return f"4 {len(vertex)}\n{_text_of_rows(np.stack([vertex, quarters], axis=1))}".encode()
+
+
+def _to_rosy(field: CrossField) -> bytes:
     """The text of the .rosy of a field."""
     straight = CrossField(
         replace(field.instance, orthogonal=True), field.alpha, np.zeros_like(field.beta), field.p
     )
     vectors = vectors_of(straight)[:, 0]
-    return f"{len(vectors)}\n4\n{text_of_rows(vectors)}".encode()
+    return f"{len(vectors)}\n4\n{_text_of_rows(vectors)}".encode()
 
 
-def to_ply(field: CrossField) -> bytes:
+def _to_ply(field: CrossField) -> bytes:
     """The text of the .ply of a field."""
     mesh, vectors = mesh_of(field.instance), vectors_of(field)
     properties = "".join(f"property double {name}\n" for name in _COMPONENTS)
@@ -46,52 +88,66 @@ def to_ply(field: CrossField) -> bytes:
     )
     rows = zip(mesh.faces.tolist(), vectors.reshape(-1, 6).tolist(), strict=True)
     faces = "".join(f"3 {' '.join(map(repr, [*corners, *numbers]))}\n" for corners, numbers in rows)
-    return (head + text_of_rows(mesh.vertices) + faces).encode()
+    return (head + _text_of_rows(mesh.vertices) + faces).encode()
 
 
-def to_vtk(field: CrossField) -> bytes:
+def _to_vtk(field: CrossField) -> bytes:
     """The text of the .vtk of a field."""
     mesh, vectors = mesh_of(field.instance), vectors_of(field)
     vertex, turns = singular_vertices(field)
     index = np.zeros((len(mesh.vertices), 1))
     index[vertex, 0] = turns
-    u, v = (f"VECTORS {name} double\n{text_of_rows(vectors[:, k])}" for k, name in enumerate("uv"))
+    u, v = (f"VECTORS {name} double\n{_text_of_rows(vectors[:, k])}" for k, name in enumerate("uv"))
     return (
         f"# vtk DataFile Version 3.0\ncrosses on {field.instance.name}\nASCII\nDATASET POLYDATA\n"
-        f"POINTS {len(mesh.vertices)} double\n{text_of_rows(mesh.vertices)}"
-        f"POLYGONS {mesh.size} {4 * mesh.size}\n{text_of_rows(mesh.faces, '3 ')}"
+        f"POINTS {len(mesh.vertices)} double\n{_text_of_rows(mesh.vertices)}"
+        f"POLYGONS {mesh.size} {4 * mesh.size}\n{_text_of_rows(mesh.faces, '3 ')}"
         f"CELL_DATA {mesh.size}\n{u}{v}"
-        f"POINT_DATA {len(index)}\nSCALARS index double 1\nLOOKUP_TABLE default\n{text_of_rows(index)}"
+        f"POINT_DATA {len(index)}\nSCALARS index double 1\nLOOKUP_TABLE default\n{_text_of_rows(index)}"
     ).encode()
 
 
-def most_exchange_bytes(instance: Instance) -> int:
+def _text_of_rows(table: np.ndarray[Any, Any], lead: str = "") -> str:
+    """One line of numbers per row of a table, each after a lead."""
+    return "".join(f"{lead}{' '.join(map(repr, row))}\n" for row in table.tolist())
+
+
+def most_text_bytes(instance: Instance) -> int:
     """Most bytes of such a file that is read for the instance."""
     return (MAX_NUMBER + 1) * _PER_FACE * (triangle_counts(instance)[0] + _PER_FACE)
 
 
-def parse_rosy(data: bytes, instance: Instance) -> CrossField:
+def _parse_rawfield(data: bytes, instance: Instance) -> CrossField:
+    """Read the field of a .rawfield on the instance. Raises InstanceError that names the line."""
+    head, *lines = data.splitlines() or [b""]
+    words = head.split()
+    if len(words) != 2 or not all(word.isdigit() and len(word) < MAX_NUMBER for word in words):
+        raise InstanceError(f"line 1: is {quote_line(head)}, not the degree 4 and a number of faces")
+    degree, faces = map(int, words)
+    if degree != 4:
+        raise InstanceError(f"line 1: has {degree} vectors per face; crosses have 4: u, v, -u, -v")
+    _check_triangles(faces, instance, "line 1: ")
+    rows = [(number, line) for number, line in enumerate(lines, 2) if line.strip()]
+    _check_stated(rows, faces)
+    vectors = _number_rows(rows, 12, "x y z of four vectors").reshape(-1, 4, 3)
+    return field_of_vectors(instance, *_pair_opposites(_unit_vectors(vectors, rows, instance), rows))
+
+
+def _parse_rosy(data: bytes, instance: Instance) -> CrossField:
     """Read the field of a .rosy on the instance. Raises InstanceError that names the line."""
     body = [(number, line) for number, line in enumerate(data.splitlines(), 1) if line.strip()]
     if [line.split() for _, line in body[1:2]] != [[b"4"]]:
         raise InstanceError("line 2: is not 4, the number of directions of a cross; give a field of crosses")
-    (faces,), rows = number_rows(body[:1], 1, "the number of faces")[0], body[2:]
-    check_triangles(len(rows), instance)
-    if faces != len(rows):
-        raise InstanceError(f"has {len(rows)} rows of vectors, but its first line states {faces:g}")
-    vectors = number_rows(rows, 3, "x y z of a vector")
-    u = unit_vectors(vectors[:, None], [number for number, _ in rows], instance)[:, 0]
-    return field_of_vectors(instance, u, _turned(u, instance))
-
-
-def _turned(vectors: Floats, instance: Instance) -> Floats:
-    """The vectors (k, 3) of faces turned by a quarter counter-clockwise."""
+    (faces,), rows = _number_rows(body[:1], 1, "the number of faces")[0], body[2:]
+    _check_triangles(len(rows), instance)
+    _check_stated(rows, faces)
+    u = _unit_vectors(_number_rows(rows, 3, "x y z of a vector")[:, None], rows, instance)[:, 0]
     normals = mesh_of(instance).normals
-    return np.cross(normals if len(normals) == len(vectors) else normals[::2], vectors)
+    return field_of_vectors(instance, u, np.cross(normals if len(normals) == len(u) else normals[::2], u))
 
 
-def parse_ply(data: bytes, instance: Instance) -> CrossField:
-    """Read the field of a .ply that `to_ply` wrote. Raises InstanceError that names the line."""
+def _parse_ply(data: bytes, instance: Instance) -> CrossField:
+    """Read the field of a .ply that `_to_ply` wrote. Raises InstanceError that names the line."""
     lines = data.splitlines()
     mesh, end = mesh_of(instance), next((k for k, line in enumerate(lines) if line == b"end_header"), 0)
     expected = [f"property double {name}".encode() for name in _COMPONENTS]
@@ -101,7 +157,7 @@ def parse_ply(data: bytes, instance: Instance) -> CrossField:
     return _field_of_rows(list(enumerate(lines[start:], start + 1)), 4, instance)
 
 
-def parse_vtk(data: bytes, instance: Instance) -> CrossField:
+def _parse_vtk(data: bytes, instance: Instance) -> CrossField:
     """Read the field of a .vtk with cell vectors u and v. Raises InstanceError that names the line."""
     lines, count = data.splitlines(), triangle_counts(instance)[0]
     heads = [
@@ -114,9 +170,80 @@ def parse_vtk(data: bytes, instance: Instance) -> CrossField:
     return _field_of_rows(rows, 0, instance)
 
 
-def _field_of_rows(body: list[tuple[int, bytes]], skipped: int, instance: Instance) -> CrossField:
+def _field_of_rows(rows: Lines, skipped: int, instance: Instance) -> CrossField:
     """The field of rows that end with u and v, after a number of others."""
-    check_triangles(len(body), instance)
-    table = number_rows(body, skipped + 6, "the last six x y z of u and v")[:, skipped:].reshape(-1, 2, 3)
-    u, v = unit_vectors(table, [number for number, _ in body], instance).swapaxes(0, 1)
-    return field_of_vectors(instance, u, v)
+    _check_triangles(len(rows), instance)
+    table = _number_rows(rows, skipped + 6, "the last six x y z of u and v")[:, skipped:].reshape(-1, 2, 3)
+    return field_of_vectors(instance, *_unit_vectors(table, rows, instance).swapaxes(0, 1))
+
+
+def _check_triangles(count: int, instance: Instance, place: str = "") -> None:
+    """Raise InstanceError unless a file about an instance may have directions on that many faces."""
+    counts, domain = triangle_counts(instance), instance.domain
+    if count not in counts:
+        remedy = f"{counts[0]}, as in its .obj" + f", or {counts[-1]}, one per pixel" * (len(counts) > 1)
+        raise InstanceError(
+            f"{place}has {count} faces, but {instance.name} has {domain.size} {domain.kind}s; give {remedy}"
+        )
+
+
+def _check_stated(rows: Lines, stated: float) -> None:
+    if len(rows) != stated:
+        raise InstanceError(f"has {len(rows)} rows of vectors, but its first line states {stated:.15g}")
+
+
+def _number_rows(rows: Lines, width: int, meaning: str) -> Floats:
+    """The numbers (k, width) of lines. Raises InstanceError that names the line and the meaning."""
+    for number, line in rows:
+        words = len(line.split())
+        if words != width:
+            raise InstanceError(f"line {number}: has {words} numbers; give {width}, {meaning}")
+        if not _NUMBERS.fullmatch(line):
+            raise InstanceError(f"line {number}: holds something other than numbers: {quote_line(line)}")
+    return np.array(b" ".join(line for _, line in rows).split(), dtype=np.float64).reshape(-1, width)
+
+
+def _unit_vectors(vectors: Floats, rows: Lines, instance: Instance) -> Floats:
+    """The vectors (k, c, 3) of faces at length 1. Raises InstanceError for one that is no direction there."""
+    largest = np.abs(vectors).max(axis=2, keepdims=True)
+    _refuse(~np.isfinite(largest).all(axis=(1, 2)), rows, "holds a number beyond the range of doubles")
+    _refuse((largest == 0).any(axis=(1, 2)), rows, "holds a vector of length 0, which has no direction")
+    unit = vectors / largest  # squares of the numbers themselves might exceed the range of doubles
+    unit /= np.linalg.norm(unit, axis=2, keepdims=True)
+    domain = instance.domain
+    normal = domain.normals if isinstance(domain, Mesh) else np.array([[0.0, 0.0, 1.0]])
+    beyond = np.abs((unit * normal[:, None]).sum(axis=2)) > _FLAT
+    _refuse(beyond.any(axis=1), rows, "has a vector out of the plane of its face")
+    return np.asarray(unit)
+
+
+def _pair_opposites(unit: Floats, rows: Lines) -> tuple[Floats, Floats]:
+    """One vector of each of the two lines (k, 3) that four unit vectors each form, (k, 4, 3)."""
+    face, first = np.arange(len(unit)), unit[:, 0]
+    partner = 1 + np.argmin(np.einsum("kc,kvc->kv", first, unit[:, 1:]), axis=1)
+    second_line = np.where(partner == 1, 2, 1)
+    last = 6 - partner - second_line  # of the indices 0 to 3, which add up to 6
+    second = unit[face, second_line]
+    both = np.stack([unit[face, partner] + first, unit[face, last] + second])
+    off = np.linalg.norm(both, axis=2).max(axis=0)
+    _refuse(off > _OPPOSITE, rows, "has no two pairs of opposite vectors: u, v, -u, -v")
+    return first, second
+
+
+def _refuse(wrong: Any, rows: Lines, reason: str) -> None:
+    if wrong.any():
+        raise InstanceError(f"line {rows[int(np.argmax(wrong))][0]}: {reason} ({int(wrong.sum())} such rows)")
+
+
+TEXT_WRITERS: Final[dict[str, Callable[[CrossField], bytes]]] = {
+    ".rawfield": _to_rawfield,
+    ".rosy": _to_rosy,
+    ".ply": _to_ply,
+    ".vtk": _to_vtk,
+}
+TEXT_READERS: Final[dict[str, Callable[[bytes, Instance], CrossField]]] = {
+    ".rawfield": _parse_rawfield,
+    ".rosy": _parse_rosy,
+    ".ply": _parse_ply,
+    ".vtk": _parse_vtk,
+}

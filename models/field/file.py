@@ -36,9 +36,8 @@ from ..instance.grid import Grid
 from ..instance.instance import Instance
 from ..instance.mesh import MOST_FACES, Mesh
 from ..storage import read_bytes, write_bytes
-from .exchange import most_exchange_bytes, parse_ply, parse_rosy, parse_vtk, to_ply, to_rosy, to_vtk
+from .exchange import OF_MESH, TEXT_READERS, TEXT_WRITERS, most_text_bytes, to_obj, to_sings
 from .field import CrossField
-from .rawfield import OF_MESH, most_rawfield_bytes, parse_rawfield, to_obj, to_rawfield, to_sings
 
 FORMAT: Final = "crossfield-field"
 VERSION: Final = 1
@@ -80,9 +79,9 @@ def write_field(field: CrossField, path: str | Path) -> Path:
     """
     path = Path(path)
     write = _look_up_suffix(_WRITERS, path, "written")
-    if write in (to_rawfield, to_rosy):
+    if path.suffix.lower() in {".rawfield", ".rosy"}:
         _write_mesh(field.instance, path.with_suffix(".obj"))
-    if write is to_rawfield:
+    if path.suffix.lower() == ".rawfield":
         write_bytes(path.with_suffix(".sings"), to_sings(field))
     return write_bytes(path, write(field))
 
@@ -127,12 +126,11 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     """
     path = Path(path)
     with naming(path):
-        if path.suffix.lower() in _DIRECTIONS:
+        if path.suffix.lower() in TEXT_READERS:
             if on is None:
                 raise InputError("holds no instance; give the instance: read_field(path, on=instance)")
-            most, parse = _DIRECTIONS[path.suffix.lower()]
-            return parse(read_bytes(path, most(on)), on)
-        read = _look_up_suffix(_READERS, path, "read", *_DIRECTIONS)
+            return TEXT_READERS[path.suffix.lower()](read_bytes(path, most_text_bytes(on)), on)
+        read = _look_up_suffix(_READERS, path, "read", *TEXT_READERS)
         field = read(read_bytes(path, MAX_ARCHIVE))
         if on is not None:
             field.check_instance(on)
@@ -305,16 +303,6 @@ def _fill_jumps(grid: Grid, p: Ints, table: Ints, jumps: Floats, name: str) -> N
 _WRITERS: Final[dict[str, Callable[[CrossField], bytes]]] = {
     ".npz": _field_to_npz,
     ".json": field_to_json,
-    ".rawfield": to_rawfield,
-    ".rosy": to_rosy,
-    ".ply": to_ply,
-    ".vtk": to_vtk,
+    **TEXT_WRITERS,
 }
 _READERS: Final[dict[str, Callable[[bytes], CrossField]]] = {".npz": _field_of_npz, ".json": field_of_json}
-_DIRECTIONS: Final[dict[str, tuple[Callable[[Instance], int], Callable[[bytes, Instance], CrossField]]]] = {
-    ".rawfield": (most_rawfield_bytes, parse_rawfield),
-    ".rosy": (most_exchange_bytes, parse_rosy),
-    ".ply": (most_exchange_bytes, parse_ply),
-    ".vtk": (most_exchange_bytes, parse_vtk),
-}
-"""Files of directions alone: the most bytes that are read for an instance, and their reader."""
