@@ -248,10 +248,7 @@ def _are_faces(rows: list[Any]) -> bool:
 def _are_jumps(rows: list[Any]) -> bool:
     """Whether all rows obey the schema of a jump: [face, face, jump]."""
     table = number_table(rows, 3)
-    if table is None or (table % 1 != 0).any():
-        return False
-    faces = table[:, :2]
-    return bool(((faces >= 0) & (faces < MOST_FACES)).all() and (np.abs(table[:, 2]) <= _MOST_JUMP).all())
+    return table is not None and are_places(table[:, :2], MOST_FACES) and _are_jump_numbers(table[:, 2])
 
 
 def _are_pixels(rows: list[Any]) -> bool:
@@ -261,8 +258,11 @@ def _are_pixels(rows: list[Any]) -> bool:
     table = number_table([[0 if value is None else value for value in row] for row in rows], 6)
     if table is None or any(None in row[:4] for row in rows):
         return False
-    jumps = table[:, 4:]
-    return are_places(table[:, :2]) and bool((np.abs(jumps) <= _MOST_JUMP).all() and (jumps % 1 == 0).all())
+    return are_places(table[:, :2]) and _are_jump_numbers(table[:, 4:])
+
+
+def _are_jump_numbers(jumps: Floats) -> bool:
+    return bool((np.abs(jumps) <= _MOST_JUMP).all() and (jumps % 1 == 0).all())
 
 
 def _make_field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:

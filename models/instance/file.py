@@ -1,6 +1,6 @@
 """Instance files: documented JSON (instance.schema.json, mask as text rows) and .npz for large ones.
 
-A file has a mask with its strokes, or a mesh with its strokes (mesh_file.py). Whether crosses are orthogonal
+A file has a mask with its strokes, or a mesh with its strokes . Whether crosses are orthogonal
 and the weights of pairs are written only where they are not the default.
 """
 
@@ -26,7 +26,6 @@ from .domain import Floats
 from .grid import Grid
 from .instance import Instance
 from .mesh import MOST_FACES, Mesh
-from .mesh_file import MESH_ARCHIVE, MESH_ROWS, mesh_arguments, mesh_arrays, mesh_blocks
 
 FORMAT: Final = "crossfield-instance"
 VERSION: Final = 1
@@ -50,6 +49,12 @@ _GRID_ARCHIVE: Final = {
     "origin": ExpectedArray(1, 2),
     "mask": ExpectedArray(2, MAX_GRID, "b"),
     "stroke_pixels": ExpectedArray(2, MAX_GRID**2, "iuf"),
+}
+_MOST_VERTICES: Final = 3 * MOST_FACES
+_MESH_ARCHIVE: Final = {
+    "vertices": ExpectedArray(2, _MOST_VERTICES, "f"),
+    "faces": ExpectedArray(2, MOST_FACES, "iu"),
+    "stroke_faces": ExpectedArray(1, MOST_FACES, "iu"),
 }
 _WEIGHTS: Final = {"pair_weights": ExpectedArray(1, max(2 * MAX_GRID**2, 2 * MOST_FACES))}
 
@@ -117,7 +122,7 @@ def read_instance(path: str | Path) -> Instance:
 
 def instance_to_json(instance: Instance) -> str:
     """The instance as JSON text: one line per mask row, vertex, face, weight of a pair, and stroke."""
-    blocks = mesh_blocks(instance) if isinstance(instance.domain, Mesh) else _grid_blocks(instance)
+    blocks = _mesh_blocks(instance) if isinstance(instance.domain, Mesh) else _grid_blocks(instance)
     if instance.pair_weights is not None:
         blocks["pair_weights"] = list(map(repr, instance.pair_weights.tolist()))
     head = _head(instance)
@@ -137,6 +142,14 @@ def _grid_blocks(instance: Instance) -> dict[str, list[str]]:
         "mask": ['"' + "".join("#" if inside else "." for inside in row) + '"' for row in instance.mask],
         "strokes": [f"[{r}, {c}, {angle!r}, {weight!r}]" for (r, c), angle, weight in rows],
     }
+
+
+def _mesh_blocks(instance: Instance) -> dict[str, list[str]]:
+    """Lines of JSON for vertices [x, y, z], faces [a, b, c] and strokes [face, theta, w]."""
+    mesh = instance.mesh
+    strokes = zip(instance.stroke_index.tolist(), instance.theta.tolist(), instance.w.tolist(), strict=True)
+    rows = {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist(), "strokes": map(list, strokes)}
+    return {name: [repr(row) for row in listed] for name, listed in rows.items()}
 
 
 def _head(instance: Instance) -> dict[str, Any]:
@@ -210,14 +223,14 @@ def instance_of_document(document: object) -> Instance:
     check_version(document, FORMAT, VERSION)
     assert isinstance(document, dict)
     on_mesh = "vertices" in document
-    tests = {key: _table_test(test) for key, test in MESH_ROWS.items()} if on_mesh else _GRID_ROWS
-    checked = check_schema(document, "instance", __package__, rows={"pair_weights": _are_weights} | tests)
+    tests = {"pair_weights": _are_weights} | (_MESH_ROWS if on_mesh else _GRID_ROWS)
+    checked = check_schema(document, "instance", __package__, rows=tests)
     more = {name: checked[key] for key, name in _SCALARS.items() if key in checked}
     if "pair_weights" in checked:
         more["pair_weights"] = checked["pair_weights"]
     try:
         if on_mesh:
-            return Instance.on_faces(**{"orthogonal": False} | more | mesh_arguments(checked))
+            return Instance.on_faces(**{"orthogonal": False} | more | _face_arguments(checked))
         return Instance.on_pixels(**more | _pixel_arguments(checked))
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
@@ -245,6 +258,15 @@ def _pixel_arguments(document: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def _face_arguments(document: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of `Instance.on_faces` from the rows of a document or the arrays of an archive."""
+    arguments: dict[str, Any] = {"mesh": Mesh(document["vertices"], document["faces"])}
+    if "strokes" in document:
+        strokes = np.array(document["strokes"], dtype=np.float64).reshape(-1, 3)
+        return arguments | dict(zip(("stroke_faces", "theta", "w"), strokes.T, strict=True))
+    return arguments | {name: document[name] for name in ("stroke_faces", "theta", "w")}
+
+
 def check_counts(strokes: int, pixels: int) -> None:
     """Raise InstanceError if there are more stroke pixels than pixels."""
     if strokes > pixels:
@@ -258,13 +280,18 @@ def _table_test(test: Callable[[Floats], bool], width: int = 3) -> Callable[[lis
     return lambda rows: (table := number_table(rows, width)) is not None and test(table)
 
 
-def _are_strokes(table: Floats) -> bool:
-    """Whether rows [row, column, theta, w] obey the schema of a stroke."""
-    w = table[:, 3]
-    return are_places(table[:, :2]) and bool(((w > 0) & (w <= 1)).all())
+def _are_strokes(table: Floats, places: int = MAX_GRID) -> bool:
+    """Whether rows [row, column, theta, w] or [face, theta, w] obey the schema of a stroke."""
+    w = table[:, -1]
+    return are_places(table[:, :-2], places) and bool(((w > 0) & (w <= 1)).all())
 
 
 _GRID_ROWS: Final = {"strokes": _table_test(_are_strokes, 4)}
+_MESH_ROWS: Final = {
+    "vertices": _table_test(lambda _: True),
+    "faces": _table_test(lambda table: are_places(table, _MOST_VERTICES)),
+    "strokes": _table_test(lambda table: _are_strokes(table, _MOST_VERTICES)),
+}
 
 
 def _are_weights(values: list[Any]) -> bool:
@@ -273,9 +300,9 @@ def _are_weights(values: list[Any]) -> bool:
     return table is not None and bool((table > 0).all())
 
 
-def are_places(numbers: Floats) -> bool:
-    """Whether all numbers are rows and columns of a grid."""
-    return bool(((numbers >= 0) & (numbers < MAX_GRID)).all() and (numbers % 1 == 0).all())
+def are_places(numbers: Floats, places: int = MAX_GRID) -> bool:
+    """Whether all numbers are whole, from 0 to fewer than `places`."""
+    return bool(((numbers >= 0) & (numbers < places)).all() and (numbers % 1 == 0).all())
 
 
 def number_table(rows: list[Any], width: int) -> Floats | None:
@@ -342,8 +369,8 @@ def instance_arrays(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
     arrays: dict[str, np.ndarray[Any, Any]] = {
         "head": np.frombuffer(json.dumps(_head(instance)).encode(), dtype=np.uint8)
     }
-    if isinstance(instance.domain, Mesh):
-        arrays |= mesh_arrays(instance)
+    if isinstance(mesh := instance.domain, Mesh):
+        arrays |= {"vertices": mesh.vertices, "faces": mesh.faces, "stroke_faces": instance.stroke_index}
     else:
         arrays["origin"] = np.array(instance.origin)
         arrays |= {"mask": instance.mask, "stroke_pixels": instance.stroke_pixels}
@@ -353,7 +380,7 @@ def instance_arrays(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
 
 def instance_of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
     """Read an instance from arrays whose names start with a prefix. Raises InstanceError."""
-    of_domain = MESH_ARCHIVE if f"{prefix}vertices" in archive else _GRID_ARCHIVE
+    of_domain = _MESH_ARCHIVE if f"{prefix}vertices" in archive else _GRID_ARCHIVE
     weights = _WEIGHTS if f"{prefix}pair_weights" in archive else {}
     return instance_of_arrays(archive.arrays(_ARCHIVE | of_domain | weights, prefix))
 
@@ -369,7 +396,7 @@ def instance_of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
         more |= {"view": head.get("view"), "orthogonal": head.get("orthogonal", False)}
         more["pair_weights"] = arrays.get("pair_weights")
         if "vertices" in arrays:
-            return Instance.on_faces(**more, **mesh_arguments(arrays))
+            return Instance.on_faces(**more, **_face_arguments(arrays))
         check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
         x, y = arrays["origin"].astype(np.float64).tolist()
         entries: dict[str, Any] = {key: arrays[key] for key in ("mask", "stroke_pixels", "theta", "w")}
