@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from dataclasses import dataclass
 from itertools import product
 from typing import Any, Final
 
@@ -29,71 +28,57 @@ _WIDTH: Final = 0.055  # of a line of a cross, in the same unit
 _DOT: Final = 0.016  # radius of a dot, in sides of the picture
 
 
-@dataclass(frozen=True, eq=False)
-class Viewpoint:
-    """A direction of view: axes, unit vectors (3, 3): to the right, upwards, to the viewer."""
+def find_view(mesh: Mesh, marked: Floats) -> Floats:
+    """Unit vectors (3, 3) to the right, upwards and to the viewer, on one of 26 sides of a mesh.
 
-    axes: Floats
+    From there most marked normals (k, 3) and most of the area show.
+    """
+    tilted = np.array([1.0, 0.8, 0.7])  # no face of a box is seen from its edge
+    sides = [tilted * side for side in product((1, -1, 0.2), repeat=3) if side != (0.2, 0.2, 0.2)]
 
-    @classmethod
-    def from_side(cls, side: Floats) -> Viewpoint:
-        """The view from a side, with z upwards, or y where that is the side."""
-        forward = side / np.linalg.norm(side)
-        up = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
-        right = np.cross(up, forward)
-        right /= np.linalg.norm(right)
-        return cls(np.stack([right, np.cross(forward, right), forward]))
+    def score(side: Floats) -> float:
+        direction = side / np.linalg.norm(side)
+        front = np.clip(mesh.normals @ direction, 0, None)
+        seen = (marked @ direction > 0.25).mean() if len(marked) else 0.0
+        area = np.minimum(front, 0.6) @ mesh.areas / mesh.areas.sum()
+        return round(float(0.5 * seen + area + 0.05 * direction[2]), 9)
 
-    @classmethod
-    def of(cls, mesh: Mesh, marked: Floats) -> Viewpoint:
-        """The view from one of 26 sides in which most marked normals (k, 3) and most of the area show."""
-        if np.ptp(mesh.vertices[:, 2]) == 0:
-            return cls.from_side(np.array([0.0, 0.0, 1.0]))
-        tilted = np.array([1.0, 0.8, 0.7])  # no face of a box is seen from its edge
-        sides = [tilted * side for side in product((1, -1, 0.2), repeat=3) if side != (0.2, 0.2, 0.2)]
-
-        def score(side: Floats) -> float:
-            direction = side / np.linalg.norm(side)
-            front = np.clip(mesh.normals @ direction, 0, None)
-            seen = (marked @ direction > 0.25).mean() if len(marked) else 0.0
-            return float(
-                0.5 * seen + np.minimum(front, 0.6) @ mesh.areas / mesh.areas.sum() + 0.05 * direction[2]
-            )
-
-        return cls.from_side(max(sides, key=lambda side: round(score(side), 9)))
-
-    def project(self, points: Floats) -> Floats:
-        """Points (..., 3) in the viewer's frame: right, up, towards the viewer."""
-        return np.asarray(points @ self.axes.T)
+    z, is_flat = np.array([0.0, 0.0, 1.0]), np.ptp(mesh.vertices[:, 2]) == 0
+    side = z if is_flat else max(sides, key=score)
+    forward = side / np.linalg.norm(side)
+    right = np.cross(np.array([0.0, 1.0, 0.0]) if is_flat else z, forward)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(forward, right), forward])
 
 
 def draw_mesh(axes: Any, subject: CrossField | Instance) -> None:
     """Draw a field or an instance on a mesh into axes of matplotlib: everything from far to near."""
     from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgba
 
     field = subject if isinstance(subject, CrossField) else None
     instance = subject if isinstance(subject, Instance) else subject.instance
     mesh = instance.mesh
-    vertex, turns = _NONE, np.zeros(0)
+    vertex, turns = np.zeros(0, dtype=np.int32), np.zeros(0)
     if field is not None:
         vertex, turns = field.singularities.vertex, field.singularities.index
-    view = Viewpoint.of(mesh, _vertex_normals(mesh)[vertex])
-    points = view.project(mesh.vertices)
+    to_viewer = find_view(mesh, _vertex_normals(mesh)[vertex]).T
+    points, towards = mesh.vertices @ to_viewer, mesh.normals @ to_viewer
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    side, corners, towards = float((high - low).max()), points[mesh.faces], view.project(mesh.normals)
+    side, corners = float((high - low).max()), points[mesh.faces]
     shown = np.ones(mesh.size, dtype=bool) if len(mesh.boundary) else towards[:, 2] > 0
     shapes = list(corners[shown][:, :, :2])
     colours, depth = [_shades(towards[shown])], [corners[shown][:, :, 2].mean(axis=1)]
-    edges = [np.tile(_rgba(_EDGE), (len(shapes), 1))]
+    edges = [np.tile(to_rgba(_EDGE), (len(shapes), 1))]
 
     def add(polygons: Floats, depths: Floats, colour: str) -> None:
         shapes.extend(polygons)
         depth.append(depths)
-        colours.append(np.tile(_rgba(colour), (len(polygons), 1)))
+        colours.append(np.tile(to_rgba(colour), (len(polygons), 1)))
         edges.append(np.zeros((len(polygons), 4)))
 
     for ends, colour, width, above in _line_marks(mesh, field, instance, shown):
-        flat = view.project(ends)
+        flat = ends @ to_viewer
         add(_strips(flat[:, :, :2], width), flat[:, :, 2].mean(axis=1) + above * side, colour)
     radius = _DOT * side * np.where(np.abs(turns) < 0.5, 1.0, 1.4)
     for colour, some in ((POSITIVE, turns > 0), (NEGATIVE, turns < 0)):
@@ -118,7 +103,6 @@ def draw_mesh(axes: Any, subject: CrossField | Instance) -> None:
 
 
 _CIRCLE: Final = np.stack([np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)], axis=1)
-_NONE: Final = np.zeros(0, dtype=np.int32)
 
 
 def _line_marks(
@@ -126,23 +110,21 @@ def _line_marks(
 ) -> list[tuple[Floats, str, float, float]]:
     """Segments (k, 2, 3) of lines, their colour, width, and by how much they lie above the faces."""
     size = np.sqrt(mesh.areas)
-    marks: list[tuple[Floats, str, float, float]] = []
     typical = float(np.median(size))
-    marks.append((mesh.vertices[_dark_edges(mesh)], _DARK, 0.6 * _WIDTH * typical, 2e-3))
+    marks = [(mesh.vertices[_dark_edges(mesh)], _DARK, 0.6 * _WIDTH * typical, 2e-3)]
     if field is not None:
-        every = -(-int(shown.sum()) // MOST_CROSSES)
-        faces = np.nonzero(shown)[0][:: max(every, 1)].astype(np.int32)
-        arm = _ARM * size[faces, None] * np.sqrt(every)
-        for line, colour in enumerate(_colours_of_lines(instance)):
-            reach = arm * vectors_of(field)[faces, line]
-            ends = np.stack([mesh.centres[faces] - reach, mesh.centres[faces] + reach], axis=1)
-            marks.append((ends, colour, _WIDTH * typical * np.sqrt(every), 1e-3))
+        every = max(-(-int(shown.sum()) // MOST_CROSSES), 1)
+        faces = np.nonzero(shown)[0][::every].astype(np.int32)
+        arm, width = np.sqrt(every), _WIDTH * typical * np.sqrt(every)
+        lines = list(zip(vectors_of(field)[faces].swapaxes(0, 1), _colours_of_lines(instance), strict=True))
     else:
         seen = shown[instance.stroke_index]
-        faces, theta = np.asarray(instance.stroke_index[seen]), np.asarray(instance.theta[seen])
-        reach = _ARM * size[faces, None] * mesh.vectors(faces, theta)
+        faces, arm, width = instance.stroke_index[seen], 1.0, 1.5 * _WIDTH * typical
+        lines = [(mesh.vectors(faces, instance.theta[seen]), STROKE)]
+    for vectors, colour in lines:
+        reach = _ARM * size[faces, None] * arm * vectors
         ends = np.stack([mesh.centres[faces] - reach, mesh.centres[faces] + reach], axis=1)
-        marks.append((ends, STROKE, 1.5 * _WIDTH * typical, 1e-3))
+        marks.append((ends, colour, width, 1e-3))
     return marks
 
 
@@ -182,12 +164,6 @@ def _strips(segments: Floats, width: float) -> Floats:
     return np.stack([start - across, end - across, end + across, start + across], axis=1)
 
 
-def _rgba(colour: str) -> tuple[float, ...]:
-    from matplotlib.colors import to_rgba
-
-    return tuple(to_rgba(colour))
-
-
 def model_data(field: CrossField) -> dict[str, Any] | None:
     """A field on a mesh for the page that turns it (templates/run/model.html.j2); None if it is too large.
 
@@ -208,11 +184,11 @@ def model_data(field: CrossField) -> dict[str, Any] | None:
         "dots": singular.vertex.astype(number),
         "turns": np.round(4 * singular.index).astype("i1"),
     }
-    view = Viewpoint.of(mesh, _vertex_normals(mesh)[singular.vertex])
+    axes = find_view(mesh, _vertex_normals(mesh)[singular.vertex])
     return {name: b64encode(array.tobytes()).decode() for name, array in arrays.items()} | {
         "wide": wide,
         "closed": not len(mesh.boundary),
-        "axes": np.round(view.axes, 6).tolist(),
+        "axes": np.round(axes, 6).tolist(),
         "u": u,
         "v": v,
         "positive": POSITIVE,
