@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.angles import cosine, sine
-from ..instance.domain import Bools, Floats, Ints
+from ..instance.domain import Bools, Floats
 from ..instance.mesh import Mesh
 
 _DECIMALS: Final = 9  # of coordinates
@@ -40,7 +40,8 @@ def plate(across: int, up: int, holes: tuple[tuple[float, float, float], ...]) -
         inside &= (x[:-1, :-1] + 0.5 - cx) ** 2 + (y[:-1, :-1] + 0.5 - cy) ** 2 > radius**2
     shape = (across + 1, up + 1)
     faces = _split_squares(shape, (False, False), inside)
-    fixed = _outer_vertices(faces, len(points))
+    flat = Mesh(np.zeros((len(points), 3)), faces.astype(np.int32))
+    fixed = flat.on_boundary & np.isin(np.arange(len(points)), faces)
     for cx, cy, radius in holes:
         away = points - (cx, cy)
         distance = np.sqrt((away * away).sum(axis=1))
@@ -119,21 +120,15 @@ def extrude(flat: Mesh, height: float, layers: int) -> Mesh:
     return _mesh(points[used], place.reshape(-1, 3))
 
 
-def twist(mesh: Mesh, turn: float) -> Mesh:
-    """The mesh turned about the z axis, by so many radians per unit of height."""
-    angle = turn * mesh.vertices[:, 2]
-    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    x, y = (mesh.vertices - middle)[:, :2].T
-    points = [x * cosine(angle) - y * sine(angle), x * sine(angle) + y * cosine(angle), mesh.vertices[:, 2]]
-    return _mesh(np.stack(points, axis=1), mesh.faces.astype(np.int64))
+def warp(mesh: Mesh, *, turn: float = 0.0, narrowing: float = 0.0) -> Mesh:
+    """The mesh turned about the z axis, and narrowed towards its top.
 
-
-def taper(mesh: Mesh, share: float) -> Mesh:
-    """The mesh narrowed towards its top in both directions, by this share of its width."""
-    low, high = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
-    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    scale = 1 - share * (mesh.vertices[:, 2:] - low) / (high - low)
-    points = np.concatenate([(mesh.vertices - middle)[:, :2] * scale, mesh.vertices[:, 2:]], axis=1)
+    turn: radians per unit of height. narrowing: by which share of its width.
+    """
+    low, high, z = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0), mesh.vertices[:, 2]
+    x, y = (mesh.vertices - (low + high) / 2)[:, :2].T * (1 - narrowing * (z - low[2]) / (high[2] - low[2]))
+    along, across = cosine(turn * z), sine(turn * z)
+    points = np.stack([x * along - y * across, x * across + y * along, z], axis=1)
     return _mesh(points, mesh.faces.astype(np.int64))
 
 
@@ -157,9 +152,8 @@ def _bracket() -> Bools:
 
 
 def _stairs() -> Bools:
-    return np.asarray(np.arange(12)[:, None, None] // 3 >= np.arange(12)[None, None, :] // 3).repeat(
-        7, axis=1
-    )
+    step = np.arange(12) // 3
+    return np.repeat(step[:, None, None] >= step, 7, axis=1)
 
 
 MESHES: Final[dict[str, tuple[str, Callable[[], Mesh]]]] = {
@@ -172,9 +166,9 @@ MESHES: Final[dict[str, tuple[str, Callable[[], Mesh]]]] = {
     "cube": ("a cube", lambda: blocks(np.ones((6, 6, 6), dtype=bool))),
     "bracket": (
         "two plates at an angle, one with a window, twisted",
-        lambda: twist(blocks(_bracket()), 0.03),
+        lambda: warp(blocks(_bracket()), turn=0.03),
     ),
-    "stairs": ("four steps, narrower at the top", lambda: taper(blocks(_stairs()), 0.5)),
+    "stairs": ("four steps, narrower at the top", lambda: warp(blocks(_stairs()), narrowing=0.5)),
     "pin": ("a cylinder with two caps", lambda: extrude(disc(5), 2.0, 8)),
     "flange": ("a thick ring with sharp edges", lambda: extrude(annulus(32, 5), 0.8, 4)),
     "gear": ("a thick star with sharp edges", lambda: extrude(star(10), 0.5, 5)),
@@ -240,12 +234,6 @@ def _split_squares(
     return np.concatenate([one.T, other.T])
 
 
-def _outer_vertices(faces: NDArray[np.int64], count: int) -> Bools:
-    """Whether each of `count` vertices is on the boundary."""
-    used = np.isin(np.arange(count), faces)
-    return used & Mesh(np.zeros((count, 3)), faces.astype(np.int32)).on_boundary
-
-
 def _smooth(points: Floats, faces: NDArray[np.int64], fixed: Bools) -> Floats:
     """The points after rounds that move each one to the mean of its neighbours; fixed ones stay."""
     start = np.concatenate([faces.ravel(), np.roll(faces, -1, axis=1).ravel()])
@@ -262,5 +250,4 @@ def _mesh(points: Floats, faces: NDArray[np.int64]) -> Mesh:
     used, place = np.unique(faces, return_inverse=True)
     spatial = np.zeros((len(used), 3))
     spatial[:, : points.shape[1]] = np.round(points[used], _DECIMALS) + 0.0
-    corners: Ints = place.reshape(-1, 3).astype(np.int32)
-    return Mesh(spatial, corners)
+    return Mesh(spatial, place.reshape(-1, 3).astype(np.int32))
