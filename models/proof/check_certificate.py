@@ -672,7 +672,7 @@ class PairCost:
 
 
 def min_plus_product(left: Array, right: Array) -> Array:
-    """The matrix of min over k of left[x, k] + right[k, y]; left may be inf, but no row of it.
+    """The matrix of min over k of left[x, k] + right[k, y]; both may be inf.
 
     Of a large product, some rows are computed at a time, without the terms k that are nowhere less than the
     best one of its row.

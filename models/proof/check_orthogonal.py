@@ -28,6 +28,7 @@ except ImportError:  # run as a program
 
 FORMAT, VERSION = "crossfield-orthogonal-certificate", 2
 HALF, QUARTER, MARGIN = base.HALF, base.QUARTER, base.ROUNDING * base.PRECISION
+min_plus = base.min_plus_product
 RELATIVE = 1e-9
 FLAT = 1.1e-8  # radians; instances take smaller turns between frames as 0
 MOST_LEVELS, MOST_DIVISIONS = 64, 10_000  # of a certificate; cells of a quarter turn
@@ -35,7 +36,6 @@ STRIDE = 4 * MOST_DIVISIONS  # between keys of labels of two points
 MOST_COSTS = 1 << 27  # of two labels of all pairs of a level: some 10 GB
 MOST_RING = 64  # pairs of a ring
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
-AT_ONCE = 1 << 16  # sums of numbers below which fewer steps are faster than less memory
 MOST_CASES = 256  # of integers after the last level
 MOST_NUMBER = 1e6  # of a weight and of an angle
 TURNS = np.arange(-3, 4)  # by which an integer may differ from that of the centre
@@ -364,16 +364,6 @@ class Excess:
 def greatest(numbers: Array, start: Array) -> Array:
     """The greatest absolute value of finite numbers in each block."""
     return np.maximum.reduceat(np.where(np.isfinite(numbers), np.abs(numbers), 0.0), start[:-1])
-
-
-def min_plus(one: Array, other: Array) -> Array:
-    """The least sum over the middle labels."""
-    if one.size * other.shape[1] <= AT_ONCE:
-        return (one[:, :, None] + other).min(axis=1)
-    least, total = one[:, :1] + other[0], np.empty((len(one), other.shape[1]))
-    for column, row in zip(one.T[1:, :, None], other[1:]):
-        np.minimum(least, np.add(column, row, out=total), out=least)
-    return np.asarray(least)
 
 
 def kept_of(level: CellLevel, excess: Excess, forests: Array, most: float) -> Array:
