@@ -225,7 +225,8 @@ class Mesh(Domain):
     @cached_property
     def defect(self) -> Floats:
         """2 pi less the angles of the faces around each vertex, in radians, shape (v,)."""
-        angles = _angle_between(self._sides, -np.roll(self._sides, 1, axis=1))
+        sides = self._sides
+        angles = _angle_between(sides, -sides[:, [2, 0, 1]])
         around = np.bincount(self.faces.ravel(), angles.ravel(), len(self.vertices))
         return np.asarray(2 * np.pi - around)
 

@@ -101,16 +101,8 @@ def read_mesh(
     )
 
 
-def mesh_sample(
-    name: str,
-    *,
-    gauge: Gauge = "strokes",
-    stroke_weight: float = STROKE_WEIGHT,
-    orthogonal: bool = True,
-) -> Instance:
-    """Instance of a built-in mesh. Raises InputError for an unknown name, InstanceError for a weight."""
-    if name not in MESHES:
-        raise InputError(f"there is no mesh {name!r}; choose one of {', '.join(MESHES)}")
+def mesh_sample(name: str, gauge: Gauge, stroke_weight: float) -> Instance:
+    """Instance of a built-in mesh. Raises InstanceError for a weight that is out of range."""
     mesh = MESHES[name][1]()
     edges = feature_edges(mesh, sharp=None if name in _SMOOTH else _SHARP, boundary=True, lines=NO_LINES)
     return Instance.on_faces(
@@ -119,6 +111,5 @@ def mesh_sample(
         *combine_strokes(mesh, edges, None)[:3],
         stroke_coefficient=stroke_weight,
         gauge=gauge,
-        orthogonal=orthogonal,
         source=f"the built-in mesh {name}",
     )

@@ -54,12 +54,10 @@ def read_directions(path: Path, mesh: Mesh) -> tuple[Ints, Floats]:
     if not "".join(rows).strip():
         raise InputError("has no row of numbers; give face,x,y,z, or leave it out")
     try:
-        if of_every_face:
-            vector = np.loadtxt(rows, comments=None, usecols=(0, 1, 2), ndmin=2)
-            face = np.arange(len(vector), dtype=np.int32)
-        else:
-            table = np.loadtxt(rows, comments=None, delimiter=",", usecols=(0, 1, 2, 3), ndmin=2)
-            face, vector = whole_numbers(table[:, 0], "the column of faces", InputError), table[:, 1:]
+        separator, columns = (None, range(3)) if of_every_face else (",", range(4))
+        table = np.loadtxt(rows, comments=None, delimiter=separator, usecols=columns, ndmin=2)
+        of_row = np.arange(len(table)) if of_every_face else table[:, 0]
+        face, vector = whole_numbers(of_row, "the column of faces", InputError), table[:, -3:]
     except ValueError as error:
         raise InputError(f"is no table of face,x,y,z and no .rawfield: {shortened(error)}") from error
     if of_every_face and len(face) != mesh.size:

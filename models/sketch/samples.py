@@ -97,7 +97,7 @@ def sample(
     if name in MESHES:
         if size is not None or silhouette != "none":
             raise InputError(f"{name} is a mesh with its own faces; leave size and silhouette out")
-        return mesh_sample(name, gauge=gauge, stroke_weight=stroke_weight)
+        return mesh_sample(name, gauge, stroke_weight)
     size = DEFAULT_SIZE if size is None else size
     check_size(size)
     check_silhouette(silhouette)

@@ -11,7 +11,6 @@ from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, formulate
 from ....models.instance.domain import Ints
 from ....models.instance.instance import Gauge, Instance
-from ....models.mesh.read import mesh_sample
 from ....models.sketch.drawing_file import parse_drawing
 from ....models.sketch.random_strokes import random_instance
 from ....models.sketch.read import instance_of_drawing, read_mask
@@ -22,7 +21,7 @@ from .recipe import InstanceRecipe
 def make_instance(recipe: InstanceRecipe) -> Instance:
     """Return the instance of a recipe. Raises InputError; NoStrokeError if its size leaves no strokes."""
     if recipe.sketch.kind == "mesh":
-        return replace(mesh_sample(recipe.sketch.what, gauge=cast("Gauge", recipe.gauge)), name=recipe.name)
+        return replace(sample(recipe.sketch.what, gauge=cast("Gauge", recipe.gauge)), name=recipe.name)
     make = {"sample": _sample_instance, "file": _drawing_instance, "random": _random_instance}[
         recipe.sketch.kind
     ]
