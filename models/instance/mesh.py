@@ -226,7 +226,7 @@ class Mesh(Domain):
     def defect(self) -> Floats:
         """2 pi less the angles of the faces around each vertex, in radians, shape (v,)."""
         sides = self._sides
-        angles = _angle_between(sides, -sides[:, [2, 0, 1]])
+        angles = np.stack([_angle_between(sides[:, k], -sides[:, k - 1]) for k in range(3)], axis=1)
         around = np.bincount(self.faces.ravel(), angles.ravel(), len(self.vertices))
         return np.asarray(2 * np.pi - around)
 
