@@ -5,7 +5,7 @@ Their refusal is one DomainError, which `Instance.grid` raises. docs/architectur
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -50,15 +50,6 @@ class MeshOptions:
             " over the distance of their centres (dual).",
         ),
     ] = "unit"
-
-    def read(self, path: Path) -> Instance:
-        """Instance of a mesh file, small enough for the memory. Raises InputError and MeshError."""
-        from ...models.memory import check_memory
-        from ...models.mesh.read import read_mesh
-
-        instance = read_mesh(path, **asdict(self))
-        check_memory(instance.domain.size, instance.domain.kind)
-        return instance
 
 
 def check_domain(instance: Instance, command: str) -> None:

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -87,19 +87,24 @@ class SketchOptions:
         Prints the warnings of the reader unless quiet. Raises DomainError for a domain that the command does
         not take, InputError, and InstanceError for a weight that is out of range.
         """
+        from ...models.memory import check_memory
+        from ...models.mesh.read import read_mesh
+        from ...models.mesh.shapes import MESHES
+
         path = Path(source)
-        suffix = path.suffix.lower() if path.is_file() else ""
-        on_mesh = is_mesh_file(path, command)
-        if mesh != _PLAIN and not on_mesh:
+        is_saved = path.is_file() and path.suffix.lower() in {".json", ".npz"}
+        is_mesh = is_mesh_file(path, command)
+        if mesh != _PLAIN and not is_mesh:
             raise InputError("is no mesh file; leave --sharp, --directions and --weights out", file=path)
-        if suffix in {".json", ".npz"}:
+        is_sample = not path.is_file() and str(path) in MESHES
+        if (is_mesh or is_sample) and replace(self, stroke_weight=None) != SketchOptions():
+            raise InputError("is a mesh; leave out the options that read a sketch", file=path)
+        if is_saved:
             instance = self._read_instance(path)
-        elif on_mesh:
-            if replace(self, stroke_weight=None) != SketchOptions():
-                raise InputError("is a mesh; leave out the options that read a sketch", file=path)
-            instance = mesh.read(path)
         else:
-            instance = self._read_drawing(path)
+            instance = read_mesh(path, **asdict(mesh)) if is_mesh else self._read_drawing(path)
+        if is_saved or is_mesh:
+            check_memory(instance.domain.size, instance.domain.kind)
         with naming(path):
             check_domain(instance, command)
         instance = instance.with_weights(stroke_weight=self.stroke_weight)
@@ -109,14 +114,10 @@ class SketchOptions:
     def _read_drawing(self, path: Path) -> Instance:
         from ...models.mesh.shapes import MESHES
         from ...models.sketch.read import DEFAULT_SIZE, read_sketch
-        from ...models.sketch.samples import SAMPLES, sample
+        from ...models.sketch.samples import SAMPLES
 
-        if not path.is_file() and str(path) in SAMPLES:
+        if not path.is_file() and (str(path) in SAMPLES or str(path) in MESHES):
             return self._make_sample(str(path))
-        if not path.is_file() and str(path) in MESHES:
-            if replace(self, stroke_weight=None) != SketchOptions():
-                raise InputError("is a mesh; leave out the options that read a sketch", file=path)
-            return sample(str(path))
         if not path.exists():
             raise InputError(
                 "there is no such file and no such sample; `crossfield list` lists the samples", file=path
@@ -131,7 +132,6 @@ class SketchOptions:
         )
 
     def _make_sample(self, name: str) -> Instance:
-        from ...models.sketch.read import DEFAULT_SIZE
         from ...models.sketch.samples import sample
 
         if self.mask is not None:
@@ -140,12 +140,10 @@ class SketchOptions:
             raise InputError(
                 f"the sample {name} has its own curvature lines; leave --curvature and --view out"
             )
-        size = DEFAULT_SIZE if self.size is None else self.size
-        return sample(name, size, silhouette=self.silhouette)
+        return sample(name, self.size, silhouette=self.silhouette)
 
     def _read_instance(self, path: Path) -> Instance:
         from ...models.instance.file import read_instance
-        from ...models.memory import check_memory
 
         if self.size is not None or self.mask is not None:
             raise InputError(
@@ -157,6 +155,4 @@ class SketchOptions:
                 "leave --silhouette, --curvature and --view out",
                 file=path,
             )
-        instance = read_instance(path)
-        check_memory(instance.domain.size, instance.domain.kind)
-        return instance
+        return read_instance(path)
