@@ -160,9 +160,8 @@ def draw(
     else:
         kind = kind or _default_kind(subject, suffix, underlaid=underlay is not None)
         chosen = _find_kind(kind, subject)
-        if isinstance(_instance_of(subject).domain, Mesh):
-            with fixed_settings():
-                return write_bytes(path, _save_figure(_draw_on_mesh(subject, underlay), suffix))
+        if underlay is not None and isinstance(_instance_of(subject).domain, Mesh):
+            raise DomainError("a mesh lies on no drawing; leave the underlay out")
         if kind == LAYERS and isinstance(subject, CrossField):
             draw_layers(subject, [path], underlay)
             return path
@@ -189,8 +188,6 @@ def preview(subject: CrossField | Instance | Surface) -> bytes:
     """
     kind = SHADED if isinstance(subject, Surface) else KINDS[_default_kind(subject, ".png", underlaid=False)]
     with fixed_settings():
-        if not isinstance(subject, Surface) and isinstance(_instance_of(subject).domain, Mesh):
-            return _save_figure(_draw_on_mesh(subject, None), ".png", dots=_PREVIEW_DOTS)
         return _save_figure(_draw_panels(subject, kind), ".png", dots=_PREVIEW_DOTS)
 
 
@@ -255,12 +252,10 @@ def _instance_of(subject: Subject) -> Instance:
     return subject if isinstance(subject, Instance) else subject.instance
 
 
-def _draw_on_mesh(subject: CrossField | Instance, underlay: object) -> Any:
+def _draw_on_mesh(subject: CrossField | Instance) -> Any:
     """The figure of a mesh with a caption below."""
     from matplotlib.figure import Figure
 
-    if underlay is not None:
-        raise DomainError("a mesh lies on no drawing; leave the underlay out")
     side, below = _MESH_SIDE / _POINTS, (2 * _EDGE + _LINE * _WORDS) / _POINTS
     figure = Figure(figsize=(side, side + below), facecolor="white")
     axes = figure.add_axes((0.0, below / (side + below), 1.0, side / (side + below)))
@@ -275,6 +270,8 @@ def _draw_panels(subject: Subject, kind: PictureKind) -> Any:
     from matplotlib.figure import Figure
 
     instance = _instance_of(subject)
+    if not isinstance(subject, Surface) and isinstance(instance.domain, Mesh):
+        return _draw_on_mesh(subject)
     field = subject if isinstance(subject, CrossField) else None
     picture = panels.PanelContent(
         instance, field, kind.size, subject if isinstance(subject, Surface) else None

@@ -121,9 +121,9 @@ class Domain(ABC):
     def check(self) -> None:
         """Raise InstanceError unless an instance can be on this domain."""
 
-    @abstractmethod
-    def place(self, point: int) -> str:
+    def place(self, point: Any) -> str:
         """Words for a point, such as `pixel [3, 4]`."""
+        return f"{self.kind} {self.places(np.array([point]))[0].tolist()}"
 
     @abstractmethod
     def content(self) -> tuple[list[int], list[float], list[NDArray[Any]]]:

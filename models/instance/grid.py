@@ -79,10 +79,6 @@ class Grid(Domain):
             "pixel_size": self.pixel_size,
         }
 
-    def place(self, point: int) -> str:
-        """Row and column of a pixel."""
-        return f"pixel [{self.rows[point]}, {self.columns[point]}]"
-
     def places(self, points: Ints) -> Ints:
         """Row and column of each of some pixels, shape (k, 2)."""
         return np.stack([self.rows[points], self.columns[points]], axis=1)

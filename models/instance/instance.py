@@ -270,7 +270,7 @@ class Instance(Pictured):
             ("is out of order or listed twice; sort them", np.diff(self.stroke_index, prepend=-1) <= 0),
         ):
             if wrong.any():
-                place = self.domain.place(int(self.stroke_index[int(np.argmax(wrong))]))
+                place = self.domain.place(self.stroke_index[np.argmax(wrong)])
                 raise InstanceError(f"stroke {place}: {label} ({int(wrong.sum())} in all)")
 
     def _check_pair_weights(self) -> None:

@@ -308,10 +308,6 @@ class Mesh(Domain):
             "parts": self.parts,
         }
 
-    def place(self, point: int) -> str:
-        """Number of a face."""
-        return f"face {point}"
-
     def places(self, points: Ints) -> Ints:
         """Numbers of faces, shape (k,)."""
         return points
