@@ -32,7 +32,7 @@ def star(rings: int) -> Mesh:
     return _sheet(10, rings, between)
 
 
-def plate(across: int, up: int, holes: tuple[tuple[float, float, float], ...]) -> Mesh:
+def plate(across: int, up: int, holes: list[tuple[float, float, float]]) -> Mesh:
     """A flat plate of squares with round holes. holes: centre and radius of each, in squares."""
     x, y = np.meshgrid(np.arange(across + 1.0), np.arange(up + 1.0), indexing="ij")
     points, inside = np.stack([x.ravel(), y.ravel()], axis=1), np.ones((across, up), dtype=bool)
@@ -143,32 +143,26 @@ def side_by_side(meshes: list[Mesh]) -> Mesh:
     return _mesh(np.concatenate(points), np.concatenate(faces))
 
 
-def _bracket() -> Bools:
+def _bracket() -> Mesh:
     """Two plates at a right angle, one with a rectangular window."""
     filled = np.zeros((10, 8, 9), dtype=bool)
     filled[:, :, :2] = filled[:2] = True
     filled[5:8, 3:5] = False
-    return filled
+    return blocks(filled)
 
 
-def _stairs() -> Bools:
+def _stairs() -> Mesh:
     step = np.arange(12) // 3
-    return np.repeat(step[:, None, None] >= step, 7, axis=1)
+    return blocks(np.repeat(step[:, None, None] >= step, 7, axis=1))
 
 
 MESHES: Final[dict[str, tuple[str, Callable[[], Mesh]]]] = {
     "disc": ("a flat disc", lambda: disc(3)),
     "star": ("a flat star with five points", lambda: star(8)),
-    "plate": (
-        "a flat plate with two round holes",
-        lambda: plate(30, 20, ((9.0, 11.0, 3.5), (21.0, 8.0, 3.0))),
-    ),
+    "plate": ("a flat plate with two round holes", lambda: plate(30, 20, [(9, 11, 3.5), (21, 8, 3)])),
     "cube": ("a cube", lambda: blocks(np.ones((6, 6, 6), dtype=bool))),
-    "bracket": (
-        "two plates at an angle, one with a window, twisted",
-        lambda: warp(blocks(_bracket()), turn=0.03),
-    ),
-    "stairs": ("four steps, narrower at the top", lambda: warp(blocks(_stairs()), narrowing=0.5)),
+    "bracket": ("two plates at an angle, one with a window, twisted", lambda: warp(_bracket(), turn=0.03)),
+    "stairs": ("four steps, narrower at the top", lambda: warp(_stairs(), narrowing=0.5)),
     "pin": ("a cylinder with two caps", lambda: extrude(disc(5), 2.0, 8)),
     "flange": ("a thick ring with sharp edges", lambda: extrude(annulus(32, 5), 0.8, 4)),
     "gear": ("a thick star with sharp edges", lambda: extrude(star(10), 0.5, 5)),
