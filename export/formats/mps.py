@@ -26,8 +26,6 @@ from ...models.formulations.families import Block, Monomial, PlacedFamily
 from ...models.formulations.names import row_names, stack_names
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Ints
-from ...models.instance.instance import Instance
-from ...models.instance.mesh import Mesh
 from ..writing.canonical import BlockBounds, CanonicalForm, coefficient
 from ..writing.names import OBJECTIVE, Names, problem_name
 from ..writing.records import (
@@ -144,8 +142,8 @@ def _incident_rows(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints
     assert family.covers_index_set  # families on a part of the pairs have terms of only those pairs
     if kind == "stroke":
         return [(0, _inverse_index(instance.stroke_index, instance.domain.size), term)]
-    of_points = _pairs_of_faces if isinstance(instance.domain, Mesh) else _pairs_of_pixels
-    return [(rank, row, term) for rank, end, row in of_points(instance) if end == kind]
+    tables = enumerate(instance.domain.pairs_of_points)
+    return [(rank, row, term) for rank, (end, row) in tables if end == kind]
 
 
 def _inverse_index(index: Ints, count: int) -> Ints:
@@ -153,38 +151,6 @@ def _inverse_index(index: Ints, count: int) -> Ints:
     place = np.full(count, -1, dtype=np.int32)
     place[index] = np.arange(len(index), dtype=np.int32)
     return place
-
-
-def _pairs_of_pixels(instance: Instance) -> list[tuple[int, str, Ints]]:
-    """(rank, end, pair of each pixel or -1): its pairs in ascending order, and which end it is.
-
-    Pairs are numbered by their first pixel, the upper before the right one, so the pairs of a pixel are those
-    to the left, upwards, to the right and downwards, in this order.
-    """
-    grid = instance.grid
-    upper, right = grid.pair_number
-    left, lower = np.full_like(right, -1), np.full_like(upper, -1)
-    left[:, 1:], lower[:-1] = right[:, :-1], upper[1:]
-    ends = (("second", left), ("first", upper), ("first", right), ("second", lower))
-    return [(rank, end, table[grid.mask]) for rank, (end, table) in enumerate(ends)]
-
-
-def _pairs_of_faces(instance: Instance) -> list[tuple[int, str, Ints]]:
-    """(rank, end, pair of each face or -1): its pairs in ascending order, and which end it is."""
-    domain = instance.domain
-    point, pair = np.concatenate([domain.first, domain.second]), np.arange(len(domain.first), dtype=np.int32)
-    pair = np.concatenate([pair, pair])
-    order = np.lexsort((pair, point))
-    point, pair, is_first = point[order], pair[order], order < len(domain.first)
-    rank = np.arange(len(point)) - np.searchsorted(point, point)
-    tables = []
-    for place in range(int(rank.max(initial=-1)) + 1):
-        for end, here in (("first", is_first), ("second", ~is_first)):
-            row = np.full(domain.size, -1, dtype=np.int32)
-            chosen = (rank == place) & here
-            row[point[chosen]] = pair[chosen]
-            tables.append((place, end, row))
-    return tables
 
 
 def _integrality_runs(problem: Problem) -> list[tuple[bool, list[Block]]]:
