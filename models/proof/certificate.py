@@ -7,6 +7,7 @@ docs/files.md, "Layout of a certificate", describes the arrays. Equal proofs giv
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, cast
@@ -127,9 +128,8 @@ def check_proof(proof: Proof, jobs: int = 1) -> Proof:
     pieces = _last_step_arrays(proof, passed)
     proven = check_certificate.check_last_step(arrays | pieces, passed)
     ended = "optimal" if proven.status == "optimal" else proof.ended
-    checked = replace(proof, bound=proven.bound, forced=proven.forced, ended=ended)
+    checked = replace(proof, bound=proven.bound, forced=proven.forced, ended=ended, pieces=pieces)
     object.__setattr__(checked, "proven", proven)
-    object.__setattr__(checked, "pieces", pieces)
     return checked
 
 
@@ -174,15 +174,27 @@ def _level_arrays(level: LevelRecord) -> Arrays:
 
 
 def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels) -> Arrays:
-    """The cuts and the multipliers of the last step; none where it is not convex."""
-    from .last_step import minimise_on_boxes  # loads solvers
+    """The cuts and the multipliers of the last step, without any where it proves nothing.
 
-    terms, last, instance = passed.terms, passed.last, proof.levels[0].instance
-    if last is not None and check_certificate.is_convex(terms, last):
-        minimum = minimise_on_boxes(instance, terms, last, proof.energy)
-        return {"cuts": minimum.cuts, "multipliers": minimum.multipliers}
-    size = 2 * (len(terms.first) + len(terms.white))
-    return {"cuts": np.zeros(0, np.int32), "multipliers": np.zeros((0, size))}
+    The prover's boxes are a little larger than the checker's, so its pieces cover these as a rule.
+    """
+    from .last_step import fit_to_boxes, minimise_on_boxes  # loads solvers
+
+    terms, last, size = passed.terms, passed.last, 2 * (len(passed.terms.first) + len(passed.terms.white))
+    none: Arrays = {"cuts": np.zeros(0, np.int32), "multipliers": np.zeros((0, size))}
+    if last is None:
+        return none
+    if (
+        proof.pieces is None
+        and proof.status != "optimal"
+        and not last.whole_piece.has_known_jump(terms).all()
+    ):
+        return none
+    instance = proof.levels[0].instance
+    if proof.pieces is not None:
+        with suppress(check_certificate.NotProvenError):
+            return fit_to_boxes(instance, terms, last, proof.pieces, proof.bound)
+    return minimise_on_boxes(instance, terms, last, proof.energy).pieces
 
 
 @check_arguments

@@ -47,7 +47,7 @@ MOST_BYTES = 1 << 31  # of all arrays
 ROOM, MORE_ROOM = 1 << 28, 128  # memory for a certificate: a number, and one for each byte of its file
 MOST_LEVELS = 256
 MOST_SIDE = 9999
-MOST_PIECES = 400  # of the boxes
+MOST_CUTS = 1200  # numbers that describe the pieces of the boxes
 MOST_COUNT = 4096  # labels of a pixel in alpha, and in beta
 MOST_LABELS = 1 << 28  # of a level
 MOST_ANGLE = 16.0
@@ -897,17 +897,23 @@ class LastStep:
     def whole_piece(self) -> BoxPiece:
         """The boxes as one piece: v carries a stroke where a whole box is beyond the window of u."""
         above, below = excess_over_windows(self.theta, self.boxes[:, [1, 0, 2, 3]]) > 1e-12
-        return BoxPiece(self.boxes, above.astype(np.int64) - below)
+        return BoxPiece(self.boxes, above.astype(np.int64) - below, self.p, np.zeros(len(self.p), bool))
 
 
 @dataclass
 class BoxPiece:
-    """A part of the boxes (n, 4), and the lines that carry the strokes there (`EnergyTerms.residuals`)."""
+    """Some of the fields in the boxes of a last step.
+
+    boxes (n, 4): a part of the boxes. line (n,): the lines that carry the strokes (`EnergyTerms.residuals`).
+    p (m,): jumps. chosen (m,): whether the best jump of a pair is p, because other pieces have the others.
+    """
 
     boxes: Array
     line: Array
+    p: Array
+    chosen: Array
 
-    def cut(self, at: int, theta: Array) -> list[BoxPiece]:
+    def cut_at_window(self, at: int, theta: Array) -> list[BoxPiece]:
         """The parts below, in and above the window of the stroke of pixel `at`; some may be empty."""
         ends = (-math.inf, theta[at] - QUARTER, theta[at] + QUARTER, math.inf)
         parts = []
@@ -915,8 +921,57 @@ class BoxPiece:
             boxes, line = self.boxes.copy(), self.line.copy()
             boxes[at, 0], boxes[at, 1] = max(boxes[at, 0], ends[side + 1]), min(boxes[at, 1], ends[side + 2])
             line[at] = side
-            parts.append(BoxPiece(boxes, line))
+            parts.append(BoxPiece(boxes, line, self.p, self.chosen))
         return parts
+
+    def with_jump(self, e: int, p: int, terms: EnergyTerms) -> BoxPiece:
+        """The part with that best jump of pair e, which may be empty."""
+        boxes, jumps, chosen = self.boxes.copy(), self.p.copy(), self.chosen.copy()
+        i, j, way = boxes[terms.first[e]], boxes[terms.second[e]], HALF * p
+        reach = greatest_a(terms, boxes, e, p)
+        i[0], i[1] = max(i[0], j[0] - way - reach), min(i[1], j[1] - way + reach)
+        j[0], j[1] = max(j[0], i[0] + way - reach), min(j[1], i[1] + way + reach)
+        jumps[e], chosen[e] = p, True
+        middle = boxes[:, :2].mean(axis=1)
+        a = middle[terms.first] - middle[terms.second] + HALF * jumps
+        jumps = jumps - np.where(chosen, 0, np.round(a / HALF)).astype(np.int64)
+        return BoxPiece(boxes, self.line, jumps, chosen)
+
+    def possible_jumps(self, e: int, terms: EnergyTerms) -> list[int]:
+        """Lemma 4a: all jumps that can be a best one of pair e in the piece."""
+        i, j = self.boxes[terms.first[e]], self.boxes[terms.second[e]]
+        low, high = (i[0] - j[1]) / HALF, (i[1] - j[0]) / HALF
+        nearby = range(math.ceil(-1 - high - 1e-9), math.floor(1 - low + 1e-9) + 1)
+        reaches = [greatest_a(terms, self.boxes, e, p) / HALF for p in nearby]
+        return [p for p, reach in zip(nearby, reaches) if low + p <= reach and high + p >= -reach]
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no field is in it."""
+        return bool((self.boxes[:, 0] > self.boxes[:, 1]).any())
+
+    def has_known_jump(self, terms: EnergyTerms) -> Array:
+        """Where p is a best jump of all its fields; shape (m,)."""
+        known: Array = self.chosen | has_forced_jump(terms, self.p, self.boxes)
+        return known
+
+    def weights(self, terms: EnergyTerms, theta: Array) -> list[Array]:
+        """The weights of all residuals with which F in the piece is bounded (sections 6 and 9)."""
+        i, j = self.boxes[terms.first], self.boxes[terms.second]
+        a = np.maximum(np.abs(i[:, 0] - j[:, 1] + HALF * self.p), np.abs(i[:, 1] - j[:, 0] + HALF * self.p))
+        known = self.has_known_jump(terms)
+        share = np.clip((HALF - a - 1e-9) / np.maximum(a, 1e-9), 0.0, 1.0) ** (2 if terms.norm == 2 else 1)
+        reach = QUARTER if terms.norm == 1 else HALF
+        far = (excess_over_windows(theta, self.boxes) > reach - 1e-9).any(axis=0)
+        of_a, of_b, of_r, of_beta = terms.weights
+        return [of_a * np.where(known, 1.0, share), of_b * known, of_r * ~far, of_beta]
+
+
+def greatest_a(terms: EnergyTerms, boxes: Array, e: int, p: int) -> float:
+    """Lemma 4a: the greatest |A| of pair e in the boxes where p is a best jump, and a little more."""
+    i, j = boxes[terms.first[e]], boxes[terms.second[e]]
+    most = max((1 - 2 * (p % 2)) * i[x] * j[y] for x in (2, 3) for y in (2, 3))
+    return 1e-9 + (min(HALF, QUARTER + 4 / math.pi * most) if terms.norm == 2 else HALF)
 
 
 def last_step(terms: EnergyTerms, boxes: Array, alpha: Array, p: Array) -> LastStep:
@@ -925,13 +980,6 @@ def last_step(terms: EnergyTerms, boxes: Array, alpha: Array, p: Array) -> LastS
     turns = np.round((middle - alpha) / HALF).astype(np.int64)
     theta = terms.theta + math.pi * np.round((middle - terms.theta) / math.pi)
     return LastStep(boxes, p - turns[terms.first] + turns[terms.second], theta)
-
-
-def is_convex(terms: EnergyTerms, step: LastStep) -> bool:
-    """Whether Lemmas 4 and 5 apply everywhere in the boxes."""
-    reach = QUARTER if terms.norm == 1 else HALF
-    far = (excess_over_windows(step.theta, step.boxes) > reach - 1e-9) & (terms.weight > 0)
-    return bool(has_forced_jump(terms, step.p, step.boxes).all() and not far.any())
 
 
 def has_forced_jump(terms: EnergyTerms, p: Array, boxes: Array) -> Array:
@@ -964,16 +1012,21 @@ def linear_bound(terms: EnergyTerms, step: LastStep, piece: BoxPiece, multiplier
     """Lemma 6: a lower bound of F in a piece, from any multipliers l of all residuals (2m + 2n,).
 
     With phi(r) >= l r - l^2/4 for squares, and >= l r for absolute values and |l| <= 1, the bound is linear
-    in the angles. So is the deduction of Lemma 5 where u carries a stroke beyond its window.
+    in the angles. So is the deduction of Lemma 5 where u carries a stroke beyond its window; a stroke with
+    l = 0 needs none. Infinite for an empty piece.
     """
+    if piece.is_empty:
+        return math.inf
     m, n, (low, high) = len(step.p), len(step.theta), (piece.boxes[:, ::2].T, piece.boxes[:, 1::2].T)
-    forces, constants = [], []
-    for l, k, squared in zip(np.split(multipliers, [m, 2 * m, 2 * m + n]), terms.weights, terms.squared):  # noqa: E741
+    forces, constants, weights = [], [], piece.weights(terms, step.theta)
+    for l, k, squared in zip(np.split(multipliers, [m, 2 * m, 2 * m + n]), weights, terms.squared):  # noqa: E741
         l = l if squared else np.clip(l, -1.0, 1.0)  # noqa: E741, PLW2901
         forces.append(k * l)
         constants.append(-k * l * l / 4 if squared else 0 * l)
     above, below = (
-        np.maximum(excess_over_windows(step.theta, piece.boxes), 0.0) * terms.weight * (piece.line == 0)
+        np.maximum(excess_over_windows(step.theta, piece.boxes), 0.0)
+        * ((piece.line == 0) & (forces[2] != 0))
+        * weights[2]
     )
     if terms.norm == 1:
         deduction, tilt = 2 * (above + below), np.zeros(n)
@@ -982,42 +1035,58 @@ def linear_bound(terms: EnergyTerms, step: LastStep, piece: BoxPiece, multiplier
     of_a, of_b, of_r, of_beta = forces
     i, j, upright = terms.first, terms.second, of_beta - tilt
     of_alpha = np.bincount(i, of_a, n) - np.bincount(j, of_a, n)
-    of_skew = np.bincount(i, parity_sign(step.p) * of_b, n) - np.bincount(j, of_b, n)
+    of_skew = np.bincount(i, parity_sign(piece.p) * of_b, n) - np.bincount(j, of_b, n)
     slope = np.stack([of_alpha + of_r, of_skew + parity_sign(piece.line) * of_r + upright])
     zero = np.zeros(n)
-    still = terms.residuals(zero, zero, step.p, piece.line, step.theta)
+    still = terms.residuals(zero, zero, piece.p, piece.line, step.theta)
     parts = [force * x for force, x in zip(forces, still)]
     parts += [*constants, -deduction, *np.minimum(slope * low, slope * high)]
     # What may fail is below 16 roundings of every product that enters.
     far, turn = np.maximum(np.abs(low), np.abs(high)).max(axis=0), np.abs(still[2])
-    size = np.sum(np.abs(of_a) * (2 * far[i] + 2 * far[j] + HALF * np.abs(step.p))) + 4.0 * m
+    size = np.sum(np.abs(of_a) * (2 * far[i] + 2 * far[j] + HALF * np.abs(piece.p))) + 4.0 * m
     size += np.sum(np.abs(of_b) * 2) + np.sum(np.abs(of_r) * (far + 1 + turn) + np.abs(upright) + deduction)
     size += sum(np.abs(x).sum() for x in constants)
     return math.fsum(np.concatenate(parts)) - 16 * PRECISION * float(size)
 
 
-def pieces_bound(terms: EnergyTerms, step: LastStep, arrays: dict[str, Array]) -> float:
-    """A lower bound of F in the boxes of the last step: the least of all pieces; -inf without any.
+def pieces_of(terms: EnergyTerms, step: LastStep, cuts: list[int]) -> Iterator[BoxPiece]:
+    """The pieces of the boxes that stay whole.
 
-    A cut is the pixel at whose window a piece is cut into three, or -1 for a piece that stays whole, which
-    has multipliers. Each piece comes before its parts.
+    cuts: describes all pieces, each before its parts: by the pixel at whose window it is cut; by n + e for
+    pair e, then the least and the greatest jump, of which each has a part; or by -1 if it stays whole.
     """
-    size, cuts = 2 * (len(terms.first) + len(terms.white)), take_array(arrays, "cuts", "<i4", None)
-    require(len(cuts) <= MOST_PIECES, "cuts", "has too many pieces")
-    require((cuts >= -1) & (cuts < len(terms.white)), "cuts", "is no pixel")
-    multipliers = take_array(arrays, "multipliers", "<f8", int((cuts < 0).sum()), size)
-    require((np.abs(multipliers) <= MOST_WEIGHT).all(axis=1), "multipliers", "is too large")
-    waiting, bounds = [step.whole_piece] if len(cuts) else [], list[float]()
-    for at in cuts.tolist():
+    waiting, numbers, n = [step.whole_piece] if cuts else [], iter(cuts), len(terms.white)
+    for at in numbers:
         require(waiting, "cuts", "has a piece too many")
+        require(-1 <= at < n + len(terms.first), "cuts", "is no pixel and no pair")
         piece = waiting.pop()
-        if at >= 0:
-            waiting += reversed(piece.cut(at, step.theta))
+        if at >= n:
+            first, last = next(numbers, 1), next(numbers, 0)
+            possible = piece.possible_jumps(at - n, terms)
+            covered = 0 <= last - first < MOST_JUMP and all(first <= p <= last for p in possible)
+            require(covered, "cuts", f"leaves out jumps of pair {at - n}")
+            waiting += [piece.with_jump(at - n, p, terms) for p in range(last, first - 1, -1)]
+        elif at >= 0:
+            waiting += reversed(piece.cut_at_window(at, step.theta))
         else:
-            least = linear_bound(terms, step, piece, multipliers[len(bounds)])
-            bounds.append(math.inf if (piece.boxes[:, 0] > piece.boxes[:, 1]).any() else least)
-    require(not waiting, "cuts", "leaves a piece without multipliers")
-    return min(bounds, default=-math.inf)
+            yield piece
+    require(not waiting, "cuts", "leaves pieces out")
+
+
+def bound_pieces(
+    terms: EnergyTerms, step: LastStep, arrays: dict[str, Array]
+) -> list[tuple[BoxPiece, float]]:
+    """The pieces of the boxes of the last step, each with a lower bound of F in it."""
+    size, cuts = 2 * (len(terms.first) + len(terms.white)), take_array(arrays, "cuts", "<i4", None)
+    require(len(cuts) <= MOST_CUTS, "cuts", "has too many pieces")
+    multipliers = take_array(arrays, "multipliers", "<f8", None, size)
+    require((np.abs(multipliers) <= MOST_WEIGHT).all(axis=1), "multipliers", "is too large")
+    bounded = []
+    for number, piece in enumerate(pieces_of(terms, step, cuts.tolist())):
+        require(number < len(multipliers), "multipliers", "has too few pieces")
+        bounded.append((piece, linear_bound(terms, step, piece, multipliers[number])))
+    require(len(bounded) == len(multipliers), "multipliers", "has too many pieces")
+    return bounded
 
 
 # Section 7: the theorem ------------------------------------------------------------------------------------
@@ -1150,17 +1219,29 @@ def check_last_step(arrays: dict[str, Array], passed: PassedLevels) -> ProvenBox
     terms, energy, last = passed.terms, passed.energy, passed.last
     require(last is not None, "the last level", "leaves nothing, not even the field")
     assert last is not None
-    least = pieces_bound(terms, last, arrays) if is_convex(terms, last) else -math.inf
+    bounded = bound_pieces(terms, last, arrays)
+    least = min((bound for _, bound in bounded), default=-math.inf)
     proven = max(0.0, min(max(max(passed.bounds) - passed.slack, least), energy - passed.error))
     bound = max(0.0, proven - SPARE * (1 + proven))
     n, m = len(passed.whole.white), len(passed.whole.first)
     boxes, pairs = np.zeros((n, 4)), np.zeros(m, bool)
-    lower = passed.whole.lower  # in parts without strokes, anything is possible
-    boxes[:, 0], boxes[:, 1], boxes[:, 2], boxes[:, 3] = lower, lower + HALF, -QUARTER, QUARTER
-    boxes[passed.pixels], pairs[passed.pairs] = last.boxes, has_forced_jump(terms, last.p, last.boxes)
+    boxes[:, 0] = passed.whole.lower  # in parts without strokes, anything is possible
+    boxes[:, 1], boxes[:, 2], boxes[:, 3] = boxes[:, 0] + HALF, -QUARTER, QUARTER
+    most = energy + passed.error + SPARE * (1 + energy)
+    left = [piece for piece, lower in bounded if lower <= most] or [last.whole_piece]
+    boxes[passed.pixels] = widest_box([piece.boxes for piece in left])
+    same = np.all([piece.p == left[0].p for piece in left], axis=0)
+    pairs[passed.pairs] = np.all([piece.has_known_jump(terms) for piece in left], axis=0) & same
     claim = ProvenBoxes(status_of(energy, bound), terms.norm, energy, bound, pairs, passed.bounds, boxes)
     check_claim(head_of(arrays), claim, proven, passed.error)
     return claim
+
+
+def widest_box(boxes: list[Array]) -> Array:
+    """The least boxes (n, 4) round all of these."""
+    upper = np.arange(4) % 2 == 1
+    widest: Array = np.where(upper, np.max(boxes, axis=0), np.min(boxes, axis=0))
+    return widest
 
 
 def check_claim(head: dict[str, Any], claim: ProvenClaim, most: float, error: float) -> None:

@@ -23,6 +23,7 @@ from typing import Final
 
 import numpy as np
 
+from ..array_archive import Arrays
 from ..field.field import CrossField, Norm, field_in_windows
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
@@ -32,10 +33,10 @@ from ..processes.limits import Limits
 from ..search.improvement import improved_field
 from ..search.search import search
 from ..search.starts import best_start, polyvector_start
-from .check_certificate import MOST_COUNT, has_forced_jump, is_convex
+from .check_certificate import MOST_COUNT, has_forced_jump
 from .clusters import table_sizes
 from .dual import Dual
-from .last_step import energy_terms, last_step_on, minimise_on_boxes
+from .last_step import energy_terms, has_few_open, last_step_on, minimise_on_boxes
 from .lattice import Lattice
 from .pruning import RemainingCells, finer_lattice, smaller_lattice
 from .record import EXACT, LevelRecord, Proof
@@ -102,11 +103,12 @@ class Termination:
 class _Chain:
     """The levels round one centre, and what they prove together.
 
-    convex: bound of the convex problem on the boxes that the last levels leave.
+    convex: bound of the last step on the boxes that the last levels leave. pieces: arrays that prove it.
     """
 
     levels: list[LevelRecord] = field(default_factory=list)
     convex: float = -math.inf
+    pieces: Arrays | None = None
     forced: int = 0
 
     @property
@@ -166,7 +168,7 @@ class Descent:
         bound, energy = min(self.proven.bound, self.energy(self.best)), self.energy(self.best)
         return Proof(
             self.best, energy, bound, self.proven.forced, tuple(self.proven.levels), seconds, ended,
-            self.norm,
+            self.norm, self.proven.pieces,
         )  # fmt: skip
 
     def run(self) -> str:
@@ -249,20 +251,22 @@ class Descent:
             if left.is_empty:
                 chain.convex, left = energy, None
             else:
-                self._solve_if_forced(left)
+                self._try_last_step(left)
         if chain.bound >= self.proven.bound:
             self.proven = chain
         return left
 
-    def _solve_if_forced(self, left: RemainingCells) -> None:
-        """Count the jumps that are forced, and if all choices are, solve the convex problem that is left."""
+    def _try_last_step(self, left: RemainingCells) -> None:
+        """Count the jumps that are forced, and if nearly all are, try the last step."""
         chain, terms = self.chain, energy_terms(self.instance, self.norm)
         step = last_step_on(left, terms, self.best)
         chain.forced = int(has_forced_jump(terms, step.p, step.boxes).sum())
-        if is_convex(terms, step):
+        if has_few_open(terms, step):
             energy = self.energy(self.best)
             minimum = minimise_on_boxes(self.instance, terms, step, energy, self.ends.over)
-            chain.convex = max(chain.convex, min(minimum.bound, chain.levels[-1].energy))
+            convex = min(minimum.bound, chain.levels[-1].energy)
+            if convex > chain.bound:
+                chain.convex, chain.pieces = convex, minimum.pieces
             if minimum.bound < energy:
                 field = minimum.field
                 better = field_in_windows(self.instance, field.alpha, field.beta, field.p)

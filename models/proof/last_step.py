@@ -1,19 +1,24 @@
-"""The last step of a proof: a convex problem, where the last boxes leave no choice of jumps.
+"""The last step of a proof: pieces of the last boxes, and a convex problem on each.
 
-Sections 6 and 9 of docs/proofs.md state and prove it. The conditions, the boxes and the bound are those of
-the checker. This module finds the least energy on the boxes, cuts them at the edges of windows where the
-bound is not sufficient, and returns the cuts and multipliers that a certificate contains.
+Sections 6 and 9 of docs/proofs.md state and prove it. The pieces and their bounds are those of the checker.
+This module branches and bounds: it cuts the piece of least bound at a pair whose jump is open, or at the
+window of a stroke, finds the least energy on the parts without what is open there, and returns the cuts and
+multipliers that a certificate contains.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from ..array_archive import Arrays
 from ..field.field import CrossField, Norm
-from ..instance.angles import QUARTER
-from ..instance.domain import Floats, Ints
+from ..instance.angles import HALF, QUARTER
+from ..instance.domain import Bools, Floats
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..search.angle_program import solve_angle_program
@@ -26,25 +31,29 @@ from .check_certificate import (
     excess_over_windows,
     last_step,
     linear_bound,
-)  # fmt: skip
+    pieces_of,
+)
 from .pruning import RemainingCells
 from .record import EXACT
 
-_MOST_PIECES: Final = 60
-_MOST_CROSSED: Final = 6  # strokes whose windows the boxes exceed; with more, all pieces are too many
+_MOST_NODES: Final = 390  # of the tree of pieces
+_MOST_OPEN: Final = 24  # pairs whose jump is open; with more, there would be too many pieces
+_SLIGHT: Final = 1e-2  # deduction, of 1 + energy, up to which a stroke beyond its window counts
+_TRIAL: Final = 50  # nodes after which this part of the way to the energy must lie behind the bound
+_TRIAL_PART: Final = 0.6
+_SECOND: Final = 0.2  # part of the difference between the least costs of two jumps in a pair's rank
 _MARGIN: Final = 2e-9  # radians by which the boxes are wider here; those of the checker are wider by less
 
 
 class BoxMinimum(NamedTuple):
     """The least energy on the last boxes: its field, a bound, and the arrays of a certificate that prove it.
 
-    cuts, multipliers: as docs/files/certificate.csv describes them.
+    pieces: cuts and multipliers, as docs/files/certificate.csv describes them.
     """
 
     field: CrossField
     bound: float
-    cuts: Ints
-    multipliers: Floats
+    pieces: Arrays
 
 
 def energy_terms(instance: Instance, norm: Norm) -> EnergyTerms:
@@ -64,51 +73,122 @@ def last_step_on(left: RemainingCells, terms: EnergyTerms, field: CrossField) ->
     return last_step(terms, np.stack(sides, axis=1), field.alpha, field.p.astype(np.int64))
 
 
+def has_few_open(terms: EnergyTerms, step: LastStep) -> bool:
+    """Whether so few jumps are open in the boxes that pieces may prove something."""
+    return int((~step.whole_piece.has_known_jump(terms)).sum()) <= _MOST_OPEN
+
+
+def fit_to_boxes(
+    instance: Instance, terms: EnergyTerms, step: LastStep, pieces: Arrays, enough: float
+) -> Arrays:
+    """The pieces of slightly larger boxes with new multipliers where theirs prove less than `enough`.
+
+    Raises NotProvenError where the pieces do not cover these boxes.
+    """
+    multipliers = pieces["multipliers"].copy()
+    for row, piece in zip(multipliers, pieces_of(terms, step, pieces["cuts"].tolist()), strict=True):
+        if linear_bound(terms, step, piece, row) < enough:
+            row[:] = _minimise_on_piece(instance, terms, step, piece).multipliers
+    return pieces | {"multipliers": multipliers}
+
+
+@dataclass(eq=False)
+class _Node:
+    """A piece with its minimum and, once it is cut, its cut and parts."""
+
+    piece: BoxPiece
+    minimum: _PieceMinimum
+    cut: int = -1
+    parts: list[_Node] = field(default_factory=list)
+
+    def __lt__(self, other: _Node) -> bool:
+        return self.minimum.bound < other.minimum.bound
+
+    def numbers(self, terms: EnergyTerms) -> list[int]:
+        """Its numbers in the cuts of a certificate."""
+        e = self.cut - len(terms.white)
+        return (
+            [self.cut] if e < 0 else [self.cut, int(self.parts[0].piece.p[e]), int(self.parts[-1].piece.p[e])]
+        )
+
+    def in_order(self) -> Iterator[_Node]:
+        """The node and all below, each before its parts."""
+        yield self
+        for part in self.parts:
+            yield from part.in_order()
+
+
 def minimise_on_boxes(
     instance: Instance, terms: EnergyTerms, step: LastStep, energy: float, over: Over = never
 ) -> BoxMinimum:
-    """Find the least energy on the boxes of a convex last step, and prove a bound of it.
+    """Find the least energy on the boxes of a last step, and prove a bound of it.
 
-    Pieces with a bound of `energy` are not cut. With too many pieces, the bound is that of the whole boxes.
+    Pieces with a bound of `energy` are not cut.
     """
     whole = step.whole_piece
-    whole_minimum = _minimise_on_piece(instance, terms, step, whole)
-    waiting, minima, cuts = [whole], list[BoxMinimum](), list[int]()
-    few = np.count_nonzero(_deductions(terms, step, whole).sum(axis=0)) <= _MOST_CROSSED
-    while waiting and len(cuts) < (_MOST_PIECES if few else 1) and not (cuts and over()):
-        piece = waiting.pop()
-        minimum = whole_minimum if piece is whole else _minimise_on_piece(instance, terms, step, piece)
-        cut = -1
-        if minimum.bound < energy - EXACT / 2 * (1 + energy):
-            cut = _pixel_to_cut(terms, step, piece, minimum.field.beta)
-        cuts.append(cut)
-        if cut < 0:
-            minima.append(minimum)
-        else:
-            waiting += reversed(piece.cut(cut, step.theta))
-    best = min(minima, key=lambda minimum: minimum.bound, default=whole_minimum)
-    if waiting:
-        return whole_minimum._replace(field=best.field)
-    multipliers = np.concatenate([minimum.multipliers for minimum in minima])
-    return BoxMinimum(best.field, best.bound, np.array(cuts, np.int32), multipliers)
-
-
-def _minimise_on_piece(instance: Instance, terms: EnergyTerms, step: LastStep, piece: BoxPiece) -> BoxMinimum:
-    """The least energy on a piece, which is infinite on an empty one."""
-    m, n, at, p = len(step.p), len(step.theta), instance.stroke_index, step.p.astype(np.int32)
-    low, high = piece.boxes[:, ::2].T.ravel(), piece.boxes[:, 1::2].T.ravel()
-    multipliers, cuts = np.zeros((1, 2 * m + 2 * n)), np.full(1, -1, np.int32)
-    if (low > high).any():
-        return BoxMinimum(field_at(instance, low, p), np.inf, cuts, multipliers)
-    above, below = _deductions(terms, step, piece)
-    tilt = np.concatenate([np.zeros(n), 4 * (above - below) * (terms.norm != 1)])
-    fit = solve_angle_program(
-        instance, p, terms.norm, low, high, tilt=tilt, lines=piece.line[at], target=step.theta[at]
+    root = _Node(whole, _minimise_on_piece(instance, terms, step, whole))
+    waiting, count, enough = [root], 1, energy - EXACT / 2 * (1 + energy)
+    hoped = root.minimum.bound + _TRIAL_PART * (energy - root.minimum.bound)
+    while waiting[0].minimum.bound < enough and count < _MOST_NODES and not (count > 1 and over()):
+        node = waiting[0]
+        node.cut = _find_cut(terms, step, node.piece, node.minimum.x)
+        if node.cut < 0:
+            break
+        heapq.heappop(waiting)
+        for piece in _parts(terms, step, node):
+            node.parts.append(_Node(piece, _minimise_on_piece(instance, terms, step, piece)))
+            heapq.heappush(waiting, node.parts[-1])
+        count += len(node.parts)
+        if count - len(node.parts) < _TRIAL <= count and waiting[0].minimum.bound < hoped:
+            break
+    least = waiting[0]
+    nodes = list(root.in_order())
+    return BoxMinimum(
+        field_at(instance, least.minimum.x, least.piece.p.astype(np.int32)),
+        least.minimum.bound,
+        {
+            "cuts": np.array([number for node in nodes for number in node.numbers(terms)], np.int32),
+            "multipliers": np.stack([node.minimum.multipliers for node in nodes if node.cut < 0]),
+        },
     )
-    multipliers[0, : 2 * m], multipliers[0, 2 * m + n :] = fit.multipliers[: 2 * m], fit.multipliers[-n:]
-    multipliers[0, 2 * m + at] = fit.multipliers[2 * m : -n]
-    bound = linear_bound(terms, step, piece, multipliers[0])
-    return BoxMinimum(field_at(instance, fit.x, p), bound, cuts, multipliers)
+
+
+def _parts(terms: EnergyTerms, step: LastStep, node: _Node) -> list[BoxPiece]:
+    """The parts of the piece of a node."""
+    e = node.cut - len(terms.white)
+    if e < 0:
+        return node.piece.cut_at_window(node.cut, step.theta)
+    return [node.piece.with_jump(e, p, terms) for p in node.piece.possible_jumps(e, terms)]
+
+
+class _PieceMinimum(NamedTuple):
+    """The angles x (2n,) of least energy on a piece, and the multipliers (2m + 2n,) of its bound."""
+
+    x: Floats
+    bound: float
+    multipliers: Floats
+
+
+def _minimise_on_piece(
+    instance: Instance, terms: EnergyTerms, step: LastStep, piece: BoxPiece
+) -> _PieceMinimum:
+    """The least energy on a piece, which is infinite on an empty one."""
+    m, n, at, p = len(step.p), len(step.theta), instance.stroke_index, piece.p.astype(np.int32)
+    low, high = piece.boxes[:, ::2].T.ravel(), piece.boxes[:, 1::2].T.ravel()
+    multipliers = np.zeros(2 * m + 2 * n)
+    if piece.is_empty:
+        return _PieceMinimum(low, np.inf, multipliers)
+    of_a, of_b, of_r, of_beta = piece.weights(terms, step.theta)
+    above, below = _deductions(terms, step, piece)
+    counts = _counts(terms, step, piece)
+    tilt = np.concatenate([np.zeros(n), 4 * (above - below) * counts * (terms.norm != 1)])
+    fit = solve_angle_program(
+        instance, p, terms.norm, low, high, tilt=tilt, lines=piece.line[at], target=step.theta[at],
+        weight=np.concatenate([of_a, of_b, (of_r * counts)[at], of_beta]),
+    )  # fmt: skip
+    multipliers[: 2 * m], multipliers[2 * m + n :] = fit.multipliers[: 2 * m], fit.multipliers[-n:]
+    multipliers[2 * m + at] = fit.multipliers[2 * m : -n]
+    return _PieceMinimum(fit.x, linear_bound(terms, step, piece, multipliers), multipliers)
 
 
 def _deductions(terms: EnergyTerms, step: LastStep, piece: BoxPiece) -> Floats:
@@ -117,13 +197,44 @@ def _deductions(terms: EnergyTerms, step: LastStep, piece: BoxPiece) -> Floats:
     return np.asarray(excess * terms.weight * (piece.line == 0))
 
 
-def _pixel_to_cut(terms: EnergyTerms, step: LastStep, piece: BoxPiece, beta: Floats) -> int:
-    """The pixel of the stroke with the largest deduction whose window the piece exceeds, or -1."""
+def _counts(terms: EnergyTerms, step: LastStep, piece: BoxPiece) -> Bools:
+    """Which strokes (n,) count: those with a slight deduction at most."""
+    return np.asarray(np.pi * _deductions(terms, step, piece).sum(axis=0) <= _SLIGHT)
+
+
+def _find_cut(terms: EnergyTerms, step: LastStep, piece: BoxPiece, x: Floats) -> int:
+    """The pixel or n + the pair that costs most at the angles x beyond what counts, or -1 without any."""
+    n = len(step.theta)
+    alpha, beta = np.split(x, 2)
+    costs, best, rank = _stroke_losses(terms, step, piece, alpha, beta), -1, 0.0
+    if costs.max(initial=0.0) > 0:
+        best, rank = int(np.argmax(costs)), float(costs.max())
+    for e in np.flatnonzero(~piece.has_known_jump(terms)).tolist():
+        i, j = terms.first[e], terms.second[e]
+        sizes = sorted(
+            _size(alpha[i] - alpha[j] + HALF * p, terms.squared[0])
+            + _size((1 - 2 * (p % 2)) * beta[i] - beta[j], terms.squared[0])
+            for p in piece.possible_jumps(e, terms)
+        )
+        lost = 2 * (sizes[0] + _SECOND * (sizes[1] - sizes[0])) if len(sizes) > 1 else np.inf
+        if lost > rank:
+            best, rank = n + e, lost
+    return best
+
+
+def _stroke_losses(
+    terms: EnergyTerms, step: LastStep, piece: BoxPiece, alpha: Floats, beta: Floats
+) -> Floats:
+    """What is lost at each stroke (n,) where the piece exceeds its window: all of it, or a deduction."""
     above, below = _deductions(terms, step, piece)
-    crossed = above + below > 0
-    if not crossed.any():
-        return -1
-    size = above + below
+    away, size = alpha - step.theta, above + below
     if terms.norm != 1:
-        size = above * (QUARTER + beta) + below * (QUARTER - beta)
-    return int(np.argmax(np.where(crossed, 1e-12 + size, 0.0)))
+        size = above * 4 * (QUARTER + beta) + below * 4 * (QUARTER - beta)
+    lines = (away + beta, away - HALF - beta, away + HALF - beta)
+    whole = terms.weight * np.min([_size(line, terms.squared[2]) for line in lines], axis=0)
+    open_here = (above + below > 0) | (piece.weights(terms, step.theta)[2] < terms.weight)
+    return np.asarray(np.where(open_here, 1e-12 + np.where(_counts(terms, step, piece), size, whole), 0.0))
+
+
+def _size(residual: Any, squared: bool) -> Any:
+    return residual * residual if squared else np.abs(residual)

@@ -102,7 +102,7 @@ class Proof(Claim):
     proven
         Findings of the checker; None before the check.
     pieces
-        The arrays of the certificate that prove the last step; None before the check.
+        The arrays of the certificate that prove the last step, None without one.
 
     """
 
@@ -111,5 +111,5 @@ class Proof(Claim):
     seconds: float
     ended: str
     norm: Norm = 2
+    pieces: Arrays | None = field(default=None, repr=False)
     proven: ProvenClaim | None = field(default=None, init=False, repr=False)  # `replace` leaves it out
-    pieces: Arrays | None = field(default=None, init=False, repr=False)

@@ -15,7 +15,7 @@ the least energy in the box.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -129,14 +129,17 @@ def solve_angle_program(
     tilt: Floats | None = None,
     lines: Ints | None = None,
     target: Floats | None = None,
+    weight: Floats | None = None,
 ) -> AngleFit:
     """Compute the angles that minimise the energy minus tilt x in a box, with Clarabel.
 
     p: jumps, shape (m,). lower, upper: the box of x = (alpha, beta) in radians, shapes (2n,). tilt: shape
-    (2n,), None for zeros. lines, target: as of `Residuals.at`. Raises CrossfieldError when Clarabel finds no
-    solution; one always exists.
+    (2n,), None for zeros. lines, target: as of `Residuals.at`. weight (r,): of the residuals, None for theirs
+    in the energy. Raises CrossfieldError when Clarabel finds no solution; one always exists.
     """
     terms = Residuals.at(instance, p, norm, lines, target)
+    if weight is not None:
+        terms = replace(terms, weight=weight)
     tilt = np.zeros(len(lower)) if tilt is None else tilt
     x, multipliers = _solve_program(terms, lower, upper, tilt)
     multipliers = np.where(terms.squared, multipliers, np.clip(multipliers, -1.0, 1.0))

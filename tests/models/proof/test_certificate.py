@@ -106,7 +106,8 @@ def test_a_part_without_strokes_has_no_cost_at_the_optimum(norm, tmp_path):
     assert (windows.alpha_lower[apart] == instance.alpha_lower[apart]).all()
     assert (windows.alpha_upper[apart] == instance.alpha_upper[apart]).all()
     assert (np.abs([windows.beta_lower[apart], windows.beta_upper[apart]]) == np.pi / 4).all()
-    assert (windows.alpha_upper - windows.alpha_lower)[~apart].min() < 1.0
+    if norm != 1:  # its last step proves the optimum on boxes that are still whole windows
+        assert (windows.alpha_upper - windows.alpha_lower)[~apart].min() < 1.0
     beta = proof.field.beta + np.where(instance.grid.rows + instance.grid.columns == 0, 0.1, 0.0)
     worse = CrossField(instance, proof.field.alpha, beta, proof.field.p)
     energy = worse.energy(norm).total
@@ -447,6 +448,11 @@ def test_boxes_hold_the_crosses_of_all_cells(written):
         assert ((x >= box[0]) & (x <= box[1]) & (y >= box[2]) & (y <= box[3])).all()
 
 
+def least_bound(terms, step, pieces):
+    """The least bound of all pieces of a last step."""
+    return min(bound for _, bound in check_certificate.bound_pieces(terms, step, pieces))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("norm", [2, 1, "mixed"])
 def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(norm, written):
@@ -465,17 +471,48 @@ def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(norm, written):
             boxes = np.stack([alpha - sides[0], alpha + sides[0], beta - sides[1], high], axis=1)
             p = np.zeros(len(terms.first), int)
             step = check_certificate.last_step(terms, boxes, alpha, p)
-            if not check_certificate.is_convex(terms, step):
-                continue
-            best, _, cuts, multipliers = minimise_on_boxes(proof.field.instance, terms, step, 1e6)
+            best, _, pieces = minimise_on_boxes(proof.field.instance, terms, step, 1e6)
             low, size = boxes[:, ::2], boxes[:, 1::2] - boxes[:, ::2]
             points = low + rng.random((400, 4, 2)) ** rng.choice([0.1, 1, 10], (400, 1, 1)) * size
             points = [*points, np.stack([best.alpha, best.beta], axis=1)]
             energies = [free_energy(proof.field.instance, *point.T, norm) for point in points]
             for noise in (0.0, 0.1):
-                parts = {"cuts": cuts, "multipliers": multipliers + rng.normal(0, noise, multipliers.shape)}
-                bound = check_certificate.pieces_bound(terms, step, parts)
+                shaken = pieces["multipliers"] + rng.normal(0, noise, pieces["multipliers"].shape)
+                parts = pieces | {"multipliers": shaken}
+                bound = least_bound(terms, step, parts)
                 assert bound <= min(energies) + 1e-9
                 assert noise or bound > min(energies) - 0.5
-            cut += len(cuts) > 1
+            cut += len(pieces["cuts"]) > 1
     assert cut > 5
+
+
+@pytest.mark.parametrize("norm", [2, 1, "mixed"])
+def test_boxes_with_open_jumps_are_divided_and_bounded(norm, written):
+    """In boxes so wide that several jumps are open, no energy is below the bound, and one is close."""
+    rng, divided = np.random.default_rng(5), 0
+    for seed in (1, 3, 4):
+        _, arrays = written(seed)
+        (terms, _), instance = check_certificate.terms_of(arrays), proven(seed).field.instance
+        terms.norm, n = norm, len(terms.white)
+        for _ in range(4):
+            middle, sides = rng.uniform(-0.5, 0.5, (2, n)), rng.uniform(0.1, 0.6, (2, n))
+            high = np.clip(middle[1] + sides[1], -np.pi / 4, np.pi / 4)
+            low = np.clip(middle[1] - sides[1], -np.pi / 4, np.pi / 4)
+            boxes = np.stack([middle[0] - sides[0], middle[0] + sides[0], low, high], axis=1)
+            step = check_certificate.last_step(terms, boxes, middle[0], np.zeros(len(terms.first), int))
+            points = boxes[:, ::2] + rng.random((2000, n, 2)) * (boxes[:, 1::2] - boxes[:, ::2])
+            least = min(free_energy(instance, *point.T, norm) for point in points)
+            best, bound, pieces = minimise_on_boxes(instance, terms, step, least)
+            assert least_bound(terms, step, pieces) == bound <= least
+            if (step.whole_piece.weights(terms, step.theta)[2] == terms.weight).all():
+                close = free_energy(instance, best.alpha, best.beta, norm)
+                assert bound >= min(least, close) - 1e-6
+            jumps = np.flatnonzero(pieces["cuts"] >= n)
+            for at in jumps[:1]:
+                assert pieces["cuts"][at + 1] < pieces["cuts"][at + 2]
+                fewer = pieces["cuts"].copy()
+                fewer[at + 2] -= 1
+                with pytest.raises(check_certificate.NotProvenError, match="leaves out jumps"):
+                    least_bound(terms, step, pieces | {"cuts": fewer})
+            divided += len(jumps) > 0
+    assert divided > 5

@@ -108,7 +108,7 @@ def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
 
 
 def test_limits_end_a_proof_with_what_it_has():
-    instance = cf.sample("bottle", 12, stroke_weight=0.5)
+    instance = cf.sample("mouse", 12)
     lines = []
     some = cf.prove(instance, limits=cf.Limits(math.inf, 0.5), progress=lines.append)
     assert some.ended == "gap"
