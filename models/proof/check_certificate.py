@@ -48,6 +48,7 @@ ROOM, MORE_ROOM = 1 << 28, 128  # memory for a certificate: a number, and one fo
 MOST_LEVELS = 256
 MOST_SIDE = 9999
 MOST_CUTS = 1200  # numbers that describe the pieces of the boxes
+MOST_PARTS = 8  # of a piece
 MOST_COUNT = 4096  # labels of a pixel in alpha, and in beta
 MOST_LABELS = 1 << 28  # of a level
 MOST_ANGLE = 16.0
@@ -913,16 +914,13 @@ class BoxPiece:
     p: Array
     chosen: Array
 
-    def cut_at_window(self, at: int, theta: Array) -> list[BoxPiece]:
-        """The parts below, in and above the window of the stroke of pixel `at`; some may be empty."""
+    def beside_window(self, at: int, side: int, theta: Array) -> BoxPiece:
+        """The part below (-1), in (0) or above (1) the window of the stroke of pixel `at`; may be empty."""
         ends = (-math.inf, theta[at] - QUARTER, theta[at] + QUARTER, math.inf)
-        parts = []
-        for side in (-1, 0, 1):
-            boxes, line = self.boxes.copy(), self.line.copy()
-            boxes[at, 0], boxes[at, 1] = max(boxes[at, 0], ends[side + 1]), min(boxes[at, 1], ends[side + 2])
-            line[at] = side
-            parts.append(BoxPiece(boxes, line, self.p, self.chosen))
-        return parts
+        boxes, line = self.boxes.copy(), self.line.copy()
+        boxes[at, 0], boxes[at, 1] = max(boxes[at, 0], ends[side + 1]), min(boxes[at, 1], ends[side + 2])
+        line[at] = side
+        return BoxPiece(boxes, line, self.p, self.chosen)
 
     def with_jump(self, e: int, p: int, terms: EnergyTerms) -> BoxPiece:
         """The part with that best jump of pair e, which may be empty."""
@@ -1055,19 +1053,21 @@ def pieces_of(terms: EnergyTerms, step: LastStep, cuts: list[int]) -> Iterator[B
     cuts: describes all pieces, each before its parts: by the pixel at whose window it is cut; by n + e for
     pair e, then the least and the greatest jump, of which each has a part; or by -1 if it stays whole.
     """
-    waiting, numbers, n = [step.whole_piece] if cuts else [], iter(cuts), len(terms.white)
+    numbers, n = iter(cuts), len(terms.white)
+    waiting: list[Callable[[], BoxPiece]] = [lambda: step.whole_piece] if cuts else []  # made when needed
     for at in numbers:
         require(waiting, "cuts", "has a piece too many")
         require(-1 <= at < n + len(terms.first), "cuts", "is no pixel and no pair")
-        piece = waiting.pop()
+        piece = waiting.pop()()
         if at >= n:
             first, last = next(numbers, 1), next(numbers, 0)
             possible = piece.possible_jumps(at - n, terms)
-            covered = 0 <= last - first < MOST_JUMP and all(first <= p <= last for p in possible)
+            covered = 0 <= last - first < MOST_PARTS and all(first <= p <= last for p in possible)
             require(covered, "cuts", f"leaves out jumps of pair {at - n}")
-            waiting += [piece.with_jump(at - n, p, terms) for p in range(last, first - 1, -1)]
+            jumps = range(last, first - 1, -1)
+            waiting += [functools.partial(piece.with_jump, at - n, p, terms) for p in jumps]
         elif at >= 0:
-            waiting += reversed(piece.cut_at_window(at, step.theta))
+            waiting += [functools.partial(piece.beside_window, at, side, step.theta) for side in (1, 0, -1)]
         else:
             yield piece
     require(not waiting, "cuts", "leaves pieces out")

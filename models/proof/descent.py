@@ -2,9 +2,9 @@
 
 Each refinement level has half the spacing of the one before, or the same spacing with fewer labels. On a
 level the dual rises by passes (models/proof/dual.py), fields are rounded from it (rounding.py), and cells
-that cannot hold a better field are dropped (pruning.py), until the jumps are forced and a convex problem is
-left (last_step.py). A better field that is found on a coarse lattice becomes the centre: the levels begin
-anew round it. On a finer lattice little is lost where the centre is another field.
+that cannot hold a better field are dropped (pruning.py), until so few jumps are open that branching among
+them proves the optimum (last_step.py). A better field that is found on a coarse lattice becomes the centre:
+the levels begin anew round it. On a finer lattice little is lost where the centre is another field.
 
 The labels of a level are those that the gap of the level before leaves. While passes close that gap, most of
 them can be dropped, and the work of a pass falls faster than the gap. A record of the level justifies that.

@@ -38,7 +38,7 @@ from .record import EXACT
 
 _MOST_NODES: Final = 390  # of the tree of pieces
 _MOST_OPEN: Final = 24  # pairs whose jump is open; with more, there would be too many pieces
-_SLIGHT: Final = 1e-2  # deduction, of 1 + energy, up to which a stroke beyond its window counts
+_SLIGHT: Final = 1e-2  # deduction up to which a stroke counts where its box exceeds the window
 _TRIAL: Final = 50  # nodes after which this part of the way to the energy must lie behind the bound
 _TRIAL_PART: Final = 0.6
 _SECOND: Final = 0.2  # part of the difference between the least costs of two jumps in a pair's rank
@@ -106,10 +106,8 @@ class _Node:
 
     def numbers(self, terms: EnergyTerms) -> list[int]:
         """Its numbers in the cuts of a certificate."""
-        e = self.cut - len(terms.white)
-        return (
-            [self.cut] if e < 0 else [self.cut, int(self.parts[0].piece.p[e]), int(self.parts[-1].piece.p[e])]
-        )
+        e, ends = self.cut - len(terms.white), [part.piece for part in (*self.parts[:1], *self.parts[-1:])]
+        return [self.cut] if e < 0 else [self.cut, *(int(piece.p[e]) for piece in ends)]
 
     def in_order(self) -> Iterator[_Node]:
         """The node and all below, each before its parts."""
@@ -157,8 +155,9 @@ def _parts(terms: EnergyTerms, step: LastStep, node: _Node) -> list[BoxPiece]:
     """The parts of the piece of a node."""
     e = node.cut - len(terms.white)
     if e < 0:
-        return node.piece.cut_at_window(node.cut, step.theta)
-    return [node.piece.with_jump(e, p, terms) for p in node.piece.possible_jumps(e, terms)]
+        return [node.piece.beside_window(node.cut, side, step.theta) for side in (-1, 0, 1)]
+    jumps = node.piece.possible_jumps(e, terms) or [int(node.piece.p[e])]  # where no field is: an empty part
+    return [node.piece.with_jump(e, p, terms) for p in range(jumps[0], jumps[-1] + 1)]
 
 
 class _PieceMinimum(NamedTuple):
