@@ -59,4 +59,4 @@ def test_the_layers_of_a_run_are_those_of_the_command(report, tmp_path):
     for name in ("normals.png", "shaded.png"):
         assert (tmp_path / name).read_bytes() == (tmp_path / "folder" / name).read_bytes()
         with Image.open(tmp_path / name) as picture:
-            assert (picture.mode, picture.size) == ("RGBA", (2000, 1670))
+            assert (picture.mode, picture.size) == ("RGBA", (1200, 1002))
