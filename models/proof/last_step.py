@@ -161,7 +161,7 @@ def _parts(terms: EnergyTerms, step: LastStep, node: _Node) -> list[BoxPiece]:
 
 
 class _PieceMinimum(NamedTuple):
-    """The angles x (2n,) of least energy on a piece, and the multipliers (2m + 2n,) of its bound."""
+    """Angles x (2n,) with the least energy in a piece, its bound, and their multipliers (2m + 2n,)."""
 
     x: Floats
     bound: float
@@ -224,7 +224,7 @@ def _find_cut(terms: EnergyTerms, step: LastStep, piece: BoxPiece, x: Floats) ->
 def _stroke_losses(
     terms: EnergyTerms, step: LastStep, piece: BoxPiece, alpha: Floats, beta: Floats
 ) -> Floats:
-    """What is lost at each stroke (n,) where the piece exceeds its window: all of it, or a deduction."""
+    """Loss at each stroke (n,) whose window the piece exceeds: its whole term or a deduction."""
     above, below = _deductions(terms, step, piece)
     away, size = alpha - step.theta, above + below
     if terms.norm != 1:
