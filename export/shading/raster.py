@@ -128,7 +128,7 @@ def raster(
 
 
 def depth_inside(instance: Instance, view: View, rows: slice = ALL, outline: Outline | None = None) -> Floats:
-    """The depth of some rows of a view, as that of a `Raster`. outline: replaces that of the mask."""
+    """Depth (h, w) of some rows of a view, as in `Raster`. outline: replaces that of the mask."""
     if outline is None:
         spread = _interpolation(_padded_grid(instance), view, rows)
         depth = _depth_in_mask(np.pad(instance.mask, _REACH), border_width(instance), spread)

@@ -1,6 +1,6 @@
 """Instance files: documented JSON (instance.schema.json, mask as text rows) and .npz for large ones.
 
-A file has a mask with its strokes, or a mesh with its strokes . Whether crosses are orthogonal
+A file has a mask with its strokes, or a mesh with its strokes. Whether crosses are orthogonal
 and the weights of pairs are written only where they are not the default.
 """
 

@@ -74,8 +74,13 @@ def last_step_on(left: RemainingCells, terms: EnergyTerms, field: CrossField) ->
 
 
 def has_few_open(terms: EnergyTerms, step: LastStep) -> bool:
-    """Whether so few jumps are open in the boxes that pieces may prove something."""
-    return int((~step.whole_piece.has_known_jump(terms)).sum()) <= _MOST_OPEN
+    """Whether so few jumps are open in the boxes that the last step may prove something.
+
+    With absolute values, none may be open: pieces would prove optima in boxes that are still whole windows,
+    and a certificate would narrow none.
+    """
+    most = _MOST_OPEN if terms.norm == 2 else 0
+    return int((~step.whole_piece.has_known_jump(terms)).sum()) <= most
 
 
 def fit_to_boxes(

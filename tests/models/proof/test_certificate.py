@@ -106,8 +106,7 @@ def test_a_part_without_strokes_has_no_cost_at_the_optimum(norm, tmp_path):
     assert (windows.alpha_lower[apart] == instance.alpha_lower[apart]).all()
     assert (windows.alpha_upper[apart] == instance.alpha_upper[apart]).all()
     assert (np.abs([windows.beta_lower[apart], windows.beta_upper[apart]]) == np.pi / 4).all()
-    if norm != 1:  # its last step proves the optimum on boxes that are still whole windows
-        assert (windows.alpha_upper - windows.alpha_lower)[~apart].min() < 1.0
+    assert (windows.alpha_upper - windows.alpha_lower)[~apart].min() < 1.0
     beta = proof.field.beta + np.where(instance.grid.rows + instance.grid.columns == 0, 0.1, 0.0)
     worse = CrossField(instance, proof.field.alpha, beta, proof.field.p)
     energy = worse.energy(norm).total
