@@ -186,22 +186,23 @@ def _pair_slacks(lattice: Lattice, state: State, corner: _Corner) -> Floats:
 
 
 @compiled
-def visit_clusters(numbers: Indices, state: State, update: bool, least: Floats) -> None:
-    """Update some clusters, one after the other; their least values are then 0. Or fill in these as they are.
+def visit_clusters(numbers: Indices, state: State, step: float, least: Floats) -> None:
+    """Update some clusters by a step, one after the other. Or, at a step of 0, fill in their least values.
 
-    The least value is that of - sum lambda over the allowed alphas.
+    step: 1 for the tables at which the least value of a cluster is greatest, which is then 0; more to go
+    beyond them. The least value is that of - sum lambda over the allowed alphas.
     """
     for number in numbers:
         rows = _allowed_alphas(number, state)
         table = 4 * number
-        f0, f1 = _table_costs(table, rows, state, update), _table_costs(table + 1, rows, state, update)
-        f2, f3 = _table_costs(table + 2, rows, state, update), _table_costs(table + 3, rows, state, update)
+        f0, f1 = _table_costs(table, rows, state, step), _table_costs(table + 1, rows, state, step)
+        f2, f3 = _table_costs(table + 2, rows, state, step), _table_costs(table + 3, rows, state, step)
         upper, lower = min_plus(f0, f1), min_plus(f3, f2)
-        if update:
-            _store_table(table, rows, state, f0, min_plus(lower, _transposed(f1)))
-            _store_table(table + 1, rows, state, f1, min_plus(_transposed(f0), lower))
-            _store_table(table + 2, rows, state, f2, min_plus(_transposed(f3), upper))
-            _store_table(table + 3, rows, state, f3, min_plus(upper, _transposed(f2)))
+        if step > 0:
+            _store_table(table, rows, state, step, f0, min_plus(lower, _transposed(f1)))
+            _store_table(table + 1, rows, state, step, f1, min_plus(_transposed(f0), lower))
+            _store_table(table + 2, rows, state, step, f2, min_plus(_transposed(f3), upper))
+            _store_table(table + 3, rows, state, step, f3, min_plus(upper, _transposed(f2)))
         else:
             least[number] = np.inf
             for x in range(upper.shape[0]):
@@ -233,13 +234,13 @@ def _allowed_alphas(number: int, state: State) -> IndexTable:
 
 
 @compiled_inside
-def _table_costs(table: int, rows: IndexTable, state: State, update: bool) -> Floats:
+def _table_costs(table: int, rows: IndexTable, state: State, step: float) -> Floats:
     """Minus a table, by allowed alphas.
 
     For its update instead: the least of its pair's cost - shares over betas and jumps, without this table.
     """
     negative = _negative_table(table, rows, state)
-    if not update:
+    if step == 0:
         return negative
     column = table % 4
     pair = state.clusters.quads[table // 4, column]
@@ -320,16 +321,19 @@ def _negative_table(table: int, rows: IndexTable, state: State) -> Floats:
 
 
 @compiled_inside
-def _store_table(table: int, rows: IndexTable, state: State, f: Floats, rest: Floats) -> None:
-    """Set a table to a quarter of the least of all four f, f + rest, less its own f, at allowed alphas."""
+def _store_table(  # noqa: PLR0917 - a tuple would be compiled once for each literal in it
+    table: int, rows: IndexTable, state: State, step: float, f: Floats, rest: Floats
+) -> None:
+    """Move a table by a step towards a quarter of the least of all four f, f + rest, less its own f."""
     column = table % 4
     rows_i, rows_j = rows[_ENDS[column, 0]], rows[_ENDS[column, 1]]
     begin = state.clusters.start[table]
     wide = state.pixels[state.pairs[state.clusters.quads[table // 4, column]].second].alpha_count
     for x in range(f.shape[0]):
         for y in range(f.shape[1]):
+            at = begin + rows_i[x + 1] * wide + rows_j[y + 1]
             value = 0.25 * (f[x, y] + rest[x, y]) - f[x, y]
-            state.clusters.tables[begin + rows_i[x + 1] * wide + rows_j[y + 1]] = value
+            state.clusters.tables[at] += step * (value - state.clusters.tables[at])
 
 
 @compiled
