@@ -69,11 +69,10 @@ def parse_drawing(
         return read_curves(data, view)
     if kind == "picture":
         return read_bitmap(data, size)
-    matcher = LabelMatcher(frozenset(labels)) if labels else None
     if kind == "scap":
-        return read_scap(data, matcher)
+        return read_scap(data, LabelMatcher(frozenset(labels)) if labels else None)
     try:
-        return read_svg(data, matcher)
+        return read_svg(data, tuple(labels))
     except NoStrokeError:
         picture = _embedded_picture(data)
         if picture is None or labels:

@@ -14,6 +14,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, Final
 from xml.etree.ElementTree import Element, ParseError, SubElement
 
@@ -97,11 +98,13 @@ class _Place:
     chosen: bool = False
 
 
-def read_svg(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
+@lru_cache(maxsize=1)  # pictures of a field show the drawing that it was read from
+def read_svg(data: bytes, labels: tuple[str, ...] = ()) -> Curves:
     """Read the visible strokes of an SVG drawing in the units of its viewBox. Raises InputError.
 
-    matcher: matches the labels of curvature lines; None: colours decide.
+    labels: of the curvature lines, as `label_of` returns them; none: colours decide.
     """
+    matcher = LabelMatcher(frozenset(labels)) if labels else None
     root = _parse_xml(data)
     if tag_of(root) != "svg":
         tag = root.tag.split("}")[-1][:30]
