@@ -190,6 +190,7 @@ def _declared(content: Any) -> tuple[_Declared, ...]:
          _text(declaration.value), declaration.important)
         for declaration in tinycss2.parse_blocks_contents(content, skip_comments=True, skip_whitespace=True)
         if declaration.type == "declaration"
+        and (declaration.name.startswith("--") or ":" not in declaration.value)  # else without a semicolon
     )  # fmt: skip
 
 

@@ -449,6 +449,18 @@ def test_places_and_clips_that_are_not_understood_are_reported(style):
     assert re.search(rf"1 property is not understood, first '{style[:10]}.*' of <path>", *curves.notes)
 
 
+@for_each("mistake", ["stroke-miterlimit: 10 stroke-width: 3", "stroke-linejoin: round fill: red"])
+def test_a_declaration_without_its_semicolon_leaves_the_others_valid(mistake):
+    path = '<path d="M640 566C700 520 1000 400 1060 381M910 387L1150 540" stroke-width="3"/>'
+    page = 'viewBox="0 0 3000 3000" style="background-color: white"'
+    drawing = f"<svg {page} xmlns='http://www.w3.org/2000/svg'><style>path {{{{{{}}}}}}</style>{path}</svg>"
+    right, wrong = (
+        read_svg(drawing.format(f"fill: none; stroke: #000; {more}").encode()) for more in ("", mistake)
+    )
+    assert len(wrong.points) == 2
+    np.testing.assert_array_equal(wrong.points, right.points)
+
+
 @for_each("line", ["stroke-opacity='0.7'", "opacity='0.7'", ""])
 def test_red_lines_below_a_clear_marker_stay_red(line):
     lines = f'<path d="M20 50H80M50 20V80" fill="none" stroke="red" {line}/>'
