@@ -18,7 +18,8 @@ from ..pictures.svg import render_sheet
 from ..pictures.underlay import Underlay
 from ..shading.raster import Outline, depth_inside, grid_box, view_of_box
 
-_SIDE: Final = 1024  # pixels of the longer side of the picture on which cells are found
+_SIDE: Final = 1024  # pixels of the longer side of the picture on which cells are found, at most
+_SHARP: Final = 20  # pixels of that picture along a pixel of the grid, at most
 _MARGIN: Final = 0.25  # of the longer side of the grid round it, so that the paper outside is one large cell
 _WIDTH: Final = 0.25  # pixels of the grid that strokes are wide there: smaller gaps are closed
 _LEAST: Final = 2.0  # pixels of that picture that strokes are wide, so that they have no gaps
@@ -34,7 +35,8 @@ def find_outline(instance: Instance, drawing: Underlay) -> Outline:
     """The outline along the strokes of a drawing."""
     x, y, width, height = grid_box(instance)
     margin = _MARGIN * max(width, height)
-    view = view_of_box((x - margin, y - margin, width + 2 * margin, height + 2 * margin), _SIDE)
+    longer = round(_SHARP * (1 + 2 * _MARGIN) * max(instance.mask.shape))
+    view = view_of_box((x - margin, y - margin, width + 2 * margin, height + 2 * margin), min(_SIDE, longer))
     thick = max(_WIDTH, _LEAST * max(view.pixel) / instance.pixel_size)
     sheet = strokes_sheet(instance, view.box, drawing, thick)
     ink = render_sheet(sheet, view.width, view.height)[..., 3] > 127
