@@ -68,6 +68,7 @@ _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above whic
 _BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
 _WIDE: Final = 0.01  # relative gap of a level above which a poor field may cause it
 _SEARCH: Final = 0.05  # share of the time left for the search
+_WAIT: Final = 2.0  # times as long as the search for a chain of levels to do without it
 _ROUNDS: Final = 5  # rounds of the search without a limit of time
 
 _ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which a first smaller one is rounded: few digits may do
@@ -292,8 +293,11 @@ class Descent:
         """Search once for a better field, where the gap of a level is wide; a poor field may cause it."""
         if self.searched or self.gap <= _WIDE * self.energy(self.best) or self.ends.over():
             return
-        self.searched, left = True, self.ends.deadline.left()
-        timed, seconds = math.isfinite(left), min(_SEARCH * left, time.monotonic() - self.began)
+        left = self.ends.deadline.left()
+        timed, seconds = math.isfinite(left), _SEARCH * left
+        if timed and time.monotonic() - self.began < _WAIT * seconds:
+            return
+        self.searched = True
         result = search(
             self.instance,
             limits=Limits().until(self.ends.deadline.within(seconds)) if timed else None,
