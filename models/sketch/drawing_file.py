@@ -72,7 +72,7 @@ def parse_drawing(
     if kind == "scap":
         return read_scap(data, LabelMatcher(frozenset(labels)) if labels else None)
     try:
-        return read_svg(data, tuple(labels))
+        return read_svg(data, labels)
     except NoStrokeError:
         picture = _embedded_picture(data)
         if picture is None or labels:

@@ -98,12 +98,17 @@ class _Place:
     chosen: bool = False
 
 
-@lru_cache(maxsize=1)  # pictures of a field show the drawing that it was read from
-def read_svg(data: bytes, labels: tuple[str, ...] = ()) -> Curves:
+def read_svg(data: bytes, labels: Sequence[str] = ()) -> Curves:
     """Read the visible strokes of an SVG drawing in the units of its viewBox. Raises InputError.
 
-    labels: of the curvature lines, as `label_of` returns them; none: colours decide.
+    The last drawing is kept, because pictures of a field show the one that it was read from. Its arrays
+    cannot be changed. labels: of the curvature lines, as `label_of` returns them; none: colours decide.
     """
+    return _read_svg(data, tuple(labels))
+
+
+@lru_cache(maxsize=1)
+def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     matcher = LabelMatcher(frozenset(labels)) if labels else None
     root = _parse_xml(data)
     if tag_of(root) != "svg":
@@ -124,7 +129,11 @@ def read_svg(data: bytes, labels: tuple[str, ...] = ()) -> Curves:
     window = page.window if page else window_around(painted)
     side = choose_side(root, window, painted)
     seen, notes = see_strokes(frame_drawing(root, page, window), window, shapes, side)
-    return _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
+    curves = _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
+    for values in (curves.points, curves.curve, curves.red, curves.chosen):
+        if values is not None:
+            values.setflags(write=False)
+    return curves
 
 
 def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page: DrawingPage | None) -> None:

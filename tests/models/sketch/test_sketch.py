@@ -449,6 +449,13 @@ def test_places_and_clips_that_are_not_understood_are_reported(style):
     assert re.search(rf"1 property is not understood, first '{style[:10]}.*' of <path>", *curves.notes)
 
 
+def test_reading_a_drawing_again_cannot_be_disturbed_by_its_users():
+    drawing = svg(f'<path d="M10 10 60 80" {BLACK}/>')
+    with pytest.raises(ValueError, match="read-only"):
+        read_svg(drawing).points[:] = 0.0
+    assert read_svg(drawing).points.max() == 80
+
+
 @for_each("mistake", ["stroke-miterlimit: 10 stroke-width: 3", "stroke-linejoin: round fill: red"])
 def test_a_declaration_without_its_semicolon_leaves_the_others_valid(mistake):
     path = '<path d="M640 566C700 520 1000 400 1060 381M910 387L1150 540" stroke-width="3"/>'
