@@ -50,7 +50,8 @@ _TOLERANCE: Final = 1e-7  # excess over the energy with which labels still survi
 _LOST: Final = 0.1  # share of the gap that rounding may cost at most; a fifth of it is usual
 _TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
 _LEVELS: Final = 64  # more than usual; the checker allows for the sides of domains at each
-_BEYOND: Final = 1.5  # step of tables before the last update: 29 % more per pass on mouse at 48 pixels
+_BEYOND: Final = 1.5  # step of tables before the last update: 29 % more per pass on mouse at 48 pixels;
+# the least values of clusters are then not 0, so only the last pass states the bound
 _ALONE: Final = 30_000  # labels up to which sharing a pass among threads takes longer than it saves
 
 
@@ -106,20 +107,20 @@ class Dual:
         return self._pass(2, over)
 
     def ascend(self, times: int, over: Over = never, closing: Over = never) -> float:
-        """The bound after that many passes forwards and backwards; -inf if time cut one off or left none.
+        """The bound after that many passes forwards and backwards; -inf if time does not allow all of them.
 
         over: returns whether to cut a pass off. closing: returns whether not to begin another two.
         """
         bound = -math.inf
-        for k in range(times):
+        for left in reversed(range(times)):
             if closing():
-                break
+                return -math.inf
             self.update_clusters(1, _BEYOND)
             self.forward(over)
-            self.update_clusters(-1, _BEYOND if k < times - 1 else 1.0)
+            self.update_clusters(-1, _BEYOND if left else 1.0)
             bound = self.backward(over)
             if over():
-                break
+                return -math.inf if left else bound
         return bound
 
     def _pass(self, earlier: int, over: Over) -> float:
