@@ -63,8 +63,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-_WITHOUT_SOLVERS: Final = ("instance", "export", "read", "draw", "shade")
-"""Commands that multiply no large matrices, and for which to start threads takes a tenth of their time."""
+_WITHOUT_SOLVERS: Final = {"instance", "export", "read", "draw", "shade"}
+"""Commands that multiply no large matrices: to start threads for that takes up to a tenth of their time."""
 _STOPPED: Final = 130  # exit code of typer after a Ctrl-C that no command handled
 
 
@@ -305,7 +305,7 @@ def main() -> NoReturn:
     for reader in ("PIL", "trimesh"):  # every error is one line, printed by `invoke`
         logging.getLogger(reader).addHandler(logging.NullHandler())
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
-    if sys.argv[1:2] and sys.argv[1] in _WITHOUT_SOLVERS:
+    if _WITHOUT_SOLVERS.intersection(sys.argv[1:2]):
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         sys.exit(invoke(sys.argv[1:]))

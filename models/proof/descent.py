@@ -68,7 +68,7 @@ _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above whic
 _BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
 _WIDE: Final = 0.01  # relative gap of a level above which a poor field may cause it
 _SEARCH: Final = 0.05  # share of the time left for the search
-_WAIT: Final = 2.0  # time of a chain of levels before it, relative to its own: many need none
+_WAIT: Final = 2.0  # times as long a chain of levels goes on before the search: many need none
 _ROUNDS: Final = 5  # rounds of the search without a limit of time
 
 _ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which a first smaller one is rounded: few digits may do
