@@ -1230,7 +1230,9 @@ def check_last_step(arrays: dict[str, Array], passed: PassedLevels) -> ProvenBox
     most = energy + passed.error + SPARE * (1 + energy)
     left = [piece for piece, lower in bounded if lower <= most] or [last.whole_piece]
     boxes[passed.pixels] = widest_box([piece.boxes for piece in left])
-    same = np.all([piece.p == left[0].p for piece in left], axis=0)
+    alpha, _, p = field_of(arrays, passed.whole)
+    here = last_step(terms, boxes[passed.pixels], alpha[passed.pixels], p[passed.pairs])
+    same = np.all([piece.p == here.p for piece in left], axis=0)
     pairs[passed.pairs] = np.all([piece.has_known_jump(terms) for piece in left], axis=0) & same
     claim = ProvenBoxes(status_of(energy, bound), terms.norm, energy, bound, pairs, passed.bounds, boxes)
     check_claim(head_of(arrays), claim, proven, passed.error)

@@ -22,6 +22,7 @@ from crossfield.export.cli.app import invoke
 from crossfield.models.array_archive import pack_arrays
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
+from crossfield.models.field.jumps import free_jumps
 from crossfield.models.processes.process_pool import parallel_map
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
@@ -515,3 +516,32 @@ def test_boxes_with_open_jumps_are_divided_and_bounded(norm, written):
                     least_bound(terms, step, pieces | {"cuts": fewer})
             divided += len(jumps) > 0
     assert divided > 5
+
+
+def test_a_forced_jump_is_that_of_the_certified_field(written):
+    """Where the field has another jump than all better ones, none is forced: it would be fixed wrongly."""
+    rng, forced, other = np.random.default_rng(8), 0, 0
+    for seed in (1, 3, 4):
+        _, arrays = written(seed)
+        (terms, _), instance = check_certificate.terms_of(arrays), proven(seed).field.instance
+        n, m, alpha = len(terms.white), len(terms.first), arrays["alpha"]
+        for _ in range(4):
+            sides = rng.uniform(0.1, 0.6, (2, n))
+            boxes = np.stack([alpha - sides[0], alpha + sides[0], -sides[1], sides[1]], axis=1)
+            p = rng.integers(-1, 2, m).astype(np.int32)
+            step = check_certificate.last_step(terms, boxes, alpha, p.astype(int))
+            points = boxes[:, ::2] + rng.random((2000, n, 2)) * (boxes[:, 1::2] - boxes[:, ::2])
+            energies = np.array([free_energy(instance, *point.T) for point in points])
+            most = float(np.sort(energies)[20])
+            pieces = minimise_on_boxes(instance, terms, step, most).pieces
+            passed = check_certificate.PassedLevels(
+                terms, terms, np.arange(n), np.arange(m), most, 0.0, 0.0, [0.0], step
+            )
+            claim = with_head(arrays | pieces | {"p": p}, energy=most, bound=0.0, status="gap")
+            at = check_certificate.check_last_step(claim, passed).forced_pairs
+            best = np.array([free_jumps(instance, *point.T)[0] for point in points[energies <= most]])
+            assert (best == p)[:, at].all()
+            forced += at.sum()
+            other += (best != p).all(axis=0).sum()
+    assert forced > 5
+    assert other > 5
