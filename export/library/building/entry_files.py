@@ -21,7 +21,7 @@ from ...writing.records import number_text
 from ..documents.documents import document_bytes, tightened_by
 from ..ledger.points import BestPoint, KnownField, Provenance, best_point, complete_point
 from ..plan.equivalence import format_notes
-from ..plan.instances import formulate_entry
+from ..plan.problems import formulate_entry
 from ..plan.recipe import EntryRecipe
 from .entry_results import entry_results
 from .sidecar import sidecar_of

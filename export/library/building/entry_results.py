@@ -21,7 +21,7 @@ from ..ledger.grades import (
 from ..ledger.ledger import Record
 from ..ledger.points import METHOD, BestPoint, provenance_by
 from ..plan.equivalence import equivalent_entries
-from ..plan.instances import formulate_entry
+from ..plan.problems import formulate_entry
 from .tasks import EntryTask
 
 _TANGENT: Final = "tangent at the point"

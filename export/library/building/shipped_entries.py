@@ -1,4 +1,7 @@
-"""Entries of the library that ships, by name: made on the spot from their recipes and the known points."""
+"""Entries of the library that ships, by name: made on the spot from the known points.
+
+Fields ship with their instances. A build makes the same instances from drawings, which takes longer.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
     from ..plan.spec import Spec
 
 SHIPPED: Final = Path(__file__).parents[1] / "plan" / TABLE
+POINTS: Final = SHIPPED.parent / "known" / "points"  # as in the specification
 _REMEDY: Final = "make the points again with `crossfield library build --search`"
 
 
@@ -71,21 +75,21 @@ class LibraryEntry:
 
     @cached_property
     def instance(self) -> Instance:
-        """The instance."""
-        from ..plan.instances import make_instance
+        """The instance. Raises InputError, InstanceError for a damaged file."""
+        from ....models.field.file import read_field
 
-        return make_instance(_plan_of(self.name)[0].recipe)
+        return read_field(POINTS / f"{self.facts['instance']}.field.json").instance
 
     @cached_property
     def problem(self) -> Problem:
         """The problem. Raises InputError, InstanceError for damaged points of a `qp` entry."""
         from ....models.formulations.catalogue import FORMULATIONS
-        from ..plan.instances import formulate_entry
+        from ..plan.problems import formulate_entry
 
-        recipe = self._recipe
-        jumps = self._points.field("baseline").field.p if FORMULATIONS[recipe.formulation].fixed else None
-        problem = formulate_entry(self.instance, recipe.formulation, recipe.facet, jumps)
-        if not recipe.tightened or self.certificate is None:
+        formulation = self.facts["formulation"]
+        jumps = self._points.field("baseline").field.p if FORMULATIONS[formulation].fixed else None
+        problem = formulate_entry(self.instance, formulation, self.facts["facet"], jumps)
+        if not self.facts["tightened"] or self.certificate is None:
             return problem
         from ..documents.documents import tightened_by
 
@@ -98,7 +102,7 @@ class LibraryEntry:
         from ..ledger.points import best_point
 
         known = [*(self._points.field(role) for role in ROLES), *self._submitted()]
-        certified = self.certificate.field if self._recipe.tightened and self.certificate else None
+        certified = self.certificate.field if self.facts["tightened"] and self.certificate else None
         return best_point(self.problem, known, certified).known.field
 
     @cached_property
@@ -112,7 +116,7 @@ class LibraryEntry:
         stated = self._points.about.get("certificates", {}).get(str(self._recipe.norm))
         if stated is None:
             return None
-        return read_certificate(_points_folder() / stated["file"], on=self.instance)
+        return read_certificate(POINTS / stated["file"], on=self.instance)
 
     def write(self, path: str | Path) -> Written:
         """Write the model file, with the same bytes as in a built library.
@@ -165,9 +169,9 @@ class LibraryEntry:
         from ..documents.documents import about_file
         from ..ledger.known_points import read_instance_points
 
-        points = read_instance_points(_points_folder() / about_file(self.facts["instance"]))
+        points = read_instance_points(POINTS / about_file(self.facts["instance"]))
         if points.instance != self.instance.sha256:
-            raise InstanceError(f"holds points of another instance; {_REMEDY}", file=_points_folder())
+            raise InstanceError(f"holds points of another instance; {_REMEDY}", file=POINTS)
         return points
 
     def _submitted(self) -> Iterable[KnownField]:
@@ -282,12 +286,6 @@ def _plan_of(name: str) -> tuple[InstancePlan, EntryRecipe]:
         if name.startswith(f"cf_{sketch.name}_") and (plan := _plans(sketch.name).get(name)):
             return plan
     raise InputError(f"{name} is not in the specification; build the library again", file=SHIPPED)
-
-
-def _points_folder() -> Path:
-    points = _spec().points
-    assert points is not None  # the specification that ships has points
-    return points
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Instances of recipes, from samples, drawings and random strokes, and problems of entries."""
+"""Instances of recipes, from samples, drawings and random strokes."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ from pathlib import Path
 from typing import cast
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
-from ....models.formulations.catalogue import FORMULATIONS
-from ....models.formulations.problem import Problem, formulate
-from ....models.instance.domain import Ints
 from ....models.instance.instance import Gauge, Instance
 from ....models.sketch.drawing_file import parse_drawing
 from ....models.sketch.random_strokes import random_instance
@@ -64,10 +61,3 @@ def _random_instance(recipe: InstanceRecipe) -> Instance:
         name=recipe.name,
         **recipe.sketch.drawn,
     )
-
-
-def formulate_entry(instance: Instance, formulation: str, facet: str, jumps: Ints | None) -> Problem:
-    """Return the problem of an entry in its full windows. jumps: fixed ones, which only `qp-fixed` has."""
-    declared = FORMULATIONS[formulation]
-    options = {"facet": facet} if "facet" in declared.option_names else {}
-    return formulate(instance, formulation, p=jumps if declared.fixed else None, **options)

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
-from crossfield.export.library.building.shipped_entries import SHIPPED, write_entries
+from crossfield.export.library.building.shipped_entries import POINTS, SHIPPED, write_entries
 from crossfield.export.library.building.table import COLUMNS, TABLE, read_table
 from crossfield.export.library.ledger.points import complete_point
+from crossfield.export.library.plan.instances import make_instance
+from crossfield.export.library.plan.recipe import plan_library
 from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.errors import InputError
+from crossfield.models.instance.file import instance_to_json
 from loops import for_each
 
 REMEDY = "build `default` and copy its entries.csv to export/library/plan/entries.csv"
@@ -66,6 +69,16 @@ def test_the_facts_are_those_of_the_sidecars(built):
 
 
 # Entries
+
+
+@pytest.mark.parametrize("rung", ["tiny", pytest.param("all", marks=pytest.mark.slow)])
+def test_the_instances_that_ship_are_those_of_a_build(rung):
+    spec = default_spec()
+    assert spec.points == POINTS
+    for planned in plan_library(spec):
+        if rung in {"all", planned.recipe.rung}:
+            shipped = cf.entry(planned.entries[0].name).instance
+            assert instance_to_json(shipped) == instance_to_json(make_instance(planned.recipe))
 
 
 def test_model_files_have_the_bytes_of_a_build(built, tmp_path):
