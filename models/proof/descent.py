@@ -66,9 +66,9 @@ _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above whic
 
 # Fields
 _BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
-_WIDE: Final = 0.01  # relative gap of a level above which a poor field may cause it
+_WIDE: Final = 0.01  # relative gap of a level above which a poor field may cause it, without a limit of time
 _SEARCH: Final = 0.05  # share of the time left for the search
-_WAIT: Final = 2.0  # times as long a chain of levels goes on before the search: many need none
+_WAIT: Final = 2.0  # times as long a proof goes on before the search: many need none
 _ROUNDS: Final = 5  # rounds of the search without a limit of time
 
 _ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which a first smaller one is rounded: few digits may do
@@ -174,7 +174,7 @@ class Descent:
 
     def run(self) -> str:
         """Go through chains of levels until a limit is met or nothing helps; return the reason."""
-        ended = ""
+        self.began, ended = time.monotonic(), ""
         while not ended:
             ended = self._go_through_levels()
         return self.ends.reason() or ended
@@ -183,7 +183,7 @@ class Descent:
         """Go through the levels round the best field; the reason of the end, empty for a better field."""
         if reason := self.ends.reason():
             return reason
-        self.chain, self.began, centre = _Chain(), time.monotonic(), self.best
+        self.chain, centre = _Chain(), self.best
         dual = Dual(self.first_level(_centre_at(centre)), self.crew)
         patient = False  # whether a finer lattice was too large, so that this one has the same spacing
         while True:
@@ -290,12 +290,14 @@ class Descent:
         return vortex or stalled
 
     def _search_once(self) -> None:
-        """Search once for a better field, where a gap stays wide for a while; a poor field may cause it."""
-        if self.searched or self.gap <= _WIDE * self.energy(self.best) or self.ends.over():
-            return
+        """Search once for a better field, where a proof takes a while: with a poor field, it never ends."""
         left = self.ends.deadline.left()
         timed, seconds = math.isfinite(left), _SEARCH * left
-        if timed and time.monotonic() - self.began < _WAIT * seconds:
+        if timed:
+            pays = time.monotonic() - self.began >= _WAIT * seconds
+        else:
+            pays = self.gap > _WIDE * self.energy(self.best)
+        if self.searched or not pays or self.ends.over():
             return
         self.searched = True
         result = search(
