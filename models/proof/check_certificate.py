@@ -1230,7 +1230,7 @@ def check_last_step(arrays: dict[str, Array], passed: PassedLevels) -> ProvenBox
     most = energy + passed.error + SPARE * (1 + energy)
     left = [piece for piece, lower in bounded if lower <= most] or [last.whole_piece]
     boxes[passed.pixels] = widest_box([piece.boxes for piece in left])
-    alpha, _, p = field_of(arrays, passed.whole)
+    alpha, _, p = field_of(arrays, passed.whole)  # all pieces may agree on a jump that is not the field's
     here = last_step(terms, boxes[passed.pixels], alpha[passed.pixels], p[passed.pairs])
     same = np.all([piece.p == here.p for piece in left], axis=0)
     pairs[passed.pairs] = np.all([piece.has_known_jump(terms) for piece in left], axis=0) & same

@@ -82,7 +82,7 @@ class LibraryEntry:
 
     @cached_property
     def problem(self) -> Problem:
-        """The problem. Raises InputError, InstanceError for damaged points of a `qp` entry."""
+        """The problem. Raises InputError, InstanceError for a damaged file."""
         from ....models.formulations.catalogue import FORMULATIONS
         from ..plan.problems import formulate_entry
 
