@@ -47,7 +47,7 @@ class AbsoluteDescent(Descent):
         """The field, fitted."""
         return alternate_absolute(field, self.norm, over)
 
-    def _search_once(self) -> None:
+    def _search_if_due(self) -> None:
         """Do nothing: rounding finds better fields than the search, which is for the 2-norm."""
 
     def _add_clusters(self, dual: Dual) -> None:

@@ -31,8 +31,8 @@ REFUSALS: Final = (check_certificate.NotProvenError, check_certificate.Unreadabl
 """Errors of the checker for a proof that does not hold."""
 
 _PREFIX: Final = "instance_"
-_FEW, _MANY = 400_000, 10_000_000
-"""Labels of a proof whose check takes longer than to start processes, and 1 GB of memory."""
+_FEW, _MANY = 400_000, 30_000_000
+"""Labels of a proof whose check takes longer than to start processes, and 3 GB of memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +123,11 @@ def check_proof(proof: Proof, jobs: int = 1) -> Proof:
     """
     arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
     shares = _FEW <= sum(level.size for level in proof.levels) <= _MANY
+    closed = proof.status == "optimal" or proof.forced == len(proof.levels[0].p)
+    has_pieces = proof.pieces is not None or closed
     with parallel_map(check_certificate.pass_level, min(jobs, len(proof.levels)) if shares else 1) as do_all:
-        passed = check_certificate.pass_levels(arrays, lambda _, tasks: do_all(tasks))
-    pieces = _last_step_arrays(proof, passed)
+        passed = check_certificate.pass_levels(arrays, lambda _, tasks: do_all(tasks), has_pieces=has_pieces)
+    pieces = _last_step_arrays(proof, passed, has_pieces=has_pieces)
     proven = check_certificate.check_last_step(arrays | pieces, passed)
     ended = "optimal" if proven.status == "optimal" else proof.ended
     checked = replace(proof, bound=proven.bound, forced=proven.forced, ended=ended, pieces=pieces)
@@ -173,23 +175,16 @@ def _level_arrays(level: LevelRecord) -> Arrays:
     }
 
 
-def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels) -> Arrays:
-    """The cuts and the multipliers of the last step, without any where it proves nothing.
+def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels, *, has_pieces: bool) -> Arrays:
+    """The cuts and the multipliers of the last step; none unless it has pieces.
 
     The prover's boxes are a little larger than the checker's, so its pieces cover these as a rule.
     """
     from .last_step import fit_to_boxes, minimise_on_boxes  # loads solvers
 
     terms, last, size = passed.terms, passed.last, 2 * (len(passed.terms.first) + len(passed.terms.white))
-    none: Arrays = {"cuts": np.zeros(0, np.int32), "multipliers": np.zeros((0, size))}
-    if last is None:
-        return none
-    if (
-        proof.pieces is None
-        and proof.status != "optimal"
-        and not last.whole_piece.has_known_jump(terms).all()
-    ):
-        return none
+    if last is None or not has_pieces:
+        return {"cuts": np.zeros(0, np.int32), "multipliers": np.zeros((0, size))}
     instance = proof.levels[0].instance
     if proof.pieces is not None:
         with suppress(check_certificate.NotProvenError):

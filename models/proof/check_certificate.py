@@ -22,6 +22,7 @@ pi stands for the double next to it, as in the definition of the field.
 
 from __future__ import annotations
 
+import copy
 import functools
 import io
 import json
@@ -29,7 +30,7 @@ import math
 import sys
 import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -179,7 +180,7 @@ def check_memory(arrays: dict[str, Array], size: int) -> None:
         )
         labels, side = int(counts.prod(axis=1).sum()), int(counts.max(initial=0))
         shares = arrays[f"{at}share_steps"].size
-        most = max(most, 8 * labels + 64 * shares + 96 * side * side + 32 * arrays[f"{at}table_steps"].size)
+        most = max(most, 16 * labels + 96 * shares + 96 * side * side + 32 * arrays[f"{at}table_steps"].size)
     most += 24 * mask.size + 1500 * int(mask.sum()) + sum(array.nbytes for array in arrays.values())
     enough = most <= ROOM + MORE_ROOM * size
     check_format(enough, f"takes {most >> 20} MB of memory to check, more than a file of its size may")
@@ -709,37 +710,25 @@ def _min_plus_block(left: Array, right: Array) -> Array:
 # Sections 4 and 5: the bound, and the cells that are left --------------------------------------------------
 
 
-@dataclass
-class PruningTest:
-    """The left side of Lemma 3 or 3a at each allowed label of each pixel, and the greatest error of these."""
-
-    bounds: list[Array]
-    error: float
-
-
 class ForwardPass:
     """A forward pass over a level: the bound L of Lemma 2, and the tests of Lemmas 3 and 3a.
 
-    The shares of later pixels are always the greatest that those of the earlier ones allow.
+    excess, partial: of each pixel, t at its allowed labels, and what Lemma 3 adds to it. error: the greatest
+    error of L and of these. The shares of later pixels are always the greatest that those of the earlier ones
+    allow.
     """
 
-    def __init__(self, level: Level, terms: EnergyTerms, most: float) -> None:
-        """most: greatest energy of interest. Where the bound exceeds it, Lemma 3 alone leaves no cell."""
+    def __init__(self, level: Level, terms: EnergyTerms) -> None:
         self.level, self.terms = level, terms
         self.before: dict[int, Array] = {}  # the shares of later pixels before the pass
         self.shares: dict[int, tuple[Array, Array]] = {}  # those of earlier and of later pixels after it
         self.errors: list[float] = []
         visits = [self._visit(i) for i in range(len(level.allowed))]
-        excess, least, before = ([visit[k] for visit in visits] for k in range(3))
+        self.excess, least, before = ([visit[k] for visit in visits] for k in range(3))
         quads = [self._quad_term(quad) for quad in level.quads]
-        error = 2 * math.fsum(self.errors)
-        bound = math.fsum([*quads, *least])
-        partial = [math.fsum([*quads, *least[: i + 1], *before[i + 1 :]]) for i in range(len(least))]
-        self.bound = bound - error
-        self.tests = [PruningTest([t + lower for t, lower in zip(excess, partial)], error)]
-        if bound - error <= most + error:
-            for comb, wrong in self._comb_bounds(excess):
-                self.tests.append(PruningTest([bound + excess for excess in comb], error + wrong))
+        self.error = 2 * math.fsum(self.errors)
+        self.partial = [math.fsum([*quads, *least[: i + 1], *before[i + 1 :]]) for i in range(len(least))]
+        self.bound = math.fsum([*quads, *least]) - self.error
 
     def _visit(self, i: int) -> tuple[Array, float, float]:
         """Visit pixel i: t_i at its labels, min theta_i, and the same minimum before the pass."""
@@ -774,17 +763,46 @@ class ForwardPass:
         diagonal = min_plus_product(ab[np.ix_(a, b)], bc[np.ix_(b, c)])
         return float((min_plus_product(ad[np.ix_(a, d)].T, diagonal) + dc[np.ix_(d, c)]).min())
 
-    def _comb_bounds(self, excess: list[Array]) -> Iterator[tuple[list[Array], float]]:
-        """Lemma 3a: m_i of each label for both kinds of trees, and the greatest error of these numbers."""
-        terms = self.terms
-        rest = [
-            t * (1 - len(later) / max(1, len(earlier), len(later)))
-            for t, earlier, later in zip(excess, terms.earlier, terms.later)
-        ]
-        columns, rows = (runs_of(terms, upper=upper) for upper in (True, False))
-        for teeth, spines in ((columns, rows), (rows, columns)):
-            self.errors = []
-            yield self._sums_along(spines, self._sums_along(teeth, rest)), 2 * math.fsum(self.errors)
+    def remaining_cells(self, most: float, *, combs: bool = True) -> list[Array]:
+        """The cells that Lemma 3 and, with combs, Lemma 3a leave to fields of energy up to `most`."""
+        cells = [combine_corners(np.logical_and, allowed) for allowed in self.level.allowed]
+        cells = surviving_cells(self.level, cells, self.bounds_of_pass(), most)
+        passed = self
+        for upper in (True, False) if combs else ():
+            if all(left.any() for left in cells):
+                passed = passed._at_corners(cells)
+                cells = surviving_cells(passed.level, cells, passed.bounds_of_combs(upper=upper), most)
+        return cells
+
+    def bounds_of_pass(self) -> list[Array]:
+        """The left side of Lemma 3 at the allowed labels of each pixel, less its error."""
+        return [t + (partial - self.error) for t, partial in zip(self.excess, self.partial)]
+
+    def bounds_of_combs(self, *, upper: bool) -> list[Array]:
+        """The left side of Lemma 3a, less its error, for the trees with columns (upper) or rows as teeth."""
+        teeth, spines = (runs_of(self.terms, upper=of_teeth) for of_teeth in (upper, not upper))
+        counts = zip(self.excess, self.terms.earlier, self.terms.later)
+        rest = [t * (1 - len(later) / max(1, len(earlier), len(later))) for t, earlier, later in counts]
+        self.errors = []
+        sums = self._sums_along(spines, self._sums_along(teeth, rest))
+        least = self.bound - 2 * math.fsum(self.errors)
+        return [m + least for m in sums]
+
+    def _at_corners(self, cells: list[Array]) -> ForwardPass:
+        """The pass over the labels at the corners of some cells alone, where crosses of interest are."""
+        allowed = [np.zeros_like(labels) for labels in self.level.allowed]
+        for corners, left in zip(allowed, cells):
+            for rows in (slice(None, -1), slice(1, None)):
+                for columns in (slice(None, -1), slice(1, None)):
+                    corners[rows, columns] |= left
+        keep = [corners[labels] for corners, labels in zip(allowed, self.level.allowed)]
+        passed, (ends, others) = copy.copy(self), np.sort([self.terms.first, self.terms.second], axis=0)
+        passed.level = replace(self.level, allowed=allowed)
+        passed.excess = [t[at] for t, at in zip(self.excess, keep)]
+        passed.shares = {
+            e: (here[keep[ends[e]]], there[keep[others[e]]]) for e, (here, there) in self.shares.items()
+        }
+        return passed
 
     def _sums_along(self, runs: list[tuple[list[int], list[int]]], at_points: list[Array]) -> list[Array]:
         """The least sums over the pixels and pairs of each run, by the labels of each of its pixels.
@@ -808,17 +826,15 @@ class ForwardPass:
         """Note how much an inequality with numbers of that size may fail."""
         self.errors.append(ROUNDING * PRECISION * size)
 
-    def remaining_cells(self, most: float) -> list[Array]:
-        """Lemmas 3 and 3a: the cells in which a field of energy up to `most` may have its crosses."""
-        remaining = []
-        for i, allowed in enumerate(self.level.allowed):
-            cells = combine_corners(np.logical_and, allowed)
-            for test in self.tests:
-                alive = np.zeros_like(allowed)
-                alive[allowed] = test.bounds[i] <= most + test.error
-                cells &= combine_corners(np.logical_or, alive)
-            remaining.append(cells)
-        return remaining
+
+def surviving_cells(level: Level, cells: list[Array], sums: list[Array], most: float) -> list[Array]:
+    """The cells with a corner whose sum is at most that. sums: of each pixel, at its allowed labels."""
+    remaining = []
+    for allowed, left, at_labels in zip(level.allowed, cells, sums):
+        alive = np.zeros_like(allowed)
+        alive[allowed] = at_labels <= most
+        remaining.append(left & combine_corners(np.logical_or, alive))
+    return remaining
 
 
 def runs_of(terms: EnergyTerms, *, upper: bool) -> list[tuple[list[int], list[int]]]:
@@ -1160,7 +1176,8 @@ def check_arrays(arrays: dict[str, Array]) -> ProvenBoxes:
     Raises NotProvenError when a level does not follow from the one before, or when less is proven than
     claimed, and UnreadableError for arrays that are not a certificate.
     """
-    return check_last_step(arrays, pass_levels(arrays))
+    has_pieces = len(take_array(arrays, "cuts", "<i4", None)) > 0
+    return check_last_step(arrays, pass_levels(arrays, has_pieces=has_pieces))
 
 
 def arrays_for(arrays: dict[str, Array], number: int) -> dict[str, Array]:
@@ -1173,22 +1190,25 @@ def arrays_for(arrays: dict[str, Array], number: int) -> dict[str, Array]:
     }
 
 
-def pass_level(task: tuple[dict[str, Array], int, float]) -> tuple[float, list[Array]]:
+def pass_level(task: tuple[dict[str, Array], int, float, bool]) -> tuple[float, list[Array]]:
     """Do the pass over one level; return its bound, and the cells that it leaves at each pixel.
 
-    task: the arrays of the certificate without those of other levels, the number of the level, and the
-    greatest energy of interest.
+    task: the arrays of the certificate without those of other levels, the number of the level, the greatest
+    energy of interest, and whether to use combs.
     """
-    arrays, number, most = task
+    arrays, number, most, combs = task
     terms, _, _ = terms_with_strokes(arrays, *terms_of(arrays))
-    passed = ForwardPass(level_of(arrays, number, terms), terms, most)
-    return passed.bound, passed.remaining_cells(most)
+    passed = ForwardPass(level_of(arrays, number, terms), terms)
+    return passed.bound, passed.remaining_cells(most, combs=combs)
 
 
-def pass_levels(arrays: dict[str, Array], do_all: Callable[..., Any] = map) -> PassedLevels:
+def pass_levels(
+    arrays: dict[str, Array], do_all: Callable[..., Any] = map, *, has_pieces: bool
+) -> PassedLevels:
     """Do the passes over all levels; check that the first is the whole strip and each covers what is left.
 
-    do_all: does `pass_level` on a list of tasks, here or in other processes.
+    do_all: does `pass_level` on a list of tasks, here or in other processes. has_pieces: whether a last step
+    follows; only then the last level has combs, which take two thirds of its time.
     """
     whole, at = terms_of(arrays)
     alpha, beta, p = field_of(arrays, whole)
@@ -1197,7 +1217,8 @@ def pass_levels(arrays: dict[str, Array], do_all: Callable[..., Any] = map) -> P
     count = level_count(head_of(arrays))
     slack = sliver_slack(terms.weight, terms.w_beta, count)
     most = energy + error + slack
-    tasks = [(arrays_for(arrays, number), number, most) for number in range(count)]
+    combs = [True] * (count - 1) + [has_pieces]
+    tasks = [(arrays_for(arrays, number), number, most, combs[number]) for number in range(count)]
     bounds: list[float] = []
     level, cells = level_of(arrays, 0, terms), list[Array]()
     check_whole_strip(level)

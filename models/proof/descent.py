@@ -58,6 +58,8 @@ _SLOWEST: Final = 0.005  # the same where the finer level would be too large
 _FEW: Final = 600_000  # labels of which passes take less time than one more level of the certificate
 _FEWER: Final = 0.5  # share of more labels that are left, at which passes go on over these only
 _RECORD: Final = 11  # passes that take as long as a record with combs, and two before it
+_COMBS: Final = 5  # of these, the combs
+_NEAR: Final = 100  # jumps left open by a level after which the combs of the next may leave few enough
 
 # Clusters
 _CLUSTERS: Final = 24  # quads that become clusters, later half of them: a vortex' gap lies in few pixels
@@ -67,8 +69,9 @@ _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above whic
 # Fields
 _BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
 _WIDE: Final = 0.01  # relative gap of a level above which a poor field may cause it, without a limit of time
-_SEARCH: Final = 0.05  # share of the time left for the search
-_WAIT: Final = 2.0  # times as long a proof goes on before the search: many need none
+_FIRST_SEARCH: Final = 3.0  # seconds after which a proof searches: many need none
+_NEXT_SEARCH: Final = 4.0  # times as late as a search, the next one
+_SEARCH: Final = (0.05, 0.25)  # share of the time left, and of the time before, that a search takes at most
 _ROUNDS: Final = 5  # rounds of the search without a limit of time
 
 _ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which a first smaller one is rounded: few digits may do
@@ -139,7 +142,8 @@ class Descent:
     progress: Progress
     chain: _Chain = field(default_factory=_Chain)
     proven: _Chain = field(default_factory=_Chain)
-    searched: bool = False
+    searches: int = 0
+    next_search: float = _FIRST_SEARCH
     began: float = 0.0
 
     @staticmethod
@@ -189,11 +193,12 @@ class Descent:
         while True:
             self._add_clusters(dual)
             rising = self._raise_bound(dual, patient=patient)
+            if self.chain.levels and not self._is_near_end(dual):
+                self._search_if_due()  # before cells are dropped: below a lower energy, fewer are left
             left = self._record_level(dual)
             if (reason := self._reason_to_end()) or left is None:
                 return reason or "time"
             lattice = smaller_lattice(left) if rising and not patient else finer_lattice(left)
-            self._search_once()
             better = self.energy(self.best) < self.energy(centre) * (1 - _BETTER)
             if better and len(self.chain.last_of_spacings) <= _SETTLED:
                 return self.ends.reason()
@@ -248,7 +253,8 @@ class Descent:
         if level.bound > chain.bound or not self.ends.over():
             chain.levels.append(level)
         if not self.ends.over():
-            left = dual.remaining_cells(level.bound, energy)
+            one, _ = dual.expected_seconds(dual.lattice)
+            left = dual.remaining_cells(level.bound, energy, combs=not self.ends.over(_COMBS * one))
             if left.is_empty:
                 chain.convex, left = energy, None
             else:
@@ -289,27 +295,27 @@ class Descent:
         stalled = len(gaps) == 2 and gaps[1] > _STALLED * gaps[0]
         return vortex or stalled
 
-    def _search_once(self) -> None:
-        """Search once for a better field, where a proof takes a while: with a poor field, it never ends."""
-        left = self.ends.deadline.left()
-        timed, seconds = math.isfinite(left), _SEARCH * left
+    def _search_if_due(self) -> None:
+        """Search for a better field, where a proof takes a while: with a poor field, it never ends."""
+        left, spent = self.ends.deadline.left(), time.monotonic() - self.began
+        timed, seconds = math.isfinite(left), min(_SEARCH[0] * left, _SEARCH[1] * spent)
         if timed:
-            pays = time.monotonic() - self.began >= _WAIT * seconds
+            due = spent >= self.next_search
         else:
-            pays = self.gap > _WIDE * self.energy(self.best)
-        if self.searched or not pays or self.ends.over():
+            due = not self.searches and self.gap > _WIDE * self.energy(self.best)
+        if not due or self.ends.over(seconds):
             return
-        self.searched = True
         result = search(
             self.instance,
             limits=Limits().until(self.ends.deadline.within(seconds)) if timed else None,
             rounds=None if timed else _ROUNDS,
-            seed=self.seed,
+            seed=self.seed + self.searches,
             jobs=self.jobs,
             start=self.best,
             progress=lambda line: self.progress(f"search: {line}"),
             stop=self.ends.stop,
         )
+        self.searches, self.next_search = self.searches + 1, _NEXT_SEARCH * spent
         self.best = min(self.best, result.field, key=self.energy)
 
     def _has_time_for(self, dual: Dual, lattice: Lattice) -> bool:
@@ -320,7 +326,12 @@ class Descent:
     def _is_closing(self, dual: Dual) -> bool:
         """Whether only the time to record the level is left."""
         one, tables = dual.expected_seconds(dual.lattice)
-        return self.ends.over(_RECORD * one + 2 * tables)
+        passes = _RECORD if self._is_near_end(dual) else _RECORD - _COMBS
+        return self.ends.over(passes * one + 2 * tables)
+
+    def _is_near_end(self, dual: Dual) -> bool:
+        """Whether the level before left so few jumps open that this one may be the last."""
+        return len(dual.lattice.p) - self.chain.forced <= _NEAR
 
     def _reason_to_end(self) -> str:
         """The reason why the work ends; empty if it goes on."""

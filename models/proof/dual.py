@@ -39,11 +39,18 @@ from .clusters import (
     visit_clusters,
     zero_clusters,
 )
-from .combs import comb_excesses, reparametrised_costs
+from .combs import comb_excesses, reparametrised_costs, single_excesses
 from .encoding import share_arrays, table_arrays
 from .lattice import Lattice, nearest_labels
 from .passes import MINIMA, PASS, work_on
-from .pruning import RemainingCells, bound_by_boxes, interpolate_shares, surviving_cells
+from .pruning import (
+    RemainingCells,
+    allowed_rows,
+    bound_by_boxes,
+    corners_of,
+    interpolate_shares,
+    surviving_cells,
+)
 from .state import Clusters, Indices, State, state_on
 
 _TOLERANCE: Final = 1e-7  # excess over the energy with which labels still survive, relative to 1 + it
@@ -114,6 +121,8 @@ class Dual:
         bound = -math.inf
         for left in reversed(range(times)):
             if closing():
+                if left + 1 < times:  # tables went too far on purpose
+                    self.update_clusters(-1)
                 return -math.inf
             self.update_clusters(1, _BEYOND)
             self.forward(over)
@@ -238,16 +247,28 @@ class Dual:
         sides = check_certificate.sliver_slack(weight, skew, _LEVELS)
         return unit * (2 * pixels + m * pair) + sides, 4 * unit * m * pair
 
-    def remaining_cells(self, bound: float, energy: float) -> RemainingCells:
-        """The cells that the level leaves below an energy, by a forward pass; see models/proof/pruning.py."""
+    def remaining_cells(self, bound: float, energy: float, *, combs: bool = True) -> RemainingCells:
+        """The cells that the level leaves below an energy, by a forward pass and, if asked for, combs.
+
+        See models/proof/pruning.py.
+        """
         self.forward()
         excess = self._excess(bound, energy)
         cells = self._cells_of_pass(excess)
-        before = max(int(np.count_nonzero(cells)), 1)
-        for excesses in comb_excesses(self.state, self._crew):
-            cells &= surviving_cells(self.lattice, excesses <= excess)
-        self._left_by_combs = int(np.count_nonzero(cells)) / before
-        return bound_by_boxes(self.lattice, cells)
+        left = bound_by_boxes(self.lattice, cells)
+        single = single_excesses(self.state, self._crew)
+        for columns in (True, False) if combs else ():
+            if not left.is_empty:
+                state = self._state_at(corners_of(self.lattice, left.cells))
+                survives = comb_excesses(state, single, self._crew, columns=columns) <= excess
+                left = bound_by_boxes(self.lattice, left.cells & surviving_cells(self.lattice, survives))
+                self._left_by_combs = int(left.cells.sum()) / int(cells.sum())
+        return left
+
+    def _state_at(self, labels: Bools) -> State:
+        """The state with these labels alone."""
+        _, begin, end = allowed_rows(self.lattice, labels)
+        return self.state._replace(begin=begin, end=end, unary=np.where(labels, self.state.unary, np.inf))
 
     def count_left(self, bound: float, energy: float) -> int:
         """The number of cells that the last pass leaves, times the share that combs left the last time."""

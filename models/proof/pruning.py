@@ -115,14 +115,22 @@ def interpolate_shares(old: Lattice, shares: tuple[Floats, Floats], new: Lattice
     return first, second
 
 
-def allowed_rows(lattice: Lattice) -> tuple[Starts, Starts, Starts]:
+def corners_of(lattice: Lattice, cells: Bools) -> Bools:
+    """The labels at the corners of some cells; both flat."""
+    corners = np.zeros(len(cells), dtype=bool)
+    of_all = rectangles(lattice)
+    _allow((of_all, cells), (of_all, corners), 1, np.full(len(lattice.count), 2, np.int32))
+    return corners
+
+
+def allowed_rows(lattice: Lattice, allowed: Bools) -> tuple[Starts, Starts, Starts]:
     """Where the rows of each pixel start, one for each alpha, and where the allowed labels of each row are.
 
     These are the first label and the one after the last; twice 0 in a row without any.
     """
     start = block_starts(lattice.alpha_count)
     begin, end = np.zeros(start[-1], np.int64), np.zeros(start[-1], np.int64)
-    _find_rows(rectangles(lattice), lattice.allowed, start, begin, end)
+    _find_rows(rectangles(lattice), allowed, start, begin, end)
     return start, begin, end
 
 

@@ -81,7 +81,7 @@ def state_on(lattice: Lattice, shares: tuple[Floats, Floats], clusters: Clusters
     """A lattice as arrays, with shares at the first and at the second pixels of all pairs, and clusters."""
     grid = lattice.instance.grid
     unary = lattice.unary_costs()
-    row_start, begin, end = allowed_rows(lattice)
+    row_start, begin, end = allowed_rows(lattice, lattice.allowed)
     pixels, pairs = np.zeros(grid.size + 1, _PIXEL), np.zeros(len(grid.first) + 1, _PAIR)
     pixels["alpha"][:-1] = lattice.alpha + lattice.h * (lattice.alpha_first + lattice.offset)
     pixels["beta"][:-1] = lattice.beta + lattice.h * (lattice.beta_first + lattice.offset)

@@ -1,7 +1,9 @@
 """Proofs round a given field, which need not be a good one: `prove` would search for a better one."""
 
 from crossfield.models.processes.compilation import crew
+from crossfield.models.proof.check_certificate import has_forced_jump
 from crossfield.models.proof.dual import Dual
+from crossfield.models.proof.last_step import energy_terms, last_step_on
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.pruning import finer_lattice
 from crossfield.models.proof.record import LevelRecord, Proof
@@ -19,4 +21,7 @@ def prove_round(field, levels, steps=8):
             if len(records) == levels or left.is_empty:
                 break
             dual.move(finer_lattice(left))
-    return Proof(field, energy, max(record.bound for record in records), 0, tuple(records), 0.0, "gap")
+    terms = energy_terms(field.instance, 2)
+    step, bound = last_step_on(left, terms, field), max(record.bound for record in records)
+    forced = int(has_forced_jump(terms, step.p, step.boxes).sum())
+    return Proof(field, energy, bound, forced, tuple(records), 0.0, "gap")

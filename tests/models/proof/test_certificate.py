@@ -85,9 +85,11 @@ def test_the_same_proof_gives_the_same_bytes(tmp_path):
 
 def test_levels_that_two_processes_check_give_the_same(written):
     _, arrays = written(1)
-    alone = check_certificate.pass_levels(arrays)
+    alone = check_certificate.pass_levels(arrays, has_pieces=True)
     with parallel_map(check_certificate.pass_level, 2) as check_in_processes:
-        shared = check_certificate.pass_levels(arrays, lambda _, tasks: check_in_processes(tasks))
+        shared = check_certificate.pass_levels(
+            arrays, lambda _, tasks: check_in_processes(tasks), has_pieces=True
+        )
     assert shared.bounds == alone.bounds
     np.testing.assert_array_equal(shared.last.boxes, alone.last.boxes)
 
@@ -410,7 +412,8 @@ def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(writ
             + steep * np.arange(len(level.shares[e]))
             for e in range(len(terms.first))
         ]
-        passed = check_certificate.ForwardPass(level, terms, np.inf)
+        passed = check_certificate.ForwardPass(level, terms)
+        tests = [passed.bounds_of_pass(), *(passed.bounds_of_combs(upper=upper) for upper in (True, False))]
         angles = [level.angles(i) for i in range(instance.grid.size)]
         for near in (1.0, 0.3, 0.05, 0.01) * 40:
             at = [near * rng.uniform(-1, 1, 2) * np.pi / 4 for _ in angles]
@@ -421,12 +424,38 @@ def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(writ
             y = [np.clip(level.beta[i] + b, -np.pi / 4, np.pi / 4) for i, (_, b) in enumerate(at)]
             energy = free_energy(instance, np.array(x), np.array(y))
             assert passed.bound <= energy
-            for number, test in enumerate(passed.tests):
+            for number, bounds in enumerate(tests):
                 for i, (alpha, beta) in enumerate(angles):
-                    mean = hat(x[i], alpha) @ test.bounds[i].reshape(len(alpha), -1) @ hat(y[i], beta)
+                    mean = hat(x[i], alpha) @ bounds[i].reshape(len(alpha), -1) @ hat(y[i], beta)
                     closest[number] = min(closest[number], energy - mean)
                     assert mean <= energy + 1e-12
     assert (closest < 0.02).all()
+
+
+def test_no_cell_that_holds_a_cross_of_low_energy_is_excluded(written):
+    """Random crosses of less energy than asked for stay in cells, though combs leave fewer than a pass."""
+    rng, excluded = np.random.default_rng(3), np.zeros(2, int)
+    for seed in (1, 3, 4, 7):
+        _, arrays = written(seed)
+        instance, (terms, _) = proven(seed).field.instance, check_certificate.terms_of(arrays)
+        level = check_certificate.level_of(arrays, 0, terms)
+        passed = check_certificate.ForwardPass(level, terms)
+        near = np.repeat(level.h * 2.0 ** np.arange(-3, 2), 400)[:, None, None]
+        crosses = np.stack([level.alpha, level.beta], axis=1) + near * rng.uniform(-1, 1, (2000, 4, 2))
+        crosses[..., 1] = np.clip(crosses[..., 1], -np.pi / 4, np.pi / 4)
+        energies = np.array([free_energy(instance, *cross.T) for cross in crosses])
+        for most in np.quantile(energies, [0.01, 0.1, 0.4]):
+            by_pass, cells = (passed.remaining_cells(most, combs=combs) for combs in (False, True))
+            excluded += [sum(left.sum() for left in kind) for kind in (by_pass, cells)]
+            low = crosses[energies <= most]
+            for i, left in enumerate(cells):
+                alpha, beta = level.angles(i)
+                k, l = (  # noqa: E741
+                    np.floor((low[:, i, axis] - side[0]) / level.h).astype(int)
+                    for axis, side in enumerate((alpha, beta))
+                )
+                assert left[k, l].all()
+    assert excluded[1] < 0.95 * excluded[0]
 
 
 def hat(value, places):
