@@ -796,11 +796,11 @@ class ForwardPass:
                 for columns in (slice(None, -1), slice(1, None)):
                     corners[rows, columns] |= left
         keep = [corners[labels] for corners, labels in zip(allowed, self.level.allowed)]
-        passed, (ends, others) = copy.copy(self), np.sort([self.terms.first, self.terms.second], axis=0)
+        passed, ends = copy.copy(self), np.sort([self.terms.first, self.terms.second], axis=0)
         passed.level = replace(self.level, allowed=allowed)
         passed.excess = [t[at] for t, at in zip(self.excess, keep)]
         passed.shares = {
-            e: (here[keep[ends[e]]], there[keep[others[e]]]) for e, (here, there) in self.shares.items()
+            e: (here[keep[ends[0, e]]], there[keep[ends[1, e]]]) for e, (here, there) in self.shares.items()
         }
         return passed
 

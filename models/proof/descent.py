@@ -222,28 +222,18 @@ class Descent:
             bound = dual.ascend(_PASSES, self.ends.over, lambda: self._is_closing(dual))
             self.best = rounding.lower(self.best, lambda: self._is_closing(dual))
             energy = self.energy(self.best)
-            self._report(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
+            labels = int(dual.lattice.allowed.sum())
+            self._report(max(self.proven.bound, min(bound, energy)), labels)
             rises = [rises[1], (bound - reached) / max(energy - bound, 1e-300)]
-            slow = _SLOWEST if patient else self._slow_rise(dual, bound)
-            if self._is_closing(dual) or self._is_exact(bound) or (max(rises) <= slow and bound >= reached):
+            if self._is_closing(dual) or self._is_exact(bound):
                 break
-            if self._has_few_left(dual, bound):
-                return True
+            left = dual.count_left(bound, energy) / labels
+            if max(rises) <= (_SLOWEST if patient else _slow_rise(left)) and bound >= reached:
+                break
+            if labels > _FEW and left <= _FEWER and self._has_time_for(dual, dual.lattice):
+                return True  # passes over the labels that are left are worth a record of the level
             reached = bound
         return False
-
-    def _slow_rise(self, dual: Dual, bound: float) -> float:
-        """The share of the gap below which a rise is slow: passes pay if the next level has many labels."""
-        left = dual.count_left(bound, self.energy(self.best))
-        growth = 4 * left / int(dual.lattice.allowed.sum())  # four labels at half the spacing for each one
-        return _SLOW / max(1.0, growth) ** 2
-
-    def _has_few_left(self, dual: Dual, bound: float) -> bool:
-        """Whether passes over the labels that are left are worth a record of the level."""
-        labels = dual.lattice.allowed.sum()
-        if labels <= _FEW or dual.count_left(bound, self.energy(self.best)) > _FEWER * labels:
-            return False
-        return self._has_time_for(dual, dual.lattice)
 
     def _record_level(self, dual: Dual) -> RemainingCells | None:
         """Record the level and, in time, prune it; return the cells that are left, None if there are none."""
@@ -348,6 +338,14 @@ class Descent:
         """Report bound, least energy and remaining labels, and count the labels as work."""
         self.ends.labels += labels
         self.progress(f"energy {self.energy(self.best):.5g}, bound {bound:.5g}, {labels} labels")
+
+
+def _slow_rise(left: float) -> float:
+    """The share of the gap below which a rise is slow: passes pay if the next level has many labels.
+
+    left: share of the labels that is left.
+    """
+    return _SLOW / max(1.0, 4 * left) ** 2  # four labels at half the spacing for each one
 
 
 def _is_too_large(dual: Dual, lattice: Lattice) -> bool:
