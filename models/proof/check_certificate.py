@@ -724,7 +724,8 @@ class ForwardPass:
         self.shares: dict[int, tuple[Array, Array]] = {}  # those of earlier and of later pixels after it
         self.errors: list[float] = []
         visits = [self._visit(i) for i in range(len(level.allowed))]
-        self.excess, least, before = ([visit[k] for visit in visits] for k in range(3))
+        self.excess: list[Array] = [visit[0] for visit in visits]
+        least, before = ([visit[k] for visit in visits] for k in (1, 2))
         quads = [self._quad_term(quad) for quad in level.quads]
         self.error = 2 * math.fsum(self.errors)
         self.partial = [math.fsum([*quads, *least[: i + 1], *before[i + 1 :]]) for i in range(len(least))]
