@@ -56,7 +56,7 @@ MOST_ANGLE = 16.0
 MOST_JUMP = 64
 MOST_WEIGHT = 1e6
 MOST_UNIT = 1.0  # of a share or a table
-ROWS, BLOCK = 32, 1 << 16  # rows of a large product, and numbers, that NumPy handles at once
+SIDE, BLOCK = 40, 1 << 16  # rows and columns of a large product, and numbers, that NumPy handles at once
 SMALL = 1 << 19  # terms of a product up to which leaving some out costs more than it saves
 
 PARTS = (
@@ -676,19 +676,21 @@ class PairCost:
 def min_plus_product(left: Array, right: Array) -> Array:
     """The matrix of min over k of left[x, k] + right[k, y]; both may be inf.
 
-    Of a large product, some rows are computed at a time, without the terms k that are nowhere less than the
-    best one of its row.
+    Of a large product, some rows and columns are computed at a time, without the terms k that are nowhere
+    there less than the best one of its row.
     """
     if left.size * right.shape[1] <= SMALL:
         return _min_plus_block(left, right)
-    product = np.empty((len(left), right.shape[1]))
-    least, most = right.min(axis=1), right.max(axis=1)
-    for begin in range(0, len(left), ROWS):
-        rows = left[begin : begin + ROWS]
-        best = (rows + least).argmin(axis=1)
-        enough = rows[np.arange(len(rows)), best] + most[best]
-        some = (rows + least <= enough[:, None]).any(axis=0)
-        product[begin : begin + ROWS] = _min_plus_block(rows[:, some], right[some])
+    product, begins = np.empty((len(left), right.shape[1])), np.arange(0, right.shape[1], SIDE)
+    all_least, all_most = (end.reduceat(right, begins, axis=1).T for end in (np.minimum, np.maximum))
+    for low in range(0, len(left), SIDE):
+        rows = left[low : low + SIDE]
+        for begin, least, most in zip(begins.tolist(), all_least, all_most):
+            best = (rows + least).argmin(axis=1)
+            enough = rows[np.arange(len(rows)), best] + most[best]
+            some = (rows + least <= enough[:, None]).any(axis=0)
+            part = right[some, begin : begin + SIDE]
+            product[low : low + SIDE, begin : begin + SIDE] = _min_plus_block(rows[:, some], part)
     return product
 
 
