@@ -220,9 +220,10 @@ def draw_reach(results: Results, path: Path) -> None:
             rows = list(results[part].values())
             seconds = sorted(row["seconds"] for row in rows if row["status"] == "optimal")
             shares = 100 * np.arange(1, len(seconds) + 1) / len(rows)
-            limit = max(row["limit"] for row in rows)
+            limits = {row["limit"] for row in rows}
+            limit, within = max(limits), "in" if len(limits) == 1 else "in up to"
             look = looks[part] | {"marker": "", "drawstyle": "steps-post", "linewidth": 1.8}
-            reach = f"{title}: {len(seconds)} of {len(rows)} in {limit:g} s"
+            reach = f"{title}: {len(seconds)} of {len(rows)} {within} {limit:g} s"
             axis.plot([seconds[0], *seconds, limit], [0, *shares, shares[-1]], label=reach, **look)
         axis.set(xscale="log", xlabel="seconds", ylabel="proven optimal, %", ylim=(0, 102))
         axis.xaxis.set_major_formatter("{x:g}")
