@@ -830,10 +830,10 @@ class ForwardPass:
         self.errors.append(ROUNDING * PRECISION * size)
 
 
-def surviving_cells(level: Level, cells: list[Array], sums: list[Array], most: float) -> list[Array]:
-    """The cells with a corner whose sum is at most that. sums: of each pixel, at its allowed labels."""
+def surviving_cells(level: Level, cells: list[Array], bounds: list[Array], most: float) -> list[Array]:
+    """The cells with a corner whose bound is at most `most`. bounds: of each pixel, at its allowed labels."""
     remaining = []
-    for allowed, left, at_labels in zip(level.allowed, cells, sums):
+    for allowed, left, at_labels in zip(level.allowed, cells, bounds):
         alive = np.zeros_like(allowed)
         alive[allowed] = at_labels <= most
         remaining.append(left & combine_corners(np.logical_or, alive))
@@ -1211,7 +1211,7 @@ def pass_levels(
     """Do the passes over all levels; check that the first is the whole strip and each covers what is left.
 
     do_all: does `pass_level` on a list of tasks, here or in other processes. has_pieces: whether a last step
-    follows; only then the last level has combs, which take two thirds of its time.
+    follows; only then the last level has combs, which take more than half of its time.
     """
     whole, at = terms_of(arrays)
     alpha, beta, p = field_of(arrays, whole)

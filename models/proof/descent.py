@@ -60,6 +60,7 @@ _FEWER: Final = 0.5  # share of more labels that are left, at which passes go on
 _RECORD: Final = 11  # passes that take as long as a record with combs, and two before it
 _COMBS: Final = 5  # of these, the combs
 _NEAR: Final = 100  # jumps left open by a level after which the combs of the next may leave few enough
+_NEAR_SHARE: Final = 0.25  # of all jumps, the same on small grids
 
 # Clusters
 _CLUSTERS: Final = 24  # quads that become clusters, later half of them: a vortex' gap lies in few pixels
@@ -321,7 +322,8 @@ class Descent:
 
     def _is_near_end(self, dual: Dual) -> bool:
         """Whether the level before left so few jumps open that this one may be the last."""
-        return len(dual.lattice.p) - self.chain.forced <= _NEAR
+        jumps = len(dual.lattice.p)
+        return jumps - self.chain.forced <= min(_NEAR, _NEAR_SHARE * jumps)
 
     def _reason_to_end(self) -> str:
         """The reason why the work ends; empty if it goes on."""

@@ -256,9 +256,9 @@ class Dual:
         excess = self._excess(bound, energy)
         cells = self._cells_of_pass(excess)
         left = bound_by_boxes(self.lattice, cells)
-        single = single_excesses(self.state, self._crew)
-        for columns in (True, False) if combs else ():
-            if not left.is_empty:
+        single = single_excesses(self.state, self._crew) if combs else None
+        for columns in (True, False):
+            if single is not None and not left.is_empty:
                 state = self._state_at(corners_of(self.lattice, left.cells))
                 survives = comb_excesses(state, single, self._crew, columns=columns) <= excess
                 left = bound_by_boxes(self.lattice, left.cells & surviving_cells(self.lattice, survives))

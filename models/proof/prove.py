@@ -72,9 +72,9 @@ def prove(
     work
         Number of labels, counted at each rounding, after which to end: a limit that no clock decides.
     seed
-        Seed of the search that follows a level with a wide gap.
+        Seed of the searches for better fields.
     jobs
-        Number of processes of that search, and of the check of many labels.
+        Number of processes of these searches, and of the check of many labels.
     progress
         Receives a line of text every few passes.
     stop

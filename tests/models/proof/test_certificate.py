@@ -434,7 +434,7 @@ def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(writ
 
 def test_no_cell_that_holds_a_cross_of_low_energy_is_excluded(written):
     """Random crosses of less energy than asked for stay in cells, though combs leave fewer than a pass."""
-    rng, excluded = np.random.default_rng(3), np.zeros(2, int)
+    rng, remaining = np.random.default_rng(3), np.zeros(2, int)
     for seed in (1, 3, 4, 7):
         _, arrays = written(seed)
         instance, (terms, _) = proven(seed).field.instance, check_certificate.terms_of(arrays)
@@ -446,7 +446,7 @@ def test_no_cell_that_holds_a_cross_of_low_energy_is_excluded(written):
         energies = np.array([free_energy(instance, *cross.T) for cross in crosses])
         for most in np.quantile(energies, [0.01, 0.1, 0.4]):
             by_pass, cells = (passed.remaining_cells(most, combs=combs) for combs in (False, True))
-            excluded += [sum(left.sum() for left in kind) for kind in (by_pass, cells)]
+            remaining += [sum(left.sum() for left in kind) for kind in (by_pass, cells)]
             low = crosses[energies <= most]
             for i, left in enumerate(cells):
                 alpha, beta = level.angles(i)
@@ -455,7 +455,7 @@ def test_no_cell_that_holds_a_cross_of_low_energy_is_excluded(written):
                     for axis, side in enumerate((alpha, beta))
                 )
                 assert left[k, l].all()
-    assert excluded[1] < 0.95 * excluded[0]
+    assert remaining[1] < 0.95 * remaining[0]
 
 
 def hat(value, places):
