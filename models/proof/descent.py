@@ -250,7 +250,7 @@ class Descent:
                 chain.convex, left = energy, None
             else:
                 self._try_last_step(left)
-        if chain.bound >= self.proven.bound:
+        if chain.levels and chain.bound >= self.proven.bound:  # without levels there is nothing to check
             self.proven = chain
         return left
 

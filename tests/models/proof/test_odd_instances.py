@@ -14,6 +14,7 @@ pytestmark = pytest.mark.numeric
 
 WORK = 30_000  # labels after which a proof ends with a gap
 LARGER = 41  # one whose proof ends with a gap
+RESTARTED = 99  # one whose proof ends in the first level round a better field, after levels round another one
 MOST_PAIRS = 4  # of an instance whose jumps are all tried
 
 
@@ -50,7 +51,7 @@ def assert_round_trip(seed, folder):
 
 def test_few_odd_instances_are_proven_written_checked_and_read(tmp_path):
     few = [seed for seed in range(100) if odd_instance(seed).grid.size <= MOST_PAIRS][:24]
-    proofs = [assert_round_trip(seed, tmp_path) for seed in (*few, LARGER)]
+    proofs = [assert_round_trip(seed, tmp_path) for seed in (*few, LARGER, RESTARTED)]
     assert {proof.norm for proof in proofs} == set(NORMS)
     assert {proof.status for proof in proofs} == {"optimal", "gap"}
 
