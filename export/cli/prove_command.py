@@ -43,7 +43,7 @@ def prove_command(
 
     The certificate in the folder can be checked with --check, or by a separate program without crossfield.
     The check of the certificate comes after the time limit, and for orthogonal crosses within it. Ctrl-C ends
-    the search, and keeps all that is proven so far.
+    the search or the check, and keeps all that is proven so far.
     """
     if check is not None:
         if source is not None or output is not None:

@@ -7,10 +7,11 @@ docs/files.md, "Layout of a certificate", describes the arrays. Equal proofs giv
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, cast
+from typing import Any, Final, cast
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField, Norm
 from ..instance.file import instance_arrays, instance_of_arrays
 from ..instance.instance import Instance
-from ..processes.process_pool import parallel_map
+from ..processes.deadline import Progress, silent
+from ..processes.process_pool import process_pool
 from ..storage import read_bytes, write_bytes
 from . import check_certificate, check_orthogonal
 from .check_certificate import ProvenClaim
@@ -115,19 +117,39 @@ def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certi
     return Certificate(checked.field, checked.energy, checked.bound, proven)
 
 
-def check_proof(proof: Proof, jobs: int = 1) -> Proof:
+def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Proof:
     """The proof with the checker's findings, and with the bound and the forced jumps that it confirms.
+
+    After Ctrl-C, the proof has only the levels that are checked; without any, KeyboardInterrupt is raised.
 
     jobs: processes that share the levels, where that saves time and memory allows it. Raises one of
     `REFUSALS` for a proof that does not hold, and WorkerError when a process dies.
     """
     arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
-    shares = _FEW <= sum(level.size for level in proof.levels) <= _MANY
+    count = len(proof.levels)
+    processes = min(jobs, count) if _FEW <= sum(level.size for level in proof.levels) <= _MANY else 1
     closed = proof.status == "optimal" or proof.forced == len(proof.levels[0].p)
     has_pieces = proof.pieces is not None or closed
-    with parallel_map(check_certificate.pass_level, min(jobs, len(proof.levels)) if shares else 1) as do_all:
-        passed = check_certificate.pass_levels(arrays, lambda _, tasks: do_all(tasks), has_pieces=has_pieces)
-    pieces = _last_step_arrays(proof, passed, has_pieces=has_pieces)
+    with process_pool(processes) as pool:
+
+        def do_all(work: Callable[..., Any], tasks: list[Any]) -> list[Any]:
+            passes = list[Any]()
+            try:
+                for each in map(work, tasks) if processes == 1 else pool.map(work, tasks):
+                    passes.append(each)
+                    progress(f"checked {len(passes)} of {count} levels")
+            except KeyboardInterrupt:
+                if not passes:
+                    raise
+            return passes
+
+        passed = check_certificate.pass_levels(arrays, do_all, has_pieces=has_pieces)
+    if len(passed.bounds) < count:
+        proof = replace(proof, levels=proof.levels[: len(passed.bounds)], ended="interrupted", pieces=None)
+        arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
+        pieces = _whole_piece(passed)
+    else:
+        pieces = _last_step_arrays(proof, passed, has_pieces=has_pieces)
     proven = check_certificate.check_last_step(arrays | pieces, passed)
     ended = "optimal" if proven.status == "optimal" else proof.ended
     checked = replace(proof, bound=proven.bound, forced=proven.forced, ended=ended, pieces=pieces)
@@ -173,6 +195,12 @@ def _level_arrays(level: LevelRecord) -> Arrays:
         **level.shares,
         **level.tables,
     }
+
+
+def _whole_piece(passed: check_certificate.PassedLevels) -> Arrays:
+    """A last step that proves nothing: because there is one, the checker gives the last level its combs."""
+    size = 2 * (len(passed.terms.first) + len(passed.terms.white))
+    return {"cuts": np.array([-1], np.int32), "multipliers": np.zeros((1, size))}
 
 
 def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels, *, has_pieces: bool) -> Arrays:

@@ -46,8 +46,8 @@ def prove(
     The proof of an instance in the gauge `box`, with its field, is that of the same sketch in the gauge
     `strokes`. The bound holds for both gauges, because every field in `box` has a field in `strokes` of at
     most its energy. Without a time limit the same arguments give the same proof, for any number of threads.
-    Ctrl-C ends the proof with its best field and bound. The first proof on a machine compiles its functions
-    before the time limit begins, in up to a minute.
+    Ctrl-C ends the proof with its best field and bound, and its check with the levels checked by then. The
+    first proof on a machine compiles its functions before the time limit begins, in up to a minute.
 
     Orthogonal crosses, on any domain, have a proof of their own, on one thread. It has the same properties.
     With a time limit, a level is begun only if its check is expected to end in time. Up to 6,000 points, the
@@ -136,8 +136,10 @@ def prove(
     proof = replace(proof, field=field, energy=energy, seconds=time.monotonic() - began)
     if not proof.levels:
         return proof
-    progress("checking the levels")
     try:
-        return check_proof(proof, chosen.threads or jobs)
+        progress("checking the levels")
+        return check_proof(proof, chosen.threads or jobs, progress)
+    except KeyboardInterrupt:
+        return replace(proof, bound=0.0, forced=0, levels=(), ended="interrupted")
     except (*REFUSALS, MemoryError, WorkerError):  # `write_certificate` names the reason
         return replace(proof, bound=0.0, forced=0)

@@ -14,12 +14,12 @@ import pytest
 from crossfield.models.processes.process_groups import start_group
 
 
-def interrupted(program: str) -> list[str]:
+def interrupted(program: str, folder: Path | None = None) -> list[str]:
     """The words of the last line that a Python program prints when Ctrl-C comes after its first line,
-    a number; it must end well.
+    a number; it must end well. folder: where it runs.
     """
     command = [sys.executable, "-c", program]
-    child = start_group(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    child = start_group(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder)
     assert int(child.stdout.readline()) > 0
     child.send_signal(signal.SIGINT)
     out, err = child.communicate()

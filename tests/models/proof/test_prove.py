@@ -113,8 +113,9 @@ def test_limits_end_a_proof_with_what_it_has():
     some = cf.prove(instance, limits=cf.Limits(math.inf, 0.5), progress=lines.append)
     assert some.ended == "gap"
     assert 0 < some.gap <= 0.5
-    assert lines.pop() == "checking the levels"
-    for line in lines:
+    begin, count = lines.index("checking the levels"), len(some.levels)
+    assert lines[begin + 1 :] == [f"checked {number + 1} of {count} levels" for number in range(count)]
+    for line in lines[:begin]:
         energy, bound, labels = re.fullmatch(r"energy (\S+), bound (\S+), (\d+) labels", line).groups()
         assert float(bound) <= float(energy)
         assert int(labels) > 0
@@ -145,6 +146,42 @@ def test_ctrl_c_ends_a_proof_with_what_it_has():
         "print(proof.ended, proof.status, proof.bound <= proof.energy)"
     )
     assert interrupted(program) == ["interrupted", "gap", "True"]
+
+
+@pytest.mark.parametrize("size", [12, pytest.param(24, marks=pytest.mark.slow)])
+def test_ctrl_c_in_the_check_keeps_the_levels_that_are_checked(size, tmp_path):
+    program = f"""if True:
+        import time
+        import crossfield as cf
+
+        def wait(line):
+            if line.startswith("checked 2 of"):
+                print(1, flush=True)
+                time.sleep(600)
+
+        proof = cf.prove(cf.sample("mouse", {size}), progress=wait)
+        cf.write_certificate(proof, "some.npz")
+        read = cf.read_certificate("some.npz")
+        same = (read.bound, read.gap, read.forced) == (proof.bound, proof.gap, proof.forced)
+        print(proof.ended, len(proof.levels), same)
+    """
+    assert interrupted(program, tmp_path) == ["interrupted", "2", "True"]
+
+
+def test_ctrl_c_before_a_level_is_checked_keeps_the_field():
+    program = """if True:
+        import time
+        import crossfield as cf
+
+        def wait(line):
+            if line == "checking the levels":
+                print(1, flush=True)
+                time.sleep(600)
+
+        proof = cf.prove(cf.sample("bottle", 8), progress=wait)
+        print(proof.ended, proof.bound, len(proof.levels), proof.energy == proof.field.energy().total)
+    """
+    assert interrupted(program) == ["interrupted", "0.0", "0", "True"]
 
 
 def weighted(seed, **weights):
