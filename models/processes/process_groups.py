@@ -60,6 +60,11 @@ class _Presses:
         return self._pressed
 
 
+def are_interrupts_caught() -> bool:
+    """Whether a block of `catch_interrupts` decides what Ctrl-C ends, the second one included."""
+    return isinstance(signal.getsignal(signal.SIGINT), _Presses)
+
+
 @contextmanager
 def catch_interrupts() -> Iterator[Callable[[], bool]]:
     """A function that returns whether Ctrl-C was pressed; a second Ctrl-C interrupts at once.

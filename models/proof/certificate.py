@@ -22,6 +22,7 @@ from ..field.field import CrossField, Norm
 from ..instance.file import instance_arrays, instance_of_arrays
 from ..instance.instance import Instance
 from ..processes.deadline import Progress, silent
+from ..processes.process_groups import are_interrupts_caught
 from ..processes.process_pool import process_pool
 from ..storage import read_bytes, write_bytes
 from . import check_certificate, check_orthogonal
@@ -120,7 +121,8 @@ def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certi
 def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Proof:
     """The proof with the checker's findings, and with the bound and the forced jumps that it confirms.
 
-    After Ctrl-C, the proof has only the levels that are checked; without any, KeyboardInterrupt is raised.
+    After Ctrl-C, the proof has only the levels that are checked. KeyboardInterrupt is raised without any, and
+    in a block that catches Ctrl-C itself.
 
     jobs: processes that share the levels, where that saves time and memory allows it. Raises one of
     `REFUSALS` for a proof that does not hold, and WorkerError when a process dies.
@@ -139,7 +141,7 @@ def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Pro
                     passes.append(each)
                     progress(f"checked {len(passes)} of {count} levels")
             except KeyboardInterrupt:
-                if not passes:
+                if not passes or are_interrupts_caught():
                     raise
             return passes
 

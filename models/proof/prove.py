@@ -15,7 +15,7 @@ from ..processes.compilation import crew
 from ..processes.deadline import Deadline, Progress, Stop, silent, stop_function
 from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
-from ..processes.process_groups import catch_interrupts
+from ..processes.process_groups import are_interrupts_caught, catch_interrupts
 from ..smooth.sparse_systems import one_thread
 from .absolute_descent import AbsoluteDescent
 from .certificate import REFUSALS, check_proof
@@ -134,12 +134,17 @@ def prove(
     field = extended(proof.field, instance)
     energy = field.energy(norm).total
     proof = replace(proof, field=field, energy=energy, seconds=time.monotonic() - began)
-    if not proof.levels:
-        return proof
+    return _checked(proof, chosen.threads or jobs, progress) if proof.levels else proof
+
+
+def _checked(proof: Proof, jobs: int, progress: Progress) -> Proof:
+    """The proof as the checker confirms it; the bound 0 where it does not."""
     try:
         progress("checking the levels")
-        return check_proof(proof, chosen.threads or jobs, progress)
+        return check_proof(proof, jobs, progress)
     except KeyboardInterrupt:
+        if are_interrupts_caught():
+            raise
         return replace(proof, bound=0.0, forced=0, levels=(), ended="interrupted")
     except (*REFUSALS, MemoryError, WorkerError):  # `write_certificate` names the reason
         return replace(proof, bound=0.0, forced=0)
