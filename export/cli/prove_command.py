@@ -152,7 +152,7 @@ def _check_certificate(path: Path, printing: options.PrintOptions) -> None:
 
     with show_progress(quiet=printing.quiet) as show:
         show("checking the certificate")
-        certificate = read_certificate(path)
+        certificate = read_certificate(path, jobs=2, progress=show)
 
     printing.show_facts(
         certificate.field.instance.summary, proof_facts(certificate), "the certificate is valid"

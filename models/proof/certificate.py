@@ -7,8 +7,8 @@ docs/files.md, "Layout of a certificate", describes the arrays. Equal proofs giv
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, cast
@@ -22,6 +22,7 @@ from ..field.field import CrossField, Norm
 from ..instance.file import instance_arrays, instance_of_arrays
 from ..instance.instance import Instance
 from ..processes.deadline import Progress, silent
+from ..processes.job_counts import check_jobs
 from ..processes.process_groups import are_interrupts_caught
 from ..processes.process_pool import process_pool
 from ..storage import read_bytes, write_bytes
@@ -124,29 +125,26 @@ def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Pro
     After Ctrl-C, the proof has only the levels that are checked. KeyboardInterrupt is raised without any, and
     in a block that catches Ctrl-C itself.
 
-    jobs: processes that share the levels, where that saves time and memory allows it. Raises one of
-    `REFUSALS` for a proof that does not hold, and WorkerError when a process dies.
+    jobs: as of `read_certificate`. Raises one of `REFUSALS` for a proof that does not hold, and WorkerError
+    when a process dies.
     """
     arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
-    count = len(proof.levels)
-    processes = min(jobs, count) if _FEW <= sum(level.size for level in proof.levels) <= _MANY else 1
     closed = proof.status == "optimal" or proof.forced == len(proof.levels[0].p)
     has_pieces = proof.pieces is not None or closed
-    with process_pool(processes) as pool:
+    with _pass_function(arrays, jobs, progress) as pass_all:
 
-        def do_all(work: Callable[..., Any], tasks: list[Any]) -> list[Any]:
+        def pass_until_interrupted(work: Any, tasks: list[Any]) -> list[Any]:
             passes = list[Any]()
             try:
-                for each in map(work, tasks) if processes == 1 else pool.map(work, tasks):
+                for each in pass_all(work, tasks):
                     passes.append(each)
-                    progress(f"checked {len(passes)} of {count} levels")
             except KeyboardInterrupt:
                 if not passes or are_interrupts_caught():
                     raise
             return passes
 
-        passed = check_certificate.pass_levels(arrays, do_all, has_pieces=has_pieces)
-    if len(passed.bounds) < count:
+        passed = check_certificate.pass_levels(arrays, pass_until_interrupted, has_pieces=has_pieces)
+    if len(passed.bounds) < len(proof.levels):
         proof = replace(proof, levels=proof.levels[: len(passed.bounds)], ended="interrupted", pieces=None)
         arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
         pieces = _whole_piece(passed)
@@ -157,6 +155,23 @@ def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Pro
     checked = replace(proof, bound=proven.bound, forced=proven.forced, ended=ended, pieces=pieces)
     object.__setattr__(checked, "proven", proven)
     return checked
+
+
+@contextmanager
+def _pass_function(arrays: Arrays, jobs: int, progress: Progress) -> Iterator[Callable[..., Iterator[Any]]]:
+    """A function that does the passes over all levels as the checker asks for, and says how many are done."""
+    levels = [array for name, array in arrays.items() if name.endswith("_allowed")]
+    labels = 8 * sum(array.size for array in levels)
+    processes = min(jobs, len(levels)) if _FEW <= labels <= _MANY else 1
+    with process_pool(processes) as pool:
+
+        def pass_all(work: Callable[..., Any], tasks: list[Any]) -> Iterator[Any]:
+            passes = map(work, tasks) if processes == 1 else pool.map(work, tasks)
+            for number, each in enumerate(passes, 1):
+                yield each
+                progress(f"checked {number} of {len(tasks)} levels")
+
+        yield pass_all
 
 
 def _head_arrays(proof: Proof) -> Arrays:
@@ -223,7 +238,9 @@ def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels, *, h
 
 
 @check_arguments
-def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certificate:
+def read_certificate(
+    path: str | Path, *, on: Instance | None = None, jobs: int = 1, progress: Progress = silent
+) -> Certificate:
     """Read and check a certificate.
 
     Field, instance, energy, bound and status come from the arrays that the checker has checked.
@@ -234,6 +251,11 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
         The file.
     on
         The instance that the field must be on, if given.
+    jobs
+        Number of processes that share the levels of crosses of any angle, where that saves time and takes
+        less than 3 GB.
+    progress
+        Receives a line of text after each of these levels.
 
     Returns
     -------
@@ -243,15 +265,16 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
     Raises
     ------
     InputError
-        For an unreadable file, another instance, and a claim that does not hold.
+        For an unreadable file, another instance, a claim that does not hold, and too few or too many jobs.
     InstanceError
         For a field or an instance that breaks its rules.
 
     """
     path = Path(path)
+    check_jobs(jobs)
     try:
         data = read_bytes(path, check_certificate.MOST_BYTES)
-        field, bound, proven = _check_any(data, path)
+        field, bound, proven = _check_any(data, path, jobs, progress)
         if on is not None and field.instance.sha256 != on.sha256:
             raise InputError(
                 f"is a certificate of another instance ({field.instance.summary}), not of {on.summary}",
@@ -266,7 +289,9 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
     return Certificate(field, field.energy(proven.norm).total, bound, proven)
 
 
-def _check_any(data: bytes, path: Path) -> tuple[CrossField, float, ProvenClaim]:
+def _check_any(
+    data: bytes, path: Path, jobs: int, progress: Progress
+) -> tuple[CrossField, float, ProvenClaim]:
     """Field, claimed bound and findings of the checker, for either kind of crosses."""
     arrays = check_certificate.unpack_archive(data)
     head = check_certificate.refuse_damage(check_certificate.json_of)(arrays, "head")
@@ -274,7 +299,8 @@ def _check_any(data: bytes, path: Path) -> tuple[CrossField, float, ProvenClaim]
         proven: ProvenClaim = check_orthogonal.check_arrays(arrays)
     else:
         check_certificate.check_sizes(arrays, len(data))
-        proven = check_certificate.check_arrays(arrays)
+        with _pass_function(arrays, jobs, progress) as pass_all:
+            proven = check_certificate.check_arrays(arrays, pass_all)
     with naming(path):
         return _field_of(arrays), head["bound"], proven
 

@@ -1173,14 +1173,14 @@ def gap_of(energy: float, bound: float) -> float:
 
 
 @refuse_damage
-def check_arrays(arrays: dict[str, Array]) -> ProvenBoxes:
+def check_arrays(arrays: dict[str, Array], do_all: Callable[..., Any] = map) -> ProvenBoxes:
     """Check the arrays of a certificate and return what they prove.
 
-    Raises NotProvenError when a level does not follow from the one before, or when less is proven than
-    claimed, and UnreadableError for arrays that are not a certificate.
+    do_all: as of `pass_levels`. Raises NotProvenError when a level does not follow from the one before, or
+    when less is proven than claimed, and UnreadableError for arrays that are not a certificate.
     """
     has_pieces = len(take_array(arrays, "cuts", "<i4", None)) > 0
-    return check_last_step(arrays, pass_levels(arrays, has_pieces=has_pieces))
+    return check_last_step(arrays, pass_levels(arrays, do_all, has_pieces=has_pieces))
 
 
 def arrays_for(arrays: dict[str, Array], number: int) -> dict[str, Array]:

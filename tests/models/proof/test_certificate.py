@@ -68,7 +68,10 @@ def refusal(arrays):
 
 def test_what_was_written_is_read_back_and_holds(written):
     path, _ = written(1)
-    certificate, proof = read_certificate(path), proven(1)
+    lines = []
+    certificate, proof = read_certificate(path, jobs=2, progress=lines.append), proven(1)
+    count = len(proof.levels)
+    assert lines == [f"checked {number + 1} of {count} levels" for number in range(count)]
     assert certificate.field.instance.sha256 == proof.field.instance.sha256
     for name in ("alpha", "beta", "p"):
         np.testing.assert_array_equal(getattr(certificate.field, name), getattr(proof.field, name))

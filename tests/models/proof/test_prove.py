@@ -161,7 +161,7 @@ def test_ctrl_c_in_the_check_keeps_the_levels_that_are_checked(size, tmp_path):
 
         proof = cf.prove(cf.sample("mouse", {size}), progress=wait)
         cf.write_certificate(proof, "some.npz")
-        read = cf.read_certificate("some.npz")
+        read = cf.read_certificate("some.npz", jobs=2)
         same = (read.bound, read.gap, read.forced) == (proof.bound, proof.gap, proof.forced)
         print(proof.ended, len(proof.levels), same)
     """
