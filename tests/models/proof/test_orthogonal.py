@@ -43,16 +43,16 @@ def can_try_all(instance):
     return len(beyond_forest(OrthogonalEnergy.of(instance))) <= MOST_FREE
 
 
-def check_seed(seed, *, grid):
+def check_seed(seed, *, grid, levels=4):
     instance = random_instance(seed, grid=grid)
     if not can_try_all(instance):
         return
     optimum, z = try_all_integers(instance)
-    best = prove_from(instance, z)
+    best = prove_from(instance, z, levels=levels)
     assert best.energy == pytest.approx(optimum, abs=1e-9)
     assert best.bound <= optimum + 1e-9
     for worse in worse_integers(instance, z, seed):
-        proof = prove_from(instance, worse)
+        proof = prove_from(instance, worse, levels=levels)
         assert proof.bound <= optimum + 1e-9
         assert proof.status == "gap" or proof.energy <= optimum + 1e-7
 
@@ -68,7 +68,7 @@ def test_no_bound_exceeds_the_optimum_of_all_integers(seed, grid):
 @pytest.mark.parametrize("decade", range(1, 21))
 def test_no_bound_exceeds_the_optimum_of_many_instances(decade, grid):
     for seed in range(10 * decade, 10 * decade + 10):
-        check_seed(seed, grid=grid)
+        check_seed(seed, grid=grid, levels=4 if decade == 1 else 3)  # a fourth takes twelve times as long
 
 
 @pytest.mark.parametrize("seed", [2, 7, 21])

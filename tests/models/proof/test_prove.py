@@ -148,7 +148,7 @@ def test_ctrl_c_ends_a_proof_with_what_it_has():
     assert interrupted(program) == ["interrupted", "gap", "True"]
 
 
-@pytest.mark.parametrize("size", [12, pytest.param(24, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("size", [8, pytest.param(24, marks=pytest.mark.slow)])
 def test_ctrl_c_in_the_check_keeps_the_levels_that_are_checked(size, tmp_path):
     program = f"""if True:
         import time
