@@ -136,8 +136,8 @@ def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Pro
         def pass_until_interrupted(work: Any, tasks: list[Any]) -> list[Any]:
             passes = list[Any]()
             try:
-                for each in pass_all(work, tasks):
-                    passes.append(each)
+                for level_pass in pass_all(work, tasks):
+                    passes.append(level_pass)
             except KeyboardInterrupt:
                 if not passes or are_interrupts_caught():
                     raise
@@ -167,8 +167,8 @@ def _pass_function(arrays: Arrays, jobs: int, progress: Progress) -> Iterator[Ca
 
         def pass_all(work: Callable[..., Any], tasks: list[Any]) -> Iterator[Any]:
             passes = map(work, tasks) if processes == 1 else pool.map(work, tasks)
-            for number, each in enumerate(passes, 1):
-                yield each
+            for number, level_pass in enumerate(passes, 1):
+                yield level_pass
                 progress(f"checked {number} of {len(tasks)} levels")
 
         yield pass_all

@@ -134,10 +134,10 @@ def prove(
     field = extended(proof.field, instance)
     energy = field.energy(norm).total
     proof = replace(proof, field=field, energy=energy, seconds=time.monotonic() - began)
-    return _checked(proof, chosen.threads or jobs, progress) if proof.levels else proof
+    return _checked_proof(proof, chosen.threads or jobs, progress) if proof.levels else proof
 
 
-def _checked(proof: Proof, jobs: int, progress: Progress) -> Proof:
+def _checked_proof(proof: Proof, jobs: int, progress: Progress) -> Proof:
     """The proof as the checker confirms it; the bound 0 where it does not."""
     try:
         progress("checking the levels")
