@@ -268,6 +268,8 @@ def read_certificate(
         For an unreadable file, another instance, a claim that does not hold, and too few or too many jobs.
     InstanceError
         For a field or an instance that breaks its rules.
+    CrossfieldError
+        When a process dies.
 
     """
     path = Path(path)
