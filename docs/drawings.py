@@ -30,6 +30,11 @@ PROOF_SECONDS: Final = 60.0
 RANDOM: Final = 8  # random instances of 5 x 5 pixels
 
 
+def subject_of(name: str) -> str:
+    """What a drawing shows: the name of its file without what differs between two files of one drawing."""
+    return name.partition(".")[0].removesuffix("_rasterized")
+
+
 @dataclass(frozen=True)
 class Sketch:
     """A sample, or a drawing in a file with its mask, if it has one."""

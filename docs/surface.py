@@ -28,7 +28,7 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.sketch.surfaces import CurvaturePatch, analytic_instance, rotation_by
 from crossfield.models.surface.trust import OFF, right_angle_deviation
-from drawings import SUFFIXES
+from drawings import SUFFIXES, subject_of
 from make import csv_text, replace_between
 from studying.plots import open_panels, styles
 
@@ -219,10 +219,9 @@ def measure_part(part: str, folder: Path | None, jobs: int) -> Rows:
 
 
 def by_time(rows: Rows) -> str:
-    """Sentence on one surface at several sizes."""
-    name, _ = TIMED[-1]
-    texts = [f"{row['seconds']:.1f} s at {row['pixels']} pixels" for row in rows if row["drawing"] == name]
-    return f"Processor time (`{name}`): {' and '.join(texts)}."
+    """Sentence on the seconds of all surfaces that are timed."""
+    texts = [f"`{row['drawing']}` {row['seconds']:.1f} s at {row['pixels']} pixels" for row in rows]
+    return f"Processor time: {', '.join(texts)}."
 
 
 def short_summary(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
@@ -230,18 +229,23 @@ def short_summary(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
     bend = [row for row in rows if row["way"] == "bend"]
     errors = [row["mean"] for row in bend if row["size"] == max(SIZES)]
     sides = [row["side"] for row in rows if row["way"] != "power"]
-    undoubted = [row["mean"] for row in bend if not row["doubts"]]
+    undoubted = {way: max(row["mean"] for row in rows if row["way"] == way and not row["doubts"]) for way in WAYS[:3]}
+    worst = ", ".join(f"{error:.1f} degrees from a `{way}` field" for way, error in undoubted.items())
     even = [row["side"] for row in both_ways]
     ranks = [row["alike"] for row in bend]
-    own = [bool(row["doubts"]) for row in drawings if row["drawing"] in SAMPLES]
-    others = [bool(row["doubts"]) for row in drawings if row["drawing"] not in SAMPLES]
+    flagged = {
+        subject: any(row["doubts"] for row in drawings if subject_of(row["drawing"]) == subject)
+        for subject in {subject_of(row["drawing"]) for row in drawings}
+    }
+    own = [doubted for subject, doubted in flagged.items() if subject in SAMPLES]
+    others = [doubted for subject, doubted in flagged.items() if subject not in SAMPLES]
     return f"""\
 - **Good on clean nets of curvature lines.** On {len(errors)} known surfaces at {max(SIZES)} pixels, normals
   from bend fields have mean errors of {min(errors):.1f} to {max(errors):.1f} degrees.
 - **Poor on most drawings by others.** crossfield [flags](#confidence-and-doubts) {sum(others)} of
   {len(others)} of their surfaces, and {sum(own)} of {len(own)} of our samples.
-- **No doubt is no guarantee.** A known surface without doubts has a mean error of {max(undoubted):.1f}
-  degrees.
+- **No doubt is no guarantee.** Known surfaces without doubts have mean errors of up to
+  {worst}.
 - **The side is a guess.** It is right in {sum(sides):.0f} of {len(sides)} cases on known surfaces, but for
   catenoids and saddle sheets, which look alike inside out, in {sum(even):.0f} of {len(even)} views.
 - **`confidence` hardly shows errors**: its rank correlation with them is {min(ranks):.1f} to

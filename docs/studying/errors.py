@@ -95,16 +95,31 @@ def change(rows: Iterable[Row], before: Kind, after: Kind) -> Change | None:
 
 def best_energies(rows: Iterable[Row]) -> dict[tuple[Any, ...], tuple[float, bool]]:
     """Least 2-norm energy of every case with default weights, and whether it is the proven optimum."""
+    rows = list(rows)
     least: dict[tuple[Any, ...], float] = {}
-    bound: dict[tuple[Any, ...], float] = {}
     for row in rows:
         case = case_of(row)
         least[case] = min(least.get(case, np.inf), row["energy_2"])
-        if row["way"] == "prove" and row["norm"] == 2 and row["bound"] is not None:
-            bound[case] = max(bound.get(case, -np.inf), row["bound"])
+    bound = proven_bounds(rows)
     return {
         case: (energy, energy - bound.get(case, -np.inf) <= CLOSE * energy) for case, energy in least.items()
     }
+
+
+def proven_bounds(rows: Iterable[Row]) -> dict[tuple[Any, ...], float]:
+    """Greatest lower bound of the 2-norm energy of every case that `prove` found."""
+    bound: dict[tuple[Any, ...], float] = {}
+    for row in rows:
+        if row["way"] == "prove" and row["norm"] == 2 and row["bound"] is not None:
+            bound[case_of(row)] = max(bound.get(case_of(row), -np.inf), row["bound"])
+    return bound
+
+
+def gaps_to_bounds(rows: Iterable[Row], way: str) -> list[float]:
+    """Relative excess of each field of a way, with default weights, over the proven bound of its case."""
+    usual = [row for row in rows_with_error(rows) if is_default(row)]
+    bound = proven_bounds(usual)
+    return [row["energy_2"] / bound[case_of(row)] - 1 for row in usual if row["way"] == way]
 
 
 def gaps(rows: Iterable[Row]) -> list[tuple[Row, float]]:

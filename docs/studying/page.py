@@ -38,25 +38,31 @@ def read() -> RowsByPart:
     return rows_of | {"solvers": solvers_table(SOLVER_ROWS).rows}
 
 
-def difference_by_others() -> str:
-    """The difference between the two best methods on drawings by others."""
+def difference_by_others() -> dict[str, str]:
+    """The difference between the two best methods on drawings by others, and what of it is significant."""
     sizes = sorted(fields_page.values("size", measure="hidden"))
     changes = {
         size: fields_page.compared("polyvector", "bend", origin=fields_page.OTHERS, size=size)
         for size in sizes
     }
-    return series(f"{change and change.cell} at {size} pixels" for size, change in changes.items())
+    sure = sum(change is not None and change.sure for change in changes.values())
+    return {
+        "by_others": series(f"{change and change.cell} at {size} pixels" for size, change in changes.items()),
+        "sure": f"{sure or 'None'} of these {len(sizes)} differences exceed{'s' * (sure < 2)} two standard errors.",
+    }
 
 
 def effect_of_energy(rows_of: RowsByPart) -> dict[str, Any]:
     """Effects of lower energies on the error, and the excess of greedy fields."""
     size = fields_page.values("size", measure="hidden", method="prove")[0]
-    before = [gap for row, gap in errors.gaps(rows_of["quality"]) if row["way"] == "greedy"]
+    closed = [gap for row, gap in errors.gaps(rows_of["quality"]) if row["way"] == "greedy"]
     return {
         "proved": fields_page.compared("greedy", "prove", size=size),
         "searched": fields_page.compared("greedy", "search", size=size),
         "optimum": quality_page.changes(rows_of["quality"], surfaces=False)[quality_page.BEST],
-        "greedy_excess": percent(float(np.mean(before))),
+        "greedy_excess": percent(float(np.mean(closed))),
+        "greedy_median": percent(float(np.median(closed))),
+        "greedy_gap": percent(float(np.mean(errors.gaps_to_bounds(rows_of["quality"], "greedy")))),
     }
 
 
@@ -96,7 +102,7 @@ def write_page(target: Path) -> None:
             csv.writer(file, lineterminator="\n").writerows([heads, *lines])
     text = TEMPLATE.read_text(encoding="utf-8").format(
         generated=generated_line(COMMAND),
-        by_others=difference_by_others(),
+        **difference_by_others(),
         missed=fields_page.missed_sentence(),
         **fields_page.counts(),
         **solvers_page.sentences(rows_of["solvers"], FULL),

@@ -62,16 +62,22 @@ def solvers_of(formulation: str) -> list[str]:
 
 
 def solved_table(rows: list[Row], plan: Plan) -> Table:
-    """Numbers of instances that at least one solver solves, and `prove`."""
+    """Numbers of instances that at least one solver solves, and `prove`; a dash where no file was taken."""
     cells = []
     for formulation in PROBLEMS:
-        runs = *((solvers_of(formulation), start, start) for start in STARTS), ([PROVE], "cold", f"`{PROVE}`")
+        runs = (
+            *((solvers_of(formulation), start, start) for start in STARTS),
+            (list(COMMERCIAL), "cold", "cold, free commercial editions"),
+            ([PROVE], "cold", f"`{PROVE}`"),
+        )
         for names, start, words in runs:
-            solved = [
-                {row["instance"] for name in names for row in of[formulation, name, start] if is_solved(row)}
-                for of in groups(rows, plan).values()
-            ]
-            cells.append([f"`{formulation}`, {words}", *(str(len(instances)) for instances in solved)])
+            cells.append([f"`{formulation}`, {words}"])
+            for of in groups(rows, plan).values():
+                ran = [
+                    row for name in names for row in of[formulation, name, start] if row["status"] != TOO_LARGE
+                ]
+                solved = {row["instance"] for row in ran if is_solved(row)}
+                cells[-1].append(str(len(solved)) if ran else MISSING)
     return ("file and start", *(f"{count} pairs" for count in plan.instances)), cells
 
 
@@ -236,13 +242,25 @@ def editions_table(rows: list[Row], plan: Plan) -> Table:
     ), cells
 
 
+def taken(rows: list[Row]) -> str:
+    """Numbers of files that each free edition takes, by formulation."""
+    return series(
+        f"{solver_title(solver)} {sum(row['status'] != TOO_LARGE for row in mine)} of {len(mine)} of `{formulation}`"
+        for solver in sorted(COMMERCIAL)
+        for formulation in PROBLEMS
+        for mine in [[row for row in rows if (row["solver"], row["formulation"]) == (solver, formulation)]]
+    )
+
+
 def claims(rows: list[Row]) -> str:
     """Sentence on answers that contradict a proven bound or a known field, and on failures."""
     best = known_values(rows)
-    wrong = [row for row in rows if problem(row) in best and contradicted(row, *best[problem(row)])]
-    lost = [row for row in rows if row["status"] in {FAILED, "unknown"}]
+    ran = [row for row in rows if row["status"] != TOO_LARGE]
+    wrong = [row for row in ran if problem(row) in best and contradicted(row, *best[problem(row)])]
+    lost = [row for row in ran if row["status"] in {FAILED, "unknown"}]
     return (
-        f"{sum(map(is_solved, rows))} of {len(rows)} runs end with a proven optimum. Answers that "
+        f"{sum(map(is_solved, ran))} of {len(ran)} runs end with a proven optimum. {len(rows) - len(ran)} "
+        "more did not take place, because the file is too large for a free edition. Answers that "
         f"contradict another run: {_listed(wrong)}. Runs without a usable answer: {_listed(lost)}."
     )
 
@@ -273,6 +291,7 @@ def sentences(rows: list[Row], plan: Plan) -> dict[str, Any]:
     closed = [row for row in long_runs if is_solved(row)]
     return {
         "claims": claims(rows),
+        "taken": taken(rows),
         "solved_cold": series(solved[0][1:]),
         "solvers": " or of ".join(
             f"{series(map(solver_title, solvers_of(formulation)))} (`{formulation}`)"
