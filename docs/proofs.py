@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -211,7 +212,7 @@ def draw_reach(results: Results, path: Path) -> None:
         "samples": f"samples, {SIZE} pixels",
         "fine": f"samples, {FINE} pixels",
         "large": f"samples, {LARGE} pixels",
-        "sketches": f"drawings by others, {SIZE} pixels",
+        "sketches": f"{len(results['sketches'])} files of drawings by others, {SIZE} pixels",
         "collections": f"{collections} public collections, {SIZE} pixels",
     }
     looks = styles(list(titles))
@@ -251,6 +252,31 @@ def agreement(rows: dict[str, Facts]) -> str:
     )
 
 
+def memory_of_levels(results: Results) -> str:
+    """The memory of the proof with the largest level."""
+    rows = [row for part in SKETCHES for row in results[part].values() if row.get("memory")]
+    largest = max(rows, key=lambda row: row["labels"])
+    return f"{largest['labels']:,} of them took {largest['memory'] / 1e9:.1f} GB."
+
+
+def open_drawings(results: Results) -> str:
+    """How many drawings of the collections keep a gap, of which sizes, and under which limits."""
+    rows = results["collections"].values()
+    gaps = [row["gap"] for row in rows if row["status"] != "optimal"]
+    sizes = ", ".join(
+        f"{sum(low <= gap < high for gap in gaps)} {words}"
+        for low, high, words in ((0.0, 0.01, "below 1 %"), (0.01, 0.05, "of 1 to 5 %"))
+    )
+    large = sorted(gap for gap in gaps if gap >= 0.05)
+    limits = Counter(f"{row['limit']:g} s" for row in rows).most_common()
+    return (
+        f"Of {len(rows)} public drawings at {SIZE} pixels, {len(gaps)} keep gaps: {sizes}, "
+        f"and {len(large)} single curves of {100 * large[0]:.0f} to {100 * large[-1]:.0f} %. "
+        + " and ".join(f"{count} drawings had {limit}" for limit, count in limits)
+        + "."
+    )
+
+
 def flatten(facts: Facts) -> Facts:
     """The facts of a row without nested ones, whose names are joined by an underscore."""
     flat: Facts = {}
@@ -278,6 +304,8 @@ def files(results: Results) -> dict[str, str]:
     texts = {
         "generated": generated_line("python docs/proofs.py"),
         "most": f"{MOST_LABELS:,}",
+        "memory": memory_of_levels(results),
+        "open": open_drawings(results),
         "agreement": agreement(results["optima"]),
     }
     page = re.sub(r"@(\w+)@", lambda match: texts[match[1]], TEMPLATE.read_text(encoding="utf-8"))

@@ -229,7 +229,9 @@ def short_summary(rows: Rows, drawings: Rows, both_ways: Rows) -> str:
     bend = [row for row in rows if row["way"] == "bend"]
     errors = [row["mean"] for row in bend if row["size"] == max(SIZES)]
     sides = [row["side"] for row in rows if row["way"] != "power"]
-    undoubted = {way: max(row["mean"] for row in rows if row["way"] == way and not row["doubts"]) for way in WAYS[:3]}
+    undoubted = {
+        way: max(row["mean"] for row in rows if row["way"] == way and not row["doubts"]) for way in WAYS[:3]
+    }
     worst = ", ".join(f"{error:.1f} degrees from a `{way}` field" for way, error in undoubted.items())
     even = [row["side"] for row in both_ways]
     ranks = [row["alike"] for row in bend]

@@ -48,7 +48,8 @@ def difference_by_others() -> dict[str, str]:
     sure = sum(change is not None and change.sure for change in changes.values())
     return {
         "by_others": series(f"{change and change.cell} at {size} pixels" for size, change in changes.items()),
-        "sure": f"{sure or 'None'} of these {len(sizes)} differences exceed{'s' * (sure < 2)} two standard errors.",
+        "sure": f"{sure or 'None'} of these {len(sizes)} differences exceed{'s' * (sure < 2)} two "
+        "standard errors.",
     }
 
 

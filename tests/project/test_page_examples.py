@@ -23,7 +23,7 @@ DOCS = places.ROOT / "docs"
 PAGES = [places.ROOT / "README.md", *sorted(DOCS.glob("tutorials/*.md")), *sorted(DOCS.glob("guides/*.md"))]
 FENCE = re.compile(r"(?:<!-- needs: (\S+) -->\n)?```(\w+)\n(.*?)```", re.DOTALL)
 SAVED = re.compile(r"Save this as `([\w.]+)`")
-ELSEWHERE = ("pip install", "sphinx-build", "python3 -m venv", ". .venv", "python -m pytest")
+ELSEWHERE = ("pip install", ".venv/bin/", "sphinx-build", "python3 -m venv", ". .venv", "python -m pytest")
 """Commands that change the environment, which other tests run."""
 
 

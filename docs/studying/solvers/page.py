@@ -74,7 +74,10 @@ def solved_table(rows: list[Row], plan: Plan) -> Table:
             cells.append([f"`{formulation}`, {words}"])
             for of in groups(rows, plan).values():
                 ran = [
-                    row for name in names for row in of[formulation, name, start] if row["status"] != TOO_LARGE
+                    row
+                    for name in names
+                    for row in of[formulation, name, start]
+                    if row["status"] != TOO_LARGE
                 ]
                 solved = {row["instance"] for row in ran if is_solved(row)}
                 cells[-1].append(str(len(solved)) if ran else MISSING)
@@ -245,10 +248,12 @@ def editions_table(rows: list[Row], plan: Plan) -> Table:
 def taken(rows: list[Row]) -> str:
     """Numbers of files that each free edition takes, by formulation."""
     return series(
-        f"{solver_title(solver)} {sum(row['status'] != TOO_LARGE for row in mine)} of {len(mine)} of `{formulation}`"
+        f"{solver_title(solver)} {len(statuses) - statuses.count(TOO_LARGE)} of {len(statuses)} of `{formulation}`"
         for solver in sorted(COMMERCIAL)
         for formulation in PROBLEMS
-        for mine in [[row for row in rows if (row["solver"], row["formulation"]) == (solver, formulation)]]
+        for statuses in [
+            [row["status"] for row in rows if (row["solver"], row["formulation"]) == (solver, formulation)]
+        ]
     )
 
 
