@@ -248,7 +248,8 @@ def editions_table(rows: list[Row], plan: Plan) -> Table:
 def taken(rows: list[Row]) -> str:
     """Numbers of files that each free edition takes, by formulation."""
     return series(
-        f"{solver_title(solver)} {len(statuses) - statuses.count(TOO_LARGE)} of {len(statuses)} of `{formulation}`"
+        f"{solver_title(solver)} {len(statuses) - statuses.count(TOO_LARGE)} of {len(statuses)} "
+        f"of `{formulation}`"
         for solver in sorted(COMMERCIAL)
         for formulation in PROBLEMS
         for statuses in [
