@@ -9,7 +9,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.arguments import check_arguments
 from ...models.errors import CrossfieldError, FormulationError, InstanceError
 from ...models.formulations.problem import Problem, formulate, with_products_lifted, with_windows
 from ...models.formulations.windows import Windows
@@ -91,7 +90,6 @@ class Manifest:
         return Windows.of_document(self.document["windows"]) if "windows" in self.document else None
 
 
-@check_arguments
 def read_manifest(path: str | Path) -> Manifest:
     """Read a manifest, with which `read_solution` reads answers back.
 

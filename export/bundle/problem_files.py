@@ -15,7 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ...models.arguments import check_arguments
+from ...models.arguments import check_flag
 from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import declaration_of, declare, list_formulations
@@ -32,7 +32,6 @@ from .manifest import LARGE, Manifest, file_stem, narrow_windows, write_manifest
 from .starts import write_starts
 
 
-@check_arguments
 def write_problem(
     problem: Problem,
     folder: str | Path,
@@ -81,7 +80,6 @@ def write_problem(
     )
 
 
-@check_arguments
 def write_all(
     instance: Instance,
     folder: str | Path,
@@ -205,6 +203,7 @@ def _write_problem_files(
     compress: bool,
 ) -> Manifest:
     """Write the files of a problem, its starting points and its manifest."""
+    check_flag("compress", compress)
     stem, written, refused = file_stem(problem), [], {}
     for name in dict.fromkeys(formats):
         entry = FORMATS[name]

@@ -16,7 +16,6 @@ from typing import Any, Final
 import numpy as np
 import pyomo.environ as pyo
 
-from ...models.arguments import check_arguments
 from ...models.field.field import CrossField
 from ...models.formulations.expressions import IN_NUMPY, Expression, Symbol
 from ...models.formulations.families import Block, PlacedFamily
@@ -38,7 +37,6 @@ _COMPARE: Final[dict[str, Callable[[Any, Any], Any]]] = {
 _FUNCTIONS: Final = {**IN_NUMPY, "cos": pyo.cos}
 
 
-@check_arguments
 def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.ConcreteModel:
     """Build a Pyomo model of a problem: the same columns, bounds, domains, rows and objective.
 

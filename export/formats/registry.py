@@ -15,7 +15,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
 
-from ...models.arguments import check_arguments
 from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.families import ANY_DEGREE
@@ -191,7 +190,6 @@ def header_lines(problem: Problem) -> list[str]:
     return lines + [f"{how}: {text}" for how, text in changes.items() if text]
 
 
-@check_arguments
 def write(
     problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
 ) -> Written:

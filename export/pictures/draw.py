@@ -15,7 +15,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.arguments import check_arguments
 from ...models.errors import DomainError, InputError
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
@@ -110,7 +109,6 @@ _MESH_SIDE: Final = 400.0  # points of the side of a picture of a mesh
 ON_MESHES: Final = ("instance", "crosses")  # kinds of pictures of instances and fields on meshes
 
 
-@check_arguments
 def draw(
     subject: CrossField | Instance | Surface,
     path: str | Path,
@@ -171,7 +169,6 @@ def draw(
         return write_bytes(path, _save_figure(_draw_panels(subject, chosen), suffix))
 
 
-@check_arguments
 def preview(subject: CrossField | Instance | Surface) -> bytes:
     """Draw a small picture for notebooks.
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...models.arguments import check_arguments
 from ...models.errors import InputError
 from ...models.input_limits import MAX_PIXELS, MAX_SIDE
 from ...models.instance.domain import Bools, Floats
@@ -16,7 +15,6 @@ from ...models.storage import replacing
 Page = tuple[float, float, float, float]
 
 
-@check_arguments
 def write_mask(instance: Instance, path: str | Path) -> Path:
     """Write the mask of an instance as a PNG: white where the field is solved for, black elsewhere.
 

@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.arguments import check_fields
 from ...models.errors import InputError
 from ...models.instance.domain import Floats
 from .raster import Raster
@@ -60,7 +59,6 @@ class Light:
 
     def __post_init__(self) -> None:
         """Check both angles."""
-        check_fields(self)
         if not (np.isfinite(self.azimuth) and 0 <= self.elevation <= np.pi / 2 + 1e-9):
             raise InputError(
                 f"a lamp cannot be at azimuth {np.degrees(self.azimuth):g}, elevation "

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.arguments import check_arguments
+from ...models.arguments import check_flag
 from ...models.errors import SolutionError, UnsupportedByFormatError, naming
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, with_products_lifted
@@ -336,7 +336,6 @@ class Solution:
         return facts | dict.fromkeys(infinite)
 
 
-@check_arguments
 def read_solution(
     path: str | Path,
     problem: Problem,
@@ -383,6 +382,7 @@ def read_solution(
         If it is damaged, or states or fits another problem.
 
     """
+    check_flag("identified", identified)
     raw = read_raw(path, solution)
     with naming(path):
         known = is_identified(raw.stamps, problem.stamp) or identified

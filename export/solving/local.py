@@ -18,7 +18,6 @@ from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
-from ...models.arguments import check_arguments
 from ...models.errors import (
     InputError,
     MissingSolverError,
@@ -61,7 +60,6 @@ _KILLED: Final = "did not end within its time; the answer is what it had written
 _NO_BETTER: Final = "nothing better than the start"
 
 
-@check_arguments
 def solve(
     problem: Problem,
     solver: str | None = None,

@@ -11,7 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from ...models.arguments import check_arguments
 from ...models.errors import CrossfieldError, SolverError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
@@ -67,7 +66,6 @@ def plan_sentence(limits: Limits, instance: Instance) -> str:
     return f"at most {one_by_one * limits.time_limit:g} s: {limits_of_methods}; files and pictures on top"
 
 
-@check_arguments
 def run(
     instance: Instance,
     folder: str | Path,

@@ -16,7 +16,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.arguments import check_arguments
 from ...models.field.triangles import vertices_of
 from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
@@ -63,7 +62,6 @@ _RIM: Final = 4.0  # pixels beyond the outline with colours, so that programs ca
 _WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
 
-@check_arguments
 def write_surface(
     surface: Surface,
     folder: str | Path,

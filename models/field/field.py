@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from ..arguments import check_fields, float_array, whole_numbers
+from ..arguments import float_array, whole_numbers
 from ..errors import InputError, InstanceError
 from ..instance.angles import HALF, MOST_ANGLE, QUARTER, line_difference
 from ..instance.domain import Bools, Floats, Ints
@@ -137,7 +137,6 @@ class CrossField(Pictured):
 
     def __post_init__(self) -> None:
         """Store read-only copies, and check shapes and values."""
-        check_fields(self, InstanceError)
         domain = self.instance.domain
         values_by_name: dict[str, np.ndarray[Any, Any]] = {
             "alpha": float_array(self.alpha, "alpha", InstanceError),

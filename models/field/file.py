@@ -13,7 +13,6 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from ..arguments import check_arguments
 from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
 from ..errors import InputError, InstanceError, OutputError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
@@ -52,7 +51,6 @@ _MOST_JUMP: Final = 1_000_000
 _Entry = TypeVar("_Entry")
 
 
-@check_arguments
 def write_field(field: CrossField, path: str | Path) -> Path:
     """Write a field. Equal fields give equal bytes.
 
@@ -98,7 +96,6 @@ def _write_mesh(instance: Instance, path: Path) -> None:
     write_bytes(path, to_obj(instance))
 
 
-@check_arguments
 def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     """Read a field with its instance.
 

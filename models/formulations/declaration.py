@@ -16,7 +16,7 @@ from operator import add
 from types import MappingProxyType
 from typing import Any, Final, Literal, get_args
 
-from ..arguments import check_fields
+from ..arguments import check_flag
 from ..errors import FormulationError, shortened
 from .expressions import Expression, Operand, Relation, Symbol, Term, expression_of
 from .symbols import (
@@ -223,7 +223,8 @@ class Declaration:
                     f"{self.name} has no option {key}; it is always {getattr(self.defaults, key)}"
                 )
         options = replace(self.defaults, **chosen)
-        check_fields(options, FormulationError)
+        for name in ("relax", "limits"):
+            check_flag(name, getattr(options, name), FormulationError)
         if not isinstance(options.facet, str) or options.facet not in FACETS:
             raise FormulationError(f"there is no facet {options.facet!r}; choose one of {', '.join(FACETS)}")
         for name in ("stroke_norm", "beta_norm"):

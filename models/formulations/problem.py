@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..arguments import check_arguments, check_kind, float_array, whole_numbers
+from ..arguments import float_array, whole_numbers
 from ..errors import FormulationError, InputError
 from ..field.field import CrossField
 from ..instance.angles import QUARTER
@@ -405,7 +405,6 @@ class Problem:
 
         Raises InstanceError when the field is on another instance.
         """
-        check_kind("field", field, "CrossField")
         field.check_instance(self.instance)
         quantities = _angles_and_jumps(field)
         return np.concatenate([_at_field(self, name, quantities) for name in self.blocks])
@@ -487,7 +486,6 @@ def stamp_of(sha256: str) -> str:
     return f"sha256_{sha256[:STAMP_DIGITS]}"
 
 
-@check_arguments
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
     """Bind a formulation to an instance.
 
@@ -518,7 +516,6 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
     return Problem(instance, declare(name, instance, **options), p)
 
 
-@check_arguments
 def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
     """Return a problem with its integer columns fixed at the jumps of a field: a continuous problem.
 

@@ -17,7 +17,6 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from ..arguments import check_arguments
 from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
 from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
@@ -59,7 +58,6 @@ _MESH_ARCHIVE: Final = {
 _WEIGHTS: Final = {"pair_weights": ExpectedArray(1, max(2 * MAX_GRID**2, 2 * MOST_FACES))}
 
 
-@check_arguments
 def write_instance(instance: Instance, path: str | Path) -> Path:
     """Write an instance. Equal instances give equal bytes.
 
@@ -88,7 +86,6 @@ def write_instance(instance: Instance, path: str | Path) -> Path:
     )
 
 
-@check_arguments
 def read_instance(path: str | Path) -> Instance:
     """Read an instance.
 

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from ..arguments import check_fields, check_kind, float_array, whole_numbers
+from ..arguments import check_flag, float_array, whole_numbers
 from ..errors import DomainError, InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import HALF, MOST_ANGLE, QUARTER, wrap
@@ -75,7 +75,6 @@ def round_to_digits(value: float) -> float:
 
 
 def _check_weight(name: str, value: float) -> None:
-    check_kind(name, value, "float", InstanceError)
     if not 0 <= value <= MOST_WEIGHT:
         raise InstanceError(f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}")
 
@@ -178,7 +177,6 @@ class Instance(Pictured):
             As in `Instance`.
 
         """
-        check_kind("pixel_size", pixel_size, "float", InstanceError)
         corner = float_array(origin, "origin", InstanceError)
         if corner.shape != (2,):
             raise InstanceError(f"origin has shape {corner.shape}; give two numbers, x and y")
@@ -211,7 +209,6 @@ class Instance(Pictured):
 
     def __post_init__(self) -> None:
         """Store read-only copies in the documented types, then check every rule."""
-        check_fields(self, InstanceError)
         if not isinstance(self.domain, Grid | Mesh):
             raise InstanceError("domain is neither a Grid nor a Mesh")
         self._freeze("stroke_index", whole_numbers(self.stroke_index, "stroke_index"))
@@ -221,6 +218,7 @@ class Instance(Pictured):
             self._freeze("pair_weights", float_array(self.pair_weights, "pair_weights", InstanceError))
         for name in ("stroke_coefficient", "skew_coefficient"):
             object.__setattr__(self, name, float(getattr(self, name)))
+        check_flag("orthogonal", self.orthogonal, InstanceError)
         object.__setattr__(self, "orthogonal", bool(self.orthogonal))
         self._check_scalars()
         self.domain.check()

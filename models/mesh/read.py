@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final, Literal, get_args
 
-from ..arguments import check_arguments
+from ..arguments import check_flag
 from ..errors import InputError, naming
 from ..instance.instance import STROKE_WEIGHT, Gauge, Instance, Reading, name_from_text
 from ..instance.mesh import list_faces
@@ -19,7 +19,6 @@ _SHARP: Final = 35.0  # degrees between two faces of a built-in mesh from which 
 _SMOOTH: Final = frozenset({"bump", "half_torus", "doughnut"})  # their edges bend a coarse smooth surface
 
 
-@check_arguments
 def read_mesh(
     path: str | Path,
     *,
@@ -72,6 +71,7 @@ def read_mesh(
 
     """
     path = Path(path)
+    check_flag("boundary", boundary)
     if sharp is not None and not 0 < sharp <= 180:
         raise InputError(f"sharp is {sharp}; give degrees above 0 and up to 180")
     if weights not in PAIR_WEIGHTS:

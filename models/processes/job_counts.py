@@ -13,7 +13,7 @@ MOST: Final = max(16, 2 * (os.cpu_count() or 1))
 
 def check_jobs(count: int, name: str = "jobs", *, least: int = 1) -> int:
     """The number of threads or processes. Raises InputError if it is out of range."""
-    if not least <= count <= MOST:
+    if not least <= count <= MOST or count % 1:
         raise InputError(f"{name} must be between {least} and {MOST}, got {count}")
     return count
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from ..arguments import check_fields
 from ..errors import InputError
 from .deadline import Deadline
 from .job_counts import check_jobs
@@ -43,7 +42,6 @@ class Limits:
 
     def __post_init__(self) -> None:
         """Check kinds and ranges."""
-        check_fields(self)
         if not (self.time_limit > 0 and 0 <= self.gap < math.inf):
             raise InputError(
                 f"a time limit of {self.time_limit} s and a gap of {self.gap} are out of range; "

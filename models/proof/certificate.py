@@ -15,7 +15,6 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from ..arguments import check_arguments
 from ..array_archive import Arrays, pack_arrays
 from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField, Norm
@@ -70,7 +69,6 @@ class Certificate(Claim):
         return self.proven.forced
 
 
-@check_arguments
 def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certificate:
     """Write the certificate of a proof, as far as the checker confirms it.
 
@@ -237,7 +235,6 @@ def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels, *, h
     return minimise_on_boxes(instance, terms, last, proof.energy).pieces
 
 
-@check_arguments
 def read_certificate(
     path: str | Path, *, on: Instance | None = None, jobs: int = 1, progress: Progress = silent
 ) -> Certificate:

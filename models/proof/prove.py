@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import replace
 
-from ..arguments import check_arguments, check_count
+from ..arguments import check_count
 from ..errors import InputError
 from ..field.field import CrossField, Norm, check_norm, field_in_windows
 from ..instance.instance import Instance
@@ -27,7 +27,6 @@ from .record import Proof
 from .stroked_parts import extended, restricted, stroked_parts
 
 
-@check_arguments
 @one_thread()
 def prove(
     instance: Instance,

@@ -12,7 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from ..arguments import check_arguments
 from ..field.field import CrossField
 from ..field.jumps import free_jumps
 from ..instance.domain import Bools, Ints
@@ -42,7 +41,6 @@ _LARGE: Final = _Pace(1.0, 3e-2)
 _ROUGH: Final = _Pace(0.5, 1e-2, 0.1)
 
 
-@check_arguments
 @one_thread()
 def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop | None = None) -> CrossField:
     """Greedy field of BendFields: the minimum 2-norm energy for its jumps, within all bounds.

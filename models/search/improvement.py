@@ -13,7 +13,6 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..arguments import check_arguments
 from ..field.field import CrossField
 from ..field.jumps import free_jumps, step_labels
 from ..instance.angles import HALF, QUARTER, line_difference
@@ -35,7 +34,6 @@ _MOST_CURVES: Final = 40  # that may change their family, those with the largest
 _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less belong to one curve
 
 
-@check_arguments
 @one_thread()
 def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField:
     """Field that neither best jumps, nor best angles, nor the turn of a curve improve further.

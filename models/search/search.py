@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from ..arguments import check_arguments, check_count
+from ..arguments import check_count
 from ..field.field import CrossField
 from ..instance.domain import Bools
 from ..instance.instance import Instance
@@ -73,7 +73,6 @@ class Search:
     ended: str
 
 
-@check_arguments
 @one_thread()
 def search(
     instance: Instance,

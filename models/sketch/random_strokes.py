@@ -10,7 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from ..arguments import check_arguments
 from ..errors import InputError, NoStrokeError
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
@@ -24,7 +23,6 @@ RAGGED_SHARE: Final = 0.75  # of the square, for the ragged masks of libraries
 MOST_SEED: Final = 2**63 - 1
 
 
-@check_arguments
 def random_instance(
     seed: int,
     *,

@@ -14,7 +14,6 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from ..arguments import check_arguments
 from ..errors import InputError, NoStrokeError, naming, printable, shortened
 from ..instance.angles import line_of
 from ..instance.domain import Bools
@@ -39,7 +38,6 @@ MAX_SIZE: Final = 4096
 Silhouette = Literal["none", "outer"]
 
 
-@check_arguments
 def read_sketch(
     path: str | Path,
     *,

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from importlib.resources import files
 from typing import Final, Literal
 
-from ..arguments import check_arguments
 from ..errors import InputError
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from ..mesh.read import mesh_sample
@@ -56,7 +55,6 @@ def samples() -> list[Sample]:
     return [*SAMPLES.values(), *(Sample(name, "mesh", text) for name, (text, _) in MESHES.items())]
 
 
-@check_arguments
 def sample(
     name: str,
     size: int | None = None,

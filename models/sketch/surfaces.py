@@ -12,7 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from ..arguments import check_arguments
 from ..errors import InputError
 from ..instance.angles import arctangent, cosine, sine, transform_vectors, vector_length, wrap
 from ..instance.domain import Bools, Floats
@@ -198,7 +197,6 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
 """The surfaces by name. Cylinder, wave and cone are developable; the last one has no symmetry of rotation."""
 
 
-@check_arguments
 def analytic(
     name: str,
     size: int = DEFAULT_SIZE,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
-from ..arguments import check_arguments, check_positive
+from ..arguments import check_positive
 from ..field.field import CrossField
 from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.domain import Floats, Ints
@@ -41,7 +41,6 @@ _FALL: Final = 1e-4  # least share of the energy that a round has to remove befo
 _ROUGH: Final = 0.03  # likewise, of a field in which only the tremble of strokes is measured
 
 
-@check_arguments
 @one_thread()
 def bend_field(
     start: CrossField, *, harmonic: float | None = None, hold: float = HOLD, stop: Stop | None = None

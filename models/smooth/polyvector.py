@@ -15,7 +15,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, cg
 
-from ..arguments import check_arguments, check_positive
+from ..arguments import check_positive
 from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps, label_of
 from ..instance.angles import HALF
@@ -35,7 +35,6 @@ _STEPS: Final = 200  # of conjugate gradients; 20 to 40 are usual
 _DECIMALS: Final = 9  # of line angles in quarter turns: rounding errors must not decide jumps
 
 
-@check_arguments
 @one_thread()
 def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float | None = None) -> CrossField:
     """Field of the smoothest polynomials whose roots are the lines, with the best jumps.
@@ -129,7 +128,6 @@ def roots(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
     return np.angle(apart - x1) / 2, np.angle(-apart - x1) / 2
 
 
-@check_arguments
 @one_thread()
 def power_field(instance: Instance) -> CrossField:
     """Field of orthogonal crosses from the harmonic extension of exp(4 i theta), with the best jumps.

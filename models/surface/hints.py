@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 from scipy import sparse
 
-from ..arguments import check_fields
 from ..errors import InputError
 from ..instance.angles import HALF
 from ..instance.domain import Floats
@@ -40,10 +39,6 @@ class Hint:
     column: int
     slant: float
     tilt: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the kinds of the values; `check_hints` checks their ranges."""
-        check_fields(self)
 
     @property
     def slopes(self) -> Floats:

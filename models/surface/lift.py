@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from scipy import ndimage
 
-from ..arguments import check_arguments
+from ..arguments import check_flag
 from ..field.field import CrossField
 from ..instance.domain import Floats
 from ..instance.grid import Grid
@@ -31,7 +31,6 @@ TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z fr
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
 
 
-@check_arguments
 @one_thread()
 def surface(
     field: CrossField,
@@ -78,6 +77,7 @@ def surface(
 
     """
     instance, all_hints, cut = field.instance, tuple(hints), TimeLimit(stop_function(stop))
+    check_flag("flip", flip)
     check_hints(all_hints, instance)
     part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
     heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)

@@ -12,7 +12,6 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from ....models.arguments import check_arguments
 from ....models.errors import InputError, InstanceError, shortened
 from ....models.processes.deadline import Progress, silent
 from .table import TABLE, read_table
@@ -187,7 +186,6 @@ class LibraryEntry:
                     yield KnownField(field, provenance_by("ledger"))
 
 
-@check_arguments
 def entries(*, rung: str | None = None) -> list[LibraryEntry]:
     """Entries of the library that ships, with their facts, in its order.
 
@@ -215,7 +213,6 @@ def entries(*, rung: str | None = None) -> list[LibraryEntry]:
     return chosen
 
 
-@check_arguments
 def entry(name: str) -> LibraryEntry:
     """Entry of the library that ships, by its name.
 

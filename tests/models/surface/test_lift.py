@@ -87,7 +87,7 @@ def test_a_hint_and_flip_choose_the_side():
             "row -1, column 3 lies outside the mask of spheroid, which has 12 rows and 10 columns",
         ),
         ((2, 99, 0.1, 0), "outside the mask"),
-        ((12.5, 10, 0.1, 0), "row is 12.5; give a whole number"),
+        ((12.5, 10, 0.1, 0), "row 12.5, column 10 lies outside the mask"),
         ((0, 0, 0.1, 0), "outside the mask"),
         ((6, 5, HALF, 0), "slant of 90 degrees; give one from 0 to less than 90"),
         ((6, 5, -0.1, 0), "slant"),
