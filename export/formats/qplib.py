@@ -82,7 +82,7 @@ def _vector(values: Floats, comment: str) -> Iterator[bytes]:
     """A vector: its most frequent value, the number of other values, and these."""
     finite = np.clip(values, -INFINITY, INFINITY)
     distinct, count = np.unique(finite, return_counts=True)
-    usual = float(distinct[count.argmax()])
+    usual = float(distinct[count.argmax()]) if len(distinct) else 0.0
     at = np.nonzero(finite != usual)[0]
     yield _line(number_text(usual), f"{comment}, where not listed")
     yield _line(str(len(at)), "listed")

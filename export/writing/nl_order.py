@@ -120,9 +120,9 @@ class NlOrder:
 
 
 def equal_runs(values: NDArray[Any]) -> list[slice]:
-    """Stretches of equal values."""
+    """Stretches of equal values; none of no values."""
     cuts = [0, *(np.nonzero(np.diff(values))[0] + 1).tolist(), len(values)]
-    return [slice(first, last) for first, last in pairwise(cuts)]
+    return [slice(first, last) for first, last in pairwise(cuts) if first < last]
 
 
 def nonlinear_terms(family: PlacedFamily) -> tuple[Monomial, ...]:
