@@ -88,12 +88,13 @@ def require_suffix(path: Path, allowed: tuple[str, ...]) -> None:
 
 
 def find_drawing(source: str) -> str | None:
-    """Drawing below the field of a sketch or a sample; None for an instance, which has no drawing."""
+    """Drawing below the field of a sketch or a sample; None for a mesh or an instance, which have none."""
+    from ...models.mesh.formats import MESH_READERS
     from ...models.sketch.samples import SAMPLES
 
     path = Path(source)
     if path.is_file():
-        return None if path.suffix.lower() in {".json", ".npz"} else source
+        return None if path.suffix.lower() in {".json", ".npz", *MESH_READERS} else source
     return source if source in SAMPLES and SAMPLES[source].kind == "sketch" else None
 
 

@@ -1,13 +1,15 @@
 """Runs and methods on meshes, and of orthogonal crosses on pixels."""
 
 import json
+from pathlib import Path
 
 import crossfield as cf
 import pytest
 from cases import make_instance
+from crossfield.export.cli.app import invoke
 from crossfield.export.solving.methods import METHODS, Request, find_method, methods_of
 from crossfield.models.errors import DomainError
-from meshes import box, on_edges
+from meshes import box, on_edges, write_obj
 
 INSTANCES = {
     "mesh": lambda: on_edges(box(1)),
@@ -37,14 +39,15 @@ def test_pixels_with_free_angles_have_every_method():
     assert methods_of(make_instance()) == list(METHODS.values())
 
 
-def test_a_run_on_a_mesh_writes_fields_and_a_report(tmp_path):
-    instance = on_edges(box(1))
-    report = cf.run(instance, tmp_path, limits=cf.Limits(2.0))
-    assert report.best.field.energy().total == pytest.approx(0.0, abs=1e-9)
-    assert {candidate.method for candidate in report.candidates} >= {"greedy", "power", "search"}
-    assert set(report.failures) <= {"certificate"}  # the energy is 0 up to rounding
-    written = {path.name for path in tmp_path.iterdir()}
+def test_a_run_on_a_mesh_file_writes_fields_and_a_report(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_obj(Path("box.obj"), box(1))
+    assert invoke(["run", "box.obj", "-o", "out", "--time-limit", "2", "-q"]) == 0
+    assert cf.read_field("out/field.npz").energy().total == pytest.approx(0.0, abs=1e-9)
+    out = tmp_path / "out"
+    written = {path.name for path in out.iterdir()}
     assert written >= {"field.rawfield", "field.obj", "lowest.npz", "models", "report.json", "index.html"}
-    facts = json.loads((tmp_path / "report.json").read_text())
+    facts = json.loads((out / "report.json").read_text())
+    assert {method["method"] for method in facts["methods"]} >= {"greedy", "power", "search"}
     assert facts["methods"][0]["singularities"] == 8
-    assert "12 faces of a mesh" in (tmp_path / "index.html").read_text()
+    assert "12 faces of a mesh" in (out / "index.html").read_text()
